@@ -1,0 +1,36 @@
+"""What can go wrong, each with the exit status that the command line gives it.
+
+Every message is one line that a user can act on: it names the file, the layer, the key and what is allowed.
+"""
+
+from __future__ import annotations
+
+
+class VelaturaError(Exception):
+    """Any failure that Velatura foresees."""
+
+    exit_status = 1
+
+
+class InvalidInput(VelaturaError, ValueError):
+    """A file, a name or a value that does not mean anything, or lies outside its range."""
+
+    exit_status = 2
+
+
+class NoSolution(VelaturaError):
+    """Valid input for which no stack exists."""
+
+    exit_status = 3
+
+
+class LawBroken(VelaturaError):
+    """A material breaks a law that every BSDF must keep, or a comparison failed."""
+
+    exit_status = 1
+
+
+class MissingTool(VelaturaError):
+    """Something that must be installed is missing or too old; the message holds the command that mends it."""
+
+    exit_status = 1

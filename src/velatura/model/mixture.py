@@ -1,0 +1,66 @@
+"""A mixture of GGX lobes as a BSDF: value, density, sampling.
+
+All reflected lobes share the mirror direction of wi; they differ in energy and roughness (Belcour 2018, Eqs. 39-40).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from velatura import ops
+from velatura.model.adding import Lobe
+from velatura.model.variance import Roughness
+from velatura.ops import Value
+from velatura.optics import ggx
+from velatura.optics.ggx import Direction
+
+ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
+
+
+def probabilities(lobes: Sequence[Lobe]) -> list[Value]:
+    """Of sampling each lobe: its share of the energy."""
+    energies = [ops.mean(lobe.energy) + 1e-9 for lobe in lobes]  # the offset decides where no lobe has any
+    total = sum(energies[1:], energies[0])
+    return [energy / total for energy in energies]
+
+
+def eval_pdf(lobes: Sequence[Lobe], wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
+    above = (wi[2] > 0) & (wo[2] > 0)
+    h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
+    jacobian = 0.25 / ops.maximum(wi[2], ops.TINY)
+    value: Value = 0.0
+    density: Value = 0.0
+    for lobe, probability in zip(lobes, probabilities(lobes)):
+        alpha_u, alpha_v, i, o, m = _in_frame(lobe.roughness, wi, wo, h)
+        visible = ggx.ndf(m, alpha_u, alpha_v) * ggx.masking(i, alpha_u, alpha_v) * jacobian
+        value = value + lobe.energy * (visible * ggx.masking(o, alpha_u, alpha_v))
+        density = density + probability * visible
+    return ops.select(above, value, 0.0), ops.select(above, density, 0.0)
+
+
+def sample(lobes: Sequence[Lobe], wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction wo from uniform numbers: a lobe by its energy, then a visible normal of that lobe.
+
+    The direction may lie below the surface, where `eval_pdf` is 0.
+    """
+    # Pick a lobe: of those that begin below u, the last
+    chosen, begin = _bounded(lobes[0].roughness), 0.0
+    for lobe, before in zip(lobes[1:], probabilities(lobes)):
+        begin = begin + before
+        chosen = Roughness(*(ops.select(u > begin, a, b) for a, b in zip(_bounded(lobe.roughness), chosen)))
+    # Reflect about a normal visible from wi
+    frame_wi = ggx.rotate(wi, chosen.rotation)
+    h = ggx.sample_visible(frame_wi, chosen.alpha_u, chosen.alpha_v, u1, u2)
+    return ggx.rotate(ggx.reflect(frame_wi, h), -chosen.rotation)
+
+
+def _bounded(roughness: Roughness) -> Roughness:
+    u, v, rotation = roughness
+    return Roughness(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), rotation)
+
+
+def _in_frame(roughness: Roughness, *directions: Direction) -> tuple[Value, ...]:
+    alpha_u, alpha_v, rotation = _bounded(roughness)
+    unturned = isinstance(rotation, float) and rotation == 0.0
+    return alpha_u, alpha_v, *(directions if unturned else (ggx.rotate(w, rotation) for w in directions))

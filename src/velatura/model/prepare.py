@@ -1,0 +1,135 @@
+"""A stack made ready for a model: all that does not depend on the direction of light.
+
+Values arrive under the flat names of a material (`layer0_eta`, ...), in any dialect; a renderer hands in constants once
+and textured values at every point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import pi
+
+from velatura import ops, tables
+from velatura.model.maps import MAPS, RoughnessMap
+from velatura.model.models import Model
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.ops import Value
+from velatura.tables import Row, Tables
+
+
+@dataclass(frozen=True)
+class PreparedInterface:
+    """An interface below a medium of index eta_1 and above one of index eta_2 (colours; kappa None for a dielectric).
+
+    `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is the mean of eta
+    over the channels: one refracted direction for all colours. `n_leaving` is the same for light that goes up from
+    here through the interface above: None for the first interface.
+    """
+
+    eta: Value | None
+    kappa: Value | None
+    n12: Value
+    n_leaving: Value | None
+    roughness: Roughness
+    s_r: Variance
+    row: Row | None
+
+    @property
+    def opaque(self) -> bool:
+        return self.eta is None or self.kappa is not None
+
+
+@dataclass(frozen=True)
+class PreparedMedium:
+    """A medium by its optical depths along the normal (colours) and its asymmetry g."""
+
+    tau: Value
+    tau_s: Value
+    g: Value
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """The layers from the top, a diffuse base left out; the model's parts that they were prepared for."""
+
+    model: Model
+    layers: tuple[PreparedInterface | PreparedMedium, ...]
+    variance: type[Variance]
+    f: RoughnessMap
+    tables: Tables
+
+
+def variance_kind(kinds: Sequence[str], values: Mapping[str, object]) -> type[Variance]:
+    """The cheapest kind of variance that holds all interfaces; `values` by flat name, only compared, never computed."""
+    interfaces = [i for i, kind in enumerate(kinds) if kind not in ("medium", "diffuse")]
+    same = [_same(values[f"layer{i}_alpha_u"], values[f"layer{i}_alpha_v"]) for i in interfaces]
+    straight = [_same(values[f"layer{i}_rotation"], 0.0) for i in interfaces]
+    if all(same):
+        return Isotropic
+    return PerAxis if all(s or t for s, t in zip(same, straight)) else Covariance
+
+
+def _same(a: object, b: object) -> bool:
+    return a is b or (isinstance(a, float) and isinstance(b, float) and a == b)
+
+
+def prepare(
+    kinds: Sequence[str],
+    values: Mapping[str, Value],
+    model: Model,
+    variance: type[Variance],
+    constant: bool = True,
+) -> Prepared:
+    """Constants of the whole stack.
+
+    Args:
+        kinds: of the layers from the top (`Stack.kinds`).
+        values: numbers and colours under flat names (`Stack.flat`), rotations in degrees.
+        variance: from `variance_kind`.
+        constant: whether the values may be looked at now, to leave out look-ups that they can never need.
+    """
+    shared = tables.load()
+    layers: list[PreparedInterface | PreparedMedium] = []
+    eta_1, n_leaving = values["exterior"], None
+    for i, kind in enumerate(kinds):
+        layer = {key.partition("_")[2]: value for key, value in values.items() if key.startswith(f"layer{i}_")}
+        if kind == "medium":
+            layers.append(_medium(layer))
+        elif kind != "diffuse":
+            interface = _interface(kind, layer, eta_1, n_leaving, model, variance, shared, constant)
+            layers.append(interface)
+            if kind == "dielectric":
+                eta_1, n_leaving = layer["eta"], ops.mean(eta_1 / layer["eta"])
+    return Prepared(model, tuple(layers), variance, MAPS[model.map], shared)
+
+
+def _medium(layer: Mapping[str, Value]) -> PreparedMedium:
+    # Scattered light stays in the lobe only where it goes forwards (model of Belcour 2018, 4.4)
+    tau_s = layer["sigma_s"] * layer["depth"]
+    return PreparedMedium(layer["sigma_a"] * layer["depth"] + tau_s, tau_s, layer["g"])
+
+
+def _interface(
+    kind: str,
+    layer: Mapping[str, Value],
+    eta_1: Value,
+    n_leaving: Value | None,
+    model: Model,
+    variance: type[Variance],
+    shared: Tables,
+    constant: bool,
+) -> PreparedInterface:
+    roughness = Roughness(layer["alpha_u"], layer["alpha_v"], layer["rotation"] * (pi / 180))
+    s_r = variance.of(roughness, MAPS[model.map])
+    by_table = model.reflectance == "fgd"
+    if kind == "mirror":
+        row = tables.mirror_row(shared) if by_table else None
+        return PreparedInterface(None, None, 1.0, n_leaving, roughness, s_r, row)
+    eta = layer["eta"] / eta_1
+    if kind == "conductor":
+        kappa = layer["k"] / eta_1
+        row = tables.conductor_row(shared, eta, kappa, constant) if by_table else None
+        return PreparedInterface(eta, kappa, 1.0, n_leaving, roughness, s_r, row)
+    row = tables.dielectric_row(shared, eta, constant) if by_table else None
+    return PreparedInterface(eta, None, ops.mean(eta), n_leaving, roughness, s_r, row)

@@ -1,0 +1,109 @@
+"""Lobe statistics of a material as NumPy arrays, for analysis; needs no renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from velatura.errors import InvalidInput
+from velatura.model import adding
+from velatura.model.models import DEFAULT, Model, named
+from velatura.model.prepare import prepare, variance_kind
+from velatura.stack import Named, Stack, Texture, spectra
+
+COLOURS = ("eta", "k", "sigma_a", "sigma_s", "albedo")
+
+
+@dataclass(frozen=True)
+class LobeStatistics:
+    """One lobe, for N directions and C channels.
+
+    energy (C, N); covariance (3, N): xx, xy, yy in the space of the model's roughness map, in the shading frame;
+    alpha (2, N) along two axes, the first turned from the tangent by rotation (N,), radians anticlockwise. With
+    `channels=separate` all but the energy have a leading axis of channels.
+    """
+
+    energy: np.ndarray
+    covariance: np.ndarray
+    alpha: np.ndarray
+    rotation: np.ndarray
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Reflected lobes as lists over interfaces from the top, and the transmitted lobe (None below an opaque base)."""
+
+    energy: list[np.ndarray]
+    covariance: list[np.ndarray]
+    alpha: list[np.ndarray]
+    rotation: list[np.ndarray]
+    transmitted: LobeStatistics | None
+
+
+def statistics(
+    stack: Stack,
+    cos_theta: float | Sequence[float] | np.ndarray,
+    phi: float | Sequence[float] | np.ndarray = 0.0,
+    model: str | Model = DEFAULT,
+    **switches: str,
+) -> Statistics:
+    """Energy, covariance and roughness of every lobe of a stack (Belcour 2018, section 5).
+
+    Args:
+        cos_theta: cosines of the directions of incidence, in (0, 1], shape (N,) or a number.
+        phi: their azimuths from the tangent, radians, broadcast against cos_theta.
+        model: name of a model, its choices changed by `switches` (`reflectance="fresnel"`, `tir="off"`, ...).
+
+    Raises:
+        InvalidInput: a cosine outside its range, an unknown model or switch, a texture where a number is needed.
+    """
+    chosen = named(model, **switches)
+    cosine, azimuth = (np.atleast_1d(np.asarray(x, float)) for x in np.broadcast_arrays(cos_theta, phi))
+    if not (np.all(cosine > 0) and np.all(cosine <= 1)):
+        raise InvalidInput(f"cos_theta: must lie in 0 (excluded) to 1, got {cosine[~((cosine > 0) & (cosine <= 1))][0]:g}")
+    flat = stack.flat()
+    values = {name: number(name, value) for name, value in flat.items()}
+    prepared = prepare(stack.kinds, values, chosen, variance_kind(stack.kinds, flat))
+    sine = np.sqrt(1 - cosine**2)
+    reflected, transmitted = adding.lobes(prepared, (sine * np.cos(azimuth), sine * np.sin(azimuth), cosine))
+    each = [_collect(lobe, chosen, len(cosine)) for lobe in reflected]
+    return Statistics(
+        energy=[lobe.energy for lobe in each],
+        covariance=[lobe.covariance for lobe in each],
+        alpha=[lobe.alpha for lobe in each],
+        rotation=[lobe.rotation for lobe in each],
+        transmitted=_collect(transmitted, chosen, len(cosine)) if stack.transmits else None,
+    )
+
+
+def number(name: str, value: Any) -> Any:
+    """A value of a material for the model in NumPy: a float, or a colour of shape (3, 1).
+
+    Raises:
+        InvalidInput: a texture, which has no one value.
+    """
+    if isinstance(value, Texture):
+        raise InvalidInput(f"{name}: is a texture, and lobes are those of one point; replace it, as in --set {name}=0.1")
+    if isinstance(value, Named):
+        value = spectra.rgb(value)
+    if name.partition("_")[2] in COLOURS:
+        return np.broadcast_to(np.asarray(value, float), (3,))[:, None]
+    return float(value)
+
+
+def _collect(lobe: adding.Lobe, model: Model, count: int) -> LobeStatistics:
+    lead = (3,) if model.channels == "separate" else ()
+
+    def shaped(values: Sequence[Any], axis: int) -> np.ndarray:
+        return np.stack([np.broadcast_to(v, (*lead, count)) for v in values], axis=axis)
+
+    alpha_u, alpha_v, rotation = lobe.roughness
+    return LobeStatistics(
+        energy=np.broadcast_to(lobe.energy, (3, count)).copy(),
+        covariance=shaped(lobe.variance.matrix(), -2),
+        alpha=shaped((alpha_u, alpha_v), -2),
+        rotation=shaped((rotation,), -2)[..., 0, :],
+    )

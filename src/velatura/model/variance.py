@@ -1,0 +1,133 @@
+"""Variances of a lobe: what the recursion adds and scales, and what becomes a GGX lobe in the end.
+
+Three kinds, from the cheapest to the most general. A stack uses one kind throughout, the cheapest that holds all of its
+interfaces; the recursion does not care which.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+from velatura import ops
+from velatura.model.maps import RoughnessMap
+from velatura.ops import Value
+
+V = TypeVar("V", bound="Variance")
+
+
+class Roughness(NamedTuple):
+    """GGX roughness along two axes, the first turned from the tangent by `rotation` (radians, anticlockwise)."""
+
+    alpha_u: Value
+    alpha_v: Value
+    rotation: Value
+
+    def scaled(self, scale: Value) -> Roughness:
+        return Roughness(scale * self.alpha_u, scale * self.alpha_v, self.rotation)
+
+
+@dataclass(frozen=True)
+class Variance:
+    """Components of a variance; sums and multiples are taken component by component."""
+
+    def __add__(self: V, other: V) -> V:
+        return type(self)(*(a + b for a, b in zip(vars(self).values(), vars(other).values())))
+
+    def __mul__(self: V, scale: Value) -> V:
+        return type(self)(*(scale * a for a in vars(self).values()))
+
+    __rmul__ = __mul__
+
+    @classmethod
+    def of(cls: type[V], roughness: Roughness, f: RoughnessMap) -> V:
+        """Variance of a rough reflection."""
+        raise NotImplementedError
+
+    @classmethod
+    def uniform(cls: type[V], s: Value) -> V:
+        """The same variance s in all directions."""
+        raise NotImplementedError
+
+    def roughness(self, f: RoughnessMap) -> Roughness:
+        """The GGX lobe of this variance."""
+        raise NotImplementedError
+
+    def matrix(self) -> tuple[Value, Value, Value]:
+        """Entries xx, xy, yy of the 2x2 covariance in the shading frame."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Isotropic(Variance):
+    """One number, the same along all axes (Belcour 2018)."""
+
+    s: Value
+
+    @classmethod
+    def of(cls, roughness: Roughness, f: RoughnessMap) -> Isotropic:
+        return cls(f.variance(roughness.alpha_u))
+
+    @classmethod
+    def uniform(cls, s: Value) -> Isotropic:
+        return cls(s)
+
+    def roughness(self, f: RoughnessMap) -> Roughness:
+        alpha = f.roughness(self.s)
+        return Roughness(alpha, alpha, 0.0)
+
+    def matrix(self) -> tuple[Value, Value, Value]:
+        return self.s, 0.0 * self.s, self.s
+
+
+@dataclass(frozen=True)
+class PerAxis(Variance):
+    """One number per tangent axis, where all interfaces share the axes (Weier & Belcour 2020)."""
+
+    uu: Value
+    vv: Value
+
+    @classmethod
+    def of(cls, roughness: Roughness, f: RoughnessMap) -> PerAxis:
+        return cls(f.variance(roughness.alpha_u), f.variance(roughness.alpha_v))
+
+    @classmethod
+    def uniform(cls, s: Value) -> PerAxis:
+        return cls(s, s)
+
+    def roughness(self, f: RoughnessMap) -> Roughness:
+        return Roughness(f.roughness(self.uu), f.roughness(self.vv), 0.0)
+
+    def matrix(self) -> tuple[Value, Value, Value]:
+        return self.uu, 0.0 * self.uu, self.vv
+
+
+@dataclass(frozen=True)
+class Covariance(Variance):
+    """A symmetric 2x2 matrix, where every interface has its own axes (Yamaguchi et al. 2019)."""
+
+    xx: Value
+    xy: Value
+    yy: Value
+
+    @classmethod
+    def of(cls, roughness: Roughness, f: RoughnessMap) -> Covariance:
+        u, v = f.variance(roughness.alpha_u), f.variance(roughness.alpha_v)
+        c, s = ops.cos(roughness.rotation), ops.sin(roughness.rotation)
+        return cls(u * c * c + v * s * s, (u - v) * c * s, u * s * s + v * c * c)
+
+    @classmethod
+    def uniform(cls, s: Value) -> Covariance:
+        return cls(s, 0.0 * s, s)
+
+    def roughness(self, f: RoughnessMap) -> Roughness:
+        # Eigenvalues mean +- radius; where they agree the axes stay those of the frame
+        mean, half = 0.5 * (self.xx + self.yy), 0.5 * (self.xx - self.yy)
+        radius = ops.sqrt(half * half + self.xy * self.xy)
+        turned = radius > 1e-9 * mean
+        rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
+        u, v = mean + radius, ops.maximum(mean - radius, 0.0)
+        return Roughness(f.roughness(u), f.roughness(v), rotation)
+
+    def matrix(self) -> tuple[Value, Value, Value]:
+        return self.xx, self.xy, self.yy

@@ -1,0 +1,200 @@
+"""The elementary functions that the model is written in, for every dialect of numbers.
+
+The model is written once. Called with Python floats or NumPy arrays it runs on those; called with Dr.Jit arrays it runs
+inside a renderer and is differentiable. The types of the arguments choose the dialect:
+
+- floats give floats (Mitsuba's scalar variants compute with them);
+- NumPy arrays, alone or mixed with floats, give NumPy arrays;
+- Dr.Jit arrays, alone or mixed with floats, give Dr.Jit arrays.
+
+Colour is the leading axis of an array; a float is the same in all channels. `sqrt` and `divide` clamp arguments outside
+their domain instead of answering NaN, so that the branch which a `select` throws away poisons neither value nor gradient.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, Protocol
+
+import numpy as np
+
+Value = Any  # a float, a NumPy array or a Dr.Jit array
+
+TINY = 1e-20
+
+
+class Gridded(Protocol):
+    """What `interpolate` reads: values at the nodes i/(N-1) of a grid, with channels on the last axis."""
+
+    @property
+    def data(self) -> np.ndarray: ...
+
+    def texture(self, dialect: Any) -> Any: ...
+
+
+class _Numpy:
+    exp, log, power, sin, cos = np.exp, np.log, np.power, np.sin, np.cos
+    arctan2, absolute, minimum, maximum = np.arctan2, np.abs, np.minimum, np.maximum
+    select = staticmethod(np.where)
+
+    @staticmethod
+    def sqrt(x: Value) -> Value:
+        return np.sqrt(np.maximum(x, 0))
+
+    @staticmethod
+    def mean(x: Value) -> Value:
+        return np.mean(x, axis=0) if np.ndim(x) else x
+
+    @staticmethod
+    def maximum_channel(x: Value) -> Value:
+        return np.max(x, axis=0) if np.ndim(x) else x
+
+    @staticmethod
+    def interpolate(table: Gridded, coordinates: Sequence[Value]) -> list[Value]:
+        channels = table.data.shape[-1]
+        index: Value = 0
+        corners = [(index, 1.0)]
+        for x, nodes in zip(coordinates, table.data.shape):
+            position = np.clip(x, 0, 1) * (nodes - 1)
+            cell = np.minimum(np.asarray(position).astype(int), nodes - 2)
+            upper = position - cell
+            corners = [(i * nodes + cell + k, w * (upper if k else 1 - upper)) for i, w in corners for k in (0, 1)]
+        flat = table.data.reshape(-1, channels)
+        total = sum(np.asarray(w)[..., None] * flat[i] for i, w in corners)
+        return [total[..., c] for c in range(channels)]
+
+
+class _Float:
+    """Python floats: NumPy's functions, without letting NumPy's own scalars out.
+
+    (A NumPy scalar times a Dr.Jit array would be a NumPy array.)
+    """
+
+    def __getattr__(self, name: str) -> Callable[..., Value]:
+        function = getattr(_Numpy, name)
+
+        def on_floats(*args: Value) -> Value:
+            result = function(*args)
+            return [float(x) for x in result] if isinstance(result, list) else np.asarray(result).item()
+
+        setattr(self, name, on_floats)
+        return on_floats
+
+
+class _DrJit:
+    def __init__(self) -> None:
+        import drjit as dr
+
+        self.sqrt, self.exp, self.log, self.sin, self.cos = dr.safe_sqrt, dr.exp, dr.log, dr.sin, dr.cos
+        self.power, self.arctan2, self.absolute = dr.power, dr.atan2, dr.abs
+        self.minimum, self.maximum, self.select = dr.minimum, dr.maximum, dr.select
+        self._dr = dr
+
+    def _is_colour(self, x: Value) -> bool:
+        return self._dr.size_v(x) > 1  # an array of lanes has a dynamic size, which reads -1
+
+    def mean(self, x: Value) -> Value:
+        return self._dr.mean(x) if self._is_colour(x) else x
+
+    def maximum_channel(self, x: Value) -> Value:
+        return self._dr.max(x) if self._is_colour(x) else x
+
+    def interpolate(self, table: Gridded, coordinates: Sequence[Value]) -> list[Value]:
+        colour = next((type(x) for x in coordinates if self._is_colour(x)), None)
+        if colour is not None:
+            channels = [[x[c] if self._is_colour(x) else x for x in coordinates] for c in range(len(colour()))]
+            return [colour(*values) for values in zip(*(self.interpolate(table, x) for x in channels))]
+        number = next(type(x) for x in coordinates if not isinstance(x, float))
+        texture = table.texture(sys.modules[number.__module__])
+        centres = [(x * (n - 1) + 0.5) / n for x, n in zip(coordinates, table.data.shape)]
+        return texture.eval([number(x) for x in reversed(centres)])
+
+
+@cache
+def _drjit() -> _DrJit:
+    return _DrJit()
+
+
+_FLOAT, _NUMPY = _Float(), _Numpy()
+
+
+def _dialect(*args: Value) -> Any:
+    found: Any = _FLOAT
+    for x in args:
+        if isinstance(x, (np.ndarray, np.generic)):
+            found = _NUMPY
+        elif not isinstance(x, (float, int)):
+            return _drjit()
+    return found
+
+
+def sqrt(x: Value) -> Value:
+    """Square root of max(x, 0)."""
+    return _dialect(x).sqrt(x)
+
+
+def exp(x: Value) -> Value:
+    return _dialect(x).exp(x)
+
+
+def log(x: Value) -> Value:
+    return _dialect(x).log(x)
+
+
+def power(x: Value, exponent: Value) -> Value:
+    return _dialect(x, exponent).power(x, exponent)
+
+
+def sin(x: Value) -> Value:
+    return _dialect(x).sin(x)
+
+
+def cos(x: Value) -> Value:
+    return _dialect(x).cos(x)
+
+
+def arctan2(y: Value, x: Value) -> Value:
+    return _dialect(y, x).arctan2(y, x)
+
+
+def absolute(x: Value) -> Value:
+    return _dialect(x).absolute(x)
+
+
+def minimum(a: Value, b: Value) -> Value:
+    return _dialect(a, b).minimum(a, b)
+
+
+def maximum(a: Value, b: Value) -> Value:
+    return _dialect(a, b).maximum(a, b)
+
+
+def clip(x: Value, low: Value, high: Value) -> Value:
+    return minimum(maximum(x, low), high)
+
+
+def select(condition: Value, a: Value, b: Value) -> Value:
+    """`a` where the condition holds, else `b`; both are worked out."""
+    return _dialect(condition, a, b).select(condition, a, b)
+
+
+def divide(a: Value, b: Value) -> Value:
+    """a / b for b >= 0, with b kept off zero."""
+    return a / maximum(b, TINY)
+
+
+def mean(colour: Value) -> Value:
+    """Mean over the channels."""
+    return _dialect(colour).mean(colour)
+
+
+def maximum_channel(colour: Value) -> Value:
+    """Largest of the channels."""
+    return _dialect(colour).maximum_channel(colour)
+
+
+def interpolate(table: Gridded, *coordinates: Value) -> list[Value]:
+    """Multilinear interpolation of a table at coordinates in [0, 1], one array per channel of the table."""
+    return _dialect(*coordinates).interpolate(table, coordinates)

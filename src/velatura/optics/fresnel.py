@@ -1,0 +1,49 @@
+"""Unpolarised Fresnel reflectance of a smooth interface.
+
+Indices are relative: eta = eta_2 / eta_1 and kappa = k_2 / eta_1 for light that travels in medium 1.
+"""
+
+from __future__ import annotations
+
+from velatura import ops
+from velatura.ops import Value
+
+
+def cos_transmitted(cos_theta: Value, eta: Value) -> Value:
+    """Cosine of the refracted direction by Snell's law; 0 where light is totally reflected."""
+    return ops.sqrt(1 - (1 - cos_theta * cos_theta) / (eta * eta))
+
+
+def dielectric(cos_theta: Value, eta: Value) -> Value:
+    """Reflectance of a dielectric of relative index eta > 0 at cos_theta in [0, 1]; 1 under total reflection."""
+    cos_t = cos_transmitted(cos_theta, eta)
+    r_s = 1 - 2 * ops.divide(eta * cos_t, cos_theta + eta * cos_t)
+    r_p = 1 - 2 * ops.divide(cos_t, eta * cos_theta + cos_t)
+    return 0.5 * (r_s * r_s + r_p * r_p)
+
+
+def conductor(cos_theta: Value, eta: Value, kappa: Value) -> Value:
+    """Reflectance of a conductor of relative index eta + i kappa at cos_theta in [0, 1]; exact, kappa = 0 included."""
+    cos2 = cos_theta * cos_theta
+    sin2 = 1 - cos2
+    t = eta * eta - kappa * kappa - sin2
+    a2_plus_b2 = ops.sqrt(t * t + 4 * eta * eta * kappa * kappa)
+    a = ops.sqrt(0.5 * (a2_plus_b2 + t))
+    r_s = 1 - ops.divide(4 * a * cos_theta, a2_plus_b2 + cos2 + 2 * a * cos_theta)
+    p = cos2 * a2_plus_b2 + sin2 * sin2
+    q = 2 * a * cos_theta * sin2
+    r_p_over_r_s = 1 - ops.divide(2 * q, p + q)
+    return 0.5 * r_s * (1 + r_p_over_r_s)
+
+
+def schlick(cos_theta: Value, f0: Value) -> Value:
+    """Schlick's approximation of the reflectance from its value f0 at normal incidence."""
+    c = 1 - cos_theta
+    c2 = c * c
+    return f0 + (1 - f0) * c2 * c2 * c
+
+
+def normal_incidence(eta: Value, kappa: Value = 0.0) -> Value:
+    """Reflectance at normal incidence, ((eta-1)^2 + kappa^2) / ((eta+1)^2 + kappa^2)."""
+    kappa2 = kappa * kappa
+    return ((eta - 1) * (eta - 1) + kappa2) / ((eta + 1) * (eta + 1) + kappa2)

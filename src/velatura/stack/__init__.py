@@ -1,0 +1,32 @@
+"""What a material is: layers, their parameters, and the files that hold them. It does no optics and no rendering."""
+
+from velatura.stack.describe import json_schema, parameter_table
+from velatura.stack.io import dumps, load, loads, preset, presets, save
+from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value
+from velatura.stack.spectra import Named, names, rgb, spectrum
+from velatura.stack.stack import Stack
+from velatura.stack.values import RGB, Texture
+
+__all__ = [
+    "RGB",
+    "Diffuse",
+    "Interface",
+    "Kind",
+    "Layer",
+    "Medium",
+    "Named",
+    "Stack",
+    "Texture",
+    "Value",
+    "dumps",
+    "json_schema",
+    "load",
+    "loads",
+    "names",
+    "parameter_table",
+    "preset",
+    "presets",
+    "rgb",
+    "save",
+    "spectrum",
+]

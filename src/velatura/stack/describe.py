@@ -1,0 +1,62 @@
+"""What a material file may hold, for machines and for the manual, read off the declared parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from velatura.stack.layers import LAYERS
+from velatura.stack.schema import Parameter, Record, parameters
+from velatura.stack.stack import Stack
+from velatura.stack.values import Texture
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of a material file. What only the layers together can break is not in it."""
+    layers = [{**_object({entry: _keys(model)}), "required": [entry]} for entry, model in LAYERS.items()]
+    material = _keys(Stack)
+    material["properties"]["layers"] = {"type": "array", "minItems": 1, "items": {"oneOf": layers}}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Velatura material",
+        **material,
+        "required": ["layers"],
+        "$defs": {"texture": {**_keys(Texture), "required": ["texture"]}},
+    }
+
+
+def parameter_table() -> str:
+    """The table of all parameters, in Markdown, for the manual."""
+    lines = [
+        "| where | key | value | unit | range | default | texture | gradient | meaning |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    models: dict[str, type[Record]] = {"material": Stack, **LAYERS, "texture": Texture}
+    for where, model in models.items():
+        for key, parameter in parameters(model).items():
+            lines.append(_row(where, key, parameter, model.model_fields[key].default))
+    return "\n".join(lines) + "\n"
+
+
+def _keys(model: type[Record]) -> dict[str, Any]:
+    return _object(
+        {key: {**parameter.json_schema(), "description": parameter.doc} for key, parameter in parameters(model).items()}
+    )
+
+
+def _object(properties: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _row(where: str, key: str, parameter: Parameter, default: object) -> str:
+    cells = (
+        where,
+        f"`{key}`",
+        parameter.values,
+        parameter.unit,
+        parameter.bounds,
+        f"{default:g}" if isinstance(default, float) else default if isinstance(default, str) else "",
+        "yes" if parameter.texturable else "",
+        "yes" if parameter.differentiable else "",
+        parameter.doc,
+    )
+    return f"| {' | '.join(cells)} |"

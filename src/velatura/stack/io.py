@@ -1,0 +1,210 @@
+"""Material files: YAML and JSON, in and out, and the presets that come with the package."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from velatura.errors import InvalidInput
+from velatura.stack.schema import unknown
+from velatura.stack.stack import Stack
+
+_PRESETS = Path(__file__).with_name("presets")
+_FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
+
+
+# In ------------------------------------------------------------------------------------------------------------------
+
+
+def load(material: str | Path) -> Stack:
+    """The stack in a material file (.yaml, .yml or .json), or the preset of that name.
+
+    A bare word without an extension is a preset. Texture paths are relative to the file.
+
+    Raises:
+        InvalidInput: no such file or preset, or what is in it is not a material; one line that names the file.
+    """
+    path = Path(material)
+    if str(material) in presets() or (not path.suffix and path.parent == Path() and not os.path.isdir(path)):
+        return preset(str(material))
+    if os.path.isdir(path):
+        raise InvalidInput(f"{path}: is a folder, not a material file")
+    _format(path)
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
+    except FileNotFoundError:
+        raise InvalidInput(f"{path}: file not found") from None
+    except (OSError, ValueError) as error:
+        raise InvalidInput(f"{path}: cannot be read: {_reason(error)}") from None
+    return loads(text, name=str(path), folder=path.parent)
+
+
+def loads(text: str, name: str = "material.yaml", folder: str | Path = ".") -> Stack:
+    """The stack in a text.
+
+    Args:
+        text: YAML, or JSON where `name` ends in .json.
+        name: what error messages call the text.
+        folder: what texture paths are relative to.
+
+    Raises:
+        InvalidInput: the text is not a material; one line that begins with `name`.
+    """
+    try:
+        fields = _parse(text, _FORMATS.get(Path(name).suffix.lower(), "yaml"))
+        return Stack.from_dict(_with_texture_paths(fields, lambda path: str(Path(folder, path))))
+    except InvalidInput as error:
+        raise InvalidInput(f"{name}: {error}") from None
+    except RecursionError:
+        raise InvalidInput(f"{name}: is nested too deeply") from None
+
+
+def preset(name: str) -> Stack:
+    """The preset of that name.
+
+    Raises:
+        InvalidInput: there is none.
+    """
+    if name not in presets():
+        raise InvalidInput(f"{unknown('preset', name, presets())}; a material file ends in {', '.join(_FORMATS)}")
+    return load(_PRESETS / f"{name}.yaml")
+
+
+def presets() -> tuple[str, ...]:
+    """The names of all presets, sorted."""
+    return tuple(sorted(path.stem for path in _PRESETS.glob("*.yaml")))
+
+
+# Out -----------------------------------------------------------------------------------------------------------------
+
+
+def save(stack: Stack, path: str | Path) -> None:
+    """Write a material file, whole or not at all; texture paths are written relative to it.
+
+    Raises:
+        InvalidInput: the extension is none of .yaml, .yml and .json, or the file cannot be written.
+    """
+    path = Path(path)
+    data = dumps(stack, _format(path), path.parent).encode("utf-8")
+    if not path.parent.is_dir():
+        raise InvalidInput(f"{path}: there is no folder {path.parent}")
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        unfinished.write_bytes(data)
+        os.replace(unfinished, path)
+    except OSError as error:
+        raise InvalidInput(f"{path}: cannot be written: {_reason(error)}") from None
+    finally:
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
+
+
+def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) -> str:
+    """The text of a material file, `yaml` or `json`, that `loads` reads back exactly.
+
+    Values that equal their default are left out. Texture paths are relative to `folder`, or absolute where it is None.
+
+    Raises:
+        InvalidInput: an unknown format.
+    """
+    fields = stack.to_dict()
+    if folder is not None:
+        start = Path(folder).resolve()
+        fields = _with_texture_paths(fields, lambda path: Path(os.path.relpath(path, start)).as_posix())
+    if format == "json":
+        return json.dumps(fields, indent=2, ensure_ascii=False) + "\n"
+    if format == "yaml":
+        fields["layers"] = [{entry: _Line(keys) for entry, keys in layer.items()} for layer in fields["layers"]]
+        return yaml.dump(fields, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
+    raise InvalidInput(unknown("format", format, ("yaml", "json")))
+
+
+# Text to values and back ---------------------------------------------------------------------------------------------
+
+
+def _parse(text: str, format: str) -> Any:
+    try:
+        if format == "json":
+            return json.loads(text, object_pairs_hook=_unique)
+        return yaml.load(text, Loader=_Loader)
+    except InvalidInput:
+        raise
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1}: " if mark else ""
+        reason = getattr(error, "problem", None) or getattr(error, "reason", None) or "it cannot be read"
+        raise InvalidInput(f"{where}is not valid YAML: {reason}") from None
+    except json.JSONDecodeError as error:
+        raise InvalidInput(f"line {error.lineno}: is not valid JSON: {error.msg}") from None
+    except ValueError as error:  # a number of too many digits, a date that is none
+        raise InvalidInput(f"cannot be read: {error}") from None
+
+
+def _unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    fields: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in fields:
+            raise InvalidInput(f"key {key!r} appears twice")
+        fields[key] = value
+    return fields
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML that refuses duplicate keys and reads 1e-3 as a number, as YAML 1.2 does."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    raise InvalidInput(f"line {key.start_mark.line + 1}: key {key.value!r} appears twice")
+                seen.add(key.value)
+        return super().construct_mapping(node, deep)
+
+
+class _Dumper(yaml.SafeDumper):
+    """YAML with one line a layer and no anchors."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+class _Line(dict[str, Any]):
+    """A mapping that is written on one line."""
+
+
+_EXPONENT = re.compile(r"[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)[eE][-+]?\d+$")
+for _dialect in (_Loader, _Dumper):
+    _dialect.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+.0123456789"))
+_Dumper.add_representer(
+    _Line, lambda dumper, data: dumper.represent_mapping("tag:yaml.org,2002:map", data, flow_style=True)
+)
+
+
+def _with_texture_paths(node: Any, rewrite: Callable[[str], str]) -> Any:
+    """A copy of parsed values in which every texture's path is rewritten."""
+    if isinstance(node, dict):
+        return {
+            key: rewrite(value) if key == "texture" and isinstance(value, str) else _with_texture_paths(value, rewrite)
+            for key, value in node.items()
+        }
+    return [_with_texture_paths(entry, rewrite) for entry in node] if isinstance(node, list) else node
+
+
+def _format(path: Path) -> str:
+    if path.suffix.lower() not in _FORMATS:
+        raise InvalidInput(f"{path}: a material file ends in {', '.join(_FORMATS)}")
+    return _FORMATS[path.suffix.lower()]
+
+
+def _reason(error: Exception) -> str:
+    return (getattr(error, "strerror", None) or str(error)).lower()

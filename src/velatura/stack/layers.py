@@ -1,0 +1,131 @@
+"""What a stack is made of: interfaces, media, and a diffuse base."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import model_validator
+
+from velatura.stack.schema import Record
+from velatura.stack.spectra import MIRROR, Named, names
+from velatura.stack.values import RGB, Colour, Conductor, Index, Pair, Scalar, Texture
+
+Kind: TypeAlias = Literal["dielectric", "conductor", "mirror", "medium", "diffuse"]
+Value: TypeAlias = float | RGB | Named | Texture
+
+
+class Interface(Record):
+    """A boundary to the medium below it.
+
+    It is a dielectric where `eta` stands alone, and opaque where `k` (even 0) or `conductor` is given.
+    """
+
+    eta: Annotated[
+        float | RGB | str | Texture | None,
+        Index("absolute index of refraction of the medium below", low=0, strict=True, part="eta"),
+    ] = None
+    k: Annotated[
+        float | RGB | str | Texture | None,
+        Index("absolute extinction of what lies below; written, even as 0, it makes it opaque", low=0, part="k"),
+    ] = None
+    conductor: Annotated[
+        str | None,
+        Conductor("a metal by name, in place of eta and k; `mirror` reflects all light"),
+    ] = None
+    alpha: Annotated[
+        float | Texture | tuple[float | Texture, float | Texture],
+        Pair("GGX roughness along the tangent and the bitangent", low=0, high=1),
+    ] = 0.0
+    rotation: Annotated[
+        float | Texture,
+        Scalar("turn of the tangent, anticlockwise seen from outside, from dp/du", unit="degrees"),
+    ] = 0.0
+
+    @model_validator(mode="after")
+    def _one_way_to_say_it(self) -> Interface:
+        for key in ("eta", "k"):
+            if self.conductor is not None and getattr(self, key) is not None:
+                raise ValueError(f"{key}: not together with conductor; write conductor, or eta and k")
+        if self.conductor is None and self.eta is None:
+            raise ValueError("eta: missing; write eta, or eta and k, or conductor")
+        if self.k is None and isinstance(self.eta, str) and self.eta in names()[0]:
+            raise ValueError(f"eta: {self.eta} is a metal; write conductor: {self.eta}")
+        return self
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing passes: `k` or `conductor` is given."""
+        return self.k is not None or self.conductor is not None
+
+    @property
+    def kind(self) -> Kind:
+        """dielectric, conductor or mirror."""
+        if self.conductor == MIRROR:
+            return "mirror"
+        return "conductor" if self.opaque else "dielectric"
+
+    def flat(self) -> dict[str, Value]:
+        """Every value under its own key; a mirror has no indices, a dielectric no extinction."""
+        values: dict[str, Value] = {}
+        if self.kind != "mirror":
+            values["eta"] = _spectrum(self.conductor or self.eta, "eta")
+        if self.kind == "conductor":
+            values["k"] = _spectrum(self.conductor or self.k, "k")
+        values["alpha_u"], values["alpha_v"] = self.alpha if isinstance(self.alpha, tuple) else (self.alpha, self.alpha)
+        values["rotation"] = self.rotation
+        return values
+
+
+class Medium(Record):
+    """A homogeneous medium between two interfaces, or above the first."""
+
+    depth: Annotated[float | Texture, Scalar("thickness, in the unit of length of sigma", unit="length", low=0)] = 1.0
+    sigma_a: Annotated[float | RGB | Texture, Colour("absorption coefficient", unit="1/length", low=0)] = 0.0
+    sigma_s: Annotated[float | RGB | Texture, Colour("scattering coefficient", unit="1/length", low=0)] = 0.0
+    g: Annotated[
+        float | Texture,
+        Scalar("mean cosine of the scattering angle (Henyey-Greenstein)", low=-1, high=1, strict=True),
+    ] = 0.0
+
+    @property
+    def kind(self) -> Kind:
+        """medium."""
+        return "medium"
+
+    def flat(self) -> dict[str, Value]:
+        """Every value under its own key."""
+        return {"depth": self.depth, "sigma_a": self.sigma_a, "sigma_s": self.sigma_s, "g": self.g}
+
+
+class Diffuse(Record):
+    """An ideally diffuse base, opaque, below everything else."""
+
+    albedo: Annotated[float | RGB | Texture, Colour("fraction of light reflected", low=0, high=1)] = 0.5
+
+    @property
+    def kind(self) -> Kind:
+        """diffuse."""
+        return "diffuse"
+
+    def flat(self) -> dict[str, Value]:
+        """Every value under its own key."""
+        return {"albedo": self.albedo}
+
+
+Layer: TypeAlias = Interface | Medium | Diffuse
+
+LAYERS: dict[str, type[Interface] | type[Medium] | type[Diffuse]] = {
+    "interface": Interface,
+    "medium": Medium,
+    "diffuse": Diffuse,
+}
+
+
+def entry_name(layer: Layer) -> str:
+    """What a file calls the layer: interface, medium or diffuse."""
+    return type(layer).__name__.lower()
+
+
+def _spectrum(value: float | RGB | str | Texture | None, part: Literal["eta", "k"]) -> Value:
+    assert value is not None  # the validator saw to that
+    return Named(value, part) if isinstance(value, str) else value

@@ -1,0 +1,141 @@
+"""How a parameter of a material is declared, and the models that hold parameters.
+
+A parameter is declared once, as the annotation of a model's field: what it holds (a class of `values`: `Scalar`,
+`Colour`, ...), its range, unit and meaning, and whether it may be textured and differentiated. Validation, the JSON
+Schema and the manual's table are all read off that declaration.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import CoreSchema, core_schema
+
+from velatura.errors import InvalidInput
+
+RecordType = TypeVar("RecordType", bound="Record")
+
+
+def unknown(what: str, name: object, known: Iterable[str]) -> str:
+    """One line about an unknown name, with the nearest known one where there is one that looks alike."""
+    lower_case = {option.lower(): option for option in known}
+    near = difflib.get_close_matches(str(name).lower(), lower_case, n=1)
+    if near:
+        return f"unknown {what} {show(name)} (did you mean {lower_case[near[0]]}?)"
+    if len(lower_case) <= 16:
+        return f"unknown {what} {show(name)} (known: {', '.join(lower_case.values())})"
+    return f"unknown {what} {show(name)}"
+
+
+def show(value: object) -> str:
+    """`value` as an error message quotes it: on one line and not too long."""
+    if value is None:
+        return "nothing"
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """The declaration of one parameter."""
+
+    doc: str
+    unit: str = ""
+    differentiable: bool = False
+    texturable: bool = False
+
+    what: ClassVar[str] = ""
+
+    @property
+    def values(self) -> str:
+        """What a value may be, as the manual says it."""
+        return self.what
+
+    @property
+    def expects(self) -> str:
+        """What a value may be, as an error message says it."""
+        return self.values
+
+    @property
+    def bounds(self) -> str:
+        """The range, as the manual prints it; empty where the parameter has none."""
+        return ""
+
+    def check(self, value: Any) -> Any:
+        """The value in its canonical form; ValueError, in one line, where it is not a value of this parameter."""
+        raise NotImplementedError
+
+    def json_schema(self) -> dict[str, Any]:
+        """The JSON Schema of the values."""
+        raise NotImplementedError
+
+    def refuse(self, value: object) -> ValueError:
+        """The error for a value of the wrong type."""
+        return ValueError(f"must be {self.expects}, got {show(value)}")
+
+    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.check)
+
+
+class Record(BaseModel):
+    """A frozen model whose fields are declared parameters; its errors are InvalidInput, in one line."""
+
+    model_config = ConfigDict(frozen=True)
+
+    def __init__(self, **fields: Any) -> None:
+        for key in fields:
+            if key not in type(self).model_fields:
+                raise InvalidInput(unknown("key", key, type(self).model_fields))
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise InvalidInput(_first_line(error)) from None
+
+    @classmethod
+    def from_dict(cls: type[RecordType], fields: Mapping[Any, Any]) -> RecordType:
+        """The model described by a mapping as it stands in a file.
+
+        Raises:
+            InvalidInput: an unknown key, a key without a value, or a value outside its range.
+        """
+        for key, value in fields.items():
+            if value is None and key in cls.model_fields:
+                raise InvalidInput(f"{key}: has no value")
+        return cls(**{str(key): value for key, value in fields.items()})
+
+    def to_dict(self) -> dict[str, Any]:
+        """The mapping that `from_dict` reads back: plain values, defaults left out."""
+        fields = type(self).model_fields
+        return {key: plain(value) for key, value in self if value != fields[key].default}
+
+
+def plain(value: Any) -> Any:
+    """`value` in the types of YAML and JSON."""
+    if isinstance(value, Record):
+        return value.to_dict()
+    if isinstance(value, Path):
+        return value.as_posix()
+    if isinstance(value, tuple):
+        return [plain(entry) for entry in value]
+    return value
+
+
+def parameters(model: type[Record]) -> dict[str, Parameter]:
+    """The declared parameters of a model, in order."""
+    return {
+        key: declaration
+        for key, field in model.model_fields.items()
+        for declaration in field.metadata
+        if isinstance(declaration, Parameter)
+    }
+
+
+def _first_line(error: ValidationError) -> str:
+    first = error.errors()[0]
+    reason = "missing" if first["type"] == "missing" else str(first["ctx"]["error"])
+    return ": ".join([*map(str, first["loc"]), reason])

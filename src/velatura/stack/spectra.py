@@ -1,0 +1,206 @@
+"""Measured spectra by name: metals and a few crystals from the data files that Mitsuba's wheel carries, other
+dielectrics from dispersion formulas.
+
+Mitsuba itself is not imported, and NumPy only where a spectrum is read.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from importlib.machinery import PathFinder
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from velatura.errors import InvalidInput, MissingTool
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+MIRROR = "mirror"  # the conductor that reflects all light; it has no spectrum
+
+# Files of the wheel that are no metals: k is 0 over the visible range.
+_CRYSTALS = ("CsI", "MgO", "SiC", "ThF4", "TiO2", "TiO2-e", "d-C")
+
+# Files of the wheel with holes: eta is 0 below 440 nm (AlAs), nothing above 590 nm (AlSb), k is 0 throughout (SnTe).
+_BROKEN = ("AlAs", "AlSb", "SnTe")
+
+_ALIASES = {
+    "aluminium": "Al",
+    "aluminum": "Al",
+    "chromium": "Cr",
+    "chrome": "Cr",
+    "copper": "Cu",
+    "gold": "Au",
+    "mercury": "Hg",
+    "molybdenum": "Mo",
+    "nickel": "Ni_palik",
+    "rhodium": "Rh",
+    "silver": "Ag",
+    "tantalum": "Ta",
+    "titanium-nitride": "TiN",
+    "tungsten": "W",
+    "diamond": "d-C",
+    "rutile": "TiO2",
+    "acrylic": "pmma",
+    "alumina": "sapphire",
+    "clear-coat": "polyurethane",
+    "glass": "bk7",
+    "quartz": "fused-silica",
+}
+
+
+@dataclass(frozen=True)
+class Named:
+    """The spectrum of a material's index: its real part (`eta`) or its extinction (`k`)."""
+
+    name: str
+    part: Literal["eta", "k"]
+
+
+@dataclass(frozen=True)
+class Dispersion:
+    """Refractive index by Sellmeier's formula, n^2 = 1 + sum of b w^2 / (w^2 - c), wavelength w in micrometres.
+
+    One term with c = 0 is a constant index.
+    """
+
+    terms: tuple[tuple[float, float], ...]
+    source: str
+
+
+def _constant(index: float, source: str) -> Dispersion:
+    return Dispersion(((index**2 - 1, 0.0),), source)
+
+
+DISPERSIONS = {
+    "bk7": Dispersion(
+        ((1.03961212, 0.00600069867), (0.231792344, 0.0200179144), (1.01046945, 103.560653)),
+        "Schott, data sheet of N-BK7",
+    ),
+    "sf11": Dispersion(
+        ((1.73759695, 0.013188707), (0.313747346, 0.0623068142), (1.89878101, 155.23629)),
+        "Schott, data sheet of N-SF11",
+    ),
+    "fused-silica": Dispersion(
+        ((0.6961663, 0.0684043**2), (0.4079426, 0.1162414**2), (0.8974794, 9.896161**2)),
+        "Malitson 1965, J. Opt. Soc. Am. 55",
+    ),
+    "sapphire": Dispersion(
+        ((1.4313493, 0.0726631**2), (0.65054713, 0.1193242**2), (5.3414021, 18.028251**2)),
+        "Malitson and Dodge 1972, ordinary ray",
+    ),
+    "water": Dispersion(
+        (
+            (0.5684027565, 0.005101829712),
+            (0.1726177391, 0.01821153936),
+            (0.02086189578, 0.02620722293),
+            (0.1130748688, 10.69792721),
+        ),
+        "Daimon and Masumura 2007, Appl. Opt. 46, at 20 degrees Celsius",
+    ),
+    "pmma": Dispersion(((1.1819, 0.011313),), "Sultanova et al. 2009, Acta Phys. Pol. A 116"),
+    "polycarbonate": Dispersion(((1.4182, 0.021304),), "Sultanova et al. 2009, Acta Phys. Pol. A 116"),
+    "polystyrene": Dispersion(((1.4435, 0.020216),), "Sultanova et al. 2009, Acta Phys. Pol. A 116"),
+    "air": _constant(1.000277, "Mitsuba 3's list of dielectrics"),
+    "ice": _constant(1.31, "Mitsuba 3's list of dielectrics"),
+    "ethanol": _constant(1.361, "Mitsuba 3's list of dielectrics"),
+    "glycerol": _constant(1.4729, "Mitsuba 3's list of dielectrics"),
+    "pyrex": _constant(1.47, "Mitsuba 3's list of dielectrics"),
+    "polypropylene": _constant(1.49, "Mitsuba 3's list of dielectrics"),
+    "salt": _constant(1.544, "Mitsuba 3's list of dielectrics"),
+    "amber": _constant(1.55, "Mitsuba 3's list of dielectrics"),
+    "pet": _constant(1.575, "Mitsuba 3's list of dielectrics"),
+    "polyurethane": _constant(1.5, "chosen: clear coats lie near 1.5"),
+    "lacquer": _constant(1.5, "chosen: lacquers and resins lie near 1.5"),
+    "varnish": _constant(1.5, "chosen: varnishes lie near 1.5"),
+    "oil": _constant(1.47, "chosen: mineral and vegetable oils lie near 1.47"),
+}
+
+
+@functools.cache
+def names() -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """All names that a material may use: (conductors, dielectrics), each sorted.
+
+    Raises:
+        MissingTool: Mitsuba, whose wheel carries the data, is not installed.
+    """
+    files = {path.name[: -len(".k.spd")] for path in _folder().glob("*.k.spd")}
+    files = {name for name in files if name.removesuffix("_palik") not in _BROKEN}
+    crystals = {name for name in files if name.removesuffix("_palik") in _CRYSTALS}
+    dielectrics = crystals | set(DISPERSIONS)
+    metals = files - crystals
+    for alias, name in _ALIASES.items():
+        (metals if name in metals else dielectrics).add(alias)
+    return tuple(sorted(metals)), tuple(sorted(dielectrics))
+
+
+@functools.cache
+def spectrum(named: Named) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths in nanometres and the values there, as measured; beyond the ends the last value holds.
+
+    Raises:
+        InvalidInput: no such material, or it has no such part.
+        MissingTool: Mitsuba, whose wheel carries the data, is not installed.
+    """
+    import numpy as np
+
+    name = _ALIASES.get(named.name, named.name)
+    conductors, dielectrics = names()
+    if name in DISPERSIONS and named.part == "eta":
+        wavelengths_nm = np.arange(360.0, 831.0, 5.0)
+        values = _sellmeier(DISPERSIONS[name], wavelengths_nm * 1e-3)
+    elif name in conductors + dielectrics and name not in DISPERSIONS:
+        wavelengths_nm, values = np.loadtxt(_folder() / f"{name}.{named.part}.spd", unpack=True)
+    else:
+        raise InvalidInput(f"there is no spectrum of {named.part} for {named.name!r}")
+    wavelengths_nm.flags.writeable = values.flags.writeable = False
+    return wavelengths_nm, values
+
+
+@functools.cache
+def rgb(named: Named) -> tuple[float, float, float]:
+    """The spectrum reduced to linear sRGB: seen by the CIE 1931 observer under D65, so that a flat one stays flat.
+
+    That is `mitsuba.spectrum_list_to_srgb(..., d65=True)`. Mitsuba's own conductor plugins reduce without D65, which
+    tints neutral metals; reflectances computed from these values are closer to those of the whole spectrum.
+
+    Raises:
+        InvalidInput, MissingTool: as `spectrum`.
+    """
+    import numpy as np
+
+    wavelengths_nm, weights = _srgb_weights()
+    red, green, blue = (weights @ np.interp(wavelengths_nm, *spectrum(named))).tolist()
+    return red, green, blue
+
+
+@functools.cache
+def _srgb_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths (95,) and the weights (3, 95) that turn a spectrum into linear sRGB; each row sums to 1."""
+    import numpy as np
+
+    wavelengths_nm, x_bar, y_bar, z_bar, d65 = np.loadtxt(Path(__file__).with_name("cie1931.csv"), delimiter=",").T
+    srgb_from_xyz = np.array(  # ITU-R BT.709 primaries
+        [[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556], [0.055648, -0.204043, 1.057311]]
+    )
+    weights = srgb_from_xyz @ np.stack([x_bar, y_bar, z_bar]) * d65
+    return wavelengths_nm, weights / weights.sum(axis=1, keepdims=True)
+
+
+def _sellmeier(dispersion: Dispersion, wavelength_um: NDArray[np.float64]) -> NDArray[np.float64]:
+    square = wavelength_um**2
+    index: NDArray[np.float64] = (1 + sum(b * square / (square - c) for b, c in dispersion.terms)) ** 0.5
+    return index
+
+
+@functools.cache
+def _folder() -> Path:
+    # Looks the package up without importing it, and does not ask Mitsuba, which replaces its own module once imported
+    found = PathFinder.find_spec("mitsuba")
+    for place in (found and found.submodule_search_locations) or ():
+        folder = Path(place) / "data" / "ior"
+        if folder.is_dir():
+            return folder
+    raise MissingTool("Mitsuba, whose wheel carries the spectra of materials, is missing: pip install mitsuba")

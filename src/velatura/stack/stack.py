@@ -1,0 +1,158 @@
+"""A material: a stack of layers, from the top."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any
+
+from pydantic import model_validator
+
+from velatura.errors import InvalidInput
+from velatura.stack import flat_names
+from velatura.stack.layers import LAYERS, Diffuse, Interface, Kind, Layer, Medium, Value, entry_name
+from velatura.stack.schema import Record, show, unknown
+from velatura.stack.values import Flag, Scalar, Text
+
+
+class Stack(Record):
+    """Layers from the top down, frozen and validated.
+
+    Args:
+        layers: `Interface`, `Medium` and `Diffuse` models, or mappings as a file holds them.
+        name, source, exterior, thin: the keys of a file.
+
+    Raises:
+        InvalidInput: in one line that names layer, key and allowed range.
+    """
+
+    name: Annotated[str, Text("name of the material")] = ""
+    source: Annotated[str, Text("where the numbers come from")] = ""
+    exterior: Annotated[
+        float,
+        Scalar("absolute index of refraction above", low=0, strict=True, texturable=False, differentiable=False),
+    ] = 1.0
+    thin: Annotated[bool, Flag("a thin pane: light leaves it into the exterior index")] = False
+    layers: tuple[Layer, ...]
+
+    def __init__(self, layers: Iterable[Layer | Mapping[str, Any]] = (), **options: Any) -> None:
+        super().__init__(layers=_layers(layers), **options)
+
+    @model_validator(mode="after")
+    def _layers_fit_together(self) -> Stack:
+        if not self.layers:
+            raise ValueError("layers: must hold at least one layer")
+        for index, (above, below) in enumerate(zip(self.kinds, self.kinds[1:]), start=1):
+            where = f"layer {index} ({entry_name(self.layers[index])})"
+            if above in ("conductor", "mirror", "diffuse"):
+                raise ValueError(f"{where}: nothing may lie below layer {index - 1} ({above}), which is opaque")
+            if above == below == "medium":
+                raise ValueError(f"{where}: two media in a row; put an interface between them")
+        if self.kinds[-1] == "medium":
+            last = len(self.layers) - 1
+            raise ValueError(f"layer {last} (medium): an interface or a diffuse base must lie below a medium")
+        if self.thin and not self.transmits:
+            raise ValueError("thin: only for a stack that ends in a dielectric interface")
+        return self
+
+    # What it holds ---------------------------------------------------------------------------------------------------
+
+    @property
+    def kinds(self) -> tuple[Kind, ...]:
+        """dielectric, conductor, mirror, medium or diffuse, for every layer."""
+        return tuple(layer.kind for layer in self.layers)
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        """The interfaces alone, from the top."""
+        return tuple(layer for layer in self.layers if isinstance(layer, Interface))
+
+    @property
+    def transmits(self) -> bool:
+        """Whether light passes: the last layer is a dielectric interface."""
+        return self.kinds[-1] == "dielectric"
+
+    # As a file holds it ----------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_dict(cls, fields: Any) -> Stack:
+        """The stack described by a mapping as it stands in a file.
+
+        Raises:
+            InvalidInput: in one line that names layer, key and allowed range.
+        """
+        if not isinstance(fields, Mapping):
+            raise InvalidInput(f"must hold the keys of a material, layers above all, got {show(fields)}")
+        return super().from_dict(fields)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The mapping that `from_dict` reads back: plain values, defaults left out."""
+        return {**super().to_dict(), "layers": [{entry_name(layer): layer.to_dict()} for layer in self.layers]}
+
+    # As flat names ---------------------------------------------------------------------------------------------------
+
+    def flat(self) -> dict[str, Value]:
+        """`exterior` and every value of every layer under its flat name, `layer0_eta`, `layer0_alpha_u`, ...
+
+        The number counts all layers from the top. `name`, `source` and `thin` are not among them: they are no numbers.
+        """
+        values: dict[str, Value] = {"exterior": self.exterior}
+        for index, layer in enumerate(self.layers):
+            values.update({f"layer{index}_{key}": value for key, value in layer.flat().items()})
+        return values
+
+    @classmethod
+    def from_flat(cls, kinds: Sequence[Kind] | None, values: Mapping[str, Any]) -> Stack:
+        """The stack with the given flat values; other values take their defaults.
+
+        Args:
+            kinds: of every layer, as in `kinds`; None: read off the names (a mirror then has `layer0_conductor`).
+            values: by flat name; also `layer0_alpha` for both axes, `layer0_conductor` for eta and k, and the
+                keys `name`, `source`, `thin`.
+
+        Raises:
+            InvalidInput: an unknown name, or a value that a file might not hold either.
+        """
+        stack = cls.from_dict(flat_names.document(kinds, values))
+        for index, (wanted, got) in enumerate(zip(kinds or stack.kinds, stack.kinds)):
+            if wanted != got:
+                raise InvalidInput(f"layer {index}: the values are those of a {got}, not of a {wanted}")
+        return stack
+
+    def replace(self, **values: Any) -> Stack:
+        """This stack with some flat values changed: `stack.replace(layer0_alpha=0.2, layer1_sigma_a=(0.1, 0.2, 0.3))`.
+
+        Takes the names of `flat`, `layer0_alpha` for both axes, `layer2_conductor` for another metal, and `name`,
+        `source`, `thin`.
+
+        Raises:
+            InvalidInput: a name that this stack does not have, or a value outside its range.
+        """
+        return type(self).from_dict(flat_names.changed(self.to_dict(), self.kinds, values))
+
+
+def _layers(entries: Any) -> tuple[Layer, ...]:
+    if isinstance(entries, str | Mapping) or not isinstance(entries, Iterable):
+        raise InvalidInput(f"layers: must be a list of layers, got {show(entries)}")
+    return tuple(_layer(index, entry) for index, entry in enumerate(entries))
+
+
+def _layer(index: int, entry: Any) -> Layer:
+    """A layer as it is, or from an entry of a file, `{interface: {eta: 1.5}}`."""
+    if isinstance(entry, Interface | Medium | Diffuse):
+        return entry
+    if not isinstance(entry, Mapping) or not entry:
+        raise InvalidInput(f"layer {index}: must be one of {', '.join(LAYERS)} with its keys, got {show(entry)}")
+    if len(entry) > 1:
+        keys = ", ".join(map(str, entry))
+        raise InvalidInput(f"layer {index}: must hold one of {', '.join(LAYERS)} alone, got {keys}; check the indent")
+    ((kind, fields),) = entry.items()
+    if kind not in LAYERS:
+        raise InvalidInput(f"layer {index}: {unknown('layer', kind, LAYERS)}")
+    fields = {} if fields is None else fields
+    where = f"layer {index} ({kind})"
+    if not isinstance(fields, Mapping):
+        raise InvalidInput(f"{where}: must hold keys and values, got {show(fields)}")
+    try:
+        return LAYERS[kind].from_dict(fields)
+    except InvalidInput as error:
+        raise InvalidInput(f"{where}: {error}") from None

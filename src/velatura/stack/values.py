@@ -1,0 +1,271 @@
+"""What a parameter may hold: words, files, names of materials, numbers, colours, and textures in their place."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, TypeAlias
+
+from velatura.stack.schema import Parameter, Record, show, unknown
+from velatura.stack.spectra import MIRROR, Named, names
+
+RGB: TypeAlias = tuple[float, float, float]
+
+# Words, switches and files -------------------------------------------------------------------------------------------
+
+
+class Text(Parameter):
+    """Free text."""
+
+    what = "text (in quotes)"
+
+    def check(self, value: Any) -> str:
+        if not isinstance(value, str) or not _encodable(value):
+            raise self.refuse(value)
+        return value
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "string"}
+
+
+class Flag(Parameter):
+    """True or false."""
+
+    what = "true or false"
+
+    def check(self, value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise self.refuse(value)
+        return value
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "boolean"}
+
+
+@dataclass(frozen=True)
+class Choice(Parameter):
+    """One of a few words."""
+
+    options: tuple[str, ...] = ()
+
+    @property
+    def values(self) -> str:
+        return "one of " + ", ".join(self.options)
+
+    def check(self, value: Any) -> str:
+        if not isinstance(value, str) or value not in self.options:
+            raise self.refuse(value)
+        return value
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"enum": list(self.options)}
+
+
+class File(Parameter):
+    """A file that exists; kept as an absolute path."""
+
+    what = "the path of a file"
+
+    def check(self, value: Any) -> Path:
+        if not isinstance(value, str | Path) or not str(value):
+            raise self.refuse(value)
+        path = Path(value).resolve()
+        if not path.is_file():
+            raise ValueError(f"file not found: {path}")
+        return path
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "string"}
+
+
+class Conductor(Parameter):
+    """A metal by name, or the perfect mirror."""
+
+    what = "the name of a metal"
+
+    def check(self, value: Any) -> str | None:
+        if value is None:
+            return None
+        if not isinstance(value, str):
+            raise self.refuse(value)
+        conductors, dielectrics = names()
+        if value in dielectrics:
+            raise ValueError(f"{value} is a dielectric; write eta: {value}")
+        if value not in (MIRROR, *conductors):
+            raise ValueError(unknown("metal", value, (MIRROR, *conductors)))
+        return value
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"enum": [MIRROR, *names()[0]]}
+
+
+def _encodable(text: str) -> bool:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+# Numbers -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Scalar(Parameter):
+    """A number in a range, or a texture."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    strict: bool = False  # the ends of the range are excluded
+    differentiable: bool = True
+    texturable: bool = True
+
+    what = "a number"
+    channel: ClassVar[str] = "r"  # what a texture gives where it does not say
+
+    @property
+    def expects(self) -> str:
+        range_clause = f", and {self._limits}" if self.bounds else ""
+        return self.what + (" or a texture" if self.texturable else "") + range_clause
+
+    @property
+    def bounds(self) -> str:
+        if math.isfinite(self.high):
+            return f"({self.low:g}, {self.high:g})" if self.strict else f"[{self.low:g}, {self.high:g}]"
+        return f"{'>' if self.strict else '>='} {self.low:g}" if math.isfinite(self.low) else ""
+
+    @property
+    def _limits(self) -> str:
+        if math.isfinite(self.high):
+            return f"lie in {self.low:g} to {self.high:g}" + (", both excluded" if self.strict else "")
+        return f"be {'above' if self.strict else 'at least'} {self.low:g}"
+
+    def check(self, value: Any) -> Any:
+        value = value.tolist() if hasattr(value, "tolist") else value
+        if self.texturable and isinstance(value, Mapping | Texture):
+            return self._texture(value)
+        return self._check_value(value)
+
+    def _check_value(self, value: Any) -> Any:
+        return self._number(value, value)
+
+    def _number(self, value: Any, whole: object) -> float:
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
+            raise self.refuse(whole)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if not math.isfinite(number):
+            raise ValueError(f"must be finite, got {number}")
+        if not self.low <= number <= self.high or (self.strict and number in (self.low, self.high)):
+            raise ValueError(f"must {self._limits}, got {show(value)}")
+        return number
+
+    def _texture(self, value: Any) -> Texture:
+        texture = value if isinstance(value, Texture) else Texture.from_dict(value)
+        if texture.channel is None:
+            return texture.model_copy(update={"channel": self.channel})
+        if texture.channel == "rgb" and self.channel != "rgb":
+            raise ValueError("channel: must be one of r, g, b, a for a single number, got 'rgb'")
+        return texture
+
+    def json_schema(self) -> dict[str, Any]:
+        forms = [*self._forms(), *([{"$ref": "#/$defs/texture"}] if self.texturable else [])]
+        return forms[0] if len(forms) == 1 else {"anyOf": forms}
+
+    def _forms(self) -> list[dict[str, Any]]:
+        number: dict[str, Any] = {"type": "number"}
+        if math.isfinite(self.low):
+            number["exclusiveMinimum" if self.strict else "minimum"] = self.low
+        if math.isfinite(self.high):
+            number["exclusiveMaximum" if self.strict else "maximum"] = self.high
+        return [number]
+
+
+class Colour(Scalar):
+    """A number for all channels, or one for each of red, green and blue."""
+
+    what = "a number, [r, g, b]"
+    channel = "rgb"
+
+    def _check_value(self, value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            if len(value) != 3:
+                raise self.refuse(value)
+            return tuple(self._number(entry, value) for entry in value)
+        return self._number(value, value)
+
+    def _forms(self) -> list[dict[str, Any]]:
+        (number,) = super()._forms()
+        return [number, {"type": "array", "items": number, "minItems": 3, "maxItems": 3}]
+
+
+@dataclass(frozen=True)
+class Index(Colour):
+    """A colour, or the name of a measured spectrum."""
+
+    part: str = "eta"
+
+    what = "a number, [r, g, b], a name"
+
+    def check(self, value: Any) -> Any:
+        if value is None:
+            return None
+        if isinstance(value, Named):
+            if value.part != self.part:
+                raise self.refuse(value)
+            value = value.name
+        if isinstance(value, str):
+            if value not in self._names():
+                raise ValueError(unknown("name", value, self._names()))
+            return value
+        return super().check(value)
+
+    def _names(self) -> tuple[str, ...]:
+        conductors, dielectrics = names()
+        return conductors + dielectrics if self.part == "eta" else conductors
+
+    def _forms(self) -> list[dict[str, Any]]:
+        return [*super()._forms(), {"enum": list(self._names())}]
+
+
+class Pair(Scalar):
+    """A number for both tangent axes, or one for each; equal ones are kept as one number."""
+
+    what = "a number, [u, v]"
+
+    def _check_value(self, value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            return self._number(value, value)
+        if len(value) != 2:
+            raise self.refuse(value)
+        u, v = (
+            self._texture(entry) if isinstance(entry, Mapping | Texture) else self._number(entry, value)
+            for entry in value
+        )
+        return u if u == v else (u, v)
+
+    def _forms(self) -> list[dict[str, Any]]:
+        (number,) = super()._forms()
+        entry = {"anyOf": [number, {"$ref": "#/$defs/texture"}]}
+        return [number, {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}]
+
+
+class Texture(Record):
+    """A number or colour read from an image: `scale * texel + offset`.
+
+    Values outside the parameter's range after scale and offset are the reader's business to clamp: the image is not
+    opened here.
+    """
+
+    texture: Annotated[Path, File("image file, relative to the material file")]
+    channel: Annotated[
+        str | None, Choice("channel that is read; rgb for colours, otherwise r", options=("r", "g", "b", "a", "rgb"))
+    ] = None
+    scale: Annotated[float, Scalar("factor on the texel", texturable=False, differentiable=False)] = 1.0
+    offset: Annotated[float, Scalar("added after the factor", texturable=False, differentiable=False)] = 0.0
+    encoding: Annotated[str, Choice("how the texel is stored", options=("linear", "srgb"))] = "linear"

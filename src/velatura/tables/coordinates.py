@@ -1,0 +1,60 @@
+"""Where the nodes of the tables lie: maps between [0, 1] and cosines, roughnesses and relative indices.
+
+Nodes crowd where the averages bend: at grazing angles, at low roughness and, for light inside a denser medium, at the
+critical angle, which the angular axis of the three-dimensional tables follows.
+"""
+
+from __future__ import annotations
+
+from math import asin, pi
+
+import numpy as np
+
+from velatura import ops
+from velatura.ops import Value
+
+ETA_MIN = 0.05  # lowest relative index of the tables for light inside a denser medium
+_CRITICAL_MIN = asin(ETA_MIN)
+
+
+def from_cosine(cos_theta: Value) -> Value:
+    return ops.sqrt(cos_theta)
+
+
+def to_cosine(x: np.ndarray) -> np.ndarray:
+    return x * x
+
+
+def from_roughness(alpha: Value) -> Value:
+    return ops.sqrt(alpha)
+
+
+def to_roughness(x: np.ndarray) -> np.ndarray:
+    return x * x
+
+
+def from_critical_angle(theta_c: Value) -> Value:
+    return (theta_c - _CRITICAL_MIN) / (pi / 2 - _CRITICAL_MIN)
+
+
+def to_critical_angle(x: np.ndarray) -> np.ndarray:
+    return _CRITICAL_MIN + x * (pi / 2 - _CRITICAL_MIN)
+
+
+def from_angle(cos_theta: Value, theta_c: Value) -> Value:
+    """Coordinate of an angle of incidence: 1 at the normal, 1/2 at the critical angle theta_c, 0 at grazing.
+
+    Nodes crowd on both sides of the critical angle, and at grazing.
+    """
+    beyond = ops.arctan2(ops.sqrt(1 - cos_theta * cos_theta), cos_theta) - theta_c
+    within = ops.sqrt(-beyond / ops.maximum(theta_c, 1e-6))
+    share = ops.minimum(beyond / ops.maximum(pi / 2 - theta_c, 1e-6), 1.0)
+    outwards = ops.sqrt(1 - ops.sqrt(1 - share))
+    return 0.5 + 0.5 * ops.select(beyond < 0, within, -outwards)
+
+
+def to_angle(x: Value, theta_c: Value) -> Value:
+    """Cosine of the angle of incidence at coordinate x."""
+    within, outwards = 2 * x - 1, ops.maximum(1 - 2 * x, 0.0)
+    share = outwards * outwards * (2 - outwards * outwards)
+    return ops.cos(ops.select(x > 0.5, theta_c * (1 - within * within), theta_c + (pi / 2 - theta_c) * share))

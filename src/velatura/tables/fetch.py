@@ -1,0 +1,120 @@
+"""Look up averages of Fresnel: the directional albedo FGD and the correction for total internal reflection.
+
+What depends on the index alone is a `Row`, made once per material; what depends on direction is one look-up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from velatura import ops
+from velatura.ops import Value
+from velatura.optics import fresnel
+from velatura.tables import coordinates
+from velatura.tables.store import Table, Tables
+
+
+@dataclass(frozen=True)
+class Row:
+    """Fresnel of one relative index at the nodes of a low-rank table.
+
+    `denser` and `rarer` tell whether the relative index can be above and below 1 (for metals: whether it can be
+    anywhere but, and in, the corner kappa < eta < 1): what cannot be is not looked up.
+    """
+
+    table: Table
+    reflectance: Sequence[Value]
+    eta: Value
+    kappa: Value | None
+    denser: bool = True
+    rarer: bool = True
+
+
+def dielectric_row(tables: Tables, eta: Value, constant: bool = False) -> Row:
+    """Row of a dielectric of relative index eta > 0; `constant` says that eta may be looked at now."""
+    nodes = tables.dielectric.nodes
+    reflectance = [fresnel.dielectric(c, eta) for c in nodes]
+    denser, rarer = _sides(eta < 1) if constant else (True, True)
+    return Row(tables.dielectric, reflectance, eta, None, denser, rarer)
+
+
+def conductor_row(tables: Tables, eta: Value, kappa: Value, constant: bool = False) -> Row:
+    """Row of a conductor of relative index eta + i kappa."""
+    nodes = tables.conductor.nodes
+    reflectance = [fresnel.conductor(c, eta, kappa) for c in nodes]
+    denser, rarer = _sides(_in_corner(eta, kappa)) if constant else (True, True)
+    return Row(tables.conductor, reflectance, eta, kappa, denser, rarer)
+
+
+def mirror_row(tables: Tables) -> Row:
+    """Row of an interface that reflects all light."""
+    return Row(tables.dielectric, [1.0] * len(tables.dielectric.nodes), 1.0, None, rarer=False)
+
+
+def fgd(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
+    """Single-scatter directional albedo of a GGX interface (Belcour 2018, Eq. 2), shape of colour against direction."""
+    channels = ops.interpolate(row.table, coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha))
+    above = _dot(channels, row.reflectance)
+    if not row.rarer:
+        return above
+    below = _dot(channels, [1.0] * len(channels)) * _mean_fresnel_inside(tables, row, cos_theta, alpha)
+    if not row.denser:
+        return below
+    return ops.select(row.eta < 1 if row.kappa is None else _in_corner(row.eta, row.kappa), below, above)
+
+
+def tir(tables: Tables, form: str, eta: Value, cos_theta: Value, alpha: Value) -> Value:
+    """Share of the light reflected at (cos_theta, alpha) that leaves upwards into a medium of relative index eta.
+
+    `published` is the mean of 1 - F(cos_theta_o), which counts Fresnel as well; `clean` the energy within the critical
+    cone.
+    """
+    if form == "clean":
+        return ops.select(eta < 1, _fetch_inside(tables.tir_clean, eta, cos_theta, alpha)[0], 1.0)
+    outside = tables.tir_published_outside
+    channels = ops.interpolate(outside, coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha))
+    above = 1 - _dot(channels, [fresnel.dielectric(c, eta) for c in outside.nodes])
+    return ops.select(eta < 1, _fetch_inside(tables.tir_published, eta, cos_theta, alpha)[0], above)
+
+
+def _mean_fresnel_inside(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
+    if row.kappa is None:
+        return _fetch_inside(tables.inside, row.eta, cos_theta, alpha)[0]
+    channels = _fetch_inside(tables.absorbing_inside, row.eta, cos_theta, alpha)
+    theta_c = _critical_angle(row.eta)
+    angles = [coordinates.to_angle(x, theta_c) for x in tables.absorbing_inside.nodes]
+    return 1 - _dot(channels, [1 - fresnel.conductor(c, row.eta, row.kappa) for c in angles])
+
+
+def _fetch_inside(table: Table, eta: Value, cos_theta: Value, alpha: Value) -> list[Value]:
+    theta_c = _critical_angle(eta)
+    return ops.interpolate(
+        table,
+        coordinates.from_angle(cos_theta, theta_c),
+        coordinates.from_roughness(alpha),
+        coordinates.from_critical_angle(theta_c),
+    )
+
+
+def _critical_angle(eta: Value) -> Value:
+    below_1 = ops.minimum(eta, 1.0)
+    return ops.arctan2(below_1, ops.sqrt(1 - below_1 * below_1))
+
+
+def _in_corner(eta: Value, kappa: Value) -> Value:
+    return (eta < 1) & (kappa < eta)
+
+
+def _sides(rarer: Value) -> tuple[bool, bool]:
+    sides = np.asarray(rarer)
+    return not bool(sides.all()), bool(sides.any())
+
+
+def _dot(a: Sequence[Value], b: Sequence[Value]) -> Value:
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:]):
+        total = total + x * y
+    return total

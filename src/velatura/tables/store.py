@@ -1,0 +1,81 @@
+"""The tables as objects and as one file of the package."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+FILE = Path(__file__).with_name("tables.npz")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Single-precision values at the nodes i/(N-1) of a two- or three-dimensional grid, channels on the last axis.
+
+    `nodes` tell the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in three
+    dimensions coordinates on the angular axis.
+    """
+
+    data: np.ndarray
+    nodes: tuple[float, ...] = ()
+    _textures: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    def texture(self, dialect: Any) -> Any:
+        """The table as a texture of a Dr.Jit module (`drjit.llvm.ad`, say), made at first use."""
+        if dialect not in self._textures:
+            import drjit as dr
+
+            kind = getattr(dialect, f"Texture{self.data.ndim - 1}f")
+            tensor = dialect.TensorXf(self.data)
+            self._textures[dialect] = kind(tensor, filter_mode=dr.FilterMode.Linear, wrap_mode=dr.WrapMode.Clamp)
+        return self._textures[dialect]
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """All that `fgd` and `tir` look up; `build` says what each one holds."""
+
+    dielectric: Table
+    conductor: Table
+    inside: Table
+    absorbing_inside: Table
+    tir_published: Table
+    tir_published_outside: Table
+    tir_clean: Table
+
+    def upload(self, dialect: Any) -> None:
+        """Make all textures of a Dr.Jit module now, as they cannot be made while a kernel is being recorded."""
+        for _, table in self.items():
+            table.texture(dialect)
+
+    def items(self) -> list[tuple[str, Table]]:
+        return [(f.name, getattr(self, f.name)) for f in fields(self)]
+
+
+def save(tables: Tables, path: Path = FILE) -> None:
+    """Write the tables, whole or not at all."""
+    arrays: dict[str, Any] = {}
+    for name, table in tables.items():
+        arrays[name] = table.data
+        arrays[f"{name}.nodes"] = np.array(table.nodes)
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        with temporary.open("wb") as file:
+            np.savez_compressed(file, **arrays)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@cache
+def load() -> Tables:
+    """The tables shipped with the package."""
+    with np.load(FILE) as arrays:
+        return Tables(
+            **{f.name: Table(arrays[f.name], tuple(arrays[f"{f.name}.nodes"].tolist())) for f in fields(Tables)}
+        )
