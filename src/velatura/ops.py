@@ -22,7 +22,7 @@ import numpy as np
 
 Value = Any  # a float, a NumPy array or a Dr.Jit array
 
-TINY = 1e-20
+TINY = 1e-15  # whose square, in gradients of quotients, single precision still holds
 
 
 class Gridded(Protocol):
@@ -105,7 +105,7 @@ class _DrJit:
         colour = next((type(x) for x in coordinates if self._is_colour(x)), None)
         if colour is not None:
             channels = [[x[c] if self._is_colour(x) else x for x in coordinates] for c in range(len(colour()))]
-            return [colour(*values) for values in zip(*(self.interpolate(table, x) for x in channels))]
+            return [colour(*values) for values in zip(*(interpolate(table, *x) for x in channels))]
         number = next(type(x) for x in coordinates if not isinstance(x, float))
         texture = table.texture(sys.modules[number.__module__])
         centres = [(x * (n - 1) + 0.5) / n for x, n in zip(coordinates, table.data.shape)]

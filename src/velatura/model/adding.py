@@ -62,9 +62,7 @@ def top(prepared: Prepared, cos_theta: Value) -> State:
     return State(cos_theta, 0.0, 1.0, 1.0, none, none, none, 1.0, 1.0)
 
 
-def add(
-    prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Direction
-) -> tuple[State, Lobe | None]:
+def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Direction) -> tuple[State, Lobe | None]:
     """The state below one more layer, and the lobe that this layer reflects (None for a medium)."""
     mean = ops.mean if prepared.model.channels == "mean" else _each
     if isinstance(layer, PreparedMedium):

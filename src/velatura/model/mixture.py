@@ -1,4 +1,4 @@
-"""A mixture of GGX lobes as a BSDF: value, density, sampling.
+"""A mixture of GGX lobes, with or without a diffuse base, as a BSDF: value, density, sampling.
 
 All reflected lobes share the mirror direction of wi; they differ in energy and roughness (Belcour 2018, Eqs. 39-40).
 """
@@ -6,9 +6,11 @@ All reflected lobes share the mirror direction of wi; they differ in energy and 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import pi
 
 from velatura import ops
 from velatura.model.adding import Lobe
+from velatura.model.diffuse import Base
 from velatura.model.variance import Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
@@ -17,21 +19,27 @@ from velatura.optics.ggx import Direction
 ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
 
 
-def probabilities(lobes: Sequence[Lobe]) -> list[Value]:
-    """Of sampling each lobe: its share of the energy."""
-    energies = [ops.mean(lobe.energy) + 1e-9 for lobe in lobes]  # the offset decides where no lobe has any
+def probabilities(lobes: Sequence[Lobe], base: Base | None) -> list[Value]:
+    """Of sampling each lobe, and at last the base: its share of the energy."""
+    parts = [*lobes, *([base] if base else [])]
+    energies = [ops.mean(part.energy) + 1e-9 for part in parts]  # the offset decides where none has any
     total = sum(energies[1:], energies[0])
     return [energy / total for energy in energies]
 
 
-def eval_pdf(lobes: Sequence[Lobe], wi: Direction, wo: Direction) -> tuple[Value, Value]:
+def eval_pdf(lobes: Sequence[Lobe], base: Base | None, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
     above = (wi[2] > 0) & (wo[2] > 0)
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
     jacobian = 0.25 / ops.maximum(wi[2], ops.TINY)
+    shares = probabilities(lobes, base)
     value: Value = 0.0
     density: Value = 0.0
-    for lobe, probability in zip(lobes, probabilities(lobes)):
+    if base:
+        cos_o = ops.maximum(wo[2], 0.0)
+        value = base.value((wo[0], wo[1], cos_o)) * cos_o
+        density = shares[-1] * cos_o / pi
+    for lobe, probability in zip(lobes, shares):
         alpha_u, alpha_v, i, o, m = _in_frame(lobe.roughness, wi, wo, h)
         visible = ggx.ndf(m, alpha_u, alpha_v) * ggx.masking(i, alpha_u, alpha_v) * jacobian
         value = value + lobe.energy * (visible * ggx.masking(o, alpha_u, alpha_v))
@@ -39,20 +47,28 @@ def eval_pdf(lobes: Sequence[Lobe], wi: Direction, wo: Direction) -> tuple[Value
     return ops.select(above, value, 0.0), ops.select(above, density, 0.0)
 
 
-def sample(lobes: Sequence[Lobe], wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
-    """A direction wo from uniform numbers: a lobe by its energy, then a visible normal of that lobe.
+def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction wo from uniform numbers: a lobe by its energy, then a visible normal of that lobe, or the base's cosine.
 
     The direction may lie below the surface, where `eval_pdf` is 0.
     """
     # Pick a lobe: of those that begin below u, the last
+    shares = probabilities(lobes, base)
     chosen, begin = _bounded(lobes[0].roughness), 0.0
-    for lobe, before in zip(lobes[1:], probabilities(lobes)):
+    for lobe, before in zip(lobes[1:], shares):
         begin = begin + before
         chosen = Roughness(*(ops.select(u > begin, a, b) for a, b in zip(_bounded(lobe.roughness), chosen)))
     # Reflect about a normal visible from wi
     frame_wi = ggx.rotate(wi, chosen.rotation)
     h = ggx.sample_visible(frame_wi, chosen.alpha_u, chosen.alpha_v, u1, u2)
-    return ggx.rotate(ggx.reflect(frame_wi, h), -chosen.rotation)
+    wo = ggx.rotate(ggx.reflect(frame_wi, h), -chosen.rotation)
+    if not base:
+        return wo
+    # Or scatter at the base
+    radius, phi = ops.sqrt(u1), 2 * pi * u2
+    scattered = radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1)
+    from_base = u > 1 - shares[-1]
+    return tuple(ops.select(from_base, a, b) for a, b in zip(scattered, wo))  # type: ignore[return-value]
 
 
 def _bounded(roughness: Roughness) -> Roughness:

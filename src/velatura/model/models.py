@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from dataclasses import dataclass
 
 from velatura.errors import InvalidInput
+from velatura.stack.schema import unknown
 
 #: Every switch with its values; `Model` says what each one means.
 SWITCHES: dict[str, tuple[str, ...]] = {
@@ -24,7 +24,7 @@ class Model:
     """A set of choices.
 
     Args:
-        reflectance: energy that an interface reflects: `fresnel` at the mean direction, or its directional albedo `fgd`.
+        reflectance: energy that an interface reflects: `fresnel` at the mean direction, or directional albedo (`fgd`).
         tir: share of light that leaves upwards after a reflection from inside: all of it (`off`), the `published` mean
             of 1 - F, or the energy fraction within the critical cone (`clean`).
         map: the roughness map f, from GGX roughness to a variance that adds.
@@ -51,7 +51,7 @@ class Model:
         """
         for key, value in switches.items():
             if key not in SWITCHES:
-                raise InvalidInput(f"unknown switch {key!r}{_nearest(key, SWITCHES)}")
+                raise InvalidInput(unknown("switch", key, SWITCHES))
             if value not in SWITCHES[key]:
                 raise InvalidInput(f"{key}: must be one of {', '.join(SWITCHES[key])}, got {value!r}")
         return dataclasses.replace(self, **switches)
@@ -82,11 +82,5 @@ def named(model: str | Model, **switches: str) -> Model:
         return model.with_switches(**switches)
     found = next((m for m in MODELS if m.name == model), None)
     if found is None:
-        raise InvalidInput(f"unknown model {model!r}{_nearest(model, [m.name for m in MODELS])}")
+        raise InvalidInput(unknown("model", model, [m.name for m in MODELS]))
     return found.with_switches(**switches)
-
-
-def _nearest(word: str, known: object) -> str:
-    options = list(known)  # type: ignore[call-overload]
-    close = difflib.get_close_matches(word, options, n=1)
-    return f"; did you mean {close[0]}?" if close else f"; known: {', '.join(options)}"

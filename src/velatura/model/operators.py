@@ -52,9 +52,10 @@ def interface(
         r = fresnel.dielectric(cos_theta, layer.eta)
     else:
         r = fresnel.conductor(cos_theta, layer.eta, layer.kappa)
+    r = ops.clip(r, 0.0, 1.0)  # which fits and rounding leave by their errors
     leaving = None
     if model.tir != "off" and layer.n_leaving is not None:
-        leaving = tables.tir(prepared.tables, model.tir, layer.n_leaving, cos_fetch, alpha)
+        leaving = ops.clip(tables.tir(prepared.tables, model.tir, layer.n_leaving, cos_fetch, alpha), 0.0, 1.0)
     if layer.opaque:
         return Operator(r, 0.0, 0.0, 0.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
 

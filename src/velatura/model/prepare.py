@@ -22,8 +22,8 @@ from velatura.tables import Row, Tables
 class PreparedInterface:
     """An interface below a medium of index eta_1 and above one of index eta_2 (colours; kappa None for a dielectric).
 
-    `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is the mean of eta
-    over the channels: one refracted direction for all colours. `n_leaving` is the same for light that goes up from
+    `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is the mean of
+    eta over the channels: one refracted direction for all colours. `n_leaving` is the same for light that goes up from
     here through the interface above: None for the first interface.
     """
 
@@ -50,14 +50,27 @@ class PreparedMedium:
 
 
 @dataclass(frozen=True)
+class PreparedBase:
+    """A diffuse base: albedo, relative index n = eta_n/eta_0 of the medium at it, mean reflectance of the stack above.
+
+    All are colours; the mean reflectance, for diffuse light from below, is known once the layers are.
+    """
+
+    albedo: Value
+    n: Value
+    mean_reflectance: Value = 0.0
+
+
+@dataclass(frozen=True)
 class Prepared:
-    """The layers from the top, a diffuse base left out; the model's parts that they were prepared for."""
+    """The layers from the top, a diffuse base apart; the model's parts that they were prepared for."""
 
     model: Model
     layers: tuple[PreparedInterface | PreparedMedium, ...]
     variance: type[Variance]
     f: RoughnessMap
     tables: Tables
+    base: PreparedBase | None = None
 
 
 def variance_kind(kinds: Sequence[str], values: Mapping[str, object]) -> type[Variance]:
@@ -91,17 +104,19 @@ def prepare(
     """
     shared = tables.load()
     layers: list[PreparedInterface | PreparedMedium] = []
-    eta_1, n_leaving = values["exterior"], None
+    eta_1, n_leaving, base = values["exterior"], None, None
     for i, kind in enumerate(kinds):
         layer = {key.partition("_")[2]: value for key, value in values.items() if key.startswith(f"layer{i}_")}
         if kind == "medium":
             layers.append(_medium(layer))
-        elif kind != "diffuse":
+        elif kind == "diffuse":
+            base = PreparedBase(layer["albedo"], eta_1 / values["exterior"])
+        else:
             interface = _interface(kind, layer, eta_1, n_leaving, model, variance, shared, constant)
             layers.append(interface)
             if kind == "dielectric":
                 eta_1, n_leaving = layer["eta"], ops.mean(eta_1 / layer["eta"])
-    return Prepared(model, tuple(layers), variance, MAPS[model.map], shared)
+    return Prepared(model, tuple(layers), variance, MAPS[model.map], shared, base)
 
 
 def _medium(layer: Mapping[str, Value]) -> PreparedMedium:

@@ -63,7 +63,9 @@ def statistics(
     chosen = named(model, **switches)
     cosine, azimuth = (np.atleast_1d(np.asarray(x, float)) for x in np.broadcast_arrays(cos_theta, phi))
     if not (np.all(cosine > 0) and np.all(cosine <= 1)):
-        raise InvalidInput(f"cos_theta: must lie in 0 (excluded) to 1, got {cosine[~((cosine > 0) & (cosine <= 1))][0]:g}")
+        raise InvalidInput(
+            f"cos_theta: must lie in 0 (excluded) to 1, got {cosine[~((cosine > 0) & (cosine <= 1))][0]:g}"
+        )
     flat = stack.flat()
     values = {name: number(name, value) for name, value in flat.items()}
     prepared = prepare(stack.kinds, values, chosen, variance_kind(stack.kinds, flat))
@@ -86,7 +88,9 @@ def number(name: str, value: Any) -> Any:
         InvalidInput: a texture, which has no one value.
     """
     if isinstance(value, Texture):
-        raise InvalidInput(f"{name}: is a texture, and lobes are those of one point; replace it, as in --set {name}=0.1")
+        raise InvalidInput(
+            f"{name}: is a texture, and lobes are those of one point; replace it, as in --set {name}=0.1"
+        )
     if isinstance(value, Named):
         value = spectra.rgb(value)
     if name.partition("_")[2] in COLOURS:

@@ -16,7 +16,14 @@ def cos_transmitted(cos_theta: Value, eta: Value) -> Value:
 
 def dielectric(cos_theta: Value, eta: Value) -> Value:
     """Reflectance of a dielectric of relative index eta > 0 at cos_theta in [0, 1]; 1 under total reflection."""
-    cos_t = cos_transmitted(cos_theta, eta)
+    return dielectric_between(cos_theta, cos_transmitted(cos_theta, eta), eta)
+
+
+def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
+    """Reflectance of a dielectric for given cosines on both sides, which Snell's law need not join.
+
+    So can several colours share one refracted direction; the reflectance is the same from either side.
+    """
     r_s = 1 - 2 * ops.divide(eta * cos_t, cos_theta + eta * cos_t)
     r_p = 1 - 2 * ops.divide(cos_t, eta * cos_theta + cos_t)
     return 0.5 * (r_s * r_s + r_p * r_p)

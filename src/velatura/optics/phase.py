@@ -14,7 +14,7 @@ from velatura.optics.ggx import Direction
 
 def henyey_greenstein(cos_theta: Value, g: Value) -> Value:
     """Density per solid angle, in 1/sr, for asymmetry g in (-1, 1)."""
-    d = 1 + g * g - 2 * g * cos_theta
+    d = (1 - g) * (1 - g) + 2 * g * (1 - cos_theta)
     return (1 - g * g) / (4 * pi * d * ops.sqrt(d))
 
 

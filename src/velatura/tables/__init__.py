@@ -3,4 +3,16 @@
 from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, mirror_row, tir
 from velatura.tables.store import FILE, Table, Tables, load, save
 
-__all__ = ["FILE", "Row", "Table", "Tables", "conductor_row", "dielectric_row", "fgd", "load", "mirror_row", "save", "tir"]
+__all__ = [
+    "FILE",
+    "Row",
+    "Table",
+    "Tables",
+    "conductor_row",
+    "dielectric_row",
+    "fgd",
+    "load",
+    "mirror_row",
+    "save",
+    "tir",
+]

@@ -1,7 +1,7 @@
 """Where the nodes of the tables lie: maps between [0, 1] and cosines, roughnesses and relative indices.
 
-Nodes crowd where the averages bend: at grazing angles, at low roughness and, for light inside a denser medium, at the
-critical angle, which the angular axis of the three-dimensional tables follows.
+Nodes crowd where the averages bend: at grazing angles, at low roughness, at critical angles near grazing and, for light
+inside a denser medium, at the critical angle, which the angular axis of the three-dimensional tables follows.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ def to_roughness(x: np.ndarray) -> np.ndarray:
 
 
 def from_critical_angle(theta_c: Value) -> Value:
-    return (theta_c - _CRITICAL_MIN) / (pi / 2 - _CRITICAL_MIN)
+    x = (theta_c - _CRITICAL_MIN) / (pi / 2 - _CRITICAL_MIN)
+    return x / (1.5 - 0.5 * x)
 
 
 def to_critical_angle(x: np.ndarray) -> np.ndarray:
-    return _CRITICAL_MIN + x * (pi / 2 - _CRITICAL_MIN)
+    return _CRITICAL_MIN + 1.5 * x / (1 + 0.5 * x) * (pi / 2 - _CRITICAL_MIN)
 
 
 def from_angle(cos_theta: Value, theta_c: Value) -> Value:

@@ -17,8 +17,8 @@ FILE = Path(__file__).with_name("tables.npz")
 class Table:
     """Single-precision values at the nodes i/(N-1) of a two- or three-dimensional grid, channels on the last axis.
 
-    `nodes` tell the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in three
-    dimensions coordinates on the angular axis.
+    `nodes` tell the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in
+    three dimensions coordinates on the angular axis.
     """
 
     data: np.ndarray
@@ -32,7 +32,12 @@ class Table:
 
             kind = getattr(dialect, f"Texture{self.data.ndim - 1}f")
             tensor = dialect.TensorXf(self.data)
-            self._textures[dialect] = kind(tensor, filter_mode=dr.FilterMode.Linear, wrap_mode=dr.WrapMode.Clamp)
+            self._textures[dialect] = kind(
+                tensor,
+                use_accel=False,  # a GPU's own filter keeps eight bits of the position
+                filter_mode=dr.FilterMode.Linear,
+                wrap_mode=dr.WrapMode.Clamp,
+            )
         return self._textures[dialect]
 
 

@@ -1,0 +1,39 @@
+# `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
+.DEFAULT_GOAL := help
+.PHONY: help demo test bench docs lint setup
+
+BIN := .venv/bin
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-6s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+demo: .venv/ready ## install, and render the preset coated-gold
+	@echo "Rendering the preset coated-gold"
+	@$(BIN)/velatura render coated-gold -o coated-gold.png
+	@echo "The picture is $(CURDIR)/coated-gold.png"
+
+test: lint ## install, and run all checks: ruff, mypy, pytest
+	$(BIN)/pytest -q
+
+lint: .venv/ready-dev ## ruff and mypy
+	$(BIN)/ruff check
+	$(BIN)/mypy
+
+bench: .venv/ready ## measure speed and start-up times
+	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+
+docs: .venv/ready-docs ## build the manual into site/
+	$(BIN)/mkdocs build --strict --quiet
+	@echo "The manual is $(CURDIR)/site/index.html"
+
+setup: .venv/ready-dev ## install what development needs, and the pre-commit hooks
+	@$(BIN)/pre-commit install
+
+.venv/ready: pyproject.toml tools/setup.sh
+	@tools/setup.sh
+	@touch $@
+
+# What development or the manual needs contains what running needs.
+.venv/ready-%: pyproject.toml tools/setup.sh
+	@tools/setup.sh $*
+	@touch .venv/ready $@

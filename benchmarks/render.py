@@ -1,0 +1,109 @@
+"""Render time of the plugin `layered` as ratios to Mitsuba's `principled`, interleaved in one run.
+
+The material ball fills over 60 % of a 512x512 picture under an environment map, 64 spp, path with max_depth 4; model
+defaults with tables and total internal reflection on. Beside it: `eval_pdf` alone, and textured parameters.
+
+    python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb]
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from statistics import median
+
+import numpy as np
+
+import velatura as vt
+from velatura import kernel
+from velatura.scenes import scene_dict
+
+ZOOM = 1.25
+
+
+def stacks() -> dict[str, vt.Stack]:
+    """What is measured: two interfaces and five, isotropic, all that the model has switched on."""
+    metal = vt.Interface(conductor="Au", alpha=0.2)
+    coats = [vt.Interface(eta=n, alpha=a) for n, a in ((1.5, 0.05), (1.7, 0.1), (1.4, 0.05), (1.6, 0.1))]
+    return {"two interfaces": vt.Stack([coats[0], metal]), "five interfaces": vt.Stack([*coats, metal])}
+
+
+def textured(mi, stack: vt.Stack):
+    """The stack with the roughness and the index of its coat from a texture."""
+    rng = np.random.default_rng(0)
+
+    def image(low: float, high: float) -> dict:
+        texels = rng.uniform(low, high, (256, 256, 1)).astype(np.float32)
+        return {"type": "bitmap", "bitmap": mi.Bitmap(texels), "raw": True}
+
+    material = vt.stack.dumps(stack, "json")
+    maps = {"layer0_alpha": image(0.02, 0.1), "layer0_eta": image(1.4, 1.6)}
+    return mi.load_dict({"type": "layered", "material": material, **maps})
+
+
+def bsdfs(mi) -> dict:
+    """By name, the yardstick first."""
+    found = {"principled": mi.load_dict({"type": "principled", "roughness": 0.2, "metallic": 0.8, "clearcoat": 0.5})}
+    found |= {name: vt.bsdf(stack) for name, stack in stacks().items()}
+    found["two, textured"] = textured(mi, stacks()["two interfaces"])
+    return found
+
+
+def interleaved(jobs: dict, rounds: int) -> dict[str, float]:
+    """Median over rounds of each job's time over the first one's in the same round."""
+    times: dict[str, list[float]] = {name: [] for name in jobs}
+    for job in jobs.values():
+        job(0)  # compile
+    for number in range(rounds):
+        for name, job in jobs.items():
+            start = time.perf_counter()
+            job(number + 1)
+            times[name].append(time.perf_counter() - start)
+    first = next(iter(times.values()))
+    return {name: median(t / f for t, f in zip(values, first)) for name, values in times.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--variant", default="llvm_ad_rgb")
+    arguments = parser.parse_args()
+    mi = kernel.mitsuba(arguments.variant)
+    import drjit as dr
+
+    vt.register()
+    materials = bsdfs(mi)
+
+    def picture(bsdf):
+        description = scene_dict("ball", "studio", bsdf, (arguments.size, arguments.size), ZOOM)
+        scene = mi.load_dict({**description, "integrator": {"type": "path", "max_depth": 4}})
+
+        def job(seed: int) -> None:
+            dr.eval(mi.render(scene, spp=arguments.spp, seed=seed))
+            dr.sync_thread()
+
+        return job
+
+    def evaluation(bsdf, count: int = 1 << 22):
+        rng = mi.PCG32(count)
+
+        def job(seed: int) -> None:
+            si = dr.zeros(mi.SurfaceInteraction3f, count)
+            si.wi = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
+            si.uv = mi.Point2f(rng.next_float32(), rng.next_float32())
+            wo = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
+            dr.eval(bsdf.eval_pdf(mi.BSDFContext(), si, wo))
+            dr.sync_thread()
+
+        return job
+
+    for title, make in (("render", picture), ("eval_pdf", evaluation)):
+        ratios = interleaved({name: make(bsdf) for name, bsdf in materials.items()}, arguments.rounds)
+        for name, ratio in ratios.items():
+            print(f"{title:10s} {name:16s} {ratio:.3f}")
+
+
+if __name__ == "__main__":
+    main()

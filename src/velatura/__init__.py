@@ -1,0 +1,51 @@
+"""Layered materials: rendered by statistics of light, held to a ground truth, and inverted.
+
+Importing this package imports no renderer and sets no variant of one; what needs more is imported at first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from velatura.api import bsdf, lobes, register, render
+    from velatura.model import MODELS, Model
+    from velatura.stack import Diffuse, Interface, Medium, Stack, Texture, load, preset, presets, save
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "velatura.api": ("bsdf", "lobes", "register", "render"),
+    "velatura.model": ("MODELS", "Model"),
+    "velatura.stack": ("Diffuse", "Interface", "Medium", "Stack", "Texture", "load", "preset", "presets", "save"),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "MODELS",
+    "Diffuse",
+    "Interface",
+    "Medium",
+    "Model",
+    "Stack",
+    "Texture",
+    "bsdf",
+    "load",
+    "lobes",
+    "preset",
+    "presets",
+    "register",
+    "render",
+    "save",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME_OF:
+        return getattr(import_module(_HOME_OF[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,5 @@
+"""`python -m velatura` is `velatura`."""
+
+from velatura.cli import main
+
+main()

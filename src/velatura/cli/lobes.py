@@ -1,0 +1,77 @@
+"""`velatura lobes`: the lobes of a material at given directions, as a table or as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from velatura.cli import options
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+# A lobe's quantities in the order of the JSON, and whether their components (rgb, uv, ...) stand before the directions.
+FIELDS = {"energy": True, "alpha": True, "rotation": False, "covariance": True}
+
+
+def lobes(
+    material: options.Material,
+    cos: Annotated[str, typer.Option(metavar="C,C,...", help="Cosines of the incident directions, in (0, 1].")] = "1",
+    phi: Annotated[
+        float, typer.Option(min=-360, max=360, metavar="DEGREES", help="Azimuth of the incident directions.")
+    ] = 0.0,
+    model: options.Model = None,
+    settings: options.Settings = None,
+    as_json: options.Json = False,
+) -> None:
+    """Print the lobes of a material: energy, roughness, rotation."""
+    cosines = options.cosines(cos)
+    stack, switches = options.read(material, settings)
+    import velatura
+
+    name = options.model_name(model)
+    found = velatura.lobes(stack, cos_theta=cosines, phi=math.radians(phi), model=name, **switches)
+    below = found.transmitted
+    reflected = [{field: getattr(found, field)[k] for field in FIELDS} for k in range(len(found.energy))]
+    transmitted = below and {field: getattr(below, field) for field in FIELDS}
+
+    if as_json:
+        report = {"model": name, "cos": cosines, "reflected": [_plain(lobe) for lobe in reflected]}
+        print(json.dumps(report | {"transmitted": transmitted and _plain(transmitted)}, allow_nan=False))
+    else:
+        from rich.console import Console
+
+        named = {f"R{k}": lobe for k, lobe in enumerate(reflected, 1)} | ({"T": transmitted} if transmitted else {})
+        Console().print(_table(f"{stack.name or material} ({name})", cosines, named))
+
+
+def _plain(lobe: dict[str, Any]) -> dict[str, Any]:
+    """Nested lists with the directions outside the components: an array (..., 2, N) becomes lists (..., N, 2)."""
+    return {field: (values.swapaxes(-1, -2) if FIELDS[field] else values).tolist() for field, values in lobe.items()}
+
+
+def _table(title: str, cosines: list[float], lobes: dict[str, dict[str, Any]]) -> Table:
+    """A row per direction and lobe: R1 is the first interface from the top, T what leaves below."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("cos", "lobe", title=Text(title), title_justify="left")
+    for column in ("energy", "alpha", "rotation"):
+        table.add_column(column, justify="right")
+    for i, cosine in enumerate(cosines):
+        for name, lobe in lobes.items():
+            energy, alpha, rotation = (lobe[field][..., i] for field in ("energy", "alpha", "rotation"))
+            degrees = _cell(rotation * 180 / math.pi, ".1f")
+            table.add_row(f"{cosine:g}", name, _cell(energy), _cell(alpha), f"{degrees}°")
+        table.add_section()
+    return table
+
+
+def _cell(values: Any, form: str = ".4f") -> str:
+    """Numbers in a line; where there is one set of them per channel, a line each."""
+    if values.ndim > 1:
+        return "\n".join(_cell(row, form) for row in values)
+    return " ".join(format(value, form) for value in values.ravel())

@@ -1,0 +1,82 @@
+"""The arguments that verbs share: the material, the model, `--set`, and how they are read."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from velatura.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from velatura.stack import Stack
+
+Material = Annotated[str, typer.Argument(metavar="M", help="A material file (YAML or JSON), or the name of a preset.")]
+Model = Annotated[str | None, typer.Option("--model", metavar="NAME", help="The named model; else the default one.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="A switch of the model (tir=off) or a parameter of the material (layer0_alpha=0.2); may be repeated.",
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+
+
+def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, Any]]:
+    """The stack that the user named, and the switches of the model, as `--set` changes them.
+
+    Raises `InvalidInput` for a file that is no material, and for a setting that is neither a switch nor a parameter.
+    """
+    from velatura.model import SWITCHES
+    from velatura.stack import load
+    from velatura.stack.schema import unknown
+
+    stack = load(material)
+    others = [*SWITCHES, *(name for name in stack.flat() if not _of_layer(name)), "thin", "layer0_..."]
+    switches: dict[str, Any] = {}
+    parameters: dict[str, Any] = {}
+    for key, value in map(_pair, settings or ()):
+        if key in SWITCHES:
+            switches[key] = value
+        elif _of_layer(key) or key in others:
+            parameters[key] = _value(value)
+        else:
+            raise InvalidInput(f"--set {key}: {unknown('key', key, others)}")
+    return stack.replace(**parameters) if parameters else stack, switches
+
+
+def model_name(name: str | None) -> str:
+    """The model that the user named, else the package's default."""
+    from velatura.model import DEFAULT
+
+    return name or DEFAULT
+
+
+def cosines(text: str) -> list[float]:
+    """The cosines of a list such as `1,0.5`; whether they are cosines is for the model to say."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InvalidInput(f"--cos {text}: needs numbers above 0 and up to 1, separated by commas") from None
+
+
+def _pair(setting: str) -> tuple[str, str]:
+    key, _, value = setting.partition("=")
+    if not (key and value):
+        raise InvalidInput(f"--set {setting}: needs KEY=VALUE")
+    return key, value
+
+
+def _of_layer(key: str) -> bool:
+    return key.startswith("layer")
+
+
+def _value(text: str) -> Any:
+    """What a file would hold: a number, several (`.1,.2,.3`, in brackets or not), true, false, or a name."""
+    try:
+        numbers = tuple(float(part) for part in text.removeprefix("[").removesuffix("]").split(","))
+    except ValueError:
+        return {"true": True, "false": False}.get(text, text)
+    return numbers if len(numbers) > 1 else numbers[0]

@@ -1,0 +1,63 @@
+"""`velatura render`: a picture of a material."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from velatura.cli import options, progress
+from velatura.errors import InvalidInput
+
+LARGEST = 16384  # pixels along one side
+
+
+def render(
+    material: options.Material,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="F", help="PNG (tone-mapped) or EXR (linear); else M with .png, here."),
+    ] = None,
+    scene: Annotated[
+        str, typer.Option(metavar="NAME|F", help="ball, sphere, wedges, or a Mitsuba scene (.xml).")
+    ] = "ball",
+    env: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|F", help="studio, sky, furnace, or an .hdr or .exr file; else the scene's own."),
+    ] = None,
+    model: options.Model = None,
+    spp: Annotated[int, typer.Option(min=1, max=2**20, metavar="N", help="Samples per pixel.")] = 64,
+    size: Annotated[str | None, typer.Option(metavar="N|WxH", help="Pixels; else 512, or the scene's own.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random numbers.")] = 0,
+    settings: options.Settings = None,
+) -> None:
+    """Render a picture of a material."""
+    # Refuse what cannot work before anything slow begins
+    pixels = None if size is None else _size(size)
+    path = output or Path(f"{Path(material).stem}.png")
+    stack, switches = options.read(material, settings)
+    import velatura
+    from velatura import scenes
+
+    scenes.check_writable(path)
+
+    # Render, then write the finished picture in one go
+    start = time.perf_counter()
+    stage: dict[str, Any] = {"scene": scene, "env": env, "spp": spp, "size": pixels, "seed": seed}
+    with progress.bar(f"Rendering {path.name}") as advance:
+        image = velatura.render(stack, model=options.model_name(model), progress=advance, **stage, **switches)
+    scenes.write_image(image, path)
+    height, width = image.shape[:2]
+    print(f"{path}: {width} x {height} pixels, {spp} samples each, {time.perf_counter() - start:.1f} s")
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Width and height from `N` or `WxH`."""
+    match = re.fullmatch(r"(\d{1,5})(?:x(\d{1,5}))?", text)
+    width, height = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
+    if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
+        raise InvalidInput(f"--size {text}: needs N or WxH in pixels, each from 1 to {LARGEST}")
+    return width, height

@@ -1,0 +1,210 @@
+"""The one door to Mitsuba and Dr.Jit: is there an LLVM that works, which variant is set, which of our plugins it knows.
+
+Importing this module imports neither. A Python BSDF class belongs to one Mitsuba variant, so a plugin module does not
+hold a class but a factory, which is called once for every variant that is used::
+
+    @kernel.plugin("layered")
+    def make(mi):
+        class Layered(mi.BSDF): ...
+        return Layered
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import importlib.metadata
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from velatura.errors import MissingTool
+
+Factory = Callable[[ModuleType], type]
+
+#: From this LLVM on, compiling `minimum` is known to work; an older one has to show it in a process of its own.
+TRUSTED_LLVM = 19
+
+_MINIMUM = "import drjit, drjit.llvm as llvm; print(drjit.minimum(llvm.Float([1, 2]), 1.5))"
+
+_factories: dict[str, Factory] = {}
+_registered: set[tuple[str, str]] = set()
+
+
+# Mitsuba and its variant
+
+
+def default_variant() -> str:
+    """The variant that is set where the user has set none."""
+    return "llvm_ad_rgb"
+
+
+def mitsuba(variant: str | None = None) -> ModuleType:
+    """Mitsuba with a variant set: the one asked for, or else the current one, or else `default_variant()`.
+
+    Raises MissingTool where Mitsuba is not installed, or where an LLVM variant would run on an LLVM that is missing or
+    too old (which would end the whole process at the first `minimum`, past anything Python can catch).
+    """
+    _drjit()
+    import mitsuba as mi
+
+    wanted = variant or mi.variant() or default_variant()
+    if wanted.startswith("llvm"):
+        require_llvm()
+    if wanted != mi.variant():
+        mi.set_variant(wanted)
+    return mi
+
+
+# LLVM
+
+
+@functools.cache
+def llvm_version() -> tuple[int, int, int] | None:
+    """Version of the LLVM library that Dr.Jit has picked, None where it found none that it can use."""
+    dr = _drjit()
+    return dr.detail.llvm_version() if dr.has_backend(dr.JitBackend.LLVM) else None
+
+
+def require_llvm() -> None:
+    """Raise MissingTool, naming the command that mends it, unless Dr.Jit's LLVM can compile what we need."""
+    if not _llvm_works():
+        found = "found none that it can use" if llvm_version() is None else f"{_dotted(llvm_version())} is too old"
+        raise MissingTool(f"Dr.Jit needs LLVM {TRUSTED_LLVM} and {found}: run `{llvm_command()}`")
+
+
+def llvm_command() -> str:
+    """The shell command that installs a working LLVM."""
+    unset = "unset DRJIT_LIBLLVM_PATH; " if "DRJIT_LIBLLVM_PATH" in os.environ else ""
+    sudo = "" if os.geteuid() == 0 else "sudo "
+    return f"{unset}{sudo}apt-get update && {sudo}apt-get install -y libllvm{TRUSTED_LLVM}"
+
+
+@functools.cache
+def _llvm_works() -> bool:
+    version = llvm_version()
+    if version is None or version[0] >= TRUSTED_LLVM:
+        return version is not None
+    return _compiles_minimum()
+
+
+def _compiles_minimum() -> bool:
+    return subprocess.run([sys.executable, "-c", _MINIMUM], capture_output=True, check=False).returncode == 0
+
+
+@functools.cache
+def _drjit() -> ModuleType:
+    try:
+        with _quiet_stderr():  # Dr.Jit looks for LLVM while it is imported, and prints what our own message says better
+            import drjit
+            import mitsuba  # noqa: F401
+    except ImportError as error:
+        raise MissingTool(f"Mitsuba does not load ({error}): run `{sys.executable} -m pip install mitsuba`") from error
+    return drjit
+
+
+@contextlib.contextmanager
+def _quiet_stderr() -> Iterator[None]:
+    sys.stderr.flush()
+    saved, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(nowhere)
+
+
+# Our plugins
+
+
+def plugin(name: str) -> Callable[[Factory], Factory]:
+    """Declare the factory below as the BSDF plugin `name`; `register()` makes it known to Mitsuba."""
+
+    def declare(factory: Factory) -> Factory:
+        _factories[name] = factory
+        return factory
+
+    return declare
+
+
+def register() -> None:
+    """Make every declared plugin known to the current variant (if one is set) and to all that are set later."""
+    _drjit()
+    import mitsuba as mi
+
+    _follow_variants()
+    if mi.variant():
+        _register_missing(mi)
+
+
+@functools.cache
+def _follow_variants() -> None:
+    import mitsuba as mi
+
+    mi.detail.add_variant_callback(lambda old, new: _register_missing(mi))
+
+
+def _register_missing(mi: Any) -> None:
+    for name, factory in _factories.items():
+        if (name, mi.variant()) not in _registered:
+            mi.register_bsdf(name, factory(mi))
+            _registered.add((name, mi.variant()))
+
+
+# What is installed
+
+
+class Finding(NamedTuple):
+    """One row of `doctor`: what was looked for, what was found, whether that will do, and the command that mends it."""
+
+    what: str
+    found: str
+    ok: bool
+    mend: str = ""
+
+
+def doctor() -> tuple[Finding, ...]:
+    """What is installed, whether it will do, and else the command that mends it."""
+    packages = [_find_package(name) for name in ("mitsuba", "drjit")]
+    backends = [_find_llvm(), _find_cuda()] if all(row.ok for row in packages) else []
+    return (_find_python(), *packages, *backends)
+
+
+def _find_python() -> Finding:
+    return Finding("Python", _dotted(sys.version_info[:3]), sys.version_info >= (3, 10), "install Python 3.10 or newer")
+
+
+def _find_package(name: str) -> Finding:
+    try:
+        return Finding(name, importlib.metadata.version(name), True)
+    except importlib.metadata.PackageNotFoundError:
+        return Finding(name, "missing", False, f"{sys.executable} -m pip install mitsuba")
+
+
+def _find_llvm() -> Finding:
+    version = llvm_version()
+    if _llvm_works():
+        return Finding("LLVM", _dotted(version), True)
+    return Finding("LLVM", "missing" if version is None else f"{_dotted(version)}, too old", False, llvm_command())
+
+
+def _find_cuda() -> Finding:
+    """A GPU is welcome and never needed, so this row is always fine."""
+    dr = _drjit()
+    if not dr.has_backend(dr.JitBackend.CUDA):
+        return Finding("CUDA", "none (optional)", True)
+    try:
+        ctypes.CDLL("libnvoptix.so.1")
+    except OSError:
+        return Finding("CUDA", f"{_dotted(dr.detail.cuda_version())}, no OptiX: BSDFs run, rendering does not", True)
+    return Finding("CUDA", f"{_dotted(dr.detail.cuda_version())} with OptiX", True)
+
+
+def _dotted(version: tuple[int, ...] | None) -> str:
+    return ".".join(map(str, version or ()))

@@ -1,0 +1,114 @@
+"""From a scene to a picture, and from a picture to a file."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from velatura import kernel
+from velatura.errors import InvalidInput
+from velatura.scenes.stage import Name, scene_dict
+
+#: Samples (pixels x spp) of one pass: between two of them progress is told and an interrupt is heard.
+PASS_SAMPLES = 2**20
+
+
+def render(
+    bsdf: Any,
+    scene: Name = "ball",
+    env: Name | None = None,
+    spp: int = 64,
+    size: tuple[int, int] | None = None,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    zoom: float = 1.0,
+) -> NDArray[np.float32]:
+    """Render a material: linear RGB, float32, of shape (height, width, 3).
+
+    Args:
+        bsdf, scene, env, size, zoom: as for `scene_dict`.
+        spp: samples per pixel.
+        seed: the same seed gives the same picture, but for rounding.
+        progress: called after every pass with (samples per pixel done, spp).
+
+    Raises:
+        InvalidInput, MissingTool: as `scene_dict`; also for spp < 1.
+    """
+    if spp < 1:
+        raise InvalidInput(f"spp is {spp}, and must be at least 1")
+    mi = kernel.mitsuba()
+    loaded = mi.load_dict(scene_dict(scene, env, bsdf, size, zoom))
+    passes = _passes(spp, int(np.prod(loaded.sensors()[0].film().size())))
+    seeds = np.random.SeedSequence(seed).generate_state(len(passes))
+
+    total, done = np.zeros(1, np.float32), 0
+    for samples, pass_seed in zip(passes, seeds):
+        total = total + np.float32(samples) * np.array(mi.render(loaded, spp=samples, seed=int(pass_seed)))
+        done += samples
+        if progress:
+            progress(done, spp)
+    return _rgb(total / np.float32(spp))
+
+
+def _rgb(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A scene file may ask for grey, for an alpha channel, or for more."""
+    return image[..., :3] if image.shape[-1] >= 3 else np.repeat(image[..., :1], 3, axis=-1)
+
+
+def _passes(spp: int, pixels: int) -> list[int]:
+    """Split spp into passes of nearly equal size, none larger than PASS_SAMPLES where that is possible."""
+    count = min(spp, -(-spp * pixels // PASS_SAMPLES))
+    return [spp // count + (i < spp % count) for i in range(count)]
+
+
+def tone_map(linear: ArrayLike, knee: float = 0.7) -> NDArray[np.float64]:
+    """Linear RGB to display values in [0, 1]: a soft shoulder from `knee` to 1, then the sRGB curve.
+
+    Up to the knee a picture is shown as it is; above, highlights approach white without ever reaching it.
+    """
+    x = np.maximum(np.nan_to_num(np.asarray(linear, dtype=np.float64)), 0.0)
+    room = 1.0 - knee
+    x = np.where(x > knee, 1.0 - room * np.exp(-np.maximum(x - knee, 0.0) / room), x)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055)
+
+
+def check_writable(path: Name) -> Path:
+    """The path of a picture, once it is sure that it can be written there. Raises InvalidInput."""
+    target = Path(path)
+    if target.suffix.lower() not in (".png", ".exr"):
+        raise InvalidInput(f"{target}: a picture ends in .png (tone-mapped) or .exr (linear)")
+    if not target.parent.is_dir():
+        raise InvalidInput(f"{target}: there is no folder {target.parent}")
+    if target.is_dir():
+        raise InvalidInput(f"{target}: is a folder")
+    try:
+        tempfile.TemporaryFile(dir=target.parent).close()
+    except OSError as error:
+        raise InvalidInput(f"{target}: the folder {target.parent} is not writable") from error
+    return target
+
+
+def write_image(image: ArrayLike, path: Name) -> None:
+    """Write linear RGB (height, width, 3), whole or not at all: `.png` tone-mapped, `.exr` linear float32.
+
+    Raises InvalidInput where `check_writable` does.
+    """
+    target = check_writable(path)
+    mi = kernel.mitsuba()
+    if target.suffix.lower() == ".png":
+        pixels: Any = np.round(255.0 * tone_map(image)).astype(np.uint8)
+    else:
+        pixels = np.asarray(image, dtype=np.float32)
+
+    unfinished = target.with_name(f".{target.stem}-{os.getpid()}{target.suffix.lower()}")
+    try:
+        mi.Bitmap(pixels).write(str(unfinished))
+        os.replace(unfinished, target)
+    finally:
+        unfinished.unlink(missing_ok=True)

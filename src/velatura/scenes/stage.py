@@ -1,0 +1,148 @@
+"""The whole scene as a Mitsuba dictionary: an object of a material, on a neutral plinth, in an environment, seen."""
+
+from __future__ import annotations
+
+import functools
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura import kernel
+from velatura.errors import InvalidInput
+from velatura.scenes.environments import emitter
+from velatura.scenes.objects import OBJECTS, View
+from velatura.scenes.surfaces import Surface, arc, extrude, lathe
+
+Name = str | os.PathLike[str]
+
+#: The id of the bsdf, in a scene file, whose place the material takes.
+MATERIAL_ID = "material"
+
+#: Longest path in surfaces met; enough for light to leave the ball's cavity.
+MAX_DEPTH = 6
+
+#: A photographer's grey card.
+_GREY = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.18}}
+
+
+def scene_dict(
+    scene: Name = "ball",
+    env: Name | None = None,
+    bsdf: Any = None,
+    size: tuple[int, int] | None = None,
+    zoom: float = 1.0,
+) -> dict[str, Any]:
+    """A scene for `mi.load_dict`, to be rendered as it is or changed first.
+
+    Args:
+        scene: "ball", "sphere", "wedges", or a Mitsuba scene file (.xml), in which every shape whose bsdf has the id
+            "material" gets the material, and which keeps its own cameras, integrator and lights.
+        env: "studio", "sky", "furnace", or an .exr or .hdr file; None means a scene file's own lights, or else the
+            studio. In the furnace the object floats alone, so that a material that loses no light vanishes.
+        bsdf: a `mi.BSDF`, or the dictionary of one.
+        size: width and height in pixels; None means a scene file's own, or else 512 x 512.
+        zoom: how much larger the object appears; at 1 the ball covers half of the picture, at 1.2 three quarters.
+
+    Raises:
+        InvalidInput: an unknown scene or environment, a file that cannot be read, a scene file without a "material".
+        MissingTool: as `kernel.mitsuba`.
+    """
+    mi = kernel.mitsuba()
+    material = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+    if Path(scene).suffix.lower() == ".xml":
+        return _from_file(mi, os.fspath(scene), env, material, size)
+    if scene not in OBJECTS:
+        raise InvalidInput(f"unknown scene {scene!r}: give {', '.join(OBJECTS)}, or a Mitsuba scene file (.xml)")
+
+    chosen = OBJECTS[str(scene)]
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": MAX_DEPTH},
+        "sensor": _camera(mi, chosen.view, size or (512, 512), zoom),
+        "light": emitter(mi, env or "studio"),
+        "object": mesh(mi, chosen.surface(), material),
+        **_surroundings(mi, env or "studio"),
+    }
+
+
+def mesh(mi: Any, surface: Surface, bsdf: Any) -> Any:
+    """A surface of a material, as a `mi.Mesh` of the current variant."""
+    properties = mi.Properties()
+    properties["mesh_bsdf"] = bsdf
+    shape = mi.Mesh("", len(surface.positions), len(surface.triangles), properties, True, True)
+    buffers = mi.traverse(shape)
+    buffers["vertex_positions"] = surface.positions.ravel().astype(np.float32)
+    buffers["vertex_normals"] = surface.normals.ravel().astype(np.float32)
+    buffers["vertex_texcoords"] = surface.uv.ravel().astype(np.float32)
+    buffers["faces"] = surface.triangles.ravel()
+    buffers.update()
+    return shape
+
+
+@functools.cache
+def _plinth() -> Surface:
+    """A low round table, its top at y = 0."""
+    return lathe(np.concatenate([arc((1.65, -0.06), 0.06, -90.0, 90.0, step=15.0), [[0.0, 0.0]]]))
+
+
+@functools.cache
+def _ground() -> Surface:
+    return extrude(np.array([[1e3, -0.12], [0.0, -0.12], [-1e3, -0.12]]), width=2e3)
+
+
+def _surroundings(mi: Any, env: Name) -> dict[str, Any]:
+    if env == "furnace":
+        return {}
+    plinth = {"plinth": mesh(mi, _plinth(), mi.load_dict(_GREY))}
+    below = {"ground": mesh(mi, _ground(), mi.load_dict(_GREY))} if env == "sky" else {}  # the sky ends at the horizon
+    return plinth | below
+
+
+def _camera(mi: Any, view: View, size: tuple[int, int], zoom: float) -> dict[str, Any]:
+    return {
+        "type": "perspective",
+        "fov": float(2.0 * np.degrees(np.arctan(np.tan(np.radians(view.fov / 2.0)) / zoom))),
+        "fov_axis": "smaller",
+        "to_world": mi.ScalarTransform4f().look_at(list(view.origin), list(view.target), [0, 1, 0]),
+        "sampler": {"type": "independent"},
+        "film": {
+            "type": "hdrfilm",
+            "width": size[0],
+            "height": size[1],
+            "pixel_format": "rgb",
+            "component_format": "float32",
+            "rfilter": {"type": "gaussian"},
+        },
+    }
+
+
+def _from_file(mi: Any, path: str, env: Name | None, material: Any, size: tuple[int, int] | None) -> dict[str, Any]:
+    # Read the scene, and give the material to its shapes
+    if not Path(path).is_file():
+        raise InvalidInput(f"{path}: no such scene file")
+    try:
+        read = mi.load_file(path, optimize=False)
+    except RuntimeError as error:
+        raise InvalidInput(f"{path}: {' '.join(str(error).split())}") from error
+    chosen = [shape for shape in read.shapes() if shape.bsdf() is not None and shape.bsdf().id() == MATERIAL_ID]
+    if not chosen:
+        raise InvalidInput(f'{path}: no shape has a bsdf with id="{MATERIAL_ID}", whose place the material would take')
+    for shape in chosen:
+        shape.set_bsdf(material)
+
+    # Keep its lights, those of its shapes aside, unless others are asked for
+    lights = [light for light in read.emitters() if not mi.has_flag(light.flags(), mi.EmitterFlags.Surface)]
+    if env or not read.emitters():
+        lights = [light for light in lights if not light.is_environment()] + [emitter(mi, env or "studio")]
+
+    # Resize its pictures
+    for sensor in read.sensors() if size else ():
+        parameters = mi.traverse(sensor)
+        parameters["film.size"] = list(size or ())
+        parameters.update()
+
+    parts = {"sensor": read.sensors(), "light": lights, "shape": read.shapes()}
+    numbered = {f"{kind}_{i}": part for kind, several in parts.items() for i, part in enumerate(several)}
+    return {"type": "scene", "integrator": read.integrator(), **numbered}

@@ -1,0 +1,97 @@
+"""Build the tables from nothing and measure them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from velatura.optics import fresnel
+from velatura.tables import yardstick
+from velatura.tables.build import build, mean_transmittance_out, share_in_cone
+from velatura.tables.fetch import conductor_row, dielectric_row, fgd, tir
+from velatura.tables.quadrature import Progress, Reflections, average, ignore
+from velatura.tables.store import Table, Tables
+
+POINTS = 2000  # per table
+NODES = 16  # of the truth, on every piece of an integral: good to 1e-5
+
+BUILDING = 0.8  # of the whole time
+
+
+def report(progress: Progress = ignore, with_yardstick: bool = False) -> list[dict[str, Any]]:
+    """One row per table: `table`, `shape`, `bytes`, `rank`, `build_s`, `max_error`, `rms_error`.
+
+    Rank is None where nothing is factored. Errors are those of the look-ups that a table serves, at seeded points with
+    cosine and roughness in [.02, 1], relative index in [.05, 4] and extinction in [0, 4].
+    """
+    built = build(lambda done: progress(BUILDING * done))
+    rows = []
+    for i, (name, errors) in enumerate(_measures(built.tables).items()):
+        rows.append(_row(name, getattr(built.tables, name), built.seconds[name], errors()))
+        progress(BUILDING + (1 - BUILDING) * (i + 1) / len(built.seconds))
+    return [*rows, _yardstick_row()] if with_yardstick else rows
+
+
+def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
+    """For each table, what gives the errors of its look-ups."""
+    cos_theta, alpha, eta, kappa = _points()
+    below, above = 0.05 + 0.95 * eta, 1 + 3 * eta
+    index = 0.05 + 3.95 * eta
+    metal = np.where(index < 1, np.maximum(4 * kappa, index), 4 * kappa)
+
+    def dielectric(eta: np.ndarray) -> np.ndarray:
+        return fgd(tables, dielectric_row(tables, eta), cos_theta, alpha) - _albedo(eta, 0 * eta)
+
+    def conductor(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+        return fgd(tables, conductor_row(tables, eta, kappa), cos_theta, alpha) - _albedo(eta, kappa)
+
+    def leaving(form: str, of: Callable[..., np.ndarray], eta: np.ndarray) -> np.ndarray:
+        return tir(tables, form, eta, cos_theta, alpha) - average(of, "cos_o", cos_theta, alpha, eta, nodes=NODES)
+
+    return {
+        "dielectric": lambda: dielectric(above),
+        "conductor": lambda: conductor(index, metal),
+        "inside": lambda: dielectric(below),
+        "absorbing_inside": lambda: conductor(below, below * kappa),
+        "tir_published": lambda: leaving("published", mean_transmittance_out, below),
+        "tir_published_outside": lambda: leaving("published", mean_transmittance_out, above),
+        "tir_clean": lambda: leaving("clean", share_in_cone, below),
+    }
+
+
+def _yardstick_row() -> dict[str, Any]:
+    start = perf_counter()
+    grid = yardstick.build()
+    seconds = perf_counter() - start
+    cos_theta, alpha, eta, kappa = _points()
+    eta, kappa = 0.05 + 3.95 * eta, 4 * kappa
+    return _row("yardstick", grid, seconds, yardstick.fgd(grid, cos_theta, alpha, eta, kappa) - _albedo(eta, kappa))
+
+
+def _points() -> tuple[np.ndarray, ...]:
+    """Cosines and roughnesses, and two numbers in [0, 1] for indices."""
+    low = np.array([0.02, 0.02, 0.0, 0.0])
+    return tuple(np.random.default_rng(0).uniform(low, 1.0, (POINTS, 4)).T)
+
+
+def _albedo(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+    def reflected(r: Reflections, eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+        return (r.weight * fresnel.conductor(r.cos_d, eta, kappa)).sum(axis=1)
+
+    cos_theta, alpha, *_ = _points()
+    return average(reflected, "cos_d", cos_theta, alpha, eta, kappa, nodes=NODES)
+
+
+def _row(name: str, table: Table, seconds: float, errors: np.ndarray) -> dict[str, Any]:
+    return {
+        "table": name,
+        "shape": list(table.data.shape),
+        "bytes": table.data.nbytes,
+        "rank": len(table.nodes) or None,
+        "build_s": seconds,
+        "max_error": float(np.max(np.abs(errors))),
+        "rms_error": float(np.sqrt(np.mean(errors**2))),
+    }

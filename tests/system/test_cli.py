@@ -1,0 +1,191 @@
+"""The command as a user runs it, with real models and real pictures.
+
+Rationale: what unit tests cannot show is that the parts fit, that the messages of all of them are fit to be read, and
+that a process ends as it should when it is interrupted, when nobody reads what it says, and when LLVM is missing.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def start(*arguments: str, **options: Any) -> subprocess.Popen[str]:
+    """The command in a process of its own."""
+    command = [sys.executable, "-m", "velatura", *arguments]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[int, str, str]:
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+# Results
+
+
+def test_lobes_as_json_are_those_of_python(run: Run) -> None:
+    """Expected: the JSON holds, to the last digit, what `vt.lobes` returns."""
+    status, out, err = run("lobes", "coated-gold", "--cos", "1,0.5,0.1", "--set", "tir=off", "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    lobes = vt.lobes(vt.preset("coated-gold"), cos_theta=[1.0, 0.5, 0.1], tir="off", model=found["model"])
+    assert list(found) == ["model", "cos", "reflected", "transmitted"]
+    assert (found["cos"], found["transmitted"]) == ([1.0, 0.5, 0.1], None)
+    assert len(found["reflected"]) == len(lobes.energy)
+    for k, lobe in enumerate(found["reflected"]):
+        for field in ("energy", "alpha", "covariance"):
+            np.testing.assert_array_equal(np.transpose(lobe[field]), getattr(lobes, field)[k])
+        np.testing.assert_array_equal(lobe["rotation"], lobes.rotation[k])
+
+
+def test_what_a_stack_transmits_is_in_the_json(run: Run) -> None:
+    """Expected: a stack that ends in a dielectric has a transmitted lobe; with the reflected ones no energy is lost."""
+    _, out, _ = run("lobes", "frosted-glass", "--set", "reflectance=fresnel", "--set", "tir=off", "--json")
+    found = json.loads(out)
+    total = np.sum([lobe["energy"] for lobe in [*found["reflected"], found["transmitted"]]], axis=0)
+    assert total == pytest.approx(np.ones((1, 3)), abs=1e-6)
+
+
+def test_lobes_of_each_channel(run: Run) -> None:
+    """Expected: with `channels=separate` a list per channel, and lists over directions within it."""
+    _, out, _ = run("lobes", "coated-gold", "--cos", "1,0.5", "--set", "channels=separate", "--json")
+    lobe = json.loads(out)["reflected"][1]
+    assert np.shape(lobe["energy"]) == (2, 3)
+    assert (np.shape(lobe["alpha"]), np.shape(lobe["rotation"])) == ((3, 2, 2), (3, 2))
+    assert run("lobes", "coated-gold", "--set", "channels=separate")[0] == 0
+
+
+def test_a_setting_changes_the_answer(run: Run) -> None:
+    """Expected: a rougher coat gives a first lobe of exactly that roughness."""
+    _, out, _ = run("lobes", "coated-gold", "--set", "layer0_alpha=.25", "--json")
+    assert json.loads(out)["reflected"][0]["alpha"] == [pytest.approx([0.25, 0.25])]
+
+
+@pytest.mark.parametrize("name", ["picture.png", "picture.exr"])
+def test_render_writes_one_picture_and_nothing_else(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Expected: one file of the right format, one line on standard output."""
+    monkeypatch.chdir(tmp_path)
+    size = ("--size", "24x16", "--spp", "4", "--scene", "sphere")
+    status, out, err = run("render", "coated-gold", "-o", name, *size)
+    assert (status, err) == (0, "")
+    assert out.startswith(f"{name}: 24 x 16 pixels, 4 samples each")
+    assert out.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    magic = {".png": b"\x89PNG\r\n\x1a\n", ".exr": b"\x76\x2f\x31\x01"}
+    assert Path(name).read_bytes().startswith(magic[Path(name).suffix])
+
+
+def test_presets_and_schema(run: Run) -> None:
+    """Expected: every preset is listed with its source, and the schema describes a material."""
+    listed = {entry["name"]: entry for entry in json.loads(run("presets", "--json")[1])}
+    assert set(listed) == set(vt.presets())
+    assert all(entry["layers"] and entry["source"] for entry in listed.values())
+    table = run("presets")[1]
+    assert all(name in table for name in listed)
+    assert json.loads(run("schema")[1])["required"] == ["layers"]
+
+
+# Bad input
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["render", "coated-gold", "-o", "nowhere/a.png"], ["nowhere"]),
+        (["render", "coated-gold", "-o", "a.gif"], [".png", ".exr"]),
+        (["render", "coated-gold", "--scene", "bal"], ["bal", "ball"]),
+        (["render", "coated-gold", "--scene", "missing.xml"], ["missing.xml"]),
+        (["render", "coated-gold", "--env", "missing.hdr"], ["missing.hdr"]),
+        (["render", "coated-gold", "--model", "belcour2081"], ["belcour2081", "belcour2018"]),
+        (["lobes", "coated-gold", "--cos", "1,0"], ["cos", "0"]),
+        (["lobes", "coated-gold", "--cos", "1.01"], ["cos", "1.01"]),
+        (["lobes", "coated-gold", "--cos", "nan"], ["cos", "nan"]),
+        (["lobes", "coated-gold", "--set", "tir=sometimes"], ["tir", "sometimes", "published"]),
+        (["lobes", "coated-gold", "--set", "reflectanse=fgd"], ["reflectanse", "reflectance"]),
+        (["lobes", "coated-gold", "--set", "layer0_alpha=2"], ["alpha", "2"]),
+        (["lobes", "coated-gould"], ["coated-gould", "coated-gold"]),
+        (["lobes", "broken.yaml"], ["broken.yaml"]),
+        (["lobes", "empty.yaml"], ["empty.yaml", "layers"]),
+        (["lobes", "negative.yaml"], ["negative.yaml", "alpha", "-0.1"]),
+        (["lobes", "misspelt.yaml"], ["misspelt.yaml", "alhpa", "alpha"]),
+        (["lobes", "buried.yaml"], ["buried.yaml", "layer 1"]),
+        (["lobes", "untextured.yaml"], ["untextured.yaml", "missing.png"]),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: list[str]
+) -> None:
+    """Expected: the line names what is wrong and what is known or allowed; nothing is written."""
+    files = {
+        "broken": "layers: [interface: {eta: 1.5}",
+        "empty": "layers: []",
+        "negative": "layers: [interface: {eta: 1.5, alpha: -0.1}]",
+        "misspelt": "layers: [interface: {eta: 1.5, alhpa: 0.1}]",
+        "buried": "layers: [interface: {conductor: Au}, medium: {depth: 1}]",
+        "untextured": "layers: [interface: {eta: 1.5, alpha: {texture: missing.png}}]",
+    }
+    for name, text in files.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    status, out, err = run(*arguments)
+    assert (status, out) == (2, "")
+    assert err.startswith("velatura: ")
+    assert err.count("\n") == 1
+    assert all(word in err for word in words), err
+    assert len(list(tmp_path.iterdir())) == len(files)
+
+
+# Processes
+
+
+def test_an_interrupt_leaves_nothing(tmp_path: Path) -> None:
+    """Expected: Ctrl-C in the middle of a long picture ends it soon, with status 130 and an empty folder."""
+    # A process that is started in the background may have been told to ignore interrupts: make it listen
+    listen = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
+    process = start("render", "coated-gold", "--spp", "1000000", "--size", "256", cwd=tmp_path, **listen)
+    while "libLLVM" not in Path(f"/proc/{process.pid}/maps").read_text():
+        time.sleep(0.05)
+    time.sleep(1)
+    process.send_signal(signal.SIGINT)
+    status, _, err = finish(process)
+    assert (status, err) == (130, "velatura: interrupted\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_nobody_reads() -> None:
+    """Expected: a reader that goes away (`velatura schema | head -1`) is no reason for a traceback."""
+    process = start("schema")
+    assert process.stdout is not None
+    process.stdout.close()
+    status = process.wait(timeout=120)
+    assert process.stderr is not None
+    assert (status, process.stderr.read()) == (1, "")
+
+
+def test_an_llvm_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: `render` and `doctor` say the command that mends it, with status 1; numbers need no LLVM."""
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM.so"))
+    render, doctor, lobes = start("render", "coated-gold", cwd=tmp_path), start("doctor"), start("lobes", "coated-gold")
+    mend = "apt-get install -y libllvm19"
+    status, out, err = finish(render)
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith("velatura: ") and mend in err
+    status, out, _ = finish(doctor)
+    assert status == 1 and mend in out
+    assert finish(lobes)[::2] == (0, "")

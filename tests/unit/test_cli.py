@@ -1,0 +1,291 @@
+"""The command line around the model: how arguments are read, what is printed, and which status it exits with.
+
+The model and the renderer are replaced by the plainest things that have their shape, so that every number that is
+printed here is known.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura
+from velatura.cli import main
+from velatura.errors import MissingTool, NoSolution
+
+Run = Callable[..., tuple[int, str, str]]
+
+MATERIAL = """\
+name: Varnish
+layers:
+  - interface: {eta: 1.5, alpha: 0.1}
+  - medium: {sigma_a: [0.1, 0.2, 0.3]}
+  - interface: {eta: 0.2, k: 3.9, alpha: 0.2}
+"""
+
+
+@pytest.fixture
+def material(tmp_path: Path) -> str:
+    path = tmp_path / "varnish.yaml"
+    path.write_text(MATERIAL)
+    return str(path)
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Puts stubs in the place of model and scenes, and notes what they are called with."""
+    seen: dict[str, Any] = {}
+
+    def lobes(stack: Any, cos_theta: list[float], **options: Any) -> SimpleNamespace:
+        seen.update(stack=stack, cos_theta=cos_theta, **options)
+        n = len(cos_theta)
+        lobe = {
+            "energy": np.arange(3 * n).reshape(3, n) / 10,
+            "alpha": np.array([[0.1] * n, [0.2] * n]),
+            "rotation": np.full(n, math.pi / 6),
+            "covariance": np.arange(3 * n).reshape(3, n) + 1.0,
+        }
+        transmitted = SimpleNamespace(**lobe) if seen.get("transmits") else None
+        return SimpleNamespace(**{field: [value, value] for field, value in lobe.items()}, transmitted=transmitted)
+
+    def render(stack: Any, progress: Callable[[int, int], None], **options: Any) -> np.ndarray:
+        seen.update(stack=stack, **options)
+        progress(1, 2)
+        seen.get("meanwhile", lambda: None)()
+        return np.zeros((6, 8, 3))
+
+    scenes = SimpleNamespace(
+        check_writable=lambda path: seen.update(checked=path),
+        write_image=lambda image, path: path.write_text(f"picture {image.shape}"),
+    )
+    model = SimpleNamespace(DEFAULT="plain", SWITCHES={"tir": ("off", "published"), "map": ("belcour", "weier")})
+    monkeypatch.setitem(sys.modules, "velatura.model", model)
+    monkeypatch.setitem(sys.modules, "velatura.scenes", scenes)
+    for name, stub in {"model": model, "scenes": scenes, "lobes": lobes, "render": render}.items():
+        monkeypatch.setitem(vars(velatura), name, stub)
+    return seen
+
+
+# Arguments
+
+
+@pytest.mark.parametrize(
+    ("setting", "name", "expected"),
+    [
+        ("layer0_alpha_u=.3", "layer0_alpha_u", 0.3),
+        ("layer0_alpha=2e-1", "layer0_alpha_v", 0.2),
+        ("layer1_sigma_a=1,2,3", "layer1_sigma_a", (1.0, 2.0, 3.0)),
+        ("layer1_sigma_a=[1, 2, 3]", "layer1_sigma_a", (1.0, 2.0, 3.0)),
+        ("layer0_eta=1.7", "layer0_eta", 1.7),
+        ("exterior=1.33", "exterior", 1.33),
+    ],
+)
+def test_set_changes_a_parameter(
+    run: Run, material: str, calls: dict[str, Any], setting: str, name: str, expected: object
+) -> None:
+    assert run("lobes", material, "--set", setting)[0] == 0
+    assert calls["stack"].flat()[name] == expected
+
+
+def test_set_takes_switches_and_names(run: Run, material: str, calls: dict[str, Any]) -> None:
+    status, _, _ = run("lobes", material, "--set", "tir=off", "--set", "map=weier", "--set", "layer2_conductor=Au")
+    assert status == 0
+    assert (calls["tir"], calls["map"]) == ("off", "weier")
+    assert calls["stack"].kinds == ("dielectric", "medium", "conductor")
+    assert calls["stack"].flat()["layer2_eta"].name == "Au"
+
+
+def test_azimuth_is_in_degrees_outside_and_radians_inside(run: Run, material: str, calls: dict[str, Any]) -> None:
+    run("lobes", material, "--phi", "90", "--cos", "1,.5")
+    assert calls["phi"] == pytest.approx(math.pi / 2)
+    assert calls["cos_theta"] == [1.0, 0.5]
+
+
+@pytest.mark.parametrize(("size", "expected"), [("32", (32, 32)), ("64x48", (64, 48)), (None, None)])
+def test_size_in_pixels(
+    run: Run, material: str, calls: dict[str, Any], tmp_path: Path, size: str | None, expected: object
+) -> None:
+    output = str(tmp_path / "a.png")
+    status, out, _ = run("render", material, "-o", output, *(["--size", size] if size else []))
+    assert (status, calls["size"]) == (0, expected)
+    assert "8 x 6 pixels" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["lobes", "M", "--set", "tri=off"], ["tri", "tir"]),
+        (["lobes", "M", "--set", "zzz=1"], ["zzz", "tir", "map", "exterior"]),
+        (["lobes", "M", "--set", "layer0_alpa=1"], ["layer0_alpa", "alpha"]),
+        (["lobes", "M", "--set", "layer9_alpha=1"], ["layer9_alpha", "layer 2"]),
+        (["lobes", "M", "--set", "layer0_alpha=-1"], ["alpha", "-1", "0 to 1"]),
+        (["lobes", "M", "--set", "layer0_alpha=rough"], ["alpha", "rough", "a number"]),
+        (["lobes", "M", "--set", "layer0_eta=glas"], ["eta", "glas"]),
+        (["lobes", "M", "--set", "tir"], ["tir", "KEY=VALUE"]),
+        (["lobes", "M", "--set", "tir="], ["tir", "KEY=VALUE"]),
+        (["lobes", "M", "--cos", "one"], ["--cos", "above 0"]),
+        (["lobes", "M", "--cos", ""], ["--cos"]),
+        (["lobes", "M", "--phi", "up"], ["--phi"]),
+        (["lobes", "nowhere.yaml"], ["nowhere.yaml", "not found"]),
+        (["lobes", "no-such-preset"], ["no-such-preset"]),
+        (["lobes"], ["M"]),
+        (["lobe"], ["lobe", "lobes"]),
+        (["lobes", "M", "--jsn"], ["--jsn"]),
+        (["render", "M", "--size", "0"], ["--size", "from 1"]),
+        (["render", "M", "--size", "10by10"], ["--size", "WxH"]),
+        (["render", "M", "--size", "99999"], ["--size", "16384"]),
+        (["render", "M", "--spp", "0"], ["--spp", "1"]),
+        (["render", "M", "--spp", "many"], ["--spp"]),
+        (["render", "M", "--seed", "-1"], ["--seed"]),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(
+    run: Run, material: str, calls: dict[str, Any], arguments: list[str], words: list[str]
+) -> None:
+    status, out, err = run(*(material if argument == "M" else argument for argument in arguments))
+    assert (status, out) == (2, "")
+    assert err.startswith("velatura: ")
+    assert err.count("\n") == 1
+    assert all(word in err for word in words)
+
+
+# Results
+
+
+def test_json_of_lobes_runs_over_directions(run: Run, material: str, calls: dict[str, Any]) -> None:
+    _, out, err = run("lobes", material, "--cos", "1,0.5", "--model", "other", "--json")
+    lobe = {
+        "energy": [[0.0, 0.2, 0.4], [0.1, 0.3, 0.5]],
+        "alpha": [[0.1, 0.2], [0.1, 0.2]],
+        "rotation": [math.pi / 6, math.pi / 6],
+        "covariance": [[1.0, 3.0, 5.0], [2.0, 4.0, 6.0]],
+    }
+    expected = {"model": "other", "cos": [1.0, 0.5], "reflected": [lobe, lobe], "transmitted": None}
+    assert json.loads(out) == expected
+    assert err == ""
+
+
+def test_table_of_lobes(run: Run, material: str, calls: dict[str, Any]) -> None:
+    calls["transmits"] = True
+    _, out, _ = run("lobes", material, "--cos", "1,0.5")
+    assert "Varnish (plain)" in out
+    rows = [line.replace("│", " ").split() for line in out.splitlines() if "°" in line]
+    assert [row[:2] for row in rows] == [[cosine, name] for cosine in ("1", "0.5") for name in ("R1", "R2", "T")]
+    assert rows[0][2:] == ["0.0000", "0.2000", "0.4000", "0.1000", "0.2000", "30.0°"]
+
+
+def test_render_writes_the_picture_named_after_the_material(
+    run: Run, material: str, calls: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = run("render", material, "--set", "tir=off", "--env", "sky", "--spp", "3")
+    assert status == 0
+    assert Path("varnish.png").read_text() == "picture (6, 8, 3)"
+    assert out.startswith("varnish.png: 8 x 6 pixels, 3 samples each")
+    expected = {"model": "plain", "tir": "off", "env": "sky", "scene": "ball", "spp": 3}
+    assert {key: calls[key] for key in expected} == expected
+
+
+def test_tables_are_measured(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    row = {
+        "table": "dielectric",
+        "shape": (64, 64),
+        "bytes": 4096,
+        "rank": None,
+        "build_s": 1.25,
+        "max_error": 2e-4,
+        "rms_error": 5e-6,
+    }
+    monkeypatch.setattr("velatura.tables.report.report", lambda **_: [row])
+    status, out, _ = run("tables", "--json")
+    assert (status, json.loads(out)) == (0, [{**row, "shape": [64, 64]}])
+    table = run("tables")[1]
+    assert all(cell in table for cell in ["dielectric", "64 x 64", "4096", "1.25", "2.0e-04", "5.0e-06"])
+
+
+@pytest.mark.parametrize("ok", [True, False])
+def test_doctor_says_the_command_that_mends(run: Run, monkeypatch: pytest.MonkeyPatch, ok: bool) -> None:
+    found = "19.1" if ok else "missing"
+    finding = SimpleNamespace(what="LLVM", found=found, ok=ok, mend="apt-get install -y libllvm19")
+    monkeypatch.setattr("velatura.kernel.doctor", lambda: (finding,))
+    status, out, _ = run("doctor")
+    assert status == (0 if ok else 1)
+    assert finding.found in out
+    assert ("apt-get install -y libllvm19" in out) is not ok
+
+
+def test_version(run: Run) -> None:
+    assert run("--version") == (0, f"velatura {velatura.__version__}\n", "")
+
+
+def test_every_verb_has_help(run: Run) -> None:
+    _, out, _ = run("--help")
+    for verb in ("render", "lobes", "presets", "schema", "tables", "doctor"):
+        assert f"  {verb} " in out
+        assert run(verb, "--help")[0] == 0
+    assert run()[1] == out
+
+
+# Ends
+
+
+def raising(error: BaseException) -> Callable[[], None]:
+    def meanwhile() -> None:
+        raise error
+
+    return meanwhile
+
+
+def interrupted_in_a_library() -> None:
+    """Libraries that are interrupted in the middle of C++ do not always pass the exception on as it is."""
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt as error:
+        raise RuntimeError("a callback failed") from error
+
+
+@pytest.mark.parametrize("meanwhile", [raising(KeyboardInterrupt()), interrupted_in_a_library])
+def test_an_interrupt_leaves_no_picture(
+    run: Run,
+    material: str,
+    calls: dict[str, Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    meanwhile: Callable[[], None],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
+    calls["meanwhile"] = meanwhile
+    status, out, err = run("render", material)
+    assert (status, out) == (130, "")
+    assert err.endswith("velatura: interrupted\n")
+    assert not Path("varnish.png").exists()
+
+
+@pytest.mark.parametrize(("error", "expected"), [(NoSolution("none exists"), 3), (MissingTool("run apt-get"), 1)])
+def test_foreseen_errors_give_their_status(
+    run: Run, material: str, calls: dict[str, Any], tmp_path: Path, error: Exception, expected: int
+) -> None:
+    calls["meanwhile"] = raising(error)
+    status, _, err = run("render", material, "-o", str(tmp_path / "a.png"))
+    assert status == expected
+    assert err.endswith(f"velatura: {error}\n")
+    assert "Traceback" not in err
+
+
+def test_unforeseen_errors_are_not_swallowed(
+    material: str, calls: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls["meanwhile"] = raising(ZeroDivisionError())
+    monkeypatch.setattr(sys, "argv", ["velatura", "render", material, "-o", str(tmp_path / "a.png")])
+    with pytest.raises(ZeroDivisionError):
+        main()

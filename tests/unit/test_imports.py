@@ -1,0 +1,153 @@
+"""Who may import whom. The tables are the architecture; the tests read every import in the package against them."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[2] / "src" / "velatura"
+
+# Part of the package -> the parts it may import. Everybody may import `errors`; a part that is not here, anything.
+MAY_IMPORT = {
+    "errors": "",
+    "ops": "",
+    "kernel": "",
+    "stack": "",
+    "optics": "ops",
+    "tables": "optics ops",
+    "model": "stack optics tables ops",
+    "binding": "stack",
+    "plugins": "stack optics tables model ops kernel binding",
+    "shader": "stack tables model ops",
+    "inverse": "stack optics tables model ops",
+    "reference": "stack optics ops kernel binding",
+    "checks": "kernel",
+    "scenes": "kernel",
+}
+
+# The ends of the stream -> who may import them.
+IMPORTED_BY = {
+    "cli": "__main__",
+    "editor": "cli",
+}
+
+# The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
+RENDERER = {
+    "mitsuba": "kernel",
+    "drjit": "kernel ops tables binding plugins reference checks scenes",
+}
+
+# Modules -> what importing them must not load.
+LOADS_NO = {
+    "velatura": "mitsuba drjit numpy pydantic",
+    "velatura.cli": "mitsuba drjit numpy pydantic scipy matplotlib yaml rich",
+    "velatura.stack": "mitsuba drjit",
+    "velatura.optics": "mitsuba drjit",
+    "velatura.tables": "mitsuba drjit scipy matplotlib",
+    "velatura.model": "mitsuba drjit scipy matplotlib",
+    "velatura.kernel": "mitsuba drjit",
+    "velatura.scenes": "mitsuba drjit",
+    "velatura.plugins": "mitsuba drjit",
+}
+
+FILES = sorted(SOURCE.rglob("*.py"))
+PARTS = {path.relative_to(SOURCE).parts[0].removesuffix(".py") for path in FILES}
+
+
+def part_of(path: Path) -> str:
+    return path.relative_to(SOURCE).parts[0].removesuffix(".py")
+
+
+def imports(path: Path, text: str = "") -> Iterator[tuple[str, bool]]:
+    """Every module that a file imports, by its full name, and whether that happens when the file is imported."""
+
+    def visit(node: ast.AST, at_import: bool) -> Iterator[tuple[str, bool]]:
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, at_import) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield from ((f"{origin(node)}.{alias.name}", at_import) for alias in node.names)
+        inside = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) or for_type_checkers(node)
+        for child in ast.iter_child_nodes(node):
+            yield from visit(child, at_import and not inside)
+
+    def origin(node: ast.ImportFrom) -> str:
+        if not node.level:
+            return node.module or ""
+        package = ("velatura", *path.relative_to(SOURCE).parent.parts)
+        return ".".join([*package[: len(package) - node.level + 1], *filter(None, [node.module])])
+
+    return visit(ast.parse(text or path.read_text(encoding="utf-8")), True)
+
+
+def for_type_checkers(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def siblings(path: Path) -> set[str]:
+    """The parts of the package that a file imports, other than its own."""
+    names = (name.split(".") for name, _ in imports(path))
+    found = {name[1] if len(name) > 1 and name[1] in PARTS else "__init__" for name in names if name[0] == "velatura"}
+    return found - {part_of(path)}
+
+
+@pytest.mark.parametrize("part", [part for part in MAY_IMPORT if part in PARTS])
+def test_a_part_imports_what_stands_above_it(part: str) -> None:
+    allowed = {"errors", *MAY_IMPORT[part].split()}
+    offences = {str(path): siblings(path) - allowed for path in FILES if part_of(path) == part}
+    assert not {path: names for path, names in offences.items() if names}
+
+
+@pytest.mark.parametrize("part", IMPORTED_BY)
+def test_nothing_imports_the_ends_of_the_stream(part: str) -> None:
+    importers = {part_of(path) for path in FILES if part in siblings(path)}
+    assert importers <= set(IMPORTED_BY[part].split())
+
+
+@pytest.mark.parametrize("library", RENDERER)
+def test_the_renderer_is_imported_inside_functions_of_few(library: str) -> None:
+    uses = [(part_of(path), at_import) for path in FILES for name, at_import in imports(path) if _is(name, library)]
+    assert {part for part, at_import in uses} <= set(RENDERER[library].split())
+    assert not any(at_import for _, at_import in uses)
+
+
+@pytest.mark.parametrize("module", LOADS_NO)
+def test_importing_loads_little(module: str) -> None:
+    script = f"import {module}, sys; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True).stdout.split()
+    assert not set(LOADS_NO[module].split()) & set(loaded)
+
+
+def test_the_reader_of_imports_sees_every_form() -> None:
+    """The rules are only as good as the reader, so it is tried on a file with all the ways to break them."""
+    path = SOURCE / "optics" / "example.py"
+    text = """
+import velatura.model as m
+from velatura.tables.fetch import Table
+from velatura import stack, load
+from ..plugins import layered
+from . import fresnel
+if TYPE_CHECKING:
+    import mitsuba
+def f():
+    import drjit as dr
+"""
+    found = dict(imports(path, text))
+    assert found == {
+        "velatura.model": True,
+        "velatura.tables.fetch.Table": True,
+        "velatura.stack": True,
+        "velatura.load": True,
+        "velatura.plugins.layered": True,
+        "velatura.optics.fresnel": True,
+        "mitsuba": False,
+        "drjit": False,
+    }
+
+
+def _is(name: str, library: str) -> bool:
+    return name == library or name.startswith(f"{library}.")
