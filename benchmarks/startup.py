@@ -1,6 +1,6 @@
 """Time to the first answer: `velatura --help`, `velatura lobes`, the demo's first picture. Medians of fresh processes.
 
-    python benchmarks/startup.py [--rounds 5]
+python benchmarks/startup.py [--rounds 5]
 """
 
 from __future__ import annotations

@@ -108,9 +108,9 @@ def truths(average: Average, points: tuple[np.ndarray, ...]) -> Iterator[np.ndar
     nodes = average.nodes
     x, w = np.polynomial.legendre.leggauss(nodes)
     x_half, w_half = np.polynomial.legendre.leggauss(nodes // 2)
-    u1, u2 = (np.asarray(v, np.float32) for v in np.meshgrid((x_half + 1) / 4, (x + 1) / 2, indexing="ij"))
-    per_point, share = u1.size, Float((w_half[:, None] * w / 4).ravel().astype(np.float32))
-    u1, u2 = Float(u1.ravel()), Float(u2.ravel())
+    grids = (*np.meshgrid((x_half + 1) / 4, (x + 1) / 2, indexing="ij"), w_half[:, None] * w / 4)
+    u1, u2, share = (Float(grid.ravel().astype(np.float32)) for grid in grids)
+    per_point = dr.width(share)
 
     few = max(1, LANES // per_point)
     for start in range(0, len(points[0]), few):

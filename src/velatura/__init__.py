@@ -9,14 +9,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from velatura.api import bsdf, lobes, register, render
+    from velatura.api import bsdf, check, lobes, register, render
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Interface, Medium, Stack, Texture, load, preset, presets, save
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "velatura.api": ("bsdf", "lobes", "register", "render"),
+    "velatura.api": ("bsdf", "check", "lobes", "register", "render"),
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": ("Diffuse", "Interface", "Medium", "Stack", "Texture", "load", "preset", "presets", "save"),
 }
@@ -31,6 +31,7 @@ __all__ = [
     "Stack",
     "Texture",
     "bsdf",
+    "check",
     "load",
     "lobes",
     "preset",
@@ -41,9 +42,14 @@ __all__ = [
 ]
 
 
+_PARTS = ("checks", "kernel", "model", "reference", "scenes", "stack", "tables")
+
+
 def __getattr__(name: str) -> Any:
     if name in _HOME_OF:
         return getattr(import_module(_HOME_OF[name]), name)
+    if name in _PARTS:
+        return import_module(f"velatura.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

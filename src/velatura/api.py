@@ -1,20 +1,28 @@
-"""What `import velatura` offers: load a material, look at its lobes, render it."""
+"""What `import velatura` offers: load a material, look at its lobes, render it, hold it to the laws."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from velatura.model.models import DEFAULT, SWITCHES, Model, named
 from velatura.model.statistics import statistics as lobes
 from velatura.stack import Stack, dumps, load
 
-__all__ = ["bsdf", "lobes", "register", "render"]
+if TYPE_CHECKING:
+    from velatura.checks import Report
+
+__all__ = ["bsdf", "check", "lobes", "register", "render"]
+
+#: What `bsdf` makes that is no statistical model: plugins by the name that it goes by among the models.
+PLUGINS = {"reference": "layered_reference", "weidlich_wilkie": "weidlich_wilkie"}
 
 
 def register() -> None:
     """Make the plugins known to Mitsuba, in the variant that is set and in all that are set later."""
-    import velatura.plugins  # noqa: F401  (declares them)
+    import velatura.plugins
+    import velatura.reference  # noqa: F401  (both declare theirs)
     from velatura import kernel
 
     kernel.register()
@@ -23,18 +31,25 @@ def register() -> None:
 def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: str) -> Any:
     """A `mi.BSDF` of a material (a stack, a file, or a preset's name), in the variant that is set (else llvm_ad_rgb).
 
+    Args:
+        model: a named model, its choices changed by `switches`; or "reference", the random walk, and "weidlich_wilkie",
+            the baseline, which are plugins of their own and take no switches.
+
     Raises:
         InvalidInput: not a valid material, an unknown model or switch.
         MissingTool: LLVM is missing or too old; the message says what to install.
     """
     from velatura import kernel
 
+    described = stack if isinstance(stack, Stack) else load(stack)
+    if model in PLUGINS and not switches:
+        options = {"type": PLUGINS[str(model)]}
+    else:
+        chosen = named(model, **switches)
+        options = {"type": "layered", "model": chosen.name, **{switch: getattr(chosen, switch) for switch in SWITCHES}}
     mi = kernel.mitsuba()
     register()
-    chosen = named(model, **switches)
-    described = stack if isinstance(stack, Stack) else load(stack)
-    options = {switch: getattr(chosen, switch) for switch in SWITCHES}
-    return mi.load_dict({"type": "layered", "material": dumps(described, "json"), "model": chosen.name, **options})
+    return mi.load_dict({**options, "material": dumps(described, "json")})
 
 
 def render(
@@ -64,3 +79,55 @@ def render(
     return scenes.render(
         bsdf(stack, model, **switches), scene=scene, env=env, spp=spp, size=size, seed=seed, progress=progress
     )
+
+
+def check(
+    material: Any,
+    model: str | Model = DEFAULT,
+    *,
+    exceptions: Collection[str] = (),
+    lossless: bool = False,
+    expected: Any = None,
+    plots: str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    **switches: str,
+) -> Report:
+    """Hold a BSDF to the laws: energy, reciprocity, sampling that follows its density, and the rest of `checks.LAWS`.
+
+    Args:
+        material: any `mi.BSDF`, ours or not; or a material (a stack, a file, or a preset's name) of which `model` makes
+            one, with the model's own exceptions, and lossless where none of its layers absorbs.
+        exceptions: names of further laws that give numbers, but no failure.
+        lossless: nothing absorbs, so that loss breaks a law as well.
+        expected: the BSDF or the material that this one should equal, if it is the limit of something.
+        plots: a folder; every law that is broken leaves `LAW.png` there.
+        progress: called with (steps done, all steps) now and then.
+
+    Raises:
+        InvalidInput, MissingTool: as `bsdf`; also an exception that is no law, a scalar variant, a folder that cannot
+            be written.
+    """
+    from velatura import checks
+
+    def made(thing: Any) -> Any:
+        return bsdf(thing, model, **switches) if isinstance(thing, Stack | str) else thing
+
+    if isinstance(material, Stack | str):
+        material = material if isinstance(material, Stack) else load(material)
+        exceptions = {*exceptions, *named(model, **switches).exceptions}
+        lossless = lossless or _lossless(material)
+    return checks.check(
+        made(material),
+        exceptions=exceptions,
+        lossless=lossless,
+        expected=made(expected),
+        plots=plots,
+        progress=progress,
+    )
+
+
+def _lossless(stack: Stack) -> bool:
+    """Whether no layer is known to absorb: no metal, no absorbing medium, a base that is white if there is one."""
+    white = {"sigma_a": (0.0, (0.0,) * 3), "albedo": (1.0, (1.0,) * 3)}
+    values = ((name.partition("_")[2], value) for name, value in stack.flat().items())
+    return "conductor" not in stack.kinds and all(value in white[key] for key, value in values if key in white)

@@ -8,7 +8,8 @@ inside a renderer and is differentiable. The types of the arguments choose the d
 - Dr.Jit arrays, alone or mixed with floats, give Dr.Jit arrays.
 
 Colour is the leading axis of an array; a float is the same in all channels. `sqrt` and `divide` clamp arguments outside
-their domain instead of answering NaN, so that the branch which a `select` throws away poisons neither value nor gradient.
+their domain instead of answering NaN, so that the branch which a `select` throws away poisons neither
+value nor gradient.
 """
 
 from __future__ import annotations

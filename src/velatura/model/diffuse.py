@@ -38,10 +38,10 @@ class Base:
 def with_mean_reflectance(prepared: Prepared, settle: Callable[[Value], Value] = lambda x: x) -> Prepared:
     """`prepared` with the mean reflectance of the stack for diffuse light from the base.
 
-    The mean is over projected solid angle in the medium at the base. Directions that Snell's law lets out are those of
-    light coming in at cosine c above, 2c dc / n^2 of all; the others are totally reflected, weakened by what lies between
-    the base and the last interface. `settle` is applied to every cosine and reflectance: a renderer evaluates them, so
-    that one kernel serves all nodes.
+    The mean is over projected solid angle in the medium at the base. Directions that Snell's law lets out are those
+    of light coming in at cosine c above, 2c dc / n^2 of all; the others are totally reflected, weakened by what
+    lies between the base and the last interface. `settle` is applied to every cosine and reflectance: a renderer
+    evaluates them, so that one kernel serves all nodes.
     """
     if prepared.base is None:
         return prepared

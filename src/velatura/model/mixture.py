@@ -21,7 +21,7 @@ ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
 
 def probabilities(lobes: Sequence[Lobe], base: Base | None) -> list[Value]:
     """Of sampling each lobe, and at last the base: its share of the energy."""
-    parts = [*lobes, *([base] if base else [])]
+    parts: list[Lobe | Base] = [*lobes, *([base] if base else [])]
     energies = [ops.mean(part.energy) + 1e-9 for part in parts]  # the offset decides where none has any
     total = sum(energies[1:], energies[0])
     return [energy / total for energy in energies]
@@ -48,7 +48,7 @@ def eval_pdf(lobes: Sequence[Lobe], base: Base | None, wi: Direction, wo: Direct
 
 
 def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
-    """A direction wo from uniform numbers: a lobe by its energy, then a visible normal of that lobe, or the base's cosine.
+    """A direction wo from uniform numbers: a lobe by its energy, then a visible normal of it, or the base's cosine.
 
     The direction may lie below the surface, where `eval_pdf` is 0.
     """
@@ -68,7 +68,8 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
     radius, phi = ops.sqrt(u1), 2 * pi * u2
     scattered = radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1)
     from_base = u > 1 - shares[-1]
-    return tuple(ops.select(from_base, a, b) for a, b in zip(scattered, wo))  # type: ignore[return-value]
+    x, y, z = (ops.select(from_base, a, b) for a, b in zip(scattered, wo))
+    return x, y, z
 
 
 def _bounded(roughness: Roughness) -> Roughness:

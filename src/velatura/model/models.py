@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 from velatura.errors import InvalidInput
 from velatura.stack.schema import unknown
@@ -33,6 +34,7 @@ class Model:
         channels: one variance for all colours, from the `mean` of the energies, or one per channel (`separate`).
         medium: a scattering medium gives its variance to all that it transmits (`shipped`), or to the scattered share
             (`weighted`).
+        exceptions: laws of `velatura.checks` that a BSDF of this model does not keep, and is known not to.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Model:
     scale: str
     channels: str
     medium: str
+    exceptions: frozenset[str] = frozenset()
 
     def with_switches(self, **switches: str) -> Model:
         """This model with some choices changed.
@@ -54,7 +57,8 @@ class Model:
                 raise InvalidInput(unknown("switch", key, SWITCHES))
             if value not in SWITCHES[key]:
                 raise InvalidInput(f"{key}: must be one of {', '.join(SWITCHES[key])}, got {value!r}")
-        return dataclasses.replace(self, **switches)
+        changes: dict[str, Any] = {**switches}
+        return dataclasses.replace(self, **changes)
 
 
 MODELS: tuple[Model, ...] = (
@@ -66,6 +70,7 @@ MODELS: tuple[Model, ...] = (
         scale="shipped",
         channels="mean",
         medium="shipped",
+        exceptions=frozenset({"reciprocity", "lossless"}),
     ),
 )
 

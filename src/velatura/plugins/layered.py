@@ -30,7 +30,8 @@ def make(mi: Any) -> type:
             model (string, default belcour2018): one of `velatura.MODELS`.
             reflectance, tir, map, scale, medium (strings): switches of the model.
 
-        One lobe per interface, over a diffuse base if there is one; reflection only. Wholly smooth, uniform stacks reflect as a mirror does.
+        One lobe per interface, over a diffuse base if there is one; reflection only. Wholly
+        smooth, uniform stacks reflect as a mirror does.
         """
 
         def __init__(self, properties: Any) -> None:

@@ -36,7 +36,7 @@ from velatura.tables.quadrature import Progress, Reflections, average, ignore
 from velatura.tables.store import Table, Tables
 
 PLANE = (48, 48)  # nodes over cosine and roughness
-INSIDE = (64, 40, 48)  # over angle, roughness and critical angle
+INSIDE = (65, 40, 56)  # over angle, roughness and critical angle; odd, for a node at the critical angle itself
 ABSORBING = (36, 16, 20)  # likewise
 DIELECTRIC_RANK, CONDUCTOR_RANK = 8, 12
 ABSORBING_ANGLES = (0.15, 0.3, 0.4, 0.45, 0.5, 0.56, 0.68, 0.84, 1.0)  # as coordinates on the angular axis

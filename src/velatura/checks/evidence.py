@@ -1,0 +1,254 @@
+"""What the laws judge: a BSDF's answers at a few directions of incidence, gathered once for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from velatura.checks.grid import Grid, integrate
+from velatura.checks.probe import Array, Probe, Samples, Values, Wrong
+
+COSINES = (0.98, 0.8, 0.55, 0.3, 0.1)  # of incidence
+SAMPLES = 2**16  # at each of them
+PILOT = SAMPLES // 4  # samples that only shape the grid
+PAIRS = 2**14
+EXTREMES = (1.0, 0.999, 0.1, 1e-2, 1e-4, 1e-6)  # cosines where formulas break
+
+Progress = Callable[[int, int], None]
+STEPS = 4
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Samples at D directions of incidence, N at each.
+
+    Args:
+        wi: directions of incidence (D, 3).
+        samples: all of them, in the order of wi (D N, ...).
+        asked, both: `eval` and `pdf`, and `eval_pdf`, at the directions sampled.
+        arrived: samples that carry light, or would if the surface were not black (D, N).
+        delta: those of them that a smooth component reflected or refracted (D, N).
+        energy: weights as energy: radiance over squared index is what is conserved (D, N, channels).
+    """
+
+    wi: Array
+    samples: Samples
+    asked: Values
+    both: Values
+    arrived: Array
+    delta: Array
+    energy: Array
+
+
+@dataclass(frozen=True)
+class Integrals:
+    """Integrals over the sphere at D directions, with variances.
+
+    Args:
+        density, density_variance: of the pdf over every cell (D, cells).
+        counts: samples in every cell, without the pilot's (D, cells).
+        albedo, albedo_variance: of `eval`, without smooth components (D, channels).
+        shape: of the cells, to look at them.
+    """
+
+    density: Array
+    density_variance: Array
+    counts: Array
+    albedo: Array
+    albedo_variance: Array
+    shape: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of directions, half of them where the BSDF sends light, and f twice each way: noise differs, f does not.
+
+    Args:
+        solid_angle: |cos theta_o| over the density with which wo was drawn (n,).
+        there, back: f(wi, wo) and f(wo, wi), brought to the same index (2, n, channels).
+        expected: f(wi, wo) of the BSDF that this one should equal, where there is one (n, channels).
+    """
+
+    solid_angle: Array
+    there: Array
+    back: Array
+    expected: Array | None
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Answers at and beyond the edges: `values` for pairs (wi, wo), `samples` for directions `sampled`."""
+
+    wi: Array
+    wo: Array
+    values: Values
+    sampled: Array
+    samples: Samples
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that the laws look at; `asked` counts the answers, and `wrong` holds those that are no number or negative."""
+
+    asked: int
+    wrong: tuple[Wrong, ...]
+    transmits: bool
+    two_sided: bool
+    lossless: bool
+    drawn: Drawn
+    integrals: Integrals
+    pairs: Pairs
+    extremes: Extremes
+    expected: Drawn | None
+
+
+def gather(
+    probe: Probe, expected: Probe | None, lossless: bool, seed: int, progress: Progress | None = None
+) -> Evidence:
+    """Ask a BSDF, and the one that it should equal if there is one, all that the laws need to know."""
+    rng = np.random.default_rng(seed)
+    told = progress or (lambda done, total: None)
+
+    # Sample at every direction of incidence
+    cosines = [*COSINES, *(-c for c in COSINES)] if probe.two_sided else COSINES
+    wi = np.array([_direction(cos, 2.4 * k + 0.4) for k, cos in enumerate(cosines)])
+    u = rng.random((len(wi) * SAMPLES, 3), dtype=np.float32)
+    drawn = _draw(probe, wi, u)
+    told(1, STEPS)
+
+    # Integrate what it says
+    integrals = _integrate(probe, drawn, rng)
+    told(2, STEPS)
+
+    # Exchange directions, and go to the edges
+    pairs = _pair(probe, expected, _index(drawn), rng)
+    extremes = _extremes(probe, rng)
+    told(3, STEPS)
+
+    # Ask the other one
+    other = _draw(expected, wi, u) if expected else None
+    told(4, STEPS)
+    return Evidence(
+        probe.asked,
+        tuple(probe.wrong),
+        probe.transmits,
+        probe.two_sided,
+        lossless,
+        drawn,
+        integrals,
+        pairs,
+        extremes,
+        other,
+    )
+
+
+def _draw(probe: Probe, wi: Array, u: Array) -> Drawn:
+    each = np.repeat(wi, SAMPLES, axis=0)
+    samples = probe.sample(each, u)
+    asked, both = probe.eval_and_pdf(each, samples.wo), probe.eval_pdf(each, samples.wo)
+    confirmed = (samples.pdf > 0) & np.isclose(samples.pdf, asked.pdf, rtol=1e-2)
+    lit = samples.weight.max(axis=1) > 0
+    across = (each[:, 2] * samples.wo[:, 2] < 0) & (not probe.transmits)
+    arrived = (lit | (confirmed & ~samples.delta)) & ~across
+    energy = samples.weight * np.square(samples.eta)[:, None] * lit[:, None]
+    shape = (len(wi), SAMPLES)
+    delta = (samples.delta & arrived).reshape(shape)
+    return Drawn(wi, samples, asked, both, arrived.reshape(shape), delta, energy.reshape(*shape, -1))
+
+
+def _index(drawn: Drawn) -> float:
+    """Index below over index above, as the samples that pass through tell."""
+    wi = np.repeat(drawn.wi, SAMPLES, axis=0)
+    wo, eta = drawn.samples.wo, drawn.samples.eta
+    through = drawn.arrived.ravel() & (wi[:, 2] > 0) & (wo[:, 2] < 0)
+    return float(np.median(eta[through])) if through.any() else 1.0
+
+
+def _squared_index(index: float, wi: Array, wo: Array) -> Array:
+    """Squared index on the side of wo over that on the side of wi."""
+    return np.where(wi[..., 2] * wo[..., 2] > 0, 1.0, np.where(wi[..., 2] > 0, index**2, index**-2))
+
+
+def _integrate(probe: Probe, drawn: Drawn, rng: np.random.Generator) -> Integrals:
+    # Lay the grids where the pilot's samples fall, on every hemisphere that light may reach
+    wo, usable = drawn.samples.wo.reshape(*drawn.arrived.shape, 3), drawn.arrived & ~drawn.delta
+    sides = [[1, -1] if probe.transmits else [int(np.sign(wi[2]))] for wi in drawn.wi]
+    grids = [
+        [Grid.around(wi, wo[k, :PILOT][usable[k, :PILOT]], side) for side in sides[k]] for k, wi in enumerate(drawn.wi)
+    ]
+    counts = [[grid.count(wo[k, PILOT:][usable[k, PILOT:]]) for grid in grids[k]] for k in range(len(grids))]
+
+    # Ask at all nodes at once
+    nodes, areas = map(np.array, zip(*(grid.nodes(rng) for row in grids for grid in row)))
+    shape = (len(drawn.wi), len(sides[0]), nodes.shape[1])
+    wi = np.broadcast_to(drawn.wi[:, None, None], (*shape, 3)).reshape(-1, 3)
+    nodes, areas = nodes.reshape(-1, 3), areas.reshape(-1, 1)
+    value, pdf = probe.eval_pdf(wi, nodes)
+
+    # Add up over cells, and over the sphere
+    energy = value * _squared_index(_index(drawn), wi, nodes)[:, None] * areas
+    answers = np.concatenate([pdf[:, None] * areas, energy], axis=1).reshape(*shape, -1)
+    sums, variances = (
+        np.array(part) for part in zip(*(zip(*(integrate(side) for side in direction)) for direction in answers))
+    )
+    cells = sums[..., 0].reshape(len(drawn.wi), -1)
+    return Integrals(
+        density=cells,
+        density_variance=variances[..., 0].reshape(cells.shape),
+        counts=np.array(counts).reshape(cells.shape),
+        albedo=sums[..., 1:].sum(axis=(1, 2, 3)),
+        albedo_variance=variances[..., 1:].sum(axis=(1, 2, 3)),
+        shape=sums.shape[1:4],
+    )
+
+
+def _pair(probe: Probe, expected: Probe | None, index: float, rng: np.random.Generator) -> Pairs:
+    # Draw wi by the light that meets the surface, wo by the BSDF or evenly
+    u = rng.random((3, PAIRS))
+    wi = _directions(np.sqrt(1 - u[0] * (1 - 1e-4)), u[1])  # cosines from 0.01 on
+    wi[:, 2] *= np.where((u[2] < 0.5) & probe.two_sided, -1, 1)
+    v = rng.random((3, PAIRS))
+    even = _directions(v[0], v[1])
+    even[:, 2] *= np.sign(wi[:, 2]) * np.where((v[2] < 0.5) & probe.transmits, -1, 1)
+    samples = probe.sample(wi, rng.random((PAIRS, 3), dtype=np.float32))
+    sampled = (rng.random(PAIRS) < 0.5) & (samples.weight.max(axis=1) > 0) & (np.abs(samples.wo[:, 2]) > 1e-2)
+    wo = np.where(sampled[:, None], samples.wo, even)
+
+    # Ask each way, twice
+    first, again = (probe.eval_pdf(wi, wo, offset) for offset in (0.0, 0.125))
+    there = np.stack([first.value, again.value]) / np.abs(wo[:, 2:])
+    there *= _squared_index(index, wi, wo)[:, None]
+    back = np.stack([probe.eval_pdf(wo, wi, offset).value for offset in (0.25, 0.375)]) / np.abs(wi[:, 2:])
+    density = 0.5 * first.pdf + 0.5 / (4 * np.pi if probe.transmits else 2 * np.pi)
+
+    # Ask the other one
+    theirs = None
+    if expected:
+        theirs = expected.eval_pdf(wi, wo).value / np.abs(wo[:, 2:]) * _squared_index(index, wi, wo)[:, None]
+    return Pairs(np.abs(wo[:, 2]) / density, there, back, theirs)
+
+
+def _extremes(probe: Probe, rng: np.random.Generator) -> Extremes:
+    heights = np.array([*EXTREMES, *(-c for c in EXTREMES)])
+    azimuths = np.array([0.0, 0.3, 0.5, 0.8])  # turns; half a turn holds the mirror direction, none the way back
+    wi, wo = (
+        directions.reshape(-1, 3)
+        for directions in np.broadcast_arrays(
+            _directions(heights, np.zeros(len(heights)))[:, None, None],
+            _directions(*np.meshgrid(heights, azimuths, indexing="ij"))[None],
+        )
+    )
+    sampled = np.repeat(_directions(heights, np.zeros(len(heights))), 64, axis=0)
+    samples = probe.sample(sampled, rng.random((len(sampled), 3), dtype=np.float32))
+    return Extremes(wi, wo, probe.eval_pdf(wi, wo), sampled, samples)
+
+
+def _direction(cos_theta: float, phi: float) -> Array:
+    return _directions(np.array(cos_theta), np.array(phi / (2 * np.pi)))
+
+
+def _directions(cos_theta: Array, turns: Array) -> Array:
+    sin_theta, phi = np.sqrt(1 - cos_theta**2), 2 * np.pi * turns
+    return np.stack(np.broadcast_arrays(sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta), axis=-1)

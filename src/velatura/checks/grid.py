@@ -1,0 +1,85 @@
+"""Cells on a hemisphere, fine where samples fall, for histograms and for integrals.
+
+Coordinates are the azimuth from the mirror direction and the height 1 - |cos theta|, in which equal areas are equal
+solid angles. Along each axis some lines follow the samples, some their tail, and some are spread evenly: so lobes of
+any width are resolved, and nothing is missed where no sample falls. (Only a lobe that is much sharper along one axis
+than along the other, and lies aslant, is not: there the integrals are noisy, and say so.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from velatura.checks.probe import Array
+
+CELLS = 32  # along each axis
+NODES = 6  # of integration, along each axis of a cell
+
+_SCALES = 4.0 ** np.arange(1, 11)  # by which the distance of samples from their middle is stretched, to reach the tail
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells and nodes of one hemisphere, seen from one direction.
+
+    Args:
+        azimuth: of the mirror direction, radians.
+        side: 1 above the surface, -1 below.
+        lines: of azimuth and height; every NODES-th of them bounds a cell.
+    """
+
+    azimuth: float
+    side: int
+    lines: tuple[Array, Array]
+
+    @classmethod
+    def around(cls, wi: Array, wo: Array, side: int) -> Grid:
+        """The grid for light from wi (3,), fine where the directions wo (n, 3) lie."""
+        azimuth = float(np.arctan2(-wi[1], -wi[0]))
+        phi, height = _coordinates(wo[wo[:, 2] * side > 0], azimuth)
+        return cls(azimuth, side, (_lines(phi, -np.pi, np.pi), _lines(height, 0.0, 1.0)))
+
+    def nodes(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Directions (n, 3), one at random within each of the smallest meshes, and the solid angles of those (n,)."""
+        u = rng.random((2, CELLS * NODES, CELLS * NODES))
+        spans = [np.diff(lines) for lines in self.lines]
+        phi = self.azimuth + self.lines[0][:-1, None] + spans[0][:, None] * u[0]
+        height = self.lines[1][None, :-1] + spans[1][None, :] * u[1]
+        sin_theta = np.sqrt(height * (2 - height))
+        wo = np.stack([sin_theta * np.cos(phi), sin_theta * np.sin(phi), self.side * (1 - height)], axis=-1)
+        return wo.reshape(-1, 3), np.outer(*spans).ravel()
+
+    def count(self, wo: Array) -> Array:
+        """How many of the directions fall in each cell, (CELLS, CELLS)."""
+        coordinates = _coordinates(wo[wo[:, 2] * self.side > 0], self.azimuth)
+        cells = [np.searchsorted(lines[NODES:-1:NODES], x, "right") for lines, x in zip(self.lines, coordinates)]
+        return np.bincount(cells[0] * CELLS + cells[1], minlength=CELLS**2).reshape(CELLS, CELLS)
+
+
+def integrate(values: Array) -> tuple[Array, Array]:
+    """Integrals over cells, and their variances, from values (nodes, ...) times solid angles.
+
+    The variance of a sum is at most that of the differences between neighbours, be they noisy or merely different.
+    """
+    meshes = values.reshape(CELLS, NODES // 2, 2, CELLS, NODES, *values.shape[1:])
+    return meshes.sum(axis=(1, 2, 4)), np.square(meshes[:, :, 0] - meshes[:, :, 1]).sum(axis=(1, 3))
+
+
+def _coordinates(wo: Array, azimuth: float) -> tuple[Array, Array]:
+    x, y, z = wo.T
+    phi = np.mod(np.arctan2(y, x) - azimuth + np.pi, 2 * np.pi) - np.pi
+    return phi, (x * x + y * y) / (1 + np.abs(z))  # 1 - |z| without the loss of digits near the pole
+
+
+def _lines(samples: Array, low: float, high: float) -> Array:
+    """A third of the lines follow the samples, a third their tail on every scale, a third is spread evenly."""
+    middle = np.median(samples) if len(samples) else 0.0
+    scales = np.resize(_SCALES, len(samples))
+    tail = middle + scales * (samples - middle)
+    tail = tail[(tail > low) & (tail < high)]
+    even = np.linspace(low, high, max(len(samples), 2))
+    lines = np.quantile(np.concatenate([samples, tail, even]), np.linspace(0, 1, CELLS * NODES + 1))
+    lines[0], lines[-1] = low, high
+    return lines

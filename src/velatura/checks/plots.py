@@ -1,0 +1,58 @@
+"""A picture of a finding, for the laws that fail."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from velatura.checks.report import Finding
+from velatura.errors import InvalidInput
+
+
+def check_folder(folder: str | Path) -> Path:
+    """The folder for plots, made where it is missing. Raises InvalidInput where it cannot be written."""
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=path).close()
+    except OSError as error:
+        raise InvalidInput(f"{path}: plots cannot be written there ({error.strerror})") from error
+    return path
+
+
+def save(finding: Finding, folder: Path) -> Path:
+    """Draw a finding into a PNG in a folder; the file is written whole or not at all."""
+    from matplotlib.figure import Figure
+
+    # Pictures side by side, or curves over the first array
+    pictures = all(values.ndim == 2 for values in finding.data.values())
+    figure = Figure(figsize=(4 * len(finding.data), 4) if pictures else (6, 4), layout="constrained")
+    (_pictures if pictures else _curves)(figure, finding)
+    figure.suptitle(f"{finding.law}: {finding.value:.4g}, allowed {finding.bound:.4g}")
+
+    # Write it in one go
+    path = folder / f"{finding.law.replace(' ', '-')}.png"
+    unfinished = path.with_name(f".{path.stem}-{os.getpid()}.png")
+    try:
+        figure.savefig(unfinished)
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path
+
+
+def _pictures(figure: Any, finding: Finding) -> None:
+    for axes, (name, values) in zip(figure.subplots(1, len(finding.data), squeeze=False)[0], finding.data.items()):
+        figure.colorbar(axes.imshow(values, aspect="auto"), ax=axes, shrink=0.7)
+        axes.set_title(name)
+
+
+def _curves(figure: Any, finding: Finding) -> None:
+    (abscissa, x), *curves = finding.data.items()
+    axes = figure.subplots()
+    for name, y in curves:
+        axes.plot(x, y, ".", label=name)
+    axes.set_xlabel(abscissa)
+    axes.legend()

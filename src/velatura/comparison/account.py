@@ -1,0 +1,129 @@
+"""What a model says of a material, in the truth's terms: its lobes sampled, so that lobes of any width are resolved."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.comparison.result import Account
+from velatura.errors import InvalidInput
+from velatura.model import Model, adding, mixture, prepare, variance_kind
+from velatura.model.diffuse import Base, under, with_mean_reflectance
+from velatura.model.prepare import Prepared
+from velatura.model.statistics import number
+from velatura.optics import fresnel
+from velatura.optics.ggx import Direction
+from velatura.reference import Lobe
+from velatura.reference.distribution import BINS
+from velatura.reference.trace import directions, relative_index
+from velatura.stack import Stack
+
+Array = NDArray[np.floating]
+
+SAMPLES = 2**17  # of each lobe
+
+_INDEX = np.arange(SAMPLES)
+_U1, _U2 = (0.5 + _INDEX * 0.7548776662466927) % 1, (0.5 + _INDEX * 0.5698402909980532) % 1  # Roberts' sequence
+
+
+@dataclasses.dataclass(frozen=True)
+class _Light:
+    """Light that leaves: points (2, n) on the projected disc and their energies (3, n)."""
+
+    points: Array
+    energy: Array
+
+
+def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
+    """The lobes of a model, and what becomes of them when they are evaluated.
+
+    Raises:
+        InvalidInput: a texture where a number is needed, or a model with a lobe for each channel.
+    """
+    if model.channels == "separate":
+        raise InvalidInput("channels=separate: only for lobes and inverse, since the truth has one roughness a lobe")
+    flat = stack.flat()
+    values = {name: number(name, value) for name, value in flat.items()}
+    prepared = with_mean_reflectance(prepare(stack.kinds, values, model, variance_kind(stack.kinds, flat)))
+    columns = [_column(stack, prepared, wi) for wi in directions(cos_theta, 0.0)]
+
+    names = [field.name for field in dataclasses.fields(Lobe)]
+    rows = zip(*(lobes for lobes, _ in columns))
+    lobes = tuple(Lobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in rows)
+    reflected, transmitted = (lobes[:-1], lobes[-1]) if stack.transmits else (lobes, None)
+    grids = np.stack([grid for _, grid in columns], axis=1)
+    return Account(reflected, transmitted, grids.sum(axis=(2, 3)), grids)
+
+
+def _column(stack: Stack, prepared: Prepared, incident: Array) -> tuple[list[Lobe], Array]:
+    """The lobes of one direction, and the distribution (3, bins, bins) of what is reflected."""
+    wi: Direction = tuple(incident[:, None])  # type: ignore[assignment]
+    reflected, transmitted = adding.lobes(prepared, wi)
+    lights = [_sampled(lobe, wi) for lobe in reflected]
+    lobes = [_described(lobe, light) for lobe, light in zip(reflected, lights)]
+    if base := under(prepared, transmitted):
+        lights.append(_sampled_base(base))
+        lobes.append(_lobe(base.energy, (np.nan, np.nan), np.nan, lights[-1]))
+    if stack.transmits:
+        lobes.append(_described(transmitted, _sampled(transmitted, _refracted(wi, relative_index(stack)))))
+    return lobes, np.sum([_distribution(light) for light in lights], axis=0)
+
+
+def _sampled(lobe: adding.Lobe, wi: Direction) -> _Light:
+    """A lobe as it is evaluated; one that is smooth, in its one direction."""
+    if np.all(np.maximum(*lobe.roughness[:2]) == 0):
+        return _Light(-np.stack(wi[:2]), _colour(lobe.energy))
+    wo = mixture.sample([lobe], None, wi, 0.0, _U1, _U2)
+    value, density = mixture.eval_pdf([lobe], None, wi, wo)
+    energy = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / SAMPLES
+    return _Light(np.stack(wo[:2]), _colour(energy, SAMPLES))
+
+
+def _sampled_base(base: Base) -> _Light:
+    """Directions by the cosine law, uniform on the disc."""
+    radius, phi = np.sqrt(_U1), 2 * np.pi * _U2
+    points = np.stack([radius * np.cos(phi), radius * np.sin(phi)])
+    value = base.value((points[0], points[1], np.sqrt(1 - _U1)))
+    return _Light(points, _colour(np.pi * value / SAMPLES, SAMPLES))
+
+
+def _refracted(wi: Direction, eta: float) -> Direction:
+    """The direction below whose mirror image is wi refracted through the whole stack (Belcour 2018, 4.2)."""
+    return wi[0] / eta, wi[1] / eta, fresnel.cos_transmitted(wi[2], eta)
+
+
+def _described(lobe: adding.Lobe, light: _Light) -> Lobe:
+    alpha_u, alpha_v, rotation = (np.broadcast_to(x, 1)[0] for x in lobe.roughness)
+    return _lobe(lobe.energy, (alpha_u, alpha_v), rotation, light)
+
+
+def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: _Light) -> Lobe:
+    """Moments on the disc weigh by the mean of the colours, as the truth's do; NaN where there is no light."""
+    grey = light.energy.mean(axis=0)
+    share = grey / (grey.sum() or np.nan)
+    mean = light.points @ share
+    x, y = light.points - mean[:, None]
+    covariance = np.stack([x * x, x * y, y * y]) @ share
+    return Lobe(_colour(energy)[:, 0], np.array(alpha), np.array(rotation), mean, covariance)
+
+
+def _distribution(light: _Light) -> Array:
+    x, y = np.clip((0.5 * (light.points + 1) * BINS).astype(int), 0, BINS - 1)
+    grids = [np.bincount(x * BINS + y, energy, BINS * BINS) for energy in light.energy]
+    return np.stack(grids).reshape(3, BINS, BINS)
+
+
+def _colour(energy: Array, count: int = 1) -> Array:
+    return np.broadcast_to(energy, (3, count))
+
+
+def along(lobe: Lobe, true: Lobe) -> Lobe:
+    """A model's lobe with its roughness along the axes of the true one; those that are not known stay as they are."""
+    turn = np.nan_to_num(true.rotation - lobe.rotation)
+    cos2, sin2 = np.cos(turn) ** 2, np.sin(turn) ** 2
+    u2, v2 = lobe.alpha**2
+    alpha = np.sqrt([u2 * cos2 + v2 * sin2, u2 * sin2 + v2 * cos2])
+    return dataclasses.replace(lobe, alpha=alpha, rotation=lobe.rotation + turn)

@@ -1,0 +1,148 @@
+"""Hold models to the truth on one material."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import reference
+from velatura.comparison.account import account, along
+from velatura.comparison.pictures import pictures as spheres
+from velatura.comparison.result import Account, Comparison
+from velatura.errors import InvalidInput
+from velatura.model import MODELS, Model, named
+from velatura.reference import Lobe
+from velatura.stack import Diffuse, Interface, Stack, load
+
+COSINES = (1.0, 0.7, 0.35)
+PATHS = 3 * 10**6
+
+Array = NDArray[np.floating]
+Progress = Callable[[int, int], None]
+
+
+def compare(
+    stack: Stack | str,
+    models: Sequence[str | Model] | None = None,
+    cos_theta: Sequence[float] = COSINES,
+    paths: int = PATHS,
+    seed: int = 0,
+    microsurface: bool | None = None,
+    pictures: bool = False,
+    progress: Progress | None = None,
+    **switches: str,
+) -> Comparison:
+    """Energies, roughnesses and distributions of a material by several models, against random walks through it.
+
+    Light comes in the plane of the tangent.
+
+    Args:
+        stack: a material (a stack, a file, or a preset's name).
+        models: names of models, or models; None means all. `switches` change the choices of each.
+        cos_theta: cosines of the directions of incidence, in (0, 1].
+        paths: of the truth, for each direction; at least 2.
+        seed: of the truth's random numbers.
+        microsurface: whether, in the truth, light scatters many times between the facets of an interface; None means
+            that it does if the reflectance of a model counts that.
+        pictures: whether to render spheres as well.
+        progress: called with (steps done, all steps) now and then.
+
+    Raises:
+        InvalidInput: not a valid material, an unknown model or switch, a value outside its range, a texture.
+        MissingTool: LLVM is missing or too old.
+    """
+    # Refuse what cannot work before anything slow begins
+    described = stack if isinstance(stack, Stack) else load(stack)
+    chosen = {m.name: m for m in (named(model, **switches) for model in (MODELS if models is None else models))}
+    if not chosen:
+        raise InvalidInput("models: name at least one")
+    if paths < 2:
+        raise InvalidInput(f"paths: must be at least 2, got {paths}")
+    if microsurface is None:
+        microsurface = any(model.reflectance == "fgd-multi" for model in chosen.values())
+
+    # Let the models speak, then the truth, and set them side by side
+    told = {name: account(described, cos_theta, model) for name, model in chosen.items()}
+    advance = _counter(progress, 3 * len(cos_theta) + (len(chosen) + 2) * pictures)
+    truth, error, noise = _truth(described, cos_theta, paths, seed, microsurface, advance)
+    return Comparison(
+        name=described.name,
+        lobe_names=_lobe_names(described),
+        cos_theta=tuple(float(c) for c in cos_theta),
+        paths=paths,
+        microsurface=microsurface,
+        truth=truth,
+        standard_error=error,
+        noise=noise,
+        models={name: _beside(model, truth) for name, model in told.items()},
+        pictures=spheres(described, chosen, seed, microsurface, advance) if pictures else None,
+    )
+
+
+def _truth(
+    stack: Stack, cos_theta: Sequence[float], paths: int, seed: int, microsurface: bool, advance: Callable[[], None]
+) -> tuple[Account, tuple[Lobe, ...], Array]:
+    """The truth's account, the standard errors of its lobes, and the noise of its distribution as a total variation."""
+    # One direction at a time, so that progress is told and memory is bounded
+    each, halves = [], []
+    for cosine in cos_theta:
+        each.append(reference.statistics(stack, cosine, 0.0, paths, seed, microsurface))
+        advance()
+        pair = []
+        for half in (1, 2):
+            found = reference.distribution(stack, cosine, 0.0, paths // 2, seed + half, microsurface)
+            pair.append(found.reflected[:, 0])
+            advance()
+        halves.append(pair)
+
+    # Half the difference of two halves is as noisy as their mean
+    grids = np.array(halves)  # (N, 2, 3, bins, bins)
+    apart = np.abs((grids[:, 0] - grids[:, 1]).mean(axis=1))
+    mean = grids.mean(axis=1)
+    noise = 0.25 * apart.sum(axis=(1, 2)) / np.maximum(mean.mean(axis=1).sum(axis=(1, 2)), 1e-12)
+
+    reflected, transmitted = _joined(each)
+    errors, below = _joined([s.standard_error for s in each if s.standard_error])
+    grid = mean.swapaxes(0, 1)
+    account = Account(reflected, transmitted, np.sum([lobe.energy for lobe in reflected], axis=0), grid)
+    return account, (*errors, *([below] if below else [])), noise
+
+
+def _joined(each: Sequence[reference.Statistics]) -> tuple[tuple[Lobe, ...], Lobe | None]:
+    """Lobes over all directions, from statistics of single ones."""
+    names = [field.name for field in fields(Lobe)]
+    reflected = tuple(
+        Lobe(**{name: np.concatenate([getattr(s, name)[k] for s in each], axis=-1) for name in names})
+        for k in range(len(each[0].energy))
+    )
+    below = [s.transmitted for s in each if s.transmitted]
+    transmitted = {name: np.concatenate([getattr(lobe, name) for lobe in below], axis=-1) for name in names if below}
+    return reflected, Lobe(**transmitted) if below else None
+
+
+def _beside(model: Account, truth: Account) -> Account:
+    """The model's account with its roughness along the axes of the true lobes."""
+    turned = [along(lobe, true) for lobe, true in zip(model.lobes, truth.lobes)]
+    split = len(model.reflected)
+    return replace(model, reflected=tuple(turned[:split]), transmitted=turned[split] if model.transmitted else None)
+
+
+def _lobe_names(stack: Stack) -> tuple[str, ...]:
+    surfaces = [layer for layer in stack.layers if isinstance(layer, Interface | Diffuse)]
+    names = ["D" if isinstance(layer, Diffuse) else f"R{k}" for k, layer in enumerate(surfaces, 1)]
+    return (*names, "T") if stack.transmits else tuple(names)
+
+
+def _counter(progress: Progress | None, total: int) -> Callable[[], None]:
+    """Tells `progress` of one more step each time that it is called."""
+    steps = count(1)
+
+    def advance() -> None:
+        if progress:
+            progress(next(steps), total)
+
+    return advance

@@ -1,0 +1,37 @@
+"""Spheres of the truth and of every model, in the same light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from velatura import api, scenes
+from velatura.comparison.result import Pictures
+from velatura.model import Model
+from velatura.stack import Stack, dumps
+
+SIZE = (192, 192)
+SAMPLES = 256
+
+
+def pictures(
+    stack: Stack, models: Mapping[str, Model], seed: int, microsurface: bool, advance: Callable[[], None]
+) -> Pictures:
+    """Render spheres in the studio; the truth twice, to tell its noise.
+
+    Raises:
+        InvalidInput, MissingTool: as `scenes.render`.
+    """
+    api.register()
+    walk = {"type": "layered_reference", "material": dumps(stack, "json"), "microsurface": microsurface}
+
+    def sphere(bsdf: object, spp: int, number: int) -> np.ndarray:
+        image = scenes.render(bsdf, scene="sphere", env="studio", spp=spp, size=SIZE, seed=seed + number)
+        advance()
+        return image
+
+    halves = [sphere({**walk, "seed": number}, SAMPLES // 2, number) for number in range(2)]
+    noise = float(np.sqrt(np.mean((halves[0] - halves[1]) ** 2))) / 2
+    images = {name: sphere(api.bsdf(stack, model), SAMPLES, 2) for name, model in models.items()}
+    return Pictures((halves[0] + halves[1]) / 2, noise, images)

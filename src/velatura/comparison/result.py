@@ -1,0 +1,161 @@
+"""What a comparison holds, and the distances between a model and the truth that follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.model.mixture import ALPHA_MIN
+from velatura.reference import Lobe
+
+Array = NDArray[np.floating]
+
+#: Lobes of less energy (mean of the colours) have no say in `Comparison.roughness_error`.
+ENERGY_MIN = 1e-3
+
+# A lobe's quantities, and whether their components (rgb, uv, ...) stand before the directions.
+_FIELDS = {"energy": True, "alpha": True, "rotation": False, "mean": True, "covariance": True}
+
+
+@dataclass(frozen=True)
+class Account:
+    """Where the light goes, for N directions of incidence, as a model or the truth has it.
+
+    reflected: lobes by the deepest interface from the top, a diffuse base last; transmitted: what leaves below, or
+    None. Their mean and covariance are those of the outgoing directions on the projected disc. evaluated (3, N): the
+    integral of `eval`, which is the albedo of what is rendered. distribution (3, N, bins, bins): energies of reflected
+    light over x and y of the projected disc.
+    """
+
+    reflected: tuple[Lobe, ...]
+    transmitted: Lobe | None
+    evaluated: Array
+    distribution: Array
+
+    @property
+    def albedo(self) -> Array:
+        """The sum of the energies of the reflected lobes, (3, N)."""
+        return np.sum([lobe.energy for lobe in self.reflected], axis=0)
+
+    @property
+    def lobes(self) -> tuple[Lobe, ...]:
+        """All lobes, the transmitted one last."""
+        return self.reflected + ((self.transmitted,) if self.transmitted else ())
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Spheres in linear RGB (height, width, 3), by the truth and by model.
+
+    noise: the part of a root mean square error that is the truth's own noise.
+    """
+
+    truth: Array
+    noise: float
+    models: Mapping[str, Array]
+
+    def rmse(self, model: str) -> float:
+        """Root mean square difference between a model's picture and the truth's, over pixels and colours."""
+        return float(np.sqrt(np.mean((self.models[model] - self.truth) ** 2)))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A material as the truth has it and as each model has it.
+
+    name: of the material; lobe_names: "R1", "R2", ... from the top, "D" for a diffuse base, "T" for what is
+    transmitted; cos_theta: the N cosines of incidence; paths: of the truth, for each; microsurface: whether light
+    scatters many times between its facets; standard_error: of the truth's lobes, in their order; noise (N,): the part
+    of a total variation that is the truth's own noise.
+    """
+
+    name: str
+    lobe_names: tuple[str, ...]
+    cos_theta: tuple[float, ...]
+    paths: int
+    microsurface: bool
+    truth: Account
+    standard_error: tuple[Lobe, ...]
+    noise: Array
+    models: Mapping[str, Account]
+    pictures: Pictures | None = None
+
+    @property
+    def albedo_error(self) -> Array:
+        """Standard error of the truth's albedo (3, N), an upper bound: a path adds to one lobe only."""
+        errors = [error.energy for error, _ in zip(self.standard_error, self.truth.reflected)]
+        return np.sqrt(np.sum(np.square(errors), axis=0))
+
+    @cached_property
+    def total_variation(self) -> Mapping[str, Array]:
+        """By model, (N,): half the light that is in the wrong place, over all light that the truth reflects.
+
+        Places are the bins of the projected disc and energies are those of all colours together. 0 is perfect; a
+        model that reflects nothing has 0.5, one with all light in wrong bins has 1.
+        """
+        p = self.truth.distribution.mean(axis=0)
+        total = np.maximum(p.sum(axis=(1, 2)), 1e-12)
+        apart = {name: np.abs(model.distribution.mean(axis=0) - p) for name, model in self.models.items()}
+        return {name: 0.5 * difference.sum(axis=(1, 2)) / total for name, difference in apart.items()}
+
+    @cached_property
+    def roughness_error(self) -> Mapping[str, float]:
+        """By model: mean |log(alpha / true alpha)| over directions, axes, and lobes of an energy above `ENERGY_MIN`.
+
+        What is smoother than a model is ever evaluated counts as that smooth. NaN where there is no such lobe.
+        """
+        return {name: float(np.nanmean(self._log_ratios(model))) for name, model in self.models.items()}
+
+    def _log_ratios(self, model: Account) -> Array:
+        ratios = [np.nan]
+        for lobe, true in zip(model.lobes, self.truth.lobes):
+            smoothest = [np.maximum(alpha, ALPHA_MIN) for alpha in (lobe.alpha, true.alpha)]
+            error = np.abs(np.log(smoothest[0] / smoothest[1]))[:, true.energy.mean(axis=0) > ENERGY_MIN]
+            ratios.extend(error[np.isfinite(error)])
+        return np.array(ratios if len(ratios) == 1 else ratios[1:])
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers but the distributions and pictures, as JSON can hold them: what is not known as None.
+
+        Inner lists run over `cos`, as in the JSON of `velatura lobes`.
+        """
+        names = self.lobe_names
+        errors = {name: _lobe_dict(error) for name, error in zip(names, self.standard_error)}
+        truth = {
+            **_account_dict(names, self.truth),
+            "standard_error": {"lobes": errors, "albedo": _plain(self.albedo_error.T)},
+            "noise": _plain(self.noise),
+            "picture_noise": self.pictures and self.pictures.noise,
+        }
+        models = {
+            name: {
+                **_account_dict(names, model),
+                "roughness_error": _plain(self.roughness_error[name]),
+                "total_variation": _plain(self.total_variation[name]),
+                "rmse": self.pictures and self.pictures.rmse(name),
+            }
+            for name, model in self.models.items()
+        }
+        about = {"material": self.name, "cos": list(self.cos_theta), "paths": self.paths}
+        return {**about, "microsurface": self.microsurface, "truth": truth, "models": models}
+
+
+def _account_dict(names: tuple[str, ...], account: Account) -> dict[str, Any]:
+    lobes = {name: _lobe_dict(lobe) for name, lobe in zip(names, account.lobes)}
+    return {"lobes": lobes, "albedo": _plain(account.albedo.T), "evaluated": _plain(account.evaluated.T)}
+
+
+def _lobe_dict(lobe: Lobe) -> dict[str, Any]:
+    return {field: _plain(getattr(lobe, field).T if turned else getattr(lobe, field)) for field, turned in _FIELDS.items()}
+
+
+def _plain(values: Any) -> Any:
+    """Nested lists of numbers, None for those that are not finite."""
+    if np.ndim(values):
+        return [_plain(value) for value in values]
+    return float(values) if np.isfinite(values) else None

@@ -1,0 +1,186 @@
+"""The plugin `weidlich_wilkie`: layers of microfacets that all share one normal (Weidlich and Wilkie 2007).
+
+    f = f_1(wi, wo) + T_12 a t f_2(wi', wo'),   a = exp(-tau (1/cos_i' + 1/cos_o')),   t = (1 - G) + T_21 G
+
+with both directions refracted about their half-vector, and f_2 layered in turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import pi
+from typing import Any
+
+from velatura import kernel, ops
+from velatura.binding import Binding
+from velatura.ops import Value
+from velatura.optics import fresnel, ggx, refraction
+from velatura.optics.ggx import Direction
+
+ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
+
+Values = Mapping[str, Value]
+
+
+@kernel.plugin("weidlich_wilkie")
+def make(mi: Any) -> type:
+    """The class for the variant that is set."""
+    import drjit as dr
+
+    class WeidlichWilkie(mi.BSDF):
+        """Layered material after Weidlich and Wilkie 2007, the baseline of the statistical models.
+
+        Properties:
+            material (string): a material file (YAML or JSON), the name of a preset, or JSON text.
+            layerN_... (number, spectrum or texture; differentiable): values by flat name, as in `layered`.
+            exterior (number, default 1): absolute index above.
+
+        Light reflects once, at one of the interfaces; media absorb and do not scatter; nothing is transmitted.
+        Interfaces of roughness below 0.001 are evaluated as of that.
+        """
+
+        def __init__(self, properties: Any) -> None:
+            mi.BSDF.__init__(self, properties)
+            self.binding = Binding(mi, properties)
+            flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.Anisotropic
+            self.m_flags = flags if self.binding.uniform else flags | mi.BSDFFlags.SpatiallyVarying
+            self.m_components = [self.m_flags]
+
+        def traverse(self, callback: Any) -> None:
+            self.binding.traverse(callback)
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            bs, kinds, values = mi.BSDFSample3f(), self.binding.stack.kinds, self.binding.at(si, active)
+            wo = sample(kinds, values, tuple(si.wi), sample1, sample2.x, sample2.y)
+            bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, 0
+            bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+            value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
+            return bs, dr.select(bs.pdf > 0, value / dr.maximum(bs.pdf, 1e-30), 0)
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[1]
+
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
+            if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
+                return mi.UnpolarizedSpectrum(0), mi.Float(0)
+            kinds, values = self.binding.stack.kinds, self.binding.at(si, active)
+            active = active & (si.wi.z > 0) & (wo.z > 0)
+            value = evaluate(kinds, values, tuple(si.wi), tuple(wo))
+            pdf = density(kinds, values, tuple(si.wi), tuple(wo))
+            return dr.select(active, mi.UnpolarizedSpectrum(value), 0), dr.select(active, pdf, 0)
+
+        def to_string(self) -> str:
+            return f"WeidlichWilkie[kinds={', '.join(self.binding.stack.kinds)}]"
+
+    return WeidlichWilkie
+
+
+def evaluate(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction) -> Value:
+    """f(wi, wo) |cos theta_o|, a colour, for two directions above; `values` by flat name (`Stack.flat`)."""
+    h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
+    i, o, n = wi, wo, values["exterior"]
+    total: Value = 0.0
+    passed: Value = 1.0
+    for k, kind in enumerate(kinds):
+        # Absorb on both ways through a medium
+        if kind == "medium":
+            tau = values[f"layer{k}_sigma_a"] * values[f"layer{k}_depth"]
+            passed = passed * ops.exp(-tau * (ops.divide(1.0, i[2]) + ops.divide(1.0, o[2])))
+            continue
+        if kind == "diffuse":
+            total = total + passed * values[f"layer{k}_albedo"] / pi
+            break
+        # Reflect at an interface
+        alpha_u, alpha_v, turned_i, turned_o, turned_h = _in_frame(values, k, i, o, h)
+        reflectance = _reflectance(kind, values, k, n, ops.maximum(ggx.dot(i, h), 0.0))
+        g = ggx.masking(turned_i, alpha_u, alpha_v) * ggx.masking(turned_o, alpha_u, alpha_v)
+        lobe = ops.divide(ggx.ndf(turned_h, alpha_u, alpha_v) * g, 4 * ops.maximum(i[2] * o[2], 0.0))
+        total = total + passed * reflectance * lobe
+        if kind != "dielectric":
+            break
+        # Pass it twice; what other facets shadow is not lost inside
+        transmittance = 1 - reflectance
+        passed = passed * transmittance * ((1 - g) + transmittance * g)
+        eta = ops.mean(values[f"layer{k}_eta"] / n)
+        i, o, n = _refracted(i, h, eta), _refracted(o, h, eta), values[f"layer{k}_eta"]
+        passed = ops.select((i[2] > 0) & (o[2] > 0), passed, 0.0)
+    return total * wo[2]
+
+
+def density(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction) -> Value:
+    """Density of `sample`, per solid angle, for two directions above."""
+    h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
+    total: Value = 0.0
+    for k, share in _shares(kinds, values):
+        if kinds[k] == "diffuse":
+            total = total + share * wo[2] / pi
+            continue
+        alpha_u, alpha_v, i, m = _in_frame(values, k, wi, h)
+        visible = ggx.ndf(m, alpha_u, alpha_v) * ggx.masking(i, alpha_u, alpha_v)
+        total = total + share * visible * ops.divide(0.25, ops.maximum(wi[2], 0.0))
+    return total
+
+
+def sample(kinds: Sequence[str], values: Values, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction: a lobe by its share, then a normal of that lobe that is visible from outside.
+
+    It may lie below the surface, where it is worth nothing.
+    """
+    wo, begin = None, 0.0
+    for k, share in _shares(kinds, values):
+        if kinds[k] == "diffuse":
+            radius, phi = ops.sqrt(u1), 2 * pi * u2
+            drawn = (radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1))
+        else:
+            alpha_u, alpha_v, i = _in_frame(values, k, wi)
+            h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
+            drawn = ggx.rotate(ggx.reflect(i, h), -_rotation(values, k))
+        wo = drawn if wo is None else tuple(ops.select(u >= begin, a, b) for a, b in zip(drawn, wo))
+        begin = begin + share
+    assert wo is not None  # no stack is without a surface
+    return wo[0], wo[1], wo[2]
+
+
+def _shares(kinds: Sequence[str], values: Values) -> Iterator[tuple[int, Value]]:
+    """Every surface with the share of samples that it gets: about its energy at normal incidence."""
+    energies: dict[int, Value] = {}
+    n, left = values["exterior"], 1.0
+    for k, kind in enumerate(kinds):
+        if kind == "medium":
+            left = left * ops.mean(ops.exp(-2 * values[f"layer{k}_sigma_a"] * values[f"layer{k}_depth"]))
+            continue
+        reflectance = values[f"layer{k}_albedo"] if kind == "diffuse" else _reflectance(kind, values, k, n, 1.0)
+        energies[k] = left * ops.mean(reflectance) + 0.02  # at a slant it may be more
+        if kind == "dielectric":
+            left, n = left * (1 - ops.mean(reflectance)) * (1 - ops.mean(reflectance)), values[f"layer{k}_eta"]
+    total = sum(energies.values())
+    for k, energy in energies.items():
+        yield k, energy / total
+
+
+def _reflectance(kind: str, values: Values, k: int, n: Value, cosine: Value) -> Value:
+    if kind == "mirror":
+        return 1.0
+    eta = values[f"layer{k}_eta"] / n
+    if kind == "conductor":
+        return fresnel.conductor(cosine, eta, values[f"layer{k}_k"] / n)
+    return fresnel.dielectric(cosine, eta)
+
+
+def _refracted(w: Direction, h: Direction, eta: Value) -> Direction:
+    """Where the light along w comes from or goes to below, away from the next surface."""
+    t = refraction.refract(w, h, eta)
+    return -t[0], -t[1], -t[2]
+
+
+def _rotation(values: Values, k: int) -> Value:
+    return values[f"layer{k}_rotation"] * (pi / 180)
+
+
+def _in_frame(values: Values, k: int, *directions: Direction) -> tuple[Any, ...]:
+    """Both roughnesses of an interface, and directions in its frame."""
+    alpha_u, alpha_v = (ops.maximum(values[f"layer{k}_alpha_{axis}"], ALPHA_MIN) for axis in "uv")
+    return alpha_u, alpha_v, *(ggx.rotate(w, _rotation(values, k)) for w in directions)

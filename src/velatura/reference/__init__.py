@@ -1,0 +1,7 @@
+"""Ground truth: random walks through the layers, which share nothing with the statistical model."""
+
+from velatura.reference import plugin  # noqa: F401  (declares it)
+from velatura.reference.distribution import Distribution, distribution
+from velatura.reference.statistics import Lobe, Statistics, statistics
+
+__all__ = ["Distribution", "Lobe", "Statistics", "distribution", "statistics"]

@@ -1,0 +1,174 @@
+"""What happens to a path at one surface: scattering into a random direction, or into a given one.
+
+All directions are local: the path comes from `wi`, which points away from the surface into the upper side, whichever
+side of the stack that is. Energy is followed, not radiance: no squared index enters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+
+from velatura import ops
+from velatura.ops import Value
+from velatura.optics import ggx, refraction
+from velatura.optics.ggx import Direction
+from velatura.reference.layers import Layers, Surface, relative_index
+
+HUGE = 1e15  # products of densities stay finite
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A path that meets surface `j` from `wi`, out of a slab of index `n_in`; beyond lies index `n_out`."""
+
+    layers: Layers
+    j: Value
+    n_in: Value
+    n_out: Value
+    wi: Direction
+
+    @property
+    def eta(self) -> Value:
+        return relative_index(self.n_in, self.n_out)
+
+    @property
+    def opaque(self) -> Value:
+        return False if self.layers.transmits else self.layers.is_base(self.j)
+
+    def reflectance(self, cosine: Value) -> Value:
+        return self.layers.reflectance(self.j, cosine, self.n_in, self.n_out)
+
+
+@dataclass(frozen=True)
+class Scattered:
+    """A direction with its weight: value over density where it was drawn, else the value f |cos theta_o|.
+
+    The densities weigh strategies against each other: that of scattering on (`sample`), and that of coming back the
+    same way when refraction is certain (`sample_refraction`). At a smooth surface both are infinite, and stand for
+    their ratio: the second is 1, and the first holds how far refraction spreads directions.
+    """
+
+    wo: Direction
+    weight: Value
+    reflected: Value
+    density: Value
+    density_back: Value
+
+
+def sample(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3: Value) -> Scattered:
+    """Scatter once; reflection or refraction is chosen by the mean of the colours that the path carries."""
+    return _with_diffuse_base(
+        meeting,
+        lambda: _sample_interface(meeting, carried, u1, u2, u3),
+        lambda: _sample_diffuse(meeting.layers.albedo, u1, u2),
+    )
+
+
+def evaluate(meeting: Meeting, wo: Direction, reflected: Value) -> Scattered:
+    """Scattering into `wo`, on the upper side where `reflected`; 0 at a smooth surface."""
+    return _with_diffuse_base(
+        meeting,
+        lambda: _evaluate_interface(meeting, wo, reflected),
+        lambda: _evaluate_diffuse(meeting.layers.albedo, wo),
+    )
+
+
+def sample_refraction(meeting: Meeting, u1: Value, u2: Value) -> Scattered:
+    """Refract at a dielectric without a choice; `density` is that of this, `density_back` of `sample` coming back."""
+    # Refract about a visible normal
+    surface, eta = meeting.layers.surface(meeting.j), meeting.eta
+    i = surface.into(meeting.wi)
+    h = surface.sample_normal(i, u1, u2)
+    cos_i = ggx.dot(i, h)
+    o = refraction.refract(i, h, eta)
+    # Weigh
+    transmittance = 1 - meeting.reflectance(cos_i)
+    weight = ops.select(o[2] < 0, transmittance * surface.masking(o), 0.0)
+    density, back = _densities(surface, i, h, o, eta)
+    density = ops.select(surface.smooth, 1.0, density)
+    back = ops.select(surface.smooth, _spread(o, i, 1 / eta), back) * ops.mean(transmittance)
+    return Scattered(surface.out_of(o), weight, False, density, back)
+
+
+def _sample_interface(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3: Value) -> Scattered:
+    # Meet a visible normal
+    surface, eta = meeting.layers.surface(meeting.j), meeting.eta
+    i = surface.into(meeting.wi)
+    h = surface.sample_normal(i, u1, u2)
+    # Choose between reflection and refraction
+    reflectance = meeting.reflectance(ggx.dot(i, h))
+    chance = ops.divide(ops.mean(carried * reflectance), ops.mean(carried))
+    chance = ops.select(meeting.opaque, 1.0, chance)
+    reflected = u3 < chance
+    o = select(reflected, ggx.reflect(i, h), refraction.refract(i, h, eta))
+    # Weigh
+    share = ops.select(reflected, reflectance, 1 - reflectance)
+    weight = ops.divide(share, ops.select(reflected, chance, 1 - chance)) * surface.masking(o)
+    weight = ops.select(_same(o[2] > 0, reflected), weight, 0.0)
+    density, back = _densities(surface, i, h, o, ops.select(reflected, 1.0, eta))
+    density = ops.select(surface.smooth, _spread(i, o, eta), density) * ops.mean(share)
+    return Scattered(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back))
+
+
+def _evaluate_interface(meeting: Meeting, wo: Direction, reflected: Value) -> Scattered:
+    # Find the normal that serves
+    surface, eta = meeting.layers.surface(meeting.j), ops.select(reflected, 1.0, meeting.eta)
+    i, o = surface.into(meeting.wi), surface.into(wo)
+    h = refraction.half_vector(i, o, eta)
+    cos_i = ggx.dot(i, h)
+    serves = (cos_i > 0) & _same(ggx.dot(o, h) > 0, reflected) & _negate(surface.smooth)
+    # Evaluate
+    reflectance = meeting.reflectance(ops.maximum(cos_i, 0.0))
+    share = ops.select(reflected, reflectance, 1 - reflectance)
+    density, back = _densities(surface, i, h, o, eta)
+    density = ops.select(serves, density, 0.0)
+    return Scattered(wo, share * density * surface.masking(o), reflected, density * ops.mean(share), back)
+
+
+def _densities(surface: Surface, i: Direction, h: Direction, o: Direction, eta: Value) -> tuple[Value, Value]:
+    """Of going from i to o by visible normals, per solid angle, and of going back; Fresnel left out."""
+    cos_i, cos_o = ggx.dot(i, h), ggx.dot(o, h)
+    onward = surface.visible(i, h, ops.absolute(cos_i)) * refraction.jacobian(cos_i, cos_o, eta)
+    back = surface.visible(o, h, ops.absolute(cos_o)) * refraction.jacobian(cos_o, cos_i, 1 / eta)
+    return ops.minimum(onward, HUGE), ops.minimum(back, HUGE)
+
+
+def _spread(i: Direction, o: Direction, eta: Value) -> Value:
+    """Solid angle around i over that around o, where a smooth surface refracts one into the other."""
+    return ops.divide(eta * eta * ops.absolute(o[2]), ops.absolute(i[2]))
+
+
+def _sample_diffuse(albedo: Value, u1: Value, u2: Value) -> Scattered:
+    radius, phi, z = ops.sqrt(u1), 2 * pi * u2, ops.sqrt(1 - u1)
+    return Scattered((radius * ops.cos(phi), radius * ops.sin(phi), z), albedo, True, z / pi, 0.0)
+
+
+def _evaluate_diffuse(albedo: Value, wo: Direction) -> Scattered:
+    density = ops.maximum(wo[2], 0.0) / pi
+    return Scattered(wo, albedo * density, True, density, 0.0)
+
+
+def _with_diffuse_base(
+    meeting: Meeting, interface: Callable[[], Scattered], diffuse: Callable[[], Scattered]
+) -> Scattered:
+    if meeting.layers.base != "diffuse":
+        return interface()
+    if meeting.layers.count == 1:
+        return diffuse()
+    pairs = zip(vars(diffuse()).values(), vars(interface()).values())
+    return Scattered(*(select(meeting.opaque, a, b) for a, b in pairs))
+
+
+def select(where: Value, a: Value, b: Value) -> Value:
+    """`ops.select` of values or of directions."""
+    return tuple(select(where, x, y) for x, y in zip(a, b)) if isinstance(a, tuple) else ops.select(where, a, b)
+
+
+def _same(a: Value, b: Value) -> Value:
+    return _negate(a ^ b)
+
+
+def _negate(condition: Value) -> Value:
+    return condition ^ True

@@ -1,0 +1,162 @@
+"""Many scattering events between the facets of one rough interface (Heitz et al. 2016).
+
+Functions alike those of `events`, with `rng` for random numbers, which they return advanced. Densities of many events
+are unknown; those of single ones, on top of a small constant, serve to weigh strategies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from velatura import ops
+from velatura.ops import Value
+from velatura.optics import ggx, microsurface, refraction
+from velatura.optics.ggx import Direction
+from velatura.reference import events
+from velatura.reference.events import Meeting, Scattered, select
+
+_MOST_EVENTS = 1000
+_FLOOR = 0.02  # density, per steradian
+
+UP = (0.0, 0.0, 1.0)
+
+
+@dataclass
+class Flight:
+    """Light between facets: its direction of travel, and the rank of its height, both as seen from its own medium.
+
+    Beyond the interface (not `outside`) that is upside down. `weight` and `value` are colours.
+    """
+
+    rng: Any
+    w: Direction
+    rank: Value
+    outside: Value
+    weight: Value
+    value: Value
+    count: Value
+    alive: Value
+
+
+def scatter(
+    types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, target: Direction, reflected: Value
+) -> tuple[Scattered, Scattered, Any]:
+    """Scatter until the light leaves the interface; also the value for the direction `target`."""
+    # Scatter as if smooth or diffuse, where it is
+    once = events.sample(meeting, carried, *(rng.next_float32() for _ in range(3)))
+    towards = events.evaluate(meeting, target, reflected)
+    surface = meeting.layers.surface(meeting.j)
+    rough = surface.smooth ^ True
+    if meeting.layers.base == "diffuse":
+        rough &= meeting.opaque ^ True
+    # Scatter between the facets elsewhere
+    flight = _fly(types, meeting, carried, rng, active & rough, surface.into(target))
+    wo = surface.out_of(select(flight.outside, flight.w, _reverse(flight.w)))
+    many = _weighed(events.evaluate(meeting, wo, flight.outside), flight.weight)
+    value = _weighed(towards, flight.value)
+    return _choose(rough, many, once), _choose(rough, value, towards), flight.rng
+
+
+def sample_refraction(types: Any, meeting: Meeting, rng: Any) -> tuple[Scattered, Any]:
+    """Scatter until the light leaves the interface; its weight is 0 where that is by reflection."""
+    # Refract once where the interface is smooth
+    once = events.sample_refraction(meeting, rng.next_float32(), rng.next_float32())
+    surface = meeting.layers.surface(meeting.j)
+    rough = surface.smooth ^ True
+    # Scatter between the facets elsewhere
+    colour = types.Float(1) + 0.0 * meeting.reflectance(1.0)
+    flight = _fly(types, meeting, colour, rng, rough, UP)
+    through = flight.outside ^ True
+    wo = select(through, surface.out_of(_reverse(flight.w)), once.wo)
+    # Weigh by what single events would do, here and back
+    i = meeting.wi
+    back = Meeting(meeting.layers, meeting.j, meeting.n_out, meeting.n_in, (wo[0], wo[1], -wo[2]))
+    densities = events.evaluate(back, (i[0], i[1], -i[2]), False)
+    turned = replace(densities, wo=wo, density=densities.density_back, density_back=densities.density)
+    many = _weighed(turned, ops.select(through, flight.weight, 0.0))
+    return _choose(rough, many, once), flight.rng
+
+
+def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, target: Direction) -> Flight:
+    """Follow light from facet to facet; `target` is a direction away from the surface, up or down."""
+    import drjit as dr
+
+    surface, colour = meeting.layers.surface(meeting.j), carried * 0
+    alpha = surface.alpha_u, surface.alpha_v
+    start = surface.into((-meeting.wi[0], -meeting.wi[1], -meeting.wi[2]))
+    flight = Flight(
+        rng, start, types.Float(1), types.Bool(True), colour + 1, colour, types.UInt32(0), types.Bool(active)
+    )
+
+    def step(f: Flight) -> tuple[Flight]:
+        # Fly to the next facet, or away
+        f.rank = microsurface.fly(f.w, f.rank, *alpha, f.rng.next_float32())
+        f.alive &= f.rank <= 1
+        i = _reverse(f.w)
+        # Send light to the target
+        goal = select(f.outside, target, _reverse(target))
+        f.value = ops.select(f.alive, f.value + f.weight * _value(meeting, f, i, goal), f.value)
+        # Meet a facet
+        h = ggx.sample_visible(i, *alpha, f.rng.next_float32(), f.rng.next_float32())
+        reflectance = _reflectance(meeting, f.outside, ggx.dot(i, h))
+        chance = ops.divide(ops.mean(carried * f.weight * reflectance), ops.mean(carried * f.weight))
+        chance = ops.select(meeting.opaque, 1.0, chance)
+        reflected = f.rng.next_float32() < chance
+        share = ops.select(reflected, reflectance / chance, ops.divide(1 - reflectance, 1 - chance))
+        f.weight = ops.select(f.alive, f.weight * share, f.weight)
+        # Turn; what is refracted sees the surface upside down
+        o = select(reflected, ggx.reflect(i, h), _reverse(refraction.refract(i, h, _eta(meeting, f.outside))))
+        f.w = select(f.alive, o, f.w)
+        f.rank = ops.select(reflected | (f.alive ^ True), f.rank, 1 - f.rank)
+        f.outside ^= f.alive & (reflected ^ True)
+        f.count += 1
+        return (f,)
+
+    def goes_on(f: Flight) -> Value:
+        return f.alive & (f.count < _MOST_EVENTS)
+
+    (flight,) = dr.while_loop((flight,), goes_on, step)
+    flight.weight = ops.select(flight.alive, 0.0, flight.weight)
+    return flight
+
+
+def _value(meeting: Meeting, flight: Flight, i: Direction, goal: Direction) -> Value:
+    """What a facet that light meets from i sends along `goal` and out of the interface, f |cos theta_o|."""
+    # Find the facet that serves
+    same_side = goal[2] > 0
+    eta = ops.select(same_side, 1.0, _eta(meeting, flight.outside))
+    h = refraction.half_vector(i, goal, eta)
+    cos_i, cos_o = ggx.dot(i, h), ggx.dot(goal, h)
+    serves = (cos_i > 0) & ((cos_o > 0) ^ same_side ^ True)
+    # Scatter there, and leave without meeting another
+    surface = meeting.layers.surface(meeting.j)
+    alpha = surface.alpha_u, surface.alpha_v
+    reflectance = _reflectance(meeting, flight.outside, ops.maximum(cos_i, 0.0))
+    share = ops.select(same_side, reflectance, 1 - reflectance)
+    density = microsurface.visible(i, h, *alpha) * refraction.jacobian(cos_i, cos_o, eta)
+    rank = ops.select(same_side, flight.rank, 1 - flight.rank)
+    leaves = microsurface.escape(select(same_side, goal, _reverse(goal)), rank, *alpha)
+    return share * ops.select(serves, density * leaves, 0.0)
+
+
+def _eta(meeting: Meeting, outside: Value) -> Value:
+    return ops.select(outside, meeting.eta, 1 / meeting.eta)
+
+
+def _reflectance(meeting: Meeting, outside: Value, cosine: Value) -> Value:
+    here = ops.select(outside, meeting.n_in, meeting.n_out)
+    there = ops.select(outside, meeting.n_out, meeting.n_in)
+    return meeting.layers.reflectance(meeting.j, cosine, here, there)
+
+
+def _weighed(event: Scattered, weight: Value) -> Scattered:
+    return replace(event, weight=weight, density=event.density + _FLOOR, density_back=event.density_back + _FLOOR)
+
+
+def _choose(where: Value, a: Scattered, b: Scattered) -> Scattered:
+    return Scattered(*(select(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
+
+
+def _reverse(w: Direction) -> Direction:
+    return -w[0], -w[1], -w[2]

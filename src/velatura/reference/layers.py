@@ -1,0 +1,207 @@
+"""A stack as the walk meets it: surfaces, and the slabs of one index between them.
+
+Slab k lies above surface k, so slab 0 is the exterior, and slab n lies below all n surfaces. Lengths are measured in
+the depth of a slab, so that only optical depths remain. Which surface a path meets differs from lane to lane: `pick`
+chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import pi
+
+from velatura import ops
+from velatura.ops import Value
+from velatura.optics import fresnel, ggx
+from velatura.optics.ggx import Direction
+
+ALPHA_MIN = 1e-3  # an interface smoother than this along both axes is perfectly smooth
+_MATCHED = 1e-3  # and so is one between indices this close, which bends no light
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The roughness of one surface, positive, and its frame, turned by `rotation` (radians)."""
+
+    alpha_u: Value
+    alpha_v: Value
+    rotation: Value
+    smooth: Value
+
+    def into(self, w: Direction) -> Direction:
+        """Coordinates in the frame of the surface."""
+        return w if _is_zero(self.rotation) else ggx.rotate(w, self.rotation)
+
+    def out_of(self, w: Direction) -> Direction:
+        """Coordinates back in the frame of the stack."""
+        return w if _is_zero(self.rotation) else ggx.rotate(w, -self.rotation)
+
+    def sample_normal(self, w: Direction, u1: Value, u2: Value) -> Direction:
+        """A normal visible from `w`."""
+        h = ggx.sample_visible(w, self.alpha_u, self.alpha_v, u1, u2)
+        x, y, z = (ops.select(self.smooth, smooth, rough) for smooth, rough in zip((0.0, 0.0, 1.0), h))
+        return x, y, z
+
+    def masking(self, w: Direction) -> Value:
+        """Smith's G1 from either side."""
+        mirrored = w[0], w[1], ops.absolute(w[2])
+        return ops.select(self.smooth, 1.0, ggx.masking(mirrored, self.alpha_u, self.alpha_v))
+
+    def visible(self, w: Direction, h: Direction, cosine: Value) -> Value:
+        """Density of normals visible from `w` on either side, where `cosine` = |w·h|."""
+        masking = ggx.masking((w[0], w[1], ops.absolute(w[2])), self.alpha_u, self.alpha_v)
+        return ops.divide(masking * ggx.ndf(h, self.alpha_u, self.alpha_v) * cosine, ops.absolute(w[2]))
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A medium by its optical depths along the normal, and its asymmetry; `scatters` decides what is compiled."""
+
+    absorption: Value = 0.0
+    scattering: Value = 0.0
+    g: Value = 0.0
+
+    @property
+    def scatters(self) -> bool:
+        return not _is_zero(self.scattering)
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Surfaces and slabs from the top, slab n included; `base` is the kind of the last surface.
+
+    With `microsurface`, light scatters many times between the facets of a surface.
+    """
+
+    base: str
+    surfaces: tuple[Surface, ...]
+    slabs: tuple[Slab, ...]
+    index: tuple[Value, ...]
+    extinction: Value = 0.0
+    albedo: Value = 0.0
+    microsurface: bool = False
+
+    @property
+    def count(self) -> int:
+        return len(self.surfaces)
+
+    @property
+    def transmits(self) -> bool:
+        return self.base == "dielectric"
+
+    @property
+    def scatters(self) -> bool:
+        """Whether any medium scatters."""
+        return any(slab.scatters for slab in self.slabs)
+
+    def reversed(self, where: Value) -> Layers:
+        """The stack seen from below where the condition holds; only for one that transmits."""
+
+        def swap(items: Sequence[Value]) -> tuple[Value, ...]:
+            return tuple(_choose(where, below, above) for above, below in zip(items, reversed(items)))
+
+        def columns(items: Sequence[object], fields: str) -> list[tuple[Value, ...]]:
+            return [swap([getattr(item, field) for item in items]) for field in fields.split()]
+
+        surfaces = zip(*columns(self.surfaces, "alpha_u alpha_v rotation smooth"))
+        slabs = zip(*columns(self.slabs, "absorption scattering g"))
+        return replace(
+            self,
+            surfaces=tuple(Surface(*fields) for fields in surfaces),
+            slabs=tuple(Slab(*fields) for fields in slabs),
+            index=swap(self.index),
+        )
+
+    # What a path meets -----------------------------------------------------------------------------------------------
+
+    def surface(self, j: Value) -> Surface:
+        fields = ("alpha_u", "alpha_v", "rotation", "smooth")
+        return Surface(*(pick([getattr(s, field) for s in self.surfaces], j) for field in fields))
+
+    def slab(self, k: Value) -> Slab:
+        return Slab(*(pick([getattr(s, field) for s in self.slabs], k) for field in ("absorption", "scattering", "g")))
+
+    def is_base(self, j: Value) -> Value:
+        return True if self.count == 1 else j == self.count - 1
+
+    def reflectance(self, j: Value, cosine: Value, n_in: Value, n_out: Value) -> Value:
+        """Fresnel reflectance of surface j, a colour, for light that meets a facet from the side of index `n_in`.
+
+        All colours are refracted into one direction, that of the mean indices; where there is none, all are reflected.
+        """
+        if self.base == "mirror":
+            base: Value = 1.0
+        elif self.base == "conductor":
+            base = fresnel.conductor(cosine, self.index[-1] / n_in, self.extinction / n_in)
+        else:
+            base = None
+        if self.count == 1 and base is not None:
+            return base
+        eta = relative_index(n_in, n_out)
+        cos_t = fresnel.cos_transmitted(cosine, eta)
+        dielectric = ops.select(cos_t > 0, fresnel.dielectric_between(cosine, cos_t, n_out / n_in), 1.0)
+        return dielectric if base is None else ops.select(self.is_base(j), base, dielectric)
+
+
+def from_values(kinds: Sequence[str], values: Mapping[str, Value], thin: bool, microsurface: bool) -> Layers:
+    """The layers from values by flat name (`Stack.flat`), numbers and colours of any dialect."""
+    surfaces: list[Surface] = []
+    slabs: list[Slab] = []
+    index: list[Value] = [values["exterior"]]
+    medium, last = Slab(), len(kinds) - 1
+    for i, kind in enumerate(kinds):
+        if kind == "medium":
+            depth, sigma_a, sigma_s, g = (values[f"layer{i}_{key}"] for key in ("depth", "sigma_a", "sigma_s", "g"))
+            medium = Slab(_product(sigma_a, depth), _product(sigma_s, depth), g)
+            continue
+        slabs.append(medium)
+        medium = Slab()
+        index.append(index[0] if thin and i == last else values.get(f"layer{i}_eta", 1.0))
+        if kind == "diffuse":
+            surfaces.append(Surface(1.0, 1.0, 0.0, False))
+        else:
+            matched = kind == "dielectric" and ops.absolute(relative_index(*index[-2:]) - 1) < _MATCHED
+            surfaces.append(_surface(values, i, matched))
+    return Layers(
+        kinds[-1],
+        tuple(surfaces),
+        (*slabs, Slab()),
+        tuple(index),
+        values.get(f"layer{last}_k", 0.0),
+        values.get(f"layer{last}_albedo", 0.0),
+        microsurface,
+    )
+
+
+def pick(items: Sequence[Value], index: Value) -> Value:
+    """The item at an index that differs from lane to lane; without a look-up where all items are one."""
+    chosen = items[-1]
+    for i, item in reversed(list(enumerate(items[:-1]))):
+        chosen = _choose(index == i, item, chosen)
+    return chosen
+
+
+def relative_index(n_in: Value, n_out: Value) -> Value:
+    """One relative index for all colours, by which light is refracted; exactly inverted for light that returns."""
+    return ops.mean(n_out) / ops.mean(n_in)
+
+
+def _surface(values: Mapping[str, Value], i: int, matched: Value) -> Surface:
+    u, v, rotation = (values[f"layer{i}_{key}"] for key in ("alpha_u", "alpha_v", "rotation"))
+    smooth = (ops.maximum(u, v) < ALPHA_MIN) | matched
+    turn = 0.0 if _is_zero(rotation) else rotation * (pi / 180)
+    return Surface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)
+
+
+def _choose(where: Value, a: Value, b: Value) -> Value:
+    same = a is b or (isinstance(a, float | bool) and isinstance(b, float | bool) and a == b)
+    return a if same else ops.select(where, a, b)
+
+
+def _product(a: Value, b: Value) -> Value:
+    return 0.0 if _is_zero(a) or _is_zero(b) else a * b
+
+
+def _is_zero(x: Value) -> bool:
+    return isinstance(x, float) and x == 0.0

@@ -1,0 +1,128 @@
+"""Many paths from one direction into a uniform stack, computed by Dr.Jit without a renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import kernel
+from velatura.errors import InvalidInput
+from velatura.reference.layers import Layers, from_values
+from velatura.reference.walk import walk
+from velatura.stack import Named, Stack, Texture, rgb
+
+Array = NDArray[np.floating]
+
+MAX_DEPTH = 4096
+_AT_ONCE = 2**21
+
+
+@dataclass(frozen=True)
+class Ends:
+    """How n paths ended.
+
+    w (3, n): the direction in which they left, below the surface where light was transmitted; weight (3, n) by colour,
+    0 where they died; deepest (n,): the deepest slab that they were in, counted from 0 above the first surface;
+    truncated: the mean weight of those that were cut off.
+    """
+
+    w: Array
+    weight: Array
+    deepest: NDArray[np.unsignedinteger]
+    truncated: float
+
+
+def directions(cos_theta: Any, phi: Any) -> Array:
+    """Unit vectors (N, 3) of the given cosines and azimuths, broadcast against each other.
+
+    Raises:
+        InvalidInput: a cosine outside (0, 1].
+    """
+    cosine, azimuth = (np.atleast_1d(np.asarray(x, float)) for x in np.broadcast_arrays(cos_theta, phi))
+    outside = ~((cosine > 0) & (cosine <= 1))
+    if outside.any():
+        raise InvalidInput(f"cos_theta: must lie in 0 (excluded) to 1, got {cosine[outside][0]:g}")
+    sine = np.sqrt(1 - cosine**2)
+    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=-1)
+
+
+def ends(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) -> Ends:
+    """All paths at once; see `trace`."""
+    parts = list(trace(stack, wi, paths, seed, microsurface))
+    if len(parts) == 1:
+        return parts[0]
+    w, weight = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("w", "weight"))
+    truncated = sum(part.truncated * len(part.deepest) for part in parts) / paths
+    return Ends(w, weight, np.concatenate([part.deepest for part in parts]), truncated)
+
+
+def trace(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) -> Iterator[Ends]:
+    """Walk paths that come from the direction wi (3,), some millions at a time.
+
+    Raises:
+        InvalidInput: the stack holds a texture.
+        MissingTool: LLVM is missing or too old.
+    """
+    kernel.require_llvm()
+    layers = _layers(stack, microsurface)
+    for start in range(0, paths, _AT_ONCE):
+        yield _part(layers, wi, min(_AT_ONCE, paths - start), _mixed(seed), start)
+
+
+def _part(layers: Layers, wi: Array, count: int, seed: int, start: int) -> Ends:
+    import drjit as dr
+    import drjit.llvm as types
+
+    # Walk
+    rng = types.PCG32(count, types.UInt64(seed), types.UInt64(start))
+    x, y, z = (dr.opaque(types.Float, float(component)) for component in wi)
+    path = walk(types, layers, (x, y, z), rng, types.Array3f(1), max_depth=MAX_DEPTH)
+    # Look at the ends
+    cut_off = dr.select(path.alive, dr.mean(path.weight), 0)
+    weight = dr.select(path.alive, 0, path.weight)
+    dr.eval(path.w, weight, path.deepest, cut_off)
+    w = np.stack([component.numpy() for component in path.w])
+    return Ends(w, weight.numpy(), path.deepest.numpy(), float(cut_off.numpy().mean()))
+
+
+def _layers(stack: Stack, microsurface: bool) -> Layers:
+    """The stack in Dr.Jit numbers, opaque to its compiler, so that stacks of one make share a kernel."""
+    import drjit as dr
+    import drjit.llvm as types
+
+    values: dict[str, Any] = {}
+    for name, value in _numbers(stack).items():
+        if value == 0.0 and "_alpha_" not in name:
+            values[name] = 0.0  # spares work in every step
+        else:
+            values[name] = types.Array3f(*value) if isinstance(value, tuple) else types.Float(value)
+            dr.make_opaque(values[name])
+    return from_values(stack.kinds, values, stack.thin, microsurface)
+
+
+def _numbers(stack: Stack) -> Mapping[str, float | tuple[float, float, float]]:
+    numbers = {}
+    for name, value in stack.flat().items():
+        if isinstance(value, Texture):
+            raise InvalidInput(f"{name}: is a texture, and statistics are those of one point; replace it by a number")
+        numbers[name] = rgb(value) if isinstance(value, Named) else value
+    return numbers
+
+
+def relative_index(stack: Stack) -> float:
+    """Index below a stack that transmits over the index above, one for all colours."""
+    numbers = _numbers(stack)
+    below = numbers["exterior" if stack.thin else f"layer{len(stack.layers) - 1}_eta"]
+    return float(np.mean(below) / np.mean(numbers["exterior"]))
+
+
+def _mixed(seed: int) -> int:
+    """A seed of which neighbours are far apart (the finaliser of splitmix64)."""
+    x = (seed + 0x9E3779B97F4A7C15) % 2**64
+    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) % 2**64
+    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) % 2**64
+    return x ^ (x >> 31)

@@ -1,0 +1,200 @@
+"""The random walk through a stack: position-free, since only depth and direction matter (Guo et al. 2018).
+
+It computes with the number types of a renderer's variant, or of Dr.Jit alone: `types` is a module that holds Float,
+UInt32 and Bool.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+from velatura import ops
+from velatura.ops import Value
+from velatura.optics import ggx, phase
+from velatura.optics.ggx import Direction
+from velatura.reference import events, facets
+from velatura.reference.connection import WayOut, connect_medium, connect_surface, way_up
+from velatura.reference.events import Meeting
+from velatura.reference.facets import UP
+from velatura.reference.layers import Layers, pick
+
+ROULETTE = 0.25  # a path that carries less than this survives by chance, and carries this then
+
+
+@dataclass
+class Path:
+    """The state of the walk before an event: at the surface ahead, or `inside` a medium.
+
+    `w` is the direction of travel in slab `slab`; `height` is measured downwards, in depths of the slab; `weight` and
+    `value` are colours. `smooth`: only smooth surfaces were met so far. `density` and `chain` weigh the strategies of
+    `connection`, where `value` comes from.
+    """
+
+    rng: Any
+    w: Direction
+    slab: Value
+    inside: Value
+    height: Value
+    weight: Value
+    smooth: Value
+    deepest: Value
+    events: Value
+    alive: Value
+    density: Value
+    chain: Value
+    value: Value
+
+
+def walk(
+    types: Any,
+    layers: Layers,
+    wi: Direction,
+    rng: Any,
+    colour: Value,
+    active: Value = True,
+    max_depth: int = 1000,
+    out: WayOut | None = None,
+) -> Path:
+    """Follow paths that enter along -wi until they leave, die, or have met `max_depth` events.
+
+    Args:
+        types: see above.
+        wi: unit vector away from the surface; below it only for a stack that transmits.
+        rng: random numbers, with `next_float32`.
+        colour: what a path carries at first, all channels 1.
+        out: the way out that every event is connected to; the paths then gather the BSDF's `value` for it.
+
+    Returns:
+        The paths as they ended. Those still `alive` were cut off; the others left along `w`, or died with weight 0.
+    """
+    import drjit as dr
+
+    # Enter
+    below = wi[2] < 0
+    path = Path(
+        rng=rng,
+        w=(-wi[0], -wi[1], -wi[2]),
+        slab=ops.select(below, types.UInt32(layers.count), types.UInt32(0)),
+        inside=types.Bool(False),
+        height=types.Float(0),
+        weight=colour,
+        smooth=types.Bool(True),
+        deepest=types.UInt32(0),
+        events=types.UInt32(0),
+        alive=types.Bool(active),
+        density=types.Float(1),
+        chain=types.Float(0),
+        value=colour * 0,
+    )
+    _travel(layers, path)
+
+    # Scatter on
+    def step(path: Path) -> tuple[Path]:
+        _scatter(types, layers, path, out)
+        _roulette(path)
+        _travel(layers, path)
+        path.events += 1
+        return (path,)
+
+    def goes_on(path: Path) -> Value:
+        return path.alive & (path.events < max_depth)
+
+    (path,) = dr.while_loop((path,), goes_on, step)
+    return path
+
+
+def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None) -> None:
+    """One event, at a surface or in a medium."""
+    # Meet the surface ahead, as if from above
+    down = path.w[2] < 0
+    j = ops.select(down, path.slab, path.slab - 1)
+    beyond = ops.select(down, path.slab + 1, path.slab - 1)
+    wi = (-path.w[0], -path.w[1], ops.absolute(path.w[2]))
+    meeting = Meeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi)
+    u1, u2, u3 = (path.rng.next_float32() for _ in range(3))
+    target = way_up(out, j, down) if out is not None else UP
+    if layers.microsurface:
+        active = path.alive & (path.inside ^ True)
+        onward, towards, path.rng = facets.scatter(types, meeting, path.weight, path.rng, active, target, down)
+    else:
+        onward = events.sample(meeting, path.weight, u1, u2, u3)
+        towards = events.evaluate(meeting, target, down)
+    rough = layers.surface(j).smooth ^ True
+    # Gather what leaves from here
+    if out is not None:
+        gathered = connect_surface(meeting, towards, out, path, down)
+        if layers.scatters:
+            gathered = ops.select(path.inside, connect_medium(layers, out, path), gathered)
+        path.value += path.weight * gathered
+    # Turn
+    z = onward.wo[2]
+    turned: Direction = (onward.wo[0], onward.wo[1], ops.select(down, z, -z))
+    chain = ops.select(rough, types.Float(1), 0)
+    chain += ops.select(onward.reflected, 0.0, ops.divide(onward.density_back, path.density) * path.chain)
+    weight, density = onward.weight, onward.density
+    slab = ops.select(onward.reflected, path.slab, beyond)
+    if layers.scatters:
+        g = layers.slab(path.slab).g
+        cosine = phase.sample_henyey_greenstein(g, u1)
+        scattered = phase.deflect(path.w, cosine, 2 * pi * u2)
+        turned = (
+            ops.select(path.inside, scattered[0], turned[0]),
+            ops.select(path.inside, scattered[1], turned[1]),
+            ops.select(path.inside, scattered[2], turned[2]),
+        )
+        weight = ops.select(path.inside, 1.0, weight)
+        density = ops.select(path.inside, phase.henyey_greenstein(cosine, g), density)
+        chain = ops.select(path.inside, 1.0, chain)
+        slab = ops.select(path.inside, path.slab, slab)
+    path.smooth &= (rough | path.inside) ^ True
+    path.w, path.slab = ggx.normalize(turned), slab
+    path.density, path.chain = density, ops.minimum(chain, events.HUGE)
+    path.weight = path.weight * weight
+    path.deepest = ops.maximum(path.deepest, slab)
+
+
+def _roulette(path: Path) -> None:
+    """End faint paths by chance, and make up for it in the others."""
+    carried = ops.mean(path.weight)
+    survival = ops.minimum(carried / ROULETTE, 1.0)
+    survives = path.rng.next_float32() < survival
+    path.weight = ops.select(survives, ops.divide(path.weight, survival), 0.0)
+    path.alive &= survives
+
+
+def _travel(layers: Layers, path: Path) -> None:
+    """Go on to the next event in the slab, or leave the stack."""
+    # Fly freely, or to the surface ahead
+    down, cosine = path.w[2] < 0, ops.maximum(ops.absolute(path.w[2]), 1e-7)
+    slab = layers.slab(path.slab)
+    if layers.scatters:
+        path.height = ops.select(path.inside, path.height, ops.select(down, 0.0, 1.0))
+        ahead = ops.select(down, 1 - path.height, path.height) / cosine
+        density = _of_one_channel(path.rng.next_float32(), path.weight, slab.scattering)
+        flight = ops.divide(-ops.log(1 - path.rng.next_float32()), density)
+        path.inside = flight < ahead
+        length = ops.minimum(flight, ahead)
+        path.height += ops.select(down, length, -length) * cosine
+        seen = ops.exp(-slab.scattering * length) * ops.select(path.inside, slab.scattering, 1.0)
+        path.weight *= ops.divide(seen, ops.divide(ops.mean(path.weight * seen), ops.mean(path.weight)))
+    else:
+        length = 1 / cosine
+    path.weight *= ops.exp(-slab.absorption * length)
+    # Leave
+    leaves = ops.select(down, path.slab == layers.count, path.slab == 0)
+    path.alive &= (leaves & (path.inside ^ True)) ^ True
+
+
+def _of_one_channel(u: Value, carried: Value, colour: Value) -> Value:
+    """The channel of `colour` that u falls on, the channels being as likely as the path carries them."""
+    import drjit as dr
+
+    if dr.size_v(colour) <= 1:
+        return colour
+    chosen, end = colour[0], carried[0]
+    for i in range(1, len(colour)):
+        chosen = ops.select(u * dr.sum(carried) < end, chosen, colour[i])
+        end = end + carried[i]
+    return chosen

@@ -1,0 +1,377 @@
+"""The laws: each has a BSDF that keeps it and one that was made to break it.
+
+Rationale: a law that cannot fail says nothing, and one that fails by chance says too much. Mitsuba's own BSDFs are the
+independent truth: they have been held to a chi-square test of their own for years.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import velatura as vt
+from velatura import checks, kernel
+from velatura.checks import LAWS, Finding, Report, check
+from velatura.errors import InvalidInput
+
+mi: Any = kernel.mitsuba("llvm_ad_rgb")
+import drjit as dr  # noqa: E402
+
+Run = Callable[..., tuple[int, str, str]]
+DOCS = Path(__file__).parents[2] / "docs" / "laws.md"
+
+
+class Made(mi.BSDF):
+    """A white Lambertian surface, but for what a test replaces: any of the functions below, by name."""
+
+    def __init__(self, **replaced: Callable[..., Any]) -> None:
+        mi.BSDF.__init__(self, mi.Properties())
+        self.__dict__.update(replaced)
+        self.m_components = [mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide]
+        self.m_flags = self.m_components[0]
+
+    def f(self, wi: Any, wo: Any) -> Any:
+        return dr.inv_pi
+
+    def density(self, wi: Any, wo: Any) -> Any:
+        return dr.inv_pi * wo.z
+
+    def drawn(self, wi: Any, u: Any) -> Any:
+        return mi.warp.square_to_cosine_hemisphere(u)
+
+    def weight(self, wi: Any, wo: Any) -> Any:
+        return self.f(wi, wo) * wo.z / self.density(wi, wo)
+
+    def lit(self, wi: Any, wo: Any) -> Any:
+        return (wi.z > 0) & (wo.z > 0)
+
+    def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return dr.select(self.lit(si.wi, wo) & active, mi.Color3f(self.f(si.wi, wo)) * dr.abs(wo.z), 0)
+
+    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return dr.select(self.lit(si.wi, wo) & active, self.density(si.wi, wo), 0)
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+        bs = mi.BSDFSample3f()
+        bs.wo, bs.eta, bs.sampled_type = self.drawn(si.wi, sample2), 1.0, mi.UInt32(+self.m_flags)
+        bs.pdf = self.pdf(ctx, si, bs.wo, active)
+        lit = self.lit(si.wi, bs.wo) & active
+        return bs, dr.select(lit, mi.Color3f(self.weight(si.wi, bs.wo)), 0)
+
+
+class Through(mi.BSDF):
+    """Another BSDF, with changes."""
+
+    def __init__(self, inner: Any, scale: float = 1.0, importance: bool = False) -> None:
+        mi.BSDF.__init__(self, mi.Properties())
+        self.inner, self.scale, self.importance = inner, scale, importance
+        self.m_components = [inner.flags(i) for i in range(inner.component_count())]
+        self.m_flags = inner.flags()
+
+    def asked(self, ctx: Any) -> Any:
+        return mi.BSDFContext(mi.TransportMode.Importance) if self.importance else ctx
+
+    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+        bs, weight = self.inner.sample(self.asked(ctx), si, sample1, sample2, active)
+        return bs, weight * self.scale
+
+    def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return self.inner.eval(self.asked(ctx), si, wo, active) * self.scale
+
+    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return self.inner.pdf(ctx, si, wo, active)
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+
+class Mismatched(Through):
+    """Draws from one BSDF, and says that it had drawn from another."""
+
+    def __init__(self, inner: Any, other: Any) -> None:
+        super().__init__(inner)
+        self.other = other
+
+    def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+        bs, _ = self.other.sample(ctx, si, sample1, sample2, active)
+        value, bs.pdf = self.inner.eval_pdf(ctx, si, bs.wo, active)
+        return bs, dr.select(bs.pdf > 0, value / bs.pdf, 0)
+
+
+def metal(alpha: float | tuple[float, float]) -> Any:
+    u, v = alpha if isinstance(alpha, tuple) else (alpha, alpha)
+    return mi.load_dict({"type": "roughconductor", "distribution": "ggx", "alpha_u": u, "alpha_v": v})
+
+
+# BSDFs that keep the laws
+
+
+@pytest.mark.parametrize(
+    "described",
+    [
+        {"type": "diffuse"},
+        {"type": "diffuse", "reflectance": 0.0},
+        {"type": "roughconductor", "alpha": 0.2},
+        {"type": "roughconductor", "alpha": 0.001},
+        {"type": "roughconductor", "alpha_u": 0.03, "alpha_v": 0.3},
+        {"type": "roughconductor", "alpha_u": 0.001, "alpha_v": 0.3},
+        {"type": "roughdielectric", "alpha": 0.3},
+        {"type": "roughdielectric", "alpha": 0.01},
+        {"type": "dielectric"},
+        {"type": "thindielectric"},
+        {"type": "plastic"},
+        {"type": "twosided", "bsdf": {"type": "roughconductor", "alpha": 0.1}},
+        {"type": "mask", "opacity": 0.4, "bsdf": {"type": "diffuse"}},
+    ],
+    ids=lambda d: " ".join(str(x) for x in d.values() if not isinstance(x, dict)),
+)
+def test_mitsubas_own_bsdfs_keep_every_law(described: dict[str, Any]) -> None:
+    """Expected: nothing is broken, whatever is smooth, narrow, black, or lets light through."""
+    report = check(mi.load_dict(described))
+    assert report.passed, {law: report[law] for law in report.broken}
+
+
+def test_mitsubas_principled_keeps_the_laws_of_energy() -> None:
+    """Expected: all but two; lit from below, where it reflects nothing, its pdf is not 0."""
+    report = check(mi.load_dict({"type": "principled", "roughness": 0.3, "metallic": 0.3, "clearcoat": 0.5}))
+    assert set(report.broken) == {"normalisation", "chi-square"}
+    assert "cosine -" in report["normalisation"].detail
+
+
+def test_a_white_surface_of_our_own_keeps_every_law() -> None:
+    """Expected: what the broken ones below are made from is whole, and loses nothing."""
+    report = check(Made(), lossless=True, expected=mi.load_dict({"type": "diffuse", "reflectance": 1.0}))
+    assert report.passed and [finding.law for finding in report.findings] == [law.name for law in LAWS]
+    assert report["white furnace"].value == pytest.approx(1, abs=1e-3)
+    assert report["limit"].value < 1e-5
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.3, 0.9])
+def test_the_furnace_is_a_number(rho: float) -> None:
+    """Expected: the albedo of a Lambertian surface is its reflectance."""
+    report = check(Made(f=lambda wi, wo: rho * dr.inv_pi))
+    assert report["white furnace"].value == pytest.approx(rho, abs=1e-3)
+    assert report["energy"].value == pytest.approx(rho, abs=1e-3)
+
+
+# BSDFs made to break them
+
+BROKEN = {
+    "no number at grazing angles": ("finite", lambda: Made(f=lambda wi, wo: dr.sqrt(wi.z - 1e-3) * dr.inv_pi)),
+    "infinite": ("finite", lambda: Made(density=lambda wi, wo: dr.select(wo.z < 1e-3, dr.inf, dr.inv_pi * wo.z))),
+    "negative": ("finite", lambda: Made(f=lambda wi, wo: (wi.z - 0.05) * dr.inv_pi)),
+    "light from below": ("sides", lambda: Made(lit=lambda wi, wo: wo.z > 0)),
+    "light through an opaque surface": ("sides", lambda: Made(lit=lambda wi, wo: wi.z > 0)),
+    "more than white": ("energy", lambda: Made(f=lambda wi, wo: 1.02 * dr.inv_pi)),
+    "more than a mirror": ("energy", lambda: Through(mi.load_dict({"type": "conductor"}), scale=1.02)),
+    "a gain at grazing angles": ("white furnace", lambda: Made(f=lambda wi, wo: (1.05 - wi.z / 4) * dr.inv_pi)),
+    "brighter than its samples": ("albedo", lambda: Made(weight=lambda wi, wo: 0.98)),
+    "a density too small": ("normalisation", lambda: Made(density=lambda wi, wo: 0.98 * dr.inv_pi * wo.z)),
+    "a density of other samples": ("chi-square", lambda: Made(density=lambda wi, wo: dr.inv_two_pi)),
+    "a rough metal, a little off": ("chi-square", lambda: Mismatched(metal(0.2), metal(0.21))),
+    "a narrow lobe, a little off": ("chi-square", lambda: Mismatched(metal(0.005), metal(0.0055))),
+    "eval_pdf not eval": ("agreement", lambda: Made(eval_pdf=lambda ctx, si, wo, active: (0.98 * si.wi, wo.z))),
+    "weight not eval over pdf": ("weights", lambda: Made(weight=lambda wi, wo: 1.5 * wo.z)),
+    "one-way": ("reciprocity", lambda: Made(f=lambda wi, wo: (1 - 0.1 * wi.z) * dr.inv_pi)),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_is_broken_is_found(name: str) -> None:
+    """Expected: the law that is broken is named."""
+    law, make = BROKEN[name]
+    report = check(make())
+    assert law in report.broken
+    assert not report[law].value <= report[law].bound
+
+
+def test_every_law_is_broken_by_something() -> None:
+    """Expected: no law lacks its counter-example, here or in the two tests below."""
+    assert {law for law, _ in BROKEN.values()} | {"lossless", "limit"} == {law.name for law in LAWS}
+
+
+def test_loss_is_found_where_nothing_absorbs() -> None:
+    """Expected: a grey surface is broken only if it is said to be lossless."""
+    grey = Made(f=lambda wi, wo: 0.98 * dr.inv_pi)
+    assert check(grey).passed
+    assert check(grey, lossless=True).broken == ("lossless",)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        ({"type": "diffuse", "reflectance": 0.5}, {"type": "diffuse", "reflectance": 0.52}),
+        ({"type": "conductor"}, {"type": "conductor", "specular_reflectance": 0.98}),
+        ({"type": "conductor"}, {"type": "null"}),
+    ],
+)
+def test_a_limit_that_is_not_reached_is_found(found: dict[str, Any], expected: dict[str, Any]) -> None:
+    """Expected: f that differs, and a mirror that is darker or that is none."""
+    assert check(mi.load_dict(found), expected=mi.load_dict(found)).passed
+    assert check(mi.load_dict(found), expected=mi.load_dict(expected)).broken == ("limit",)
+
+
+def test_radiance_is_scaled_by_the_squared_index() -> None:
+    """Expected: a dielectric that forgets it gains energy from one side, and is not reciprocal."""
+    forgetful = Through(mi.load_dict({"type": "roughdielectric", "alpha": 0.3}), importance=True)
+    report = check(forgetful)
+    assert {"energy", "white furnace", "reciprocity"} <= set(report.broken)
+    assert report["energy"].value > 1.5
+
+
+def test_noise_in_eval_is_no_breach() -> None:
+    """Expected: an unbiased estimate is reciprocal; a biased one is not, and is found in spite of the noise."""
+
+    def noisy(bias: float) -> Made:
+        def value(ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            bits = (dr.reinterpret_array(mi.UInt32, x) for x in (si.wi.x, wo.x + si.p.x))
+            noise = mi.sample_tea_float32(*bits, 8)
+            mean = (1 - bias * si.wi.z) * dr.inv_pi
+            return dr.select((si.wi.z > 0) & (wo.z > 0), mi.Color3f(2 * noise * mean * wo.z), 0)
+
+        return Made(eval=value)
+
+    unbiased, biased = (check(noisy(bias), exceptions={"weights"}) for bias in (0.0, 0.8))
+    assert unbiased.passed and unbiased["weights"].status == "declared"
+    assert "noisy" in unbiased["reciprocity"].detail
+    assert "reciprocity" in biased.broken
+
+
+# An independent opinion
+
+
+@pytest.mark.parametrize(("drawn", "passes"), [(0.2, True), (0.22, False)])
+def test_chi_square_decides_as_mitsubas_own(drawn: float, passes: bool) -> None:
+    """Expected: on a lobe wide enough for Mitsuba's grid both tests come to the same verdict."""
+    bsdf, wi = Mismatched(metal(0.2), metal(drawn)), mi.Vector3f(0.6, 0, 0.8)
+
+    def interaction(n: int) -> Any:
+        si = dr.zeros(mi.SurfaceInteraction3f, n)
+        si.wi = wi
+        return si
+
+    def sample(u: Any) -> Any:
+        bs, _ = bsdf.sample(mi.BSDFContext(), interaction(dr.width(u)), u[0], mi.Point2f(u[1], u[2]))
+        return bs.wo, dr.select(bs.pdf > 0, 1.0, 0.0)
+
+    def pdf(wo: Any) -> Any:
+        return bsdf.pdf(mi.BSDFContext(), interaction(dr.width(wo)), wo)
+
+    domain = mi.chi2.SphericalDomain()
+    theirs = mi.chi2.ChiSquareTest(domain, sample, pdf, sample_dim=3, sample_count=50_000, ires=8)
+    assert theirs.run(1e-3, 1, quiet=True) == passes
+    assert check(bsdf)["chi-square"].passed == passes
+
+
+# What is reported
+
+
+def test_exceptions_are_numbers_and_no_failures() -> None:
+    one_way = Made(f=lambda wi, wo: (1 - 0.1 * wi.z) * dr.inv_pi)
+    report = check(one_way, exceptions={"reciprocity"})
+    found = report["reciprocity"]
+    assert report.passed and found.status == "declared"
+    assert 0.01 < found.value < 0.1
+    assert json.loads(json.dumps(report.to_dict()))["laws"][-1]["status"] == "declared"
+
+
+def test_what_is_broken_leaves_a_plot(tmp_path: Path) -> None:
+    """Expected: one picture for each law that is broken, and none for those that are declared."""
+    wrong = Made(density=lambda wi, wo: dr.inv_two_pi, f=lambda wi, wo: (1.1 - 0.1 * wi.z) * dr.inv_pi)
+    folder = tmp_path / "new" / "plots"
+    report = check(wrong, plots=folder, exceptions={"reciprocity"})
+    assert {path.name for path in folder.iterdir()} == {f"{law.replace(' ', '-')}.png" for law in report.broken}
+    assert {"chi-square", "white furnace"} <= set(report.broken)
+
+
+def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(InvalidInput, match="gravity: is no law"):
+        check(Made(), exceptions={"gravity"})
+    with pytest.raises(InvalidInput, match="cannot be written"):
+        check(Made(), plots=tmp_path / "file")
+    try:
+        scalar = kernel.mitsuba("scalar_rgb")
+        with pytest.raises(InvalidInput, match="llvm_ad_rgb"):
+            check(scalar.load_dict({"type": "diffuse"}))
+    finally:
+        kernel.mitsuba("llvm_ad_rgb")
+
+
+# Materials
+
+
+def test_a_material_is_checked_with_what_its_model_declares() -> None:
+    """Expected: of a forward model that one-way street is known; a wrong limit and a law of one's own are not."""
+    bare = vt.Stack([vt.Interface(eta=0.2, k=3.9, alpha=0.2)])
+    coated = vt.Stack([vt.Interface(eta=1.0, alpha=0.0), *bare.layers])
+    progress: list[tuple[int, int]] = []
+    report = vt.check(coated, expected=bare, tir="off", progress=lambda done, total: progress.append((done, total)))
+    assert report.passed
+    assert report["reciprocity"].status == "declared"
+    assert progress[-1][0] == progress[-1][1]
+
+
+@pytest.mark.parametrize(
+    ("layers", "judged"),
+    [
+        ([vt.Interface(eta=1.5), vt.Interface(conductor="mirror")], True),
+        ([vt.Interface(eta=1.5), vt.Medium(sigma_a=0.1), vt.Interface(conductor="mirror")], False),
+        ([vt.Interface(eta=1.5), vt.Interface(conductor="Au")], False),
+    ],
+)
+def test_loss_is_judged_where_no_layer_absorbs(
+    monkeypatch: pytest.MonkeyPatch, layers: list[Any], judged: bool
+) -> None:
+    seen: dict[str, Any] = {}
+    monkeypatch.setattr(checks, "check", lambda bsdf, **options: seen.update(options))
+    vt.check(vt.Stack(layers))
+    assert seen["lossless"] is judged
+
+
+@pytest.mark.parametrize("passed", [True, False])
+def test_the_command_line(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, passed: bool) -> None:
+    """Expected: a row a law, the numbers as JSON, and exit status 1 and one line where a law is broken."""
+    seen: dict[str, Any] = {}
+    finding = Finding("energy", passed, 1.5, 1.0, "too bright")
+
+    def stub(material: Any, **options: Any) -> Report:
+        seen.update(options)
+        return Report((finding,), 1e-3)
+
+    monkeypatch.setattr(vt, "check", stub, raising=False)
+    status, out, err = run("check", "coated-gold", "--set", "tir=off", "--plots", str(tmp_path))
+    assert status == (0 if passed else 1)
+    assert "energy" in out and "too bright" in out
+    assert err == ("" if passed else "velatura: Coated brushed gold (belcour2018) breaks a law: energy\n")
+    assert (seen["tir"], seen["plots"], seen["model"]) == ("off", tmp_path, "belcour2018")
+    status, out, _ = run("check", "coated-gold", "--json")
+    report = json.loads(out)
+    assert (status, report["passed"], report["model"]) == (0 if passed else 1, passed, "belcour2018")
+    assert report["laws"][0] == {
+        "law": "energy",
+        "status": "kept" if passed else "broken",
+        "value": 1.5,
+        "bound": 1.0,
+        "detail": "too bright",
+    }
+
+
+# The manual
+
+
+def test_the_manual_says_what_the_laws_say() -> None:
+    """Expected: the page has every law with its sentence, and what every model declares."""
+    rows = re.findall(r"^\| ([\w -]+) \| (.+?) \|", DOCS.read_text(encoding="utf-8"), re.MULTILINE)
+    table = [row for row in rows if row[0] in {law.name for law in LAWS}]
+    assert table == [(law.name, law.says) for law in LAWS]
+    declared = {name: set(text.split(", ")) for name, text in rows if name in {model.name for model in vt.MODELS}}
+    assert declared == {model.name: set(model.exceptions) or {"nothing"} for model in vt.MODELS}
