@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from velatura.api import bsdf, check, lobes, register, render
+    from velatura.comparison import compare
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Interface, Medium, Stack, Texture, load, preset, presets, save
 
@@ -17,6 +18,7 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "velatura.api": ("bsdf", "check", "lobes", "register", "render"),
+    "velatura.comparison": ("compare",),
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": ("Diffuse", "Interface", "Medium", "Stack", "Texture", "load", "preset", "presets", "save"),
 }
@@ -32,6 +34,7 @@ __all__ = [
     "Texture",
     "bsdf",
     "check",
+    "compare",
     "load",
     "lobes",
     "preset",
@@ -42,7 +45,7 @@ __all__ = [
 ]
 
 
-_PARTS = ("checks", "kernel", "model", "reference", "scenes", "stack", "tables")
+_PARTS = ("checks", "comparison", "kernel", "model", "reference", "scenes", "stack", "tables")
 
 
 def __getattr__(name: str) -> Any:

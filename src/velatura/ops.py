@@ -27,10 +27,13 @@ TINY = 1e-15  # whose square, in gradients of quotients, single precision still 
 
 
 class Gridded(Protocol):
-    """What `interpolate` reads: values at the nodes i/(N-1) of a grid, with channels on the last axis."""
+    """What `interpolate` reads: values at the nodes i/(N-1) of a grid of some shape.
+
+    Dr.Jit reads a texture; NumPy reads `data`, with channels on the last axis.
+    """
 
     @property
-    def data(self) -> np.ndarray: ...
+    def shape(self) -> tuple[int, ...]: ...
 
     def texture(self, dialect: Any) -> Any: ...
 
@@ -53,14 +56,14 @@ class _Numpy:
         return np.max(x, axis=0) if np.ndim(x) else x
 
     @staticmethod
-    def interpolate(table: Gridded, coordinates: Sequence[Value]) -> list[Value]:
+    def interpolate(table: Any, coordinates: Sequence[Value]) -> list[Value]:
         channels = table.data.shape[-1]
         index: Value = 0
         corners = [(index, 1.0)]
         for x, nodes in zip(coordinates, table.data.shape):
             position = np.clip(x, 0, 1) * (nodes - 1)
             cell = np.minimum(np.asarray(position).astype(int), nodes - 2)
-            upper = position - cell
+            upper = position - cell.astype(np.result_type(position))
             corners = [(i * nodes + cell + k, w * (upper if k else 1 - upper)) for i, w in corners for k in (0, 1)]
         flat = table.data.reshape(-1, channels)
         total = sum(np.asarray(w)[..., None] * flat[i] for i, w in corners)
@@ -109,7 +112,7 @@ class _DrJit:
             return [colour(*values) for values in zip(*(interpolate(table, *x) for x in channels))]
         number = next(type(x) for x in coordinates if not isinstance(x, float))
         texture = table.texture(sys.modules[number.__module__])
-        centres = [(x * (n - 1) + 0.5) / n for x, n in zip(coordinates, table.data.shape)]
+        centres = [(x * (n - 1) + 0.5) / n for x, n in zip(coordinates, table.shape)]
         return texture.eval([number(x) for x in reversed(centres)])
 
 

@@ -209,7 +209,7 @@ def test_tables_are_measured(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     status, out, _ = run("tables", "--json")
     assert (status, json.loads(out)) == (0, [{**row, "shape": [64, 64]}])
     table = run("tables")[1]
-    assert all(cell in table for cell in ["dielectric", "64 x 64", "4096", "1.25", "2.0e-04", "5.0e-06"])
+    assert all(cell in table for cell in ["dielectric", "64x64", "4096", "1.25", "2.0e-04", "5.0e-06"])
 
 
 @pytest.mark.parametrize("ok", [True, False])

@@ -28,12 +28,14 @@ MAY_IMPORT = {
     "reference": "stack optics ops kernel binding",
     "checks": "kernel",
     "scenes": "kernel",
+    "comparison": "stack optics model reference scenes api",
 }
 
 # The ends of the stream -> who may import them.
 IMPORTED_BY = {
     "cli": "__main__",
     "editor": "cli",
+    "comparison": "__init__ cli",
 }
 
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
@@ -53,6 +55,7 @@ LOADS_NO = {
     "velatura.kernel": "mitsuba drjit",
     "velatura.scenes": "mitsuba drjit",
     "velatura.plugins": "mitsuba drjit",
+    "velatura.comparison": "mitsuba drjit matplotlib",
 }
 
 FILES = sorted(SOURCE.rglob("*.py"))

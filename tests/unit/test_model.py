@@ -263,8 +263,12 @@ KINDS = {"d": "dielectric", "c": "conductor", "m": "mirror", "v": "medium"}
 VARIANTS = [{}, {"reflectance": "fresnel"}, {"tir": "clean", "scale": "angles"}, {"medium": "weighted", "map": "weier"}]
 
 
-def test_no_stack_or_direction_gives_nan_or_negative_energy() -> None:
-    """10^5 random stacks and directions over 40 layer patterns, each with all kinds of variance in turn."""
+@pytest.mark.parametrize("precision", [np.float32, np.float64])
+def test_no_stack_or_direction_gives_nan_or_negative_energy(precision) -> None:
+    """10^5 random stacks and directions over 40 layer patterns, with each kind of variance in turn.
+
+    In single precision, as renderers have it, and in double.
+    """
     from velatura.model import adding, mixture, prepare
     from velatura.model.variance import Isotropic, PerAxis
 
@@ -272,20 +276,22 @@ def test_no_stack_or_direction_gives_nan_or_negative_energy() -> None:
     count = 100_000 // len(PATTERNS)
     assert len(PATTERNS) == 40
     for number, pattern in enumerate(PATTERNS):
-        values = random_values(pattern, count, rng)
+        values = {name: value.astype(precision) for name, value in random_values(pattern, count, rng).items()}
         model = named("belcour2018", **VARIANTS[number % len(VARIANTS)])
         variance = (Isotropic, PerAxis, Covariance)[number % 3]
         prepared = prepare([KINDS[kind] for kind in pattern], values, model, variance)
         cos_theta = np.where(rng.random(count) < 0.2, 10 ** rng.uniform(-7, -1, count), rng.uniform(0, 1, count))
         phi, sin_theta = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - cos_theta**2)
-        wi = (sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta)
+        x, y, z = sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta
+        wi = (x.astype(precision), y.astype(precision), z.astype(precision))
         reflected, transmitted = adding.lobes(prepared, wi)
+        assert reflected[0].roughness.alpha_u.dtype == precision
         for lobe in (*reflected, transmitted):
             assert np.isfinite(lobe.energy).all() and np.min(lobe.energy) >= 0, pattern
             for part in (*lobe.roughness, *lobe.variance.matrix()):
                 assert np.isfinite(part).all(), pattern
             assert np.min(lobe.roughness.alpha_u) >= 0 and np.max(lobe.roughness.alpha_u) <= 1
-        wo = mixture.sample(reflected, None, wi, *rng.random((3, count)))
+        wo = mixture.sample(reflected, None, wi, *rng.random((3, count)).astype(precision))
         value, pdf = mixture.eval_pdf(reflected, None, wi, wo)
         assert np.isfinite(value).all() and np.min(value) >= 0, pattern
         assert np.isfinite(pdf).all() and np.min(pdf) >= 0, pattern

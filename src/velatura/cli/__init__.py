@@ -16,7 +16,7 @@ from typing import Annotated, cast
 import typer
 
 from velatura import __version__
-from velatura.cli import check, doctor, lobes, presets, render, schema, tables
+from velatura.cli import check, compare, doctor, lobes, presets, render, schema, tables
 from velatura.errors import VelaturaError
 
 # What Typer raises for a wrong option; caught, so that it is reported in one line like every other wrong input.
@@ -33,7 +33,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for verb in (render.render, lobes.lobes, check.check, presets.presets, schema.schema, tables.tables, doctor.doctor):
+for verb in (
+    render.render,
+    lobes.lobes,
+    check.check,
+    compare.compare,
+    presets.presets,
+    schema.schema,
+    tables.tables,
+    doctor.doctor,
+):
     app.command()(verb)
 
 

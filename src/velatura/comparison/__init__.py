@@ -1,7 +1,7 @@
 """How far each model is from the truth: lobes, albedo, distribution and pictures, as numbers and as one figure."""
 
-from velatura.comparison.compare import COSINES, compare
-from velatura.comparison.figure import save_figure
+from velatura.comparison.figure import check_figure, save_figure
 from velatura.comparison.result import Account, Comparison, Pictures
+from velatura.comparison.side_by_side import COSINES, compare
 
-__all__ = ["COSINES", "Account", "Comparison", "Pictures", "compare", "save_figure"]
+__all__ = ["COSINES", "Account", "Comparison", "Pictures", "check_figure", "compare", "save_figure"]

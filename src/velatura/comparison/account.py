@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -23,10 +24,8 @@ from velatura.stack import Stack
 
 Array = NDArray[np.floating]
 
-SAMPLES = 2**17  # of each lobe
-
-_INDEX = np.arange(SAMPLES)
-_U1, _U2 = (0.5 + _INDEX * 0.7548776662466927) % 1, (0.5 + _INDEX * 0.5698402909980532) % 1  # Roberts' sequence
+SAMPLES = 2**19  # of each lobe: so many that they are less noisy than the truth
+BASE_SAMPLES = 2**17  # of a diffuse base, which is smooth
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +59,8 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
 
 def _column(stack: Stack, prepared: Prepared, incident: Array) -> tuple[list[Lobe], Array]:
     """The lobes of one direction, and the distribution (3, bins, bins) of what is reflected."""
-    wi: Direction = tuple(incident[:, None])  # type: ignore[assignment]
+    x, y, z = incident[:, None]
+    wi: Direction = (x, y, z)
     reflected, transmitted = adding.lobes(prepared, wi)
     lights = [_sampled(lobe, wi) for lobe in reflected]
     lobes = [_described(lobe, light) for lobe, light in zip(reflected, lights)]
@@ -76,7 +76,7 @@ def _sampled(lobe: adding.Lobe, wi: Direction) -> _Light:
     """A lobe as it is evaluated; one that is smooth, in its one direction."""
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
         return _Light(-np.stack(wi[:2]), _colour(lobe.energy))
-    wo = mixture.sample([lobe], None, wi, 0.0, _U1, _U2)
+    wo = mixture.sample([lobe], None, wi, 0.0, *_uniform(SAMPLES))
     value, density = mixture.eval_pdf([lobe], None, wi, wo)
     energy = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / SAMPLES
     return _Light(np.stack(wo[:2]), _colour(energy, SAMPLES))
@@ -84,10 +84,18 @@ def _sampled(lobe: adding.Lobe, wi: Direction) -> _Light:
 
 def _sampled_base(base: Base) -> _Light:
     """Directions by the cosine law, uniform on the disc."""
-    radius, phi = np.sqrt(_U1), 2 * np.pi * _U2
+    u1, u2 = _uniform(BASE_SAMPLES)
+    radius, phi = np.sqrt(u1), 2 * np.pi * u2
     points = np.stack([radius * np.cos(phi), radius * np.sin(phi)])
-    value = base.value((points[0], points[1], np.sqrt(1 - _U1)))
-    return _Light(points, _colour(np.pi * value / SAMPLES, SAMPLES))
+    value = base.value((points[0], points[1], np.sqrt(1 - u1)))
+    return _Light(points, _colour(np.pi * value / BASE_SAMPLES, BASE_SAMPLES))
+
+
+@functools.cache
+def _uniform(count: int) -> tuple[Array, Array]:
+    """Pairs of numbers in [0, 1), spread evenly (Roberts' sequence)."""
+    i = np.arange(count)
+    return (0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1
 
 
 def _refracted(wi: Direction, eta: float) -> Direction:
@@ -113,7 +121,7 @@ def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: _Li
 def _distribution(light: _Light) -> Array:
     x, y = np.clip((0.5 * (light.points + 1) * BINS).astype(int), 0, BINS - 1)
     grids = [np.bincount(x * BINS + y, energy, BINS * BINS) for energy in light.energy]
-    return np.stack(grids).reshape(3, BINS, BINS)
+    return np.array(grids, float).reshape(3, BINS, BINS)
 
 
 def _colour(energy: Array, count: int = 1) -> Array:
@@ -121,9 +129,8 @@ def _colour(energy: Array, count: int = 1) -> Array:
 
 
 def along(lobe: Lobe, true: Lobe) -> Lobe:
-    """A model's lobe with its roughness along the axes of the true one; those that are not known stay as they are."""
+    """A model's lobe with its roughness along the axes of the true lobe, or along its own where those are not known."""
     turn = np.nan_to_num(true.rotation - lobe.rotation)
     cos2, sin2 = np.cos(turn) ** 2, np.sin(turn) ** 2
     u2, v2 = lobe.alpha**2
-    alpha = np.sqrt([u2 * cos2 + v2 * sin2, u2 * sin2 + v2 * cos2])
-    return dataclasses.replace(lobe, alpha=alpha, rotation=lobe.rotation + turn)
+    return dataclasses.replace(lobe, alpha=np.sqrt([u2 * cos2 + v2 * sin2, u2 * sin2 + v2 * cos2]))

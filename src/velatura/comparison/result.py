@@ -27,7 +27,8 @@ class Account:
     """Where the light goes, for N directions of incidence, as a model or the truth has it.
 
     reflected: lobes by the deepest interface from the top, a diffuse base last; transmitted: what leaves below, or
-    None. Their mean and covariance are those of the outgoing directions on the projected disc. evaluated (3, N): the
+    None. Their mean and covariance are those of the outgoing directions on the projected disc, and a model's alpha is
+    that along the axes of the true lobe, wherever its own `rotation` has turned them. evaluated (3, N): the
     integral of `eval`, which is the albedo of what is rendered. distribution (3, N, bins, bins): energies of reflected
     light over x and y of the projected disc.
     """
@@ -151,7 +152,9 @@ def _account_dict(names: tuple[str, ...], account: Account) -> dict[str, Any]:
 
 
 def _lobe_dict(lobe: Lobe) -> dict[str, Any]:
-    return {field: _plain(getattr(lobe, field).T if turned else getattr(lobe, field)) for field, turned in _FIELDS.items()}
+    return {
+        field: _plain(getattr(lobe, field).T if turned else getattr(lobe, field)) for field, turned in _FIELDS.items()
+    }
 
 
 def _plain(values: Any) -> Any:

@@ -16,6 +16,8 @@ from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
+LOSS_MIN = 1e-6  # of one bounce between the stack and a layer; light that loses less is trapped, and blurred out
+
 
 @dataclass(frozen=True)
 class Lobe:
@@ -74,7 +76,7 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
     r_i0, t_0i, t_i0 = above.r_i0, above.t_0i, above.t_i0
 
     # Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 33-36)
-    bounces = 1 / ops.maximum(1 - r_i0 * own.r_12, ops.TINY)
+    bounces = 1 / ops.maximum(1 - r_i0 * own.r_12, LOSS_MIN)
     m_r0i = t_0i * own.r_12 * t_i0 * bounces
     m_ri0 = own.t_21 * r_i0 * own.t_12 * bounces
     m_rr = mean(r_i0 * own.r_12 * bounces)
@@ -84,7 +86,7 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
     back_and_forth = (own.s_r + above.s_ri0) * m_rr
     lobe = None
     if not isinstance(layer, PreparedMedium):
-        variance = above.s_ti0 + (above.s_t0i + own.s_r + back_and_forth) * above.j_0i
+        variance = (above.s_ti0 + (above.s_t0i + own.s_r + back_and_forth) * above.j_0i).bounded()
         lobe = Lobe(m_r0i, variance, variance.roughness(prepared.f))
     from_above = own.s_t12 + (own.s_t21 + above.s_ri0 + back_and_forth) * own.j_12
     share = 1 / ops.maximum(e_ri0, ops.TINY)
@@ -93,9 +95,9 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
         r_i0=own.r_21 + m_ri0,
         t_0i=t_0i * own.t_12 * bounces,
         t_i0=own.t_21 * t_i0 * bounces,
-        s_t0i=above.s_t0i * own.j_12 + own.s_t12 + back_and_forth * own.j_12,
-        s_ti0=own.s_t21 * above.j_i0 + above.s_ti0 + back_and_forth * above.j_i0,
-        s_ri0=own.s_r * (mean(own.r_21) * share) + from_above * (mean(m_ri0) * share),
+        s_t0i=(above.s_t0i * own.j_12 + own.s_t12 + back_and_forth * own.j_12).bounded(),
+        s_ti0=(own.s_t21 * above.j_i0 + above.s_ti0 + back_and_forth * above.j_i0).bounded(),
+        s_ri0=(own.s_r * (mean(own.r_21) * share) + from_above * (mean(m_ri0) * share)).bounded(),
         j_0i=above.j_0i * own.j_12,
         j_i0=above.j_i0 * own.j_21,
     )

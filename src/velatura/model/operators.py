@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from velatura import ops, tables
+from velatura import ops
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
@@ -44,8 +44,8 @@ def interface(
     cos_fetch, alpha = _table_point((s_t0i + layer.s_r).roughness(prepared.f), cos_theta, wi)
 
     # Reflect
-    if layer.row is not None:
-        r = tables.fgd(prepared.tables, layer.row, cos_fetch, alpha)
+    if layer.reflectance is not None:
+        r = layer.reflectance(cos_fetch, alpha)
     elif layer.eta is None:
         r = 1.0
     elif layer.kappa is None:
@@ -53,9 +53,7 @@ def interface(
     else:
         r = fresnel.conductor(cos_theta, layer.eta, layer.kappa)
     r = ops.clip(r, 0.0, 1.0)  # which fits and rounding leave by their errors
-    leaving = None
-    if model.tir != "off" and layer.n_leaving is not None:
-        leaving = ops.clip(tables.tir(prepared.tables, model.tir, layer.n_leaving, cos_fetch, alpha), 0.0, 1.0)
+    leaving = ops.clip(layer.leaving(cos_fetch, alpha), 0.0, 1.0) if layer.leaving is not None else None
     if layer.opaque:
         return Operator(r, 0.0, 0.0, 0.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 
 from velatura import ops, tables
@@ -15,25 +16,26 @@ from velatura.model.maps import MAPS, RoughnessMap
 from velatura.model.models import Model
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
-from velatura.tables import Row, Tables
+from velatura.tables import Average, Tables
 
 
 @dataclass(frozen=True)
 class PreparedInterface:
-    """An interface below a medium of index eta_1 and above one of index eta_2 (colours; kappa None for a dielectric).
+    """An interface between media of indices eta_1 above and eta_2 below (colours; kappa None for a dielectric).
 
     `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is the mean of
-    eta over the channels: one refracted direction for all colours. `n_leaving` is the same for light that goes up from
-    here through the interface above: None for the first interface.
+    eta over the channels: one refracted direction for all colours. `reflectance` is its directional albedo, None where
+    the model takes Fresnel at the mean direction; `leaving` the share of light going up from it that total internal
+    reflection lets out, None where that is all.
     """
 
     eta: Value | None
     kappa: Value | None
     n12: Value
-    n_leaving: Value | None
     roughness: Roughness
     s_r: Variance
-    row: Row | None
+    reflectance: Average | None
+    leaving: Average | None
 
     @property
     def opaque(self) -> bool:
@@ -69,7 +71,6 @@ class Prepared:
     layers: tuple[PreparedInterface | PreparedMedium, ...]
     variance: type[Variance]
     f: RoughnessMap
-    tables: Tables
     base: PreparedBase | None = None
 
 
@@ -93,6 +94,7 @@ def prepare(
     model: Model,
     variance: type[Variance],
     constant: bool = True,
+    number: type | None = None,
 ) -> Prepared:
     """Constants of the whole stack.
 
@@ -101,8 +103,10 @@ def prepare(
         values: numbers and colours under flat names (`Stack.flat`), rotations in degrees.
         variance: from `variance_kind`.
         constant: whether the values may be looked at now, to leave out look-ups that they can never need.
+        number: Dr.Jit's type of numbers, to have the averages of this material sampled once; None to look them up in
+            the shared tables.
     """
-    shared = tables.load()
+    averages = _Averages(model, tables.load(), constant, number)
     layers: list[PreparedInterface | PreparedMedium] = []
     eta_1, n_leaving, base = values["exterior"], None, None
     for i, kind in enumerate(kinds):
@@ -112,11 +116,10 @@ def prepare(
         elif kind == "diffuse":
             base = PreparedBase(layer["albedo"], eta_1 / values["exterior"])
         else:
-            interface = _interface(kind, layer, eta_1, n_leaving, model, variance, shared, constant)
-            layers.append(interface)
+            layers.append(_interface(kind, layer, eta_1, n_leaving, averages, variance))
             if kind == "dielectric":
                 eta_1, n_leaving = layer["eta"], ops.mean(eta_1 / layer["eta"])
-    return Prepared(model, tuple(layers), variance, MAPS[model.map], shared, base)
+    return Prepared(model, tuple(layers), variance, MAPS[model.map], base)
 
 
 def _medium(layer: Mapping[str, Value]) -> PreparedMedium:
@@ -130,21 +133,43 @@ def _interface(
     layer: Mapping[str, Value],
     eta_1: Value,
     n_leaving: Value | None,
-    model: Model,
+    averages: _Averages,
     variance: type[Variance],
-    shared: Tables,
-    constant: bool,
 ) -> PreparedInterface:
     roughness = Roughness(layer["alpha_u"], layer["alpha_v"], layer["rotation"] * (pi / 180))
-    s_r = variance.of(roughness, MAPS[model.map])
-    by_table = model.reflectance == "fgd"
-    if kind == "mirror":
-        row = tables.mirror_row(shared) if by_table else None
-        return PreparedInterface(None, None, 1.0, n_leaving, roughness, s_r, row)
-    eta = layer["eta"] / eta_1
-    if kind == "conductor":
-        kappa = layer["k"] / eta_1
-        row = tables.conductor_row(shared, eta, kappa, constant) if by_table else None
-        return PreparedInterface(eta, kappa, 1.0, n_leaving, roughness, s_r, row)
-    row = tables.dielectric_row(shared, eta, constant) if by_table else None
-    return PreparedInterface(eta, None, ops.mean(eta), n_leaving, roughness, s_r, row)
+    s_r = variance.of(roughness, MAPS[averages.model.map])
+    eta = layer["eta"] / eta_1 if kind != "mirror" else None
+    kappa = layer["k"] / eta_1 if kind == "conductor" else None
+    n12 = ops.mean(eta) if kind == "dielectric" else 1.0
+    reflectance, leaving = averages.reflectance(eta, kappa), averages.leaving(n_leaving)
+    return PreparedInterface(eta, kappa, n12, roughness, s_r, reflectance, leaving)
+
+
+@dataclass(frozen=True)
+class _Averages:
+    """How a model looks up averages over rough interfaces."""
+
+    model: Model
+    tables: Tables
+    constant: bool
+    number: type | None
+
+    def reflectance(self, eta: Value | None, kappa: Value | None) -> Average | None:
+        if self.model.reflectance == "fresnel":
+            return None
+        if eta is None:
+            row = tables.mirror_row(self.tables)
+        elif kappa is None:
+            row = tables.dielectric_row(self.tables, eta, self.constant)
+        else:
+            row = tables.conductor_row(self.tables, eta, kappa, self.constant)
+        if self.number:
+            return tables.fgd_sheet(self.tables, row, self.number)
+        return partial(tables.fgd, self.tables, row)
+
+    def leaving(self, n: Value | None) -> Average | None:
+        if n is None or self.model.tir == "off":
+            return None
+        if self.number:
+            return tables.tir_sheet(self.tables, self.model.tir, n, self.number)
+        return partial(tables.tir, self.tables, self.model.tir, n)

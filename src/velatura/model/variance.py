@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 from velatura import ops
-from velatura.model.maps import RoughnessMap
+from velatura.model.maps import VARIANCE_MAX, RoughnessMap
 from velatura.ops import Value
 
 V = TypeVar("V", bound="Variance")
@@ -38,6 +38,10 @@ class Variance:
         return type(self)(*(scale * a for a in vars(self).values()))
 
     __rmul__ = __mul__
+
+    def bounded(self: V) -> V:
+        """With every component within what a roughness map tells apart from infinity, so that no sum overflows."""
+        return type(self)(*(ops.clip(a, -VARIANCE_MAX, VARIANCE_MAX) for a in vars(self).values()))
 
     @classmethod
     def of(cls: type[V], roughness: Roughness, f: RoughnessMap) -> V:

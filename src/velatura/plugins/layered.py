@@ -64,7 +64,8 @@ def make(mi: Any) -> type:
             self.variance = variance_kind(kinds, {**flat, **binding.images})
             self.prepared: Prepared | None = None
             if binding.uniform:
-                layers = prepare(kinds, binding.values(), self.model, self.variance)
+                number = mi.Float if dr.is_jit_v(mi.Float) else None
+                layers = prepare(kinds, binding.values(), self.model, self.variance, number=number)
                 dr.eval(layers)
                 self.prepared = with_mean_reflectance(layers, self._settled)
                 dr.eval(self.prepared)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.tables import coordinates
+from velatura.tables.sheet import Average, sample
 from velatura.tables.store import Table, Tables
 
 
@@ -78,6 +80,24 @@ def tir(tables: Tables, form: str, eta: Value, cos_theta: Value, alpha: Value) -
     channels = ops.interpolate(outside, coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha))
     above = 1 - _dot(channels, [fresnel.dielectric(c, eta) for c in outside.nodes])
     return ops.select(eta < 1, _fetch_inside(tables.tir_published, eta, cos_theta, alpha)[0], above)
+
+
+def fgd_sheet(tables: Tables, row: Row, number: type) -> Average:
+    """`fgd` of one material as one fetch where its index allows; `number` is Dr.Jit's type of numbers."""
+    look_up = partial(fgd, tables, row)
+    if row.rarer and row.denser:
+        return look_up
+    if not row.rarer:
+        return sample(look_up, number, row.table.shape)
+    return sample(look_up, number, tables.inside.shape[:2], _critical_angle(ops.mean(row.eta)))
+
+
+def tir_sheet(tables: Tables, form: str, eta: Value, number: type) -> Average:
+    """`tir` for one relative index as one fetch; `number` is Dr.Jit's type of numbers."""
+    look_up = partial(tir, tables, form, eta)
+    if _sides(eta < 1)[1]:
+        return sample(look_up, number, tables.tir_clean.shape[:2], _critical_angle(eta))
+    return sample(look_up, number, tables.tir_published_outside.shape)
 
 
 def _mean_fresnel_inside(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:

@@ -25,6 +25,11 @@ class Table:
     nodes: tuple[float, ...] = ()
     _textures: dict[Any, Any] = field(default_factory=dict, repr=False)
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the grid, without the channels."""
+        return self.data.shape[:-1]
+
     def texture(self, dialect: Any) -> Any:
         """The table as a texture of a Dr.Jit module (`drjit.llvm.ad`, say), made at first use."""
         if dialect not in self._textures:

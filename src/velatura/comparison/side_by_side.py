@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import count
 
-import numpy as np
-from numpy.typing import NDArray
-
-from velatura import reference
 from velatura.comparison.account import account, along
 from velatura.comparison.pictures import pictures as spheres
 from velatura.comparison.result import Account, Comparison
+from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
-from velatura.reference import Lobe
 from velatura.stack import Diffuse, Interface, Stack, load
 
 COSINES = (1.0, 0.7, 0.35)
 PATHS = 3 * 10**6
 
-Array = NDArray[np.floating]
 Progress = Callable[[int, int], None]
 
 
@@ -68,7 +63,7 @@ def compare(
     # Let the models speak, then the truth, and set them side by side
     told = {name: account(described, cos_theta, model) for name, model in chosen.items()}
     advance = _counter(progress, 3 * len(cos_theta) + (len(chosen) + 2) * pictures)
-    truth, error, noise = _truth(described, cos_theta, paths, seed, microsurface, advance)
+    truth, error, noise = walked(described, cos_theta, paths, seed, microsurface, advance)
     return Comparison(
         name=described.name,
         lobe_names=_lobe_names(described),
@@ -81,47 +76,6 @@ def compare(
         models={name: _beside(model, truth) for name, model in told.items()},
         pictures=spheres(described, chosen, seed, microsurface, advance) if pictures else None,
     )
-
-
-def _truth(
-    stack: Stack, cos_theta: Sequence[float], paths: int, seed: int, microsurface: bool, advance: Callable[[], None]
-) -> tuple[Account, tuple[Lobe, ...], Array]:
-    """The truth's account, the standard errors of its lobes, and the noise of its distribution as a total variation."""
-    # One direction at a time, so that progress is told and memory is bounded
-    each, halves = [], []
-    for cosine in cos_theta:
-        each.append(reference.statistics(stack, cosine, 0.0, paths, seed, microsurface))
-        advance()
-        pair = []
-        for half in (1, 2):
-            found = reference.distribution(stack, cosine, 0.0, paths // 2, seed + half, microsurface)
-            pair.append(found.reflected[:, 0])
-            advance()
-        halves.append(pair)
-
-    # Half the difference of two halves is as noisy as their mean
-    grids = np.array(halves)  # (N, 2, 3, bins, bins)
-    apart = np.abs((grids[:, 0] - grids[:, 1]).mean(axis=1))
-    mean = grids.mean(axis=1)
-    noise = 0.25 * apart.sum(axis=(1, 2)) / np.maximum(mean.mean(axis=1).sum(axis=(1, 2)), 1e-12)
-
-    reflected, transmitted = _joined(each)
-    errors, below = _joined([s.standard_error for s in each if s.standard_error])
-    grid = mean.swapaxes(0, 1)
-    account = Account(reflected, transmitted, np.sum([lobe.energy for lobe in reflected], axis=0), grid)
-    return account, (*errors, *([below] if below else [])), noise
-
-
-def _joined(each: Sequence[reference.Statistics]) -> tuple[tuple[Lobe, ...], Lobe | None]:
-    """Lobes over all directions, from statistics of single ones."""
-    names = [field.name for field in fields(Lobe)]
-    reflected = tuple(
-        Lobe(**{name: np.concatenate([getattr(s, name)[k] for s in each], axis=-1) for name in names})
-        for k in range(len(each[0].energy))
-    )
-    below = [s.transmitted for s in each if s.transmitted]
-    transmitted = {name: np.concatenate([getattr(lobe, name) for lobe in below], axis=-1) for name in names if below}
-    return reflected, Lobe(**transmitted) if below else None
 
 
 def _beside(model: Account, truth: Account) -> Account:
