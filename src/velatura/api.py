@@ -47,9 +47,9 @@ def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: str) -> A
     else:
         chosen = named(model, **switches)
         options = {"type": "layered", "model": chosen.name, **{switch: getattr(chosen, switch) for switch in SWITCHES}}
-    mi = kernel.mitsuba()
+    kernel.mitsuba()
     register()
-    return mi.load_dict({**options, "material": dumps(described, "json")})
+    return kernel.load_dict({**options, "material": dumps(described, "json")})
 
 
 def render(

@@ -121,16 +121,20 @@ class Binding:
         if isinstance(value, mi.Object):
             self.images[name] = Image(value, colour, None, **_range(key))
         elif isinstance(value, Texture):
-            self.images[name] = self._image(key, value)
+            self.images[name] = self._image(name, value)
         elif colour and mi.is_spectral and not isinstance(value, float):
             self.images[name] = self._spectrum(value)
         else:
             value = rgb_of(value) if isinstance(value, Named) else value
             self.constants[name] = mi.Color3f(*value) if isinstance(value, tuple) else mi.Float(value)
 
-    def _image(self, key: str, image: Texture) -> Image:
+    def _image(self, name: str, image: Texture) -> Image:
+        key = _key(name)
         raw = image.encoding == "linear"
-        texture = self.mi.load_dict({"type": "bitmap", "filename": str(image.texture), "raw": raw})
+        try:
+            texture = self.mi.load_dict({"type": "bitmap", "filename": str(image.texture), "raw": raw})
+        except RuntimeError:
+            raise InvalidInput(f"{name}: the texture {image.texture} is no image that Mitsuba can read") from None
         colour = key in COLOURS and image.channel in (None, "rgb")
         channels = self.mi.traverse(texture)["data"].shape[-1]
         channel = None if colour or channels == 1 else "rgba".index(image.channel or "r")

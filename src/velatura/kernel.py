@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from velatura.errors import MissingTool
+from velatura.errors import InvalidInput, MissingTool
 
 Factory = Callable[[ModuleType], type]
 
@@ -155,6 +155,21 @@ def _register_missing(mi: Any) -> None:
         if (name, mi.variant()) not in _registered:
             mi.register_bsdf(name, factory(mi))
             _registered.add((name, mi.variant()))
+
+
+def load_dict(description: dict[str, Any]) -> Any:
+    """`mi.load_dict`, which hides what a plugin of ours refuses under a stack of calls.
+
+    Raises:
+        InvalidInput: what the plugin said, in its one line.
+    """
+    try:
+        return mitsuba().load_dict(description)
+    except RuntimeError as error:
+        _, refused, reason = str(error).rpartition(f"{InvalidInput.__name__}: ")
+        if not refused:
+            raise
+        raise InvalidInput(reason.strip()) from None
 
 
 # What is installed

@@ -9,6 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.errors import InvalidInput
 from velatura.model import adding, mixture, named, prepare, variance_kind
 from velatura.model.diffuse import under, with_mean_reflectance
 from velatura.model.statistics import number
@@ -320,6 +321,15 @@ def test_gradients_of_a_pixel_are_finite_differences() -> None:
         gradient = dr.grad(parameters[name])
         found = float((gradient[channels[key]] if key in channels else gradient)[0])
         assert np.isclose(found, slopes[key], rtol=0.02, atol=1e-5), (key, found, slopes[key])
+
+
+def test_what_the_plugin_refuses_is_one_line(tmp_path) -> None:
+    (tmp_path / "text.png").write_text("no image")
+    textured = vt.Stack([vt.Interface(eta=1.5, alpha=vt.Texture(texture=tmp_path / "text.png"))])
+    with pytest.raises(InvalidInput, match=r"^layer0_alpha_u: the texture .*text\.png is no image that Mitsuba can read$"):
+        vt.bsdf(textured)
+    with pytest.raises(InvalidInput, match=r"^channels=separate: only for lobes and inverse, .*$"):
+        vt.bsdf("coated-gold", channels="separate")
 
 
 def test_the_scalar_variant_agrees() -> None:
