@@ -102,7 +102,7 @@ def main() -> None:
     for title, make in (("render", picture), ("eval_pdf", evaluation)):
         ratios = interleaved({name: make(bsdf) for name, bsdf in materials.items()}, arguments.rounds)
         for name, ratio in ratios.items():
-            print(f"{title:10s} {name:16s} {ratio:.3f}")
+            print(f"{title:10s} {name:16s} {ratio:.3f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
+from velatura import files
 from velatura.checks.report import Finding
 from velatura.errors import InvalidInput
 
@@ -16,9 +15,9 @@ def check_folder(folder: str | Path) -> Path:
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=path).close()
     except OSError as error:
-        raise InvalidInput(f"{path}: plots cannot be written there ({error.strerror})") from error
+        raise InvalidInput(f"{path}: plots cannot be written there ({error.strerror})") from None
+    files.check_folder(path, str(path))
     return path
 
 
@@ -34,12 +33,8 @@ def save(finding: Finding, folder: Path) -> Path:
 
     # Write it in one go
     path = folder / f"{finding.law.replace(' ', '-')}.png"
-    unfinished = path.with_name(f".{path.stem}-{os.getpid()}.png")
-    try:
+    with files.whole(path) as unfinished:
         figure.savefig(unfinished)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
     return path
 
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura import scenes
+from velatura import files, scenes
 from velatura.comparison.result import Comparison, Pictures
-from velatura.errors import InvalidInput
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,16 +23,7 @@ _WIDTH, _HEIGHT = 3.2, 2.7  # of one plot, inches
 
 def check_figure(path: str | Path) -> Path:
     """The path of a figure, once it is sure that it can be written there. Raises InvalidInput."""
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        raise InvalidInput(f"{target}: a figure ends in {', '.join(SUFFIXES)}")
-    if target.is_dir():
-        raise InvalidInput(f"{target}: is a folder")
-    try:
-        tempfile.TemporaryFile(dir=target.parent).close()
-    except OSError as error:
-        raise InvalidInput(f"{target}: cannot be written there ({error.strerror})") from error
-    return target
+    return files.check_writable(path, "a figure", SUFFIXES)
 
 
 def save_figure(comparison: Comparison, path: str | Path) -> None:
@@ -50,12 +38,8 @@ def save_figure(comparison: Comparison, path: str | Path) -> None:
     """
     target = check_figure(path)
     figure = _draw(comparison)
-    unfinished = target.with_name(f".{target.stem}-{os.getpid()}{target.suffix.lower()}")
-    try:
+    with files.whole(target) as unfinished:
         figure.savefig(unfinished, dpi=120)
-        os.replace(unfinished, target)
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def _draw(comparison: Comparison) -> Figure:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from velatura import kernel
+from velatura import files, kernel
 from velatura.errors import InvalidInput
 from velatura.scenes.stage import Name, scene_dict
 
@@ -80,18 +78,7 @@ def tone_map(linear: ArrayLike, knee: float = 0.7) -> NDArray[np.float64]:
 
 def check_writable(path: Name) -> Path:
     """The path of a picture, once it is sure that it can be written there. Raises InvalidInput."""
-    target = Path(path)
-    if target.suffix.lower() not in (".png", ".exr"):
-        raise InvalidInput(f"{target}: a picture ends in .png (tone-mapped) or .exr (linear)")
-    if not target.parent.is_dir():
-        raise InvalidInput(f"{target}: there is no folder {target.parent}")
-    if target.is_dir():
-        raise InvalidInput(f"{target}: is a folder")
-    try:
-        tempfile.TemporaryFile(dir=target.parent).close()
-    except OSError as error:
-        raise InvalidInput(f"{target}: the folder {target.parent} is not writable") from error
-    return target
+    return files.check_writable(path, "a picture", (".png (tone-mapped)", ".exr (linear)"))
 
 
 def write_image(image: ArrayLike, path: Name) -> None:
@@ -106,9 +93,5 @@ def write_image(image: ArrayLike, path: Name) -> None:
     else:
         pixels = np.asarray(image, dtype=np.float32)
 
-    unfinished = target.with_name(f".{target.stem}-{os.getpid()}{target.suffix.lower()}")
-    try:
+    with files.whole(target) as unfinished:
         mi.Bitmap(pixels).write(str(unfinished))
-        os.replace(unfinished, target)
-    finally:
-        unfinished.unlink(missing_ok=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
@@ -13,6 +12,7 @@ from typing import Any
 import yaml
 
 from velatura.errors import InvalidInput
+from velatura.files import whole
 from velatura.stack.schema import unknown
 from velatura.stack.stack import Stack
 
@@ -97,15 +97,11 @@ def save(stack: Stack, path: str | Path) -> None:
     data = dumps(stack, _format(path), path.parent).encode("utf-8")
     if not path.parent.is_dir():
         raise InvalidInput(f"{path}: there is no folder {path.parent}")
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        unfinished.write_bytes(data)
-        os.replace(unfinished, path)
+        with whole(path) as unfinished:
+            unfinished.write_bytes(data)
     except OSError as error:
         raise InvalidInput(f"{path}: cannot be written: {_reason(error)}") from None
-    finally:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
 
 
 def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from velatura.files import whole
 
 FILE = Path(__file__).with_name("tables.npz")
 
@@ -73,13 +74,8 @@ def save(tables: Tables, path: Path = FILE) -> None:
     for name, table in tables.items():
         arrays[name] = table.data
         arrays[f"{name}.nodes"] = np.array(table.nodes)
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        with temporary.open("wb") as file:
-            np.savez_compressed(file, **arrays)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole(path) as unfinished, unfinished.open("wb") as file:
+        np.savez_compressed(file, **arrays)
 
 
 @cache

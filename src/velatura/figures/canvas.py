@@ -1,0 +1,77 @@
+"""What figures share: spheres rendered alike, albedos measured alike, plots saved whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from velatura import api, files, scenes
+from velatura.checks.probe import Probe, Samples
+from velatura.comparison import check_figure
+from velatura.stack import Stack
+
+Array = NDArray[np.floating]
+Item = TypeVar("Item")
+
+SIZE, SAMPLES = 128, 32  # of a sphere: pixels along a side, and samples of each
+COLOURS = {"belcour2018": "C0", "weidlich_wilkie": "C1", "reference": "black"}
+
+
+def track(items: Sequence[Item], progress: Callable[[int, int], None] | None) -> Iterator[Item]:
+    """The items; `progress` is told of each one when it is done."""
+    for done, item in enumerate(items, 1):
+        yield item
+        if progress:
+            progress(done, len(items))
+
+
+def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int) -> Array:
+    """Two pictures of a sphere, linear RGB of shape (2, size, size, 3), by half of the samples each."""
+    bsdf = api.bsdf(stack, model)
+    numbers = np.random.default_rng([seed, *model.encode()]).integers(2**31, size=2)
+    halves = [scenes.render(bsdf, "sphere", env, max(spp // 2, 1), (size, size), int(number)) for number in numbers]
+    return np.array(halves)
+
+
+def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int) -> Samples:
+    """What a BSDF makes of light from one direction in the plane of the tangent."""
+    wi = np.array([np.sqrt(1 - cosine**2), 0, cosine])
+    u = np.random.default_rng(seed).random((paths, 3))
+    return Probe(api.bsdf(stack, model)).sample(np.tile(wi, (paths, 1)), u)
+
+
+def rmse(halves: Array, others: Array) -> float:
+    """Root mean square difference of two pictures over pixels and colours, each given in two halves.
+
+    The halves' noise is independent, so that it cancels from the mean of the product of their differences.
+    """
+    first, second = halves - others
+    return float(np.sqrt(max(np.mean(first * second), 0)))
+
+
+# Drawing
+
+
+def canvas(width: float, height: float) -> Any:
+    """An empty matplotlib figure of so many inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def show(axes: Any, image: ArrayLike, title: str) -> None:
+    """A picture, tone-mapped, with a title."""
+    axes.imshow(scenes.tone_map(image))
+    axes.set_title(title, fontsize="medium")
+    axes.set_axis_off()
+
+
+def save(figure: Any, path: str | Path) -> None:
+    """Write a matplotlib figure whole or not at all. Raises InvalidInput where that cannot be done."""
+    target = check_figure(path)
+    with files.whole(target) as unfinished:
+        figure.savefig(unfinished, dpi=120)
