@@ -9,7 +9,7 @@ help: ## list the targets
 
 demo: .venv/ready ## install, and render the preset coated-gold
 	@echo "Rendering the preset coated-gold"
-	@$(BIN)/velatura render coated-gold -o coated-gold.png
+	@$(BIN)/velatura render coated-gold --spp 32 -o coated-gold.png
 	@echo "The picture is $(CURDIR)/coated-gold.png"
 
 test: lint ## install, and run all checks: ruff, mypy, pytest

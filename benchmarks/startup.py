@@ -16,7 +16,7 @@ from statistics import median
 COMMANDS = {
     "velatura --help": ["--help"],
     "velatura lobes": ["lobes", "coated-gold", "--cos", "1,0.5"],
-    "first picture": ["render", "coated-gold", "-o", "picture.png"],
+    "first picture": ["render", "coated-gold", "--spp", "32", "-o", "picture.png"],
 }
 REACH_S = {"velatura --help": 0.5, "velatura lobes": 1.0, "first picture": 10.0}
 
