@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.stack import Diffuse, Interface, Medium, Named, Stack, Texture, load, loads, spectrum
+from velatura.stack import Diffuse, Interface, Medium, Named, Stack, Texture, is_colour, load, loads, spectrum
 from velatura.stack import rgb as rgb_of
 from velatura.stack.schema import parameters
-
-COLOURS = ("eta", "k", "sigma_a", "sigma_s", "albedo")
 
 #: What stands in the stack for a value that a plugin got as a texture object.
 _STAND_IN = {"alpha_u": 0.1, "alpha_v": 0.1, "eta": 1.5, "k": 1.0}
@@ -38,14 +36,14 @@ class Image:
 
     def at(self, mi: Any, si: Any, active: Any) -> Any:
         """The value at a surface point: a colour or spectrum, or a number."""
+        import drjit as dr
+
         if self.colour:
             value = self.texture.eval(si, active)
         elif self.channel is None:
             value = self.texture.eval_1(si, active)
         else:
             value = self.texture.eval_3(si, active)[self.channel]
-        import drjit as dr
-
         return dr.clip(value * self.scale + self.offset, self.low, self.high)
 
 
@@ -98,7 +96,7 @@ class Binding:
         """The constants by flat name, colours as colours."""
         spectrum_type = self.mi.UnpolarizedSpectrum
         return {
-            name: spectrum_type(value) if _key(name) in COLOURS or name == "exterior" else value
+            name: spectrum_type(value) if is_colour(name) or name == "exterior" else value
             for name, value in self.constants.items()
         }
 
@@ -117,7 +115,7 @@ class Binding:
 
     def _bind(self, name: str, value: Any) -> None:
         key, mi = _key(name), self.mi
-        colour = key in COLOURS
+        colour = is_colour(name)
         if isinstance(value, mi.Object):
             self.images[name] = Image(value, colour, None, **_range(key))
         elif isinstance(value, Texture):
@@ -135,7 +133,7 @@ class Binding:
             texture = self.mi.load_dict({"type": "bitmap", "filename": str(image.texture), "raw": raw})
         except RuntimeError:
             raise InvalidInput(f"{name}: the texture {image.texture} is no image that Mitsuba can read") from None
-        colour = key in COLOURS and image.channel in (None, "rgb")
+        colour = is_colour(name) and image.channel in (None, "rgb")
         channels = self.mi.traverse(texture)["data"].shape[-1]
         channel = None if colour or channels == 1 else "rgba".index(image.channel or "r")
         return Image(texture, colour, channel, image.scale, image.offset, **_range(key))

@@ -7,7 +7,7 @@ down to layer i, i0 for light that comes up to the top, 12 and 21 for the layer 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from velatura import ops
 from velatura.model import operators
@@ -107,7 +107,7 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
 def _totally_reflected(above: State, leaving: Value) -> State:
     """Move what cannot leave upwards from the light that is transmitted to the light that is reflected (5.1)."""
     r_i0 = ops.clip(above.r_i0 + (1 - leaving) * above.t_i0, 0.0, 1.0)
-    return State(**{**vars(above), "r_i0": r_i0, "t_i0": above.t_i0 * leaving})
+    return replace(above, r_i0=r_i0, t_i0=above.t_i0 * leaving)
 
 
 def _each(colour: Value) -> Value:

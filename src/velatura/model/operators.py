@@ -14,6 +14,9 @@ from velatura.optics.ggx import Direction, normalize, rotate
 
 PreparedLayer: TypeAlias = PreparedInterface | PreparedMedium
 
+COS_MIN = 1e-4  # keeps Snell's factors finite at grazing
+G_MIN = 1e-3  # keeps the variance of a phase function finite where it scatters evenly
+
 
 @dataclass(frozen=True)
 class Operator:
@@ -69,9 +72,6 @@ def interface(
     return Operator(r, t, ops.select(passes, r, 0.0), t, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
 
 
-COS_MIN = 1e-4  # keeps Snell's factors finite at grazing
-
-
 def _transmitted(prepared: Prepared, roughness: Roughness, ratio: Value, passes: Value) -> Variance:
     """Variance of a refraction: that of a reflection by a rescaled roughness (Eq. 10 in magnitudes)."""
     scale = ops.select(passes, 0.5 * ops.absolute(1 - ratio), 0.0)
@@ -92,9 +92,6 @@ def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) ->
     s_t = prepared.variance.uniform(ops.select(layer.g > 0, s_g, 0.0))
     none = prepared.variance.uniform(0.0)
     return Operator(0.0, t, 0.0, t, none, s_t, s_t, 1.0, 1.0, cos_theta, None)
-
-
-G_MIN = 1e-3
 
 
 def _table_point(roughness: Roughness, cos_theta: Value, wi: Direction) -> tuple[Value, Value]:

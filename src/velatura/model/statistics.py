@@ -12,9 +12,7 @@ from velatura.errors import InvalidInput
 from velatura.model import adding
 from velatura.model.models import DEFAULT, Model, named
 from velatura.model.prepare import prepare, variance_kind
-from velatura.stack import Named, Stack, Texture, spectra
-
-COLOURS = ("eta", "k", "sigma_a", "sigma_s", "albedo")
+from velatura.stack import Named, Stack, Texture, is_colour, spectra
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,7 @@ def number(name: str, value: Any) -> Any:
         )
     if isinstance(value, Named):
         value = spectra.rgb(value)
-    if name.partition("_")[2] in COLOURS:
+    if is_colour(name):
         return np.broadcast_to(np.asarray(value, float), (3,))[:, None]
     return float(value)
 

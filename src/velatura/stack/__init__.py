@@ -2,7 +2,7 @@
 
 from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.io import dumps, load, loads, preset, presets, save
-from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value
+from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, is_colour
 from velatura.stack.spectra import Named, names, rgb, spectrum
 from velatura.stack.stack import Stack
 from velatura.stack.values import RGB, Texture
@@ -19,6 +19,7 @@ __all__ = [
     "Texture",
     "Value",
     "dumps",
+    "is_colour",
     "json_schema",
     "load",
     "loads",

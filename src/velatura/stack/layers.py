@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import model_validator
 
-from velatura.stack.schema import Record
+from velatura.stack.schema import Record, parameters
 from velatura.stack.spectra import MIRROR, Named, names
 from velatura.stack.values import RGB, Colour, Conductor, Index, Pair, Scalar, Texture
 
@@ -119,6 +119,14 @@ LAYERS: dict[str, type[Interface] | type[Medium] | type[Diffuse]] = {
     "medium": Medium,
     "diffuse": Diffuse,
 }
+
+
+_COLOURS = {k for model in LAYERS.values() for k, declared in parameters(model).items() if isinstance(declared, Colour)}
+
+
+def is_colour(name: str) -> bool:
+    """Whether the value of that flat name (`layer0_eta`) may differ between colours."""
+    return name.partition("_")[2] in _COLOURS
 
 
 def entry_name(layer: Layer) -> str:
