@@ -28,12 +28,12 @@ def register() -> None:
     kernel.register()
 
 
-def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: str) -> Any:
+def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: Any) -> Any:
     """A `mi.BSDF` of a material (a stack, a file, or a preset's name), in the variant that is set (else llvm_ad_rgb).
 
     Args:
         model: a named model, its choices changed by `switches`; or "reference", the random walk, and "weidlich_wilkie",
-            the baseline, which are plugins of their own and take no switches.
+            the baseline, which are plugins of their own, and whose options (`microsurface=True`) stand for switches.
 
     Raises:
         InvalidInput: not a valid material, an unknown model or switch.
@@ -42,8 +42,8 @@ def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: str) -> A
     from velatura import kernel
 
     described = stack if isinstance(stack, Stack) else load(stack)
-    if model in PLUGINS and not switches:
-        options = {"type": PLUGINS[str(model)]}
+    if model in PLUGINS:
+        options = {"type": PLUGINS[str(model)], **switches}
     else:
         chosen = named(model, **switches)
         options = {"type": "layered", "model": chosen.name, **{switch: getattr(chosen, switch) for switch in SWITCHES}}
@@ -66,7 +66,7 @@ def render(
     """A picture of a material: linear RGB of shape (height, width, 3).
 
     Args:
-        scene: "ball", "sphere", "wedges", or a Mitsuba scene file whose BSDF "material" is to be replaced.
+        scene: "ball", "sphere", "wedges", "lid", or a Mitsuba scene file whose BSDF "material" is to be replaced.
         env: "studio", "sky", "furnace", or an .exr or .hdr file.
         spp: samples per pixel.
         progress: called with (samples per pixel done, spp) now and then.
@@ -114,7 +114,6 @@ def check(
 
     if isinstance(material, Stack | str):
         material = material if isinstance(material, Stack) else load(material)
-        exceptions = {*exceptions, *named(model, **switches).exceptions}
         lossless = lossless or _lossless(material)
     return checks.check(
         made(material),

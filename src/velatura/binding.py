@@ -14,7 +14,19 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.stack import Diffuse, Interface, Medium, Named, Stack, Texture, is_colour, load, loads, spectrum
+from velatura.stack import (
+    Brushing,
+    Diffuse,
+    Interface,
+    Medium,
+    Named,
+    Stack,
+    Texture,
+    is_colour,
+    load,
+    loads,
+    spectrum,
+)
 from velatura.stack import rgb as rgb_of
 from velatura.stack.schema import parameters
 
@@ -47,6 +59,22 @@ class Image:
         return dr.clip(value * self.scale + self.offset, self.low, self.high)
 
 
+@dataclass(frozen=True)
+class Field:
+    """Directions away from a centre of the texture coordinates, or around it, as degrees from dp/du."""
+
+    brushing: Brushing
+
+    def at(self, mi: Any, si: Any, active: Any) -> Any:
+        """The angle at a surface point; 0 more than the offset where the surface has no texture coordinates."""
+        import drjit as dr
+
+        field = self.brushing
+        away = si.to_local(si.dp_du * (si.uv.x - field.u) + si.dp_dv * (si.uv.y - field.v))
+        across = 90.0 if field.brushing == "concentric" else 0.0
+        return dr.rad2deg(dr.atan2(away.y, away.x)) + (across + field.offset)
+
+
 class Binding:
     """The values of one plugin.
 
@@ -57,7 +85,7 @@ class Binding:
     Attributes:
         stack: the material as described; textures given as objects have a number standing in.
         constants: Dr.Jit values by flat name.
-        images: textures and spectra by flat name.
+        images: textures, spectra and fields by flat name.
 
     Raises:
         InvalidInput: in one line, whatever a material file would be refused for, and unknown names.
@@ -78,7 +106,7 @@ class Binding:
         else:
             self.stack = Stack.from_flat(None, {**numbers, **stand_ins})
         self.constants: dict[str, Any] = {}
-        self.images: dict[str, Image] = {}
+        self.images: dict[str, Image | Field] = {}
         for name, value in self.stack.flat().items():
             self._bind(name, objects.get(name, value))
 
@@ -105,7 +133,8 @@ class Binding:
         for name, value in self.constants.items():
             callback.put(name, value, self._flags(name))
         for name, image in self.images.items():
-            callback.put(name, image.texture, self._flags(name))
+            if isinstance(image, Image):
+                callback.put(name, image.texture, self._flags(name))
 
     def _flags(self, name: str) -> Any:
         flags = self.mi.ParamFlags
@@ -120,6 +149,8 @@ class Binding:
             self.images[name] = Image(value, colour, None, **_range(key))
         elif isinstance(value, Texture):
             self.images[name] = self._image(name, value)
+        elif isinstance(value, Brushing):
+            self.images[name] = Field(value)
         elif colour and mi.is_spectral and not isinstance(value, float):
             self.images[name] = self._spectrum(value)
         else:

@@ -5,7 +5,9 @@ inside a renderer and is differentiable. The types of the arguments choose the d
 
 - floats give floats (Mitsuba's scalar variants compute with them);
 - NumPy arrays, alone or mixed with floats, give NumPy arrays;
-- Dr.Jit arrays, alone or mixed with floats, give Dr.Jit arrays.
+- Dr.Jit arrays, alone or mixed with floats, give Dr.Jit arrays;
+- values of a class with a `dialect` of its own, alone or mixed with floats and NumPy arrays, give values of that class
+  (the recorder's, which print as shader code).
 
 Colour is the leading axis of an array; a float is the same in all channels. `sqrt` and `divide` clamp arguments outside
 their domain instead of answering NaN, so that the branch which a `select` throws away poisons neither
@@ -21,7 +23,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-Value = Any  # a float, a NumPy array or a Dr.Jit array
+Value = Any  # a float, a NumPy array, a Dr.Jit array or a recorded symbol
 
 TINY = 1e-15  # whose square, in gradients of quotients, single precision still holds
 
@@ -130,7 +132,7 @@ def _dialect(*args: Value) -> Any:
         if isinstance(x, (np.ndarray, np.generic)):
             found = _NUMPY
         elif not isinstance(x, (float, int)):
-            return _drjit()
+            return getattr(type(x), "dialect", None) or _drjit()
     return found
 
 

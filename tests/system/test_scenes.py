@@ -193,7 +193,7 @@ def test_an_environment_file_lights_the_scene(ending: str, tmp_path: Path, mi: A
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        ({"scene": "bal"}, "unknown scene 'bal': give ball, sphere, wedges, or"),
+        ({"scene": "bal"}, "unknown scene 'bal': give ball, sphere, wedges, lid, or"),
         ({"scene": "nowhere.xml"}, "nowhere.xml: no such scene file"),
         ({"env": "studoi"}, "unknown environment 'studoi': give studio, sky, furnace, or"),
         ({"env": "nowhere.hdr"}, "nowhere.hdr: no such environment file"),
@@ -269,6 +269,24 @@ def test_an_exr_holds_the_linear_picture(tmp_path: Path, mi: Any) -> None:
     image = np.random.default_rng(0).uniform(0.0, 20.0, (5, 7, 3)).astype(np.float32)
     scenes.write_image(image, tmp_path / "a.exr")
     assert np.array_equal(mi.Bitmap(str(tmp_path / "a.exr")), image)
+
+
+def test_an_interrupt_is_one_whatever_the_renderer_makes_of_it(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rationale: Mitsuba, interrupted in a callback, raises a RuntimeError. Expected: any other error is told."""
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise RuntimeError("error while performing a custom differentiable operation") from KeyboardInterrupt()
+
+    monkeypatch.setattr(mi, "render", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        scenes.render(GOLD, spp=1, size=(8, 8))
+
+    def failed(*_: object, **__: object) -> None:
+        raise RuntimeError("out of memory")
+
+    monkeypatch.setattr(mi, "render", failed)
+    with pytest.raises(RuntimeError, match="out of memory"):
+        scenes.render(GOLD, spp=1, size=(8, 8))
 
 
 def test_an_interrupted_writing_leaves_the_old_picture_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,7 +31,7 @@ MAY_IMPORT = {
     "checks": "kernel",
     "scenes": "kernel",
     "comparison": "stack optics model reference scenes api",
-    "figures": "stack model reference checks scenes comparison api",
+    "figures": "stack optics model inverse reference checks scenes comparison api kernel",
 }
 
 # The ends of the stream -> who may import them.

@@ -34,7 +34,9 @@ VALUES = {
     one_layer("eta: 1.5, alpha: true"): (
         "layer 0 (interface): alpha: must be a number, [u, v] or a texture, and lie in 0 to 1, got True"
     ),
-    one_layer("eta: 1.5, rotation: left"): "layer 0 (interface): rotation: must be a number or a texture, got 'left'",
+    one_layer(
+        "eta: 1.5, rotation: left"
+    ): "layer 0 (interface): rotation: must be a number, a brushing or a texture, got 'left'",
     one_layer("eta: 1.5, rotation: "): "layer 0 (interface): rotation: has no value",
     one_layer("eta: 0"): "layer 0 (interface): eta: must be above 0, got 0",
     one_layer("eta: -1.5"): "layer 0 (interface): eta: must be above 0, got -1.5",

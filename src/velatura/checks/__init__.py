@@ -35,7 +35,8 @@ def check(
 
     Args:
         bsdf: any `mi.BSDF` of the variant that is set, which must be a vectorised one.
-        exceptions: names of laws that it is declared not to keep: these give numbers, and no failure.
+        exceptions: names of laws that it is declared not to keep, beside those in its own attribute `exceptions` if it
+            has one: these give numbers, and no failure.
         lossless: it absorbs nothing, so that loss breaks a law as well as gain does.
         expected: the BSDF that this one should equal, if it is the limit of something.
         uv: where on its textures it is looked at.
@@ -46,7 +47,8 @@ def check(
     Raises:
         InvalidInput: an exception that is no law, a scalar variant, a folder that cannot be written.
     """
-    unknown = sorted(set(exceptions) - {law.name for law in LAWS})
+    declared = {*exceptions, *getattr(bsdf, "exceptions", ())}
+    unknown = sorted(declared - {law.name for law in LAWS})
     if unknown:
         raise InvalidInput(f"{unknown[0]}: is no law, must be one of {', '.join(law.name for law in LAWS)}")
     folder = None if plots is None else check_folder(plots)
@@ -56,7 +58,7 @@ def check(
     evidence = gather(Probe(bsdf, uv), other, lossless, seed, progress)
     alarm = 1 - (1 - FALSE_ALARMS) ** (1 / len(LAWS))
     judged = (law.judge(evidence, alarm) for law in LAWS)
-    report = Report(tuple(replace(found, declared=found.law in exceptions) for found in judged if found), FALSE_ALARMS)
+    report = Report(tuple(replace(found, declared=found.law in declared) for found in judged if found), FALSE_ALARMS)
 
     # Show what is broken
     if folder is not None:

@@ -16,7 +16,7 @@ from typing import Annotated, cast
 import typer
 
 from velatura import __version__
-from velatura.cli import check, compare, doctor, figure, lobes, presets, render, schema, tables
+from velatura.cli import check, coat, compare, doctor, explore, figure, invert, lobes, presets, render, schema, tables
 from velatura.errors import VelaturaError
 
 # What Typer raises for a wrong option; caught, so that it is reported in one line like every other wrong input.
@@ -38,6 +38,9 @@ for verb in (
     lobes.lobes,
     check.check,
     compare.compare,
+    invert.invert,
+    coat.coat,
+    explore.explore,
     figure.figure,
     presets.presets,
     schema.schema,

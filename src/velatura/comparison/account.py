@@ -11,20 +11,19 @@ from numpy.typing import NDArray
 
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
-from velatura.model import Model, adding, mixture, prepare, variance_kind
-from velatura.model.diffuse import Base, under, with_mean_reflectance
-from velatura.model.prepare import Prepared
+from velatura.model import Model, adding, bsdf, mixture, recursion, variance_kind
+from velatura.model.diffuse import Base
 from velatura.model.statistics import number
-from velatura.optics import fresnel
 from velatura.optics.ggx import Direction
 from velatura.reference import Lobe
 from velatura.reference.distribution import BINS
-from velatura.reference.trace import directions, relative_index
+from velatura.reference.trace import directions
 from velatura.stack import Stack
 
 Array = NDArray[np.floating]
 
 SAMPLES = 2**19  # of each lobe: so many that they are less noisy than the truth
+LIT_SAMPLES = 2**17  # of a lobe in the symmetric form, which adds up the layers for each of them
 BASE_SAMPLES = 2**17  # of a diffuse base, which is smooth
 
 
@@ -46,8 +45,8 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
         raise InvalidInput("channels=separate: only for lobes and inverse, since the truth has one roughness a lobe")
     flat = stack.flat()
     values = {name: number(name, value) for name, value in flat.items()}
-    prepared = with_mean_reflectance(prepare(stack.kinds, values, model, variance_kind(stack.kinds, flat)))
-    columns = [_column(stack, prepared, wi) for wi in directions(cos_theta, 0.0)]
+    body = bsdf.body(stack.kinds, values, stack.thin, model, variance_kind(stack.kinds, flat))
+    columns = [_column(body, wi) for wi in directions(cos_theta, 0.0)]
 
     names = [field.name for field in dataclasses.fields(Lobe)]
     rows = zip(*(lobes for lobes, _ in columns))
@@ -57,29 +56,52 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     return Account(reflected, transmitted, grids.sum(axis=(2, 3)), grids)
 
 
-def _column(stack: Stack, prepared: Prepared, incident: Array) -> tuple[list[Lobe], Array]:
+def _column(body: bsdf.Body, incident: Array) -> tuple[list[Lobe], Array]:
     """The lobes of one direction, and the distribution (3, bins, bins) of what is reflected."""
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
-    reflected, transmitted = adding.lobes(prepared, wi)
-    lights = [_sampled(lobe, wi) for lobe in reflected]
-    lobes = [_described(lobe, light) for lobe, light in zip(reflected, lights)]
-    if base := under(prepared, transmitted):
-        lights.append(_sampled_base(base))
-        lobes.append(_lobe(base.energy, (np.nan, np.nan), np.nan, lights[-1]))
-    if stack.transmits:
-        lobes.append(_described(transmitted, _sampled(transmitted, _refracted(wi, relative_index(stack)))))
+    each, _ = recursion.lobes(body.above, wi)
+    seen = bsdf.scattered(body, wi)
+    lights = [_sampled(body, lobe, wi, k) for k, lobe in enumerate(seen.reflected)]
+    # A model that merges lobes still has one for each interface
+    apart = lights if len(lights) == len(each) else [_sampled(body, lobe, wi) for lobe in each]
+    lobes = [_described(lobe, light) for lobe, light in zip(each, apart)]
+    if seen.base:
+        lights.append(_sampled_base(seen.base))
+        lobes.append(_lobe(seen.base.energy, (np.nan, np.nan), np.nan, lights[-1]))
+    if seen.transmitted:
+        lobes.append(_described(seen.transmitted, _sampled_below(body, seen.transmitted, wi)))
     return lobes, np.sum([_distribution(light) for light in lights], axis=0)
 
 
-def _sampled(lobe: adding.Lobe, wi: Direction) -> _Light:
-    """A lobe as it is evaluated; one that is smooth, in its one direction."""
+def _sampled(body: bsdf.Body, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> _Light:
+    """A lobe as it is evaluated; one that is smooth, in its one direction.
+
+    `place` is its place among the lobes that the symmetric form evaluates, None for a lobe that it does not.
+    """
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
         return _Light(-np.stack(wi[:2]), _colour(lobe.energy))
-    wo = mixture.sample([lobe], None, wi, 0.0, *_uniform(SAMPLES))
-    value, density = mixture.eval_pdf([lobe], None, wi, wo)
-    energy = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / SAMPLES
-    return _Light(np.stack(wo[:2]), _colour(energy, SAMPLES))
+    if body.above.model.form == "forward" or place is None:
+        wo = mixture.sample([lobe], None, wi, 0.0, *_uniform(SAMPLES))
+        return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo))
+    wo = mixture.sample([lobe], None, wi, 0.0, *_uniform(LIT_SAMPLES))
+    lit = bsdf.exchangeable(body, wi, wo)[0][place]
+    return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo, [lit]))
+
+
+def _sampled_below(body: bsdf.Body, lobe: adding.Lobe, wi: Direction) -> _Light:
+    """The transmitted lobe as it is evaluated, as energy."""
+    if np.all(np.maximum(*lobe.roughness[:2]) == 0):
+        return _Light(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
+    asked = bsdf.Asked(reflection=False, radiance=False)
+    wo, _ = bsdf.sample(body, wi, 0.0, *_uniform(LIT_SAMPLES), asked)
+    return _light(wo, *bsdf.eval_pdf(body, wi, wo, asked))
+
+
+def _light(wo: Direction, value: Array, density: Array) -> _Light:
+    count = len(density)
+    energy = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / count
+    return _Light(np.stack(wo[:2]), _colour(energy, count))
 
 
 def _sampled_base(base: Base) -> _Light:
@@ -96,11 +118,6 @@ def _uniform(count: int) -> tuple[Array, Array]:
     """Pairs of numbers in [0, 1), spread evenly (Roberts' sequence)."""
     i = np.arange(count)
     return (0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1
-
-
-def _refracted(wi: Direction, eta: float) -> Direction:
-    """The direction below whose mirror image is wi refracted through the whole stack (Belcour 2018, 4.2)."""
-    return wi[0] / eta, wi[1] / eta, fresnel.cos_transmitted(wi[2], eta)
 
 
 def _described(lobe: adding.Lobe, light: _Light) -> Lobe:

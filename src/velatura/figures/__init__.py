@@ -19,7 +19,19 @@ from velatura.stack.schema import show
 
 Progress = Callable[[int, int], None]
 
-FIGURES = ("belcour2018-12", "belcour2018-13", "belcour2018-19", "belcour2018-21")
+FIGURES = (
+    "bati2021-07",
+    "bati2021-17",
+    "bati2021-25",
+    "belcour2018-11",
+    "belcour2018-12",
+    "belcour2018-13",
+    "belcour2018-19",
+    "belcour2018-21",
+    "belcour2018-22",
+    "belcour2018-table2",
+    "linear-space",
+)
 
 
 class Figure(Protocol):

@@ -48,7 +48,7 @@ def compute(
     numbers["rmse"] = {name: canvas.rmse(images[name], images["reference"]) for name in MODELS[:-1]}
     numbers["pictures"] = {name: halves.mean(axis=0).tolist() for name, halves in images.items()}
     numbers["base_alpha"] = {
-        "belcour2018": lobes(stack, COSINES, model="belcour2018").alpha[1][0].tolist(),
+        "belcour2018": lobes(stack, COSINES, model="belcour2018", **canvas.CHOICES).alpha[1][0].tolist(),
         "walk": reference.statistics(stack, COSINES, 0.0, paths, seed).alpha[1][0].tolist(),
     }
     return numbers
@@ -74,10 +74,10 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     for column, name in zip(axes.T, MODELS):
         image = np.array(numbers["pictures"][name])
         canvas.show(column[0], image, name)
-        column[1].set_axis_off()
         if name != "reference":
-            drawn = column[1].imshow((image - truth).mean(axis=-1), cmap="RdBu_r", vmin=-0.1, vmax=0.1)
-            column[1].set_title(f"RMSE {numbers['rmse'][name]:.4f}", fontsize="medium")
+            title = f"RMSE {numbers['rmse'][name]:.4f}"
+            drawn = canvas.show_difference(column[1], image, truth, 0.1, title)
+    axes[1, -1].set_axis_off()
     figure.colorbar(drawn, ax=axes, shrink=0.5, label="minus the reference")
     canvas.save(figure, path)
 

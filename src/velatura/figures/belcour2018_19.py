@@ -46,7 +46,7 @@ def compute(
     for alpha in canvas.track(alphas, progress):
         # What is told
         stack = Stack([Interface(eta=2.0, alpha=alpha), Interface(eta=0.01, k=1.0, alpha=alpha)])
-        found = compare(stack, [MODEL], [1.0], paths, seed, microsurface=False)
+        found = compare(stack, [MODEL], [1.0], paths, seed, microsurface=False, **canvas.CHOICES)
         numbers["total_variation"].append(float(found.total_variation[MODEL][0]))
         numbers["noise"].append(float(found.noise[0]))
         for side, told in (("model", found.models[MODEL]), ("walk", found.truth)):
@@ -75,10 +75,9 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         model, true = (np.array(numbers["pictures"][side][i]) for side in ("model", "reference"))
         canvas.show(axes[0, i], model, f"{MODEL}, alpha {alpha:g}")
         canvas.show(axes[1, i], true, "reference")
-        drawn = axes[2, i].imshow((model - true).mean(axis=-1), cmap="RdBu_r", vmin=-0.2, vmax=0.2)
         variation = numbers["total_variation"][i]
-        axes[2, i].set_title(f"RMSE {numbers['rmse'][i]:.3f}, variation {variation:.2f}", fontsize="medium")
-        axes[2, i].set_axis_off()
+        title = f"RMSE {numbers['rmse'][i]:.3f}, variation {variation:.2f}"
+        drawn = canvas.show_difference(axes[2, i], model, true, 0.2, title)
     figure.colorbar(drawn, ax=axes[2, :], shrink=0.8, label="minus the reference")
     canvas.save(figure, path)
 

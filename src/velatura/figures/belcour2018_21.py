@@ -66,7 +66,7 @@ def compute(
 
 
 def _modelled(stack: Stack, cosine: float) -> dict[str, float]:
-    lobes = account(stack, [cosine], named(MODEL)).reflected
+    lobes = account(stack, [cosine], named(MODEL, **canvas.CHOICES)).reflected
     energy, mean, covariance = (
         np.array([getattr(x, f)[:, 0] for x in lobes]) for f in ("energy", "mean", "covariance")
     )

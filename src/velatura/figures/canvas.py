@@ -18,6 +18,8 @@ Array = NDArray[np.floating]
 Item = TypeVar("Item")
 
 SIZE, SAMPLES = 128, 32  # of a sphere: pixels along a side, and samples of each
+#: Of every model: light meets one facet of an interface at a time, as in the reference that it is compared with.
+CHOICES: dict[str, Any] = {"reflectance": "fgd"}
 COLOURS = {"belcour2018": "C0", "weidlich_wilkie": "C1", "reference": "black"}
 
 
@@ -29,19 +31,29 @@ def track(items: Sequence[Item], progress: Callable[[int, int], None] | None) ->
             progress(done, len(items))
 
 
-def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int) -> Array:
+def bsdf(stack: Stack, model: str, **switches: Any) -> Any:
+    """The BSDF of a model with the figures' choices, or a plugin, changed by switches."""
+    return api.bsdf(stack, model, **({} if model in api.PLUGINS else CHOICES) | switches)
+
+
+def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:
     """Two pictures of a sphere, linear RGB of shape (2, size, size, 3), by half of the samples each."""
-    bsdf = api.bsdf(stack, model)
+    return pictures("sphere", stack, model, env, size, spp, seed, **switches)
+
+
+def pictures(scene: str, stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:
+    """As `spheres`, of any object."""
+    made = bsdf(stack, model, **switches)
     numbers = np.random.default_rng([seed, *model.encode()]).integers(2**31, size=2)
-    halves = [scenes.render(bsdf, "sphere", env, max(spp // 2, 1), (size, size), int(number)) for number in numbers]
+    halves = [scenes.render(made, scene, env, max(spp // 2, 1), (size, size), int(number)) for number in numbers]
     return np.array(halves)
 
 
-def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int) -> Samples:
+def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **switches: Any) -> Samples:
     """What a BSDF makes of light from one direction in the plane of the tangent."""
     wi = np.array([np.sqrt(1 - cosine**2), 0, cosine])
     u = np.random.default_rng(seed).random((paths, 3))
-    return Probe(api.bsdf(stack, model)).sample(np.tile(wi, (paths, 1)), u)
+    return Probe(bsdf(stack, model, **switches)).sample(np.tile(wi, (paths, 1)), u)
 
 
 def rmse(halves: Array, others: Array) -> float:
@@ -68,6 +80,14 @@ def show(axes: Any, image: ArrayLike, title: str) -> None:
     axes.imshow(scenes.tone_map(image))
     axes.set_title(title, fontsize="medium")
     axes.set_axis_off()
+
+
+def show_difference(axes: Any, image: ArrayLike, truth: ArrayLike, bound: float, title: str) -> Any:
+    """What a picture has too much (red) or too little (blue), up to a bound; returns what a colour bar is made of."""
+    axes.set_title(title, fontsize="medium")
+    axes.set_axis_off()
+    difference = np.subtract(image, truth).mean(axis=-1)
+    return axes.imshow(difference, cmap="RdBu_r", vmin=-bound, vmax=bound)
 
 
 def save(figure: Any, path: str | Path) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from velatura import ops
 from velatura.model import operators
-from velatura.model.prepare import Prepared, PreparedMedium
+from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -21,11 +21,17 @@ LOSS_MIN = 1e-6  # of one bounce between the stack and a layer; light that loses
 
 @dataclass(frozen=True)
 class Lobe:
-    """Energy (a colour), variance in the space of the roughness map, and the GGX lobe that has it."""
+    """Energy (a colour), variance in the space of the roughness map, and the GGX lobe that has it.
+
+    The lobe is drawn as `gain` times its energy times a GGX reflection, or, where it is that of `facets`, times their
+    Fresnel reflectance.
+    """
 
     energy: Value
     variance: Variance
     roughness: Roughness
+    gain: Value = 1.0
+    facets: PreparedInterface | None = None
 
 
 @dataclass(frozen=True)
@@ -48,14 +54,22 @@ def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
 
     `wi` points away from the surface. Where nothing passes, the transmitted lobe has energy 0.
     """
-    state = top(prepared, wi[2])
-    reflected = []
+    state, reflected = _down(prepared, wi)
+    return reflected, Lobe(state.t_0i, state.s_t0i, state.s_t0i.roughness(prepared.f))
+
+
+def below(prepared: Prepared, wi: Direction) -> State:
+    """The stack with all of its layers, for light from wi."""
+    return _down(prepared, wi)[0]
+
+
+def _down(prepared: Prepared, wi: Direction) -> tuple[State, list[Lobe]]:
+    state, reflected = top(prepared, wi[2]), []
     for layer in prepared.layers:
         state, lobe = add(prepared, state, layer, wi)
         if lobe is not None:
             reflected.append(lobe)
-    transmitted = Lobe(state.t_0i, state.s_t0i, state.s_t0i.roughness(prepared.f))
-    return reflected, transmitted
+    return state, reflected
 
 
 def top(prepared: Prepared, cos_theta: Value) -> State:

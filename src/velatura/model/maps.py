@@ -1,6 +1,7 @@
 """Roughness maps: from GGX roughness to a variance that adds along a path, and back.
 
-Each map is exactly 0 at 0 and increasing. Roughness is clamped to 0.9999, since the variance of 1 is infinite.
+Each map is exactly 0 at 0. Roughness is clamped to 0.9999, since the variance of 1 is infinite. Of a pair of axes, all
+maps but one treat each by itself.
 """
 
 from __future__ import annotations
@@ -13,22 +14,37 @@ from velatura.ops import Value
 
 ALPHA_MAX = 0.9999
 VARIANCE_MAX = 1e12  # keeps s/(1+s) from inf/inf
+EXPONENT_MAX = 60.0  # whose exponential single precision holds
 
 
 @dataclass(frozen=True)
 class RoughnessMap:
-    """f and its inverse."""
+    """f and its inverse, along one axis.
 
-    forward: Callable[[Value], Value]
-    backward: Callable[[Value], Value]
+    Both take the value along this axis and that across; where `decorrelated`, the second makes no difference, and the
+    inverse is exact.
+    """
 
-    def variance(self, alpha: Value) -> Value:
-        """Variance f(alpha) of a roughness alpha >= 0."""
-        return ops.select(alpha > 0, self.forward(ops.clip(alpha, ops.TINY, ALPHA_MAX)), 0.0)
+    forward: Callable[[Value, Value], Value]
+    backward: Callable[[Value, Value], Value]
+    decorrelated: bool = True
 
-    def roughness(self, variance: Value) -> Value:
-        """Roughness f^-1(s) of a variance s >= 0."""
-        return ops.select(variance > 0, self.backward(ops.clip(variance, ops.TINY, VARIANCE_MAX)), 0.0)
+    def variance(self, alpha: Value, across: Value | None = None) -> Value:
+        """Variance f(alpha) of a roughness alpha >= 0; `across` that along the other axis, None for the same."""
+        along = ops.clip(alpha, ops.TINY, ALPHA_MAX)
+        other = along if across is None else ops.clip(across, ops.TINY, ALPHA_MAX)
+        return ops.select(alpha > 0, self.forward(along, other), 0.0)
+
+    def roughness(self, variance: Value, across: Value | None = None) -> Value:
+        """Roughness f^-1(s) of a variance s >= 0; `across` that along the other axis, None for the same."""
+        along = ops.clip(variance, ops.TINY, VARIANCE_MAX)
+        other = along if across is None else ops.clip(across, ops.TINY, VARIANCE_MAX)
+        return ops.select(variance > 0, self.backward(along, other), 0.0)
+
+
+def _each(forward: Callable[[Value], Value], backward: Callable[[Value], Value]) -> RoughnessMap:
+    """The map that treats each axis by itself."""
+    return RoughnessMap(lambda along, across: forward(along), lambda along, across: backward(along))
 
 
 def _odds_of_power(p: float) -> RoughnessMap:
@@ -36,7 +52,7 @@ def _odds_of_power(p: float) -> RoughnessMap:
         x = ops.power(alpha, p)
         return x / (1 - x)
 
-    return RoughnessMap(forward, lambda s: ops.power(s / (1 + s), 1 / p))
+    return _each(forward, lambda s: ops.power(s / (1 + s), 1 / p))
 
 
 def _weier() -> RoughnessMap:
@@ -47,14 +63,37 @@ def _weier() -> RoughnessMap:
         return ops.log(1 + b * x / (1 - x))
 
     def backward(s: Value) -> Value:
-        x = ops.exp(ops.minimum(s, 60.0)) - 1
-        return ops.power(x / (x + b), 1 / p)
+        return ops.power(_log_sigmoid(s, b), 1 / p)
 
-    return RoughnessMap(forward, backward)
+    return _each(forward, backward)
+
+
+def _weier_2d() -> RoughnessMap:
+    """A fit for either way, which are no exact inverses: .3 goes to .316 (Weier & Belcour 2020, Appendix B)."""
+
+    def forward(along: Value, across: Value) -> Value:
+        a, b, c, d = 0.0134517769, 0.0123629536, 0.493769777, 0.225934414
+        x, apart = ops.power(along, a), along - across
+        return along * ops.log(1 + b * x / (1 - x)) * ops.exp(apart * (c * apart + d))
+
+    def backward(along: Value, across: Value) -> Value:
+        a, b, c, d, e = 1.38609881, 0.609910674, 100.608653, 64.1513931, 1e-5
+        apart = ops.clip(along - across, -EXPONENT_MAX, EXPONENT_MAX)
+        own, other = ops.power(_log_sigmoid(along, b), 1 / a), ops.power(_log_sigmoid(across, c), 1 / d)
+        return ops.minimum(own * other * ops.exp(e * apart), 1.0)
+
+    return RoughnessMap(forward, backward, decorrelated=False)
+
+
+def _log_sigmoid(s: Value, b: Value) -> Value:
+    x = ops.maximum(ops.exp(ops.minimum(s, EXPONENT_MAX)) - 1, s)  # s where rounding leaves less
+    return x / (x + b)
 
 
 MAPS: dict[str, RoughnessMap] = {
     "belcour": _odds_of_power(1.1),  # Belcour 2018, Eq. 6
-    "belcour-release": RoughnessMap(lambda a: a / (1 - a), lambda s: s / (1 + s)),  # as in its released plugin
+    "belcour-release": _each(lambda a: a / (1 - a), lambda s: s / (1 + s)),  # as in its released plugin
+    "power": _each(lambda a: ops.power(a, 1.5), lambda s: ops.power(s, 2 / 3)),  # of `velatura.model.momentum`
     "weier": _weier(),  # Weier & Belcour 2020, Listing 2
+    "weier-2d": _weier_2d(),
 }

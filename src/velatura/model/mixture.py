@@ -27,8 +27,13 @@ def probabilities(lobes: Sequence[Lobe], base: Base | None) -> list[Value]:
     return [energy / total for energy in energies]
 
 
-def eval_pdf(lobes: Sequence[Lobe], base: Base | None, wi: Direction, wo: Direction) -> tuple[Value, Value]:
-    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
+def eval_pdf(
+    lobes: Sequence[Lobe], base: Base | None, wi: Direction, wo: Direction, lit: Sequence[Lobe] | None = None
+) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface.
+
+    `lit` are the lobes that the value is taken from, where they are not those that are sampled.
+    """
     above = (wi[2] > 0) & (wo[2] > 0)
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
     jacobian = 0.25 / ops.maximum(wi[2], ops.TINY)
@@ -40,10 +45,11 @@ def eval_pdf(lobes: Sequence[Lobe], base: Base | None, wi: Direction, wo: Direct
         value = base.value((wo[0], wo[1], cos_o)) * cos_o
         density = shares[-1] * cos_o / pi
     for lobe, probability in zip(lobes, shares):
-        alpha_u, alpha_v, i, o, m = _in_frame(lobe.roughness, wi, wo, h)
-        visible = ggx.ndf(m, alpha_u, alpha_v) * ggx.masking(i, alpha_u, alpha_v) * jacobian
-        value = value + lobe.energy * (visible * ggx.masking(o, alpha_u, alpha_v))
-        density = density + probability * visible
+        visible, _ = _visible(lobe.roughness, wi, wo, h)
+        density = density + probability * (visible * jacobian)
+    for lobe in lobes if lit is None else lit:
+        visible, masking = _visible(lobe.roughness, wi, wo, h)
+        value = value + _colour(lobe, wi, h) * (visible * jacobian * masking)
     return ops.select(above, value, 0.0), ops.select(above, density, 0.0)
 
 
@@ -72,9 +78,22 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
     return x, y, z
 
 
+def _colour(lobe: Lobe, wi: Direction, h: Direction) -> Value:
+    """What a GGX reflection is multiplied by to be the lobe."""
+    if lobe.facets is None:
+        return lobe.energy * lobe.gain
+    return lobe.facets.reflect(ops.clip(ggx.dot(wi, h), 0.0, 1.0)) * lobe.gain
+
+
 def _bounded(roughness: Roughness) -> Roughness:
     u, v, rotation = roughness
     return Roughness(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), rotation)
+
+
+def _visible(roughness: Roughness, wi: Direction, wo: Direction, h: Direction) -> tuple[Value, Value]:
+    """D(h) G1(wi), and G1(wo)."""
+    alpha_u, alpha_v, i, o, m = _in_frame(roughness, wi, wo, h)
+    return ggx.ndf(m, alpha_u, alpha_v) * ggx.masking(i, alpha_u, alpha_v), ggx.masking(o, alpha_u, alpha_v)
 
 
 def _in_frame(roughness: Roughness, *directions: Direction) -> tuple[Value, ...]:

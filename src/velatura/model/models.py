@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from velatura.errors import InvalidInput
+from velatura.model.calibration import CALIBRATIONS, Calibration
 from velatura.stack.schema import unknown
 
 #: Every switch with its values; `Model` says what each one means.
 SWITCHES: dict[str, tuple[str, ...]] = {
-    "reflectance": ("fresnel", "fgd"),
+    "reflectance": ("fresnel", "fg", "fgd", "fgd-multi", "split-sum"),
     "tir": ("off", "published", "clean"),
-    "map": ("belcour", "belcour-release", "weier"),
+    "map": ("belcour", "belcour-release", "weier", "weier-2d", "power"),
     "scale": ("shipped", "angles"),
     "channels": ("mean", "separate"),
-    "medium": ("shipped", "weighted"),
+    "medium": ("shipped", "weighted", "doubled"),
+    "form": ("forward", "symmetric"),
+    "fetch": ("averaged", "stretched"),
+    "lobes": ("all", "three", "two"),
+}
+
+#: By form, the laws that its BSDFs do not keep: light that a lobe sends below the surface is lost, the forward form is
+#: not reciprocal, and the symmetric one gains at grazing angles.
+EXCEPTIONS: dict[str, frozenset[str]] = {
+    "forward": frozenset({"lossless", "reciprocity"}),
+    "symmetric": frozenset({"lossless", "energy", "white furnace"}),
 }
 
 
@@ -25,16 +37,28 @@ class Model:
     """A set of choices.
 
     Args:
-        reflectance: energy that an interface reflects: `fresnel` at the mean direction, or directional albedo (`fgd`).
+        reflectance: energy that an interface reflects: `fresnel` at the mean direction, the same times the masking of
+            the mirror direction both ways (`fg`; Yamaguchi et al. 2019, 2), directional albedo of single reflections
+            (`fgd`) or of any number of bounces between the facets (`fgd-multi`; Belcour 2018, 4.1), or the first with
+            Schlick's Fresnel and the interface's own roughness (`split-sum`; Weier & Belcour 2020, Listing 1).
         tir: share of light that leaves upwards after a reflection from inside: all of it (`off`), the `published` mean
             of 1 - F, or the energy fraction within the critical cone (`clean`).
         map: the roughness map f, from GGX roughness to a variance that adds.
         scale: whether the roughness of a refraction is scaled as at normal incidence (`shipped`) or by the real
             cosines (`angles`).
         channels: one variance for all colours, from the `mean` of the energies, or one per channel (`separate`).
-        medium: a scattering medium gives its variance to all that it transmits (`shipped`), or to the scattered share
-            (`weighted`).
-        exceptions: laws of `velatura.checks` that a BSDF of this model does not keep, and is known not to.
+        medium: a scattering medium gives its variance to all that it transmits (`shipped`), or to the share that it
+            scatters, once (`weighted`) or as often as it will, as layers do that are doubled from thin ones (`doubled`;
+            Belcour 2018, 5.1).
+        form: lobes from the cosine of the light's direction (`forward`), or from that of half the angle between light
+            and view (`symmetric`; Belcour 2018, 6.2), which is reciprocal.
+        fetch: where an average over an anisotropic interface is looked up: at a mean of its roughnesses in which that
+            along the azimuth counts more (`averaged`), or at the lower one, for a `stretched` direction (Weier &
+            Belcour 2020, Listing 1).
+        lobes: reflected lobes that are evaluated: `all`, one for each interface, or at most `three` or `two`, inner
+            ones merged.
+        calibrations: numbers of the recursion in momentum (`velatura.model.momentum`), by reflectance; None for the
+            recursion of the papers.
     """
 
     name: str
@@ -44,7 +68,19 @@ class Model:
     scale: str
     channels: str
     medium: str
-    exceptions: frozenset[str] = frozenset()
+    form: str = "forward"
+    fetch: str = "averaged"
+    lobes: str = "all"
+    calibrations: Mapping[str, Calibration] | None = field(default=None, hash=False)
+
+    @property
+    def calibration(self) -> Calibration | None:
+        return None if self.calibrations is None else self.calibrations[self.reflectance]
+
+    @property
+    def exceptions(self) -> frozenset[str]:
+        """Laws of `velatura.checks` that a BSDF of this model does not keep, and is known not to."""
+        return EXCEPTIONS[self.form]
 
     def with_switches(self, **switches: str) -> Model:
         """This model with some choices changed.
@@ -57,20 +93,75 @@ class Model:
                 raise InvalidInput(unknown("switch", key, SWITCHES))
             if value not in SWITCHES[key]:
                 raise InvalidInput(f"{key}: must be one of {', '.join(SWITCHES[key])}, got {value!r}")
+            if value not in self._allowed(key):
+                raise InvalidInput(f"{key}={value}: {self.name} has {' and '.join(self._allowed(key))} only")
         changes: dict[str, Any] = {**switches}
         return dataclasses.replace(self, **changes)
+
+    def _allowed(self, key: str) -> tuple[str, ...]:
+        """Values of a switch: all, where the model is of the papers; else the form, and what it is calibrated for."""
+        if self.calibrations is None or key == "form":
+            return SWITCHES[key]
+        return tuple(self.calibrations) if key == "reflectance" else (getattr(self, key),)
 
 
 MODELS: tuple[Model, ...] = (
     Model(
         "belcour2018",
-        reflectance="fgd",
+        reflectance="fgd-multi",
         tir="published",
         map="belcour",
         scale="shipped",
         channels="mean",
         medium="shipped",
-        exceptions=frozenset({"reciprocity", "lossless"}),
+    ),
+    Model(
+        "yamaguchi2019",
+        reflectance="fresnel",  # as its shader has it; `fg` in print
+        tir="off",
+        map="belcour",
+        scale="shipped",
+        channels="mean",
+        medium="shipped",
+    ),
+    Model(
+        "weier2020",
+        reflectance="fresnel",
+        tir="off",
+        map="weier",
+        scale="angles",
+        channels="mean",
+        medium="shipped",
+        fetch="stretched",
+    ),
+    Model(
+        "bati2021",  # of the inverse
+        reflectance="fgd",
+        tir="off",
+        map="belcour",
+        scale="shipped",
+        channels="mean",
+        medium="shipped",
+    ),
+    Model(
+        "realtime",
+        reflectance="split-sum",
+        tir="off",
+        map="belcour",
+        scale="shipped",
+        channels="mean",
+        medium="weighted",
+        lobes="three",
+    ),
+    Model(
+        "velatura",
+        reflectance="fgd-multi",
+        tir="published",
+        map="power",
+        scale="angles",
+        channels="mean",
+        medium="doubled",
+        calibrations=CALIBRATIONS,
     ),
 )
 

@@ -7,10 +7,9 @@ from typing import TypeAlias
 
 from velatura import ops
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
-from velatura.model.variance import Roughness, Variance
+from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
-from velatura.optics import fresnel
-from velatura.optics.ggx import Direction, normalize, rotate
+from velatura.optics.ggx import Direction, masking, rotate
 
 PreparedLayer: TypeAlias = PreparedInterface | PreparedMedium
 
@@ -44,19 +43,13 @@ def interface(
 ) -> Operator:
     """Reflection and refraction by a rough interface (Eqs. 7-13), lit with variance s_t0i at cos_theta."""
     model, none = prepared.model, prepared.variance.uniform(0.0)
-    cos_fetch, alpha = _table_point((s_t0i + layer.s_r).roughness(prepared.f), cos_theta, wi)
+    lit = (s_t0i + layer.s_r).roughness(prepared.f)  # as rough as interface and light together
 
-    # Reflect
-    if layer.reflectance is not None:
-        r = layer.reflectance(cos_fetch, alpha)
-    elif layer.eta is None:
-        r = 1.0
-    elif layer.kappa is None:
-        r = fresnel.dielectric(cos_theta, layer.eta)
-    else:
-        r = fresnel.conductor(cos_theta, layer.eta, layer.kappa)
-    r = ops.clip(r, 0.0, 1.0)  # which fits and rounding leave by their errors
-    leaving = ops.clip(layer.leaving(cos_fetch, alpha), 0.0, 1.0) if layer.leaving is not None else None
+    # Reflect, within the bounds that fits and rounding leave by their errors
+    r = ops.clip(_reflectance(prepared, layer, cos_theta, lit, wi), 0.0, 1.0)
+    leaving = None
+    if layer.leaving is not None:
+        leaving = ops.clip(layer.leaving(*_fetched(prepared, lit, cos_theta, wi)), 0.0, 1.0)
     if layer.opaque:
         return Operator(r, 0.0, 0.0, 0.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
 
@@ -72,6 +65,22 @@ def interface(
     return Operator(r, t, ops.select(passes, r, 0.0), t, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
 
 
+def _reflectance(
+    prepared: Prepared, layer: PreparedInterface, cos_theta: Value, lit: Roughness, wi: Direction
+) -> Value:
+    """Energy that an interface reflects of light at cos_theta; `lit` is its roughness with that of the light."""
+    if layer.reflectance is not None:
+        # The split sum looks at the interface alone (Weier & Belcour 2020, Listing 3)
+        roughness = layer.roughness if prepared.model.reflectance == "split-sum" else lit
+        return layer.reflectance(*_fetched(prepared, roughness, cos_theta, wi, layer.opaque))
+    r = layer.reflect(cos_theta)
+    if prepared.model.reflectance == "fg":
+        # Masking is the same for a direction and its mirror image
+        g = masking(_with_azimuth(wi, cos_theta, lit.rotation), lit.alpha_u, lit.alpha_v)
+        r = r * g * g
+    return r
+
+
 def _transmitted(prepared: Prepared, roughness: Roughness, ratio: Value, passes: Value) -> Variance:
     """Variance of a refraction: that of a reflection by a rescaled roughness (Eq. 10 in magnitudes)."""
     scale = ops.select(passes, 0.5 * ops.absolute(1 - ratio), 0.0)
@@ -85,28 +94,37 @@ def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) ->
     scattered = ops.select(layer.g > 0, layer.tau_s * path, 0.0)
     t = (1 + scattered) * ops.exp(-layer.tau * path)
     s_g = ops.power((1 - g) / g, 0.8) / (1 + g)
+    mean = ops.mean(scattered)
     if prepared.model.medium == "weighted":
         # The variance of a mixture is the weighted mean (5.2)
-        mean = ops.mean(scattered)
         s_g = s_g * mean / (1 + mean)
+    elif prepared.model.medium == "doubled":
+        # The limit of many such layers, each of them thin
+        t, s_g = ops.exp(scattered - layer.tau * path), s_g * mean
     s_t = prepared.variance.uniform(ops.select(layer.g > 0, s_g, 0.0))
     none = prepared.variance.uniform(0.0)
     return Operator(0.0, t, 0.0, t, none, s_t, s_t, 1.0, 1.0, cos_theta, None)
 
 
-def _table_point(roughness: Roughness, cos_theta: Value, wi: Direction) -> tuple[Value, Value]:
-    """Cosine and isotropic roughness at which to look up the average over an anisotropic interface.
-
-    The direction is stretched along the smoother axis and the table read there (Weier & Belcour 2020, Listing 1).
-    """
-    if roughness.alpha_u is roughness.alpha_v:
+def _fetched(
+    prepared: Prepared, roughness: Roughness, cos_theta: Value, wi: Direction, opaque: bool = False
+) -> tuple[Value, Value]:
+    """Cosine and isotropic roughness at which an average over an anisotropic interface is looked up."""
+    if prepared.variance is Isotropic:
         return cos_theta, roughness.alpha_u
-    # Give the azimuth of wi to the direction at cos_theta
-    sin_theta = ops.sqrt(1 - cos_theta * cos_theta)
-    sin_i = ops.maximum(ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1]), ops.TINY)
-    x, y, _ = rotate((wi[0] / sin_i, wi[1] / sin_i, wi[2]), roughness.rotation)
-    # Stretch it
-    alpha = ops.minimum(roughness.alpha_u, roughness.alpha_v)
-    excess_u, excess_v = roughness.alpha_u - alpha, roughness.alpha_v - alpha
-    stretched = x * sin_theta / (1 + excess_u * excess_u), y * sin_theta / (1 + excess_v * excess_v), cos_theta
-    return normalize(stretched)[2], alpha
+    u, v, rotation = roughness
+    x, y, z = _with_azimuth(wi, cos_theta, rotation)
+    if prepared.model.fetch == "stretched":
+        alpha = ops.minimum(u, v)
+        x, y = x / (1 + (u - alpha) * (u - alpha)), y / (1 + (v - alpha) * (v - alpha))
+        return ops.sqrt(1 - x * x - y * y), alpha
+    # What passes depends on the normals' slopes along the azimuth; what is lost hardly does
+    mean2 = 0.5 * (u * u + v * v)
+    along2 = mean2 if opaque else z * z * mean2 + u * u * x * x + v * v * y * y
+    return cos_theta, ops.sqrt(along2)
+
+
+def _with_azimuth(wi: Direction, cos_theta: Value, rotation: Value) -> Direction:
+    """The direction at cos_theta with the azimuth of wi, in a frame turned by `rotation`."""
+    scale = ops.sqrt(1 - cos_theta * cos_theta) / ops.maximum(ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1]), ops.TINY)
+    return rotate((wi[0] * scale, wi[1] * scale, cos_theta), rotation)

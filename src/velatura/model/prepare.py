@@ -7,7 +7,7 @@ and textured values at every point.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 
@@ -16,7 +16,8 @@ from velatura.model.maps import MAPS, RoughnessMap
 from velatura.model.models import Model
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
-from velatura.tables import Average, Tables
+from velatura.optics import fresnel
+from velatura.tables import Average, Row, Tables
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,14 @@ class PreparedInterface:
     def opaque(self) -> bool:
         return self.eta is None or self.kappa is not None
 
+    def reflect(self, cos_theta: Value) -> Value:
+        """Fresnel reflectance of its facets."""
+        if self.eta is None:
+            return 1.0
+        if self.kappa is None:
+            return fresnel.dielectric(cos_theta, self.eta)
+        return fresnel.conductor(cos_theta, self.eta, self.kappa)
+
 
 @dataclass(frozen=True)
 class PreparedMedium:
@@ -53,25 +62,30 @@ class PreparedMedium:
 
 @dataclass(frozen=True)
 class PreparedBase:
-    """A diffuse base: albedo, relative index n = eta_n/eta_0 of the medium at it, mean reflectance of the stack above.
+    """A diffuse base: albedo, relative index n = eta_n/eta_0 of the medium at it, and what the stack does to its light.
 
-    All are colours; the mean reflectance, for diffuse light from below, is known once the layers are.
+    All are colours. The means are those for diffuse light from below, and are known once the layers are.
     """
 
     albedo: Value
     n: Value
     mean_reflectance: Value = 0.0
+    mean_transmittance: Value = 1.0
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """The layers from the top, a diffuse base apart; the model's parts that they were prepared for."""
+    """The layers from the top, a diffuse base apart; the model's parts that they were prepared for.
+
+    For the recursion in momentum, `once` is the albedo of the first interface where light meets its facets once.
+    """
 
     model: Model
     layers: tuple[PreparedInterface | PreparedMedium, ...]
     variance: type[Variance]
     f: RoughnessMap
     base: PreparedBase | None = None
+    once: Average | None = None
 
 
 def variance_kind(kinds: Sequence[str], values: Mapping[str, object]) -> type[Variance]:
@@ -109,6 +123,8 @@ def prepare(
     averages = _Averages(model, tables.load(), constant, number)
     layers: list[PreparedInterface | PreparedMedium] = []
     eta_1, n_leaving, base = values["exterior"], None, None
+    n: Value = 1.0  # index so far, and the lowest of those above, over that outside
+    lowest: Value = 1.0
     for i, kind in enumerate(kinds):
         layer = {key.partition("_")[2]: value for key, value in values.items() if key.startswith(f"layer{i}_")}
         if kind == "medium":
@@ -118,8 +134,15 @@ def prepare(
         else:
             layers.append(_interface(kind, layer, eta_1, n_leaving, averages, variance))
             if kind == "dielectric":
-                eta_1, n_leaving = layer["eta"], ops.mean(eta_1 / layer["eta"])
-    return Prepared(model, tuple(layers), variance, MAPS[model.map], base)
+                lowest, n = ops.minimum(lowest, n), n * ops.mean(layer["eta"] / eta_1)
+                n_leaving = lowest / n if model.calibrations else ops.mean(eta_1 / layer["eta"])
+                eta_1 = layer["eta"]
+    prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], base)
+    if model.calibrations is None:
+        return prepared
+    first = next((layer for layer in layers if isinstance(layer, PreparedInterface)), None)
+    once = averages.once(first.eta, first.kappa) if first else None
+    return replace(prepared, once=once)
 
 
 def _medium(layer: Mapping[str, Value]) -> PreparedMedium:
@@ -155,14 +178,29 @@ class _Averages:
     number: type | None
 
     def reflectance(self, eta: Value | None, kappa: Value | None) -> Average | None:
-        if self.model.reflectance == "fresnel":
+        if self.model.reflectance in ("fresnel", "fg"):
             return None
-        if eta is None:
+        multiple = self.model.reflectance == "fgd-multi"
+        if self.model.reflectance == "split-sum":
+            r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
+            row = tables.schlick_row(self.tables, r_0)
+        elif eta is None:
+            if multiple:
+                return None  # light that bounces between the facets of a mirror is not lost
             row = tables.mirror_row(self.tables)
         elif kappa is None:
-            row = tables.dielectric_row(self.tables, eta, self.constant)
+            row = tables.dielectric_row(self.tables, eta, self.constant, multiple)
         else:
-            row = tables.conductor_row(self.tables, eta, kappa, self.constant)
+            row = tables.conductor_row(self.tables, eta, kappa, self.constant, multiple)
+        return self._of(row)
+
+    def once(self, eta: Value | None, kappa: Value | None) -> Average:
+        """Albedo of an interface whose facets light meets once."""
+        average = replace(self, model=replace(self.model, reflectance="fgd")).reflectance(eta, kappa)
+        assert average is not None
+        return average
+
+    def _of(self, row: Row) -> Average:
         if self.number:
             return tables.fgd_sheet(self.tables, row, self.number)
         return partial(tables.fgd, self.tables, row)

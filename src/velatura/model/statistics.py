@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.model import adding
+from velatura.model.adding import Lobe
 from velatura.model.models import DEFAULT, Model, named
 from velatura.model.prepare import prepare, variance_kind
-from velatura.stack import Named, Stack, Texture, is_colour, spectra
+from velatura.model.recursion import lobes
+from velatura.model.sides import with_index_below
+from velatura.stack import Named, Stack, Varying, is_colour, spectra
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,10 @@ def statistics(
         )
     flat = stack.flat()
     values = {name: number(name, value) for name, value in flat.items()}
+    values = with_index_below(stack.kinds, values, stack.thin)
     prepared = prepare(stack.kinds, values, chosen, variance_kind(stack.kinds, flat))
     sine = np.sqrt(1 - cosine**2)
-    reflected, transmitted = adding.lobes(prepared, (sine * np.cos(azimuth), sine * np.sin(azimuth), cosine))
+    reflected, transmitted = lobes(prepared, (sine * np.cos(azimuth), sine * np.sin(azimuth), cosine))
     each = [_collect(lobe, chosen, len(cosine)) for lobe in reflected]
     return Statistics(
         energy=[lobe.energy for lobe in each],
@@ -85,9 +88,9 @@ def number(name: str, value: Any) -> Any:
     Raises:
         InvalidInput: a texture, which has no one value.
     """
-    if isinstance(value, Texture):
+    if isinstance(value, Varying):
         raise InvalidInput(
-            f"{name}: is a texture, and lobes are those of one point; replace it, as in --set {name}=0.1"
+            f"{name}: is a {value.what}, and lobes are those of one point; replace it, as in --set {name}=0.1"
         )
     if isinstance(value, Named):
         value = spectra.rgb(value)
@@ -96,7 +99,7 @@ def number(name: str, value: Any) -> Any:
     return float(value)
 
 
-def _collect(lobe: adding.Lobe, model: Model, count: int) -> LobeStatistics:
+def _collect(lobe: Lobe, model: Model, count: int) -> LobeStatistics:
     lead = (3,) if model.channels == "separate" else ()
 
     def shaped(values: Sequence[Any], axis: int) -> np.ndarray:

@@ -93,14 +93,15 @@ class PerAxis(Variance):
 
     @classmethod
     def of(cls, roughness: Roughness, f: RoughnessMap) -> PerAxis:
-        return cls(f.variance(roughness.alpha_u), f.variance(roughness.alpha_v))
+        u, v = roughness.alpha_u, roughness.alpha_v
+        return cls(f.variance(u, v), f.variance(v, u))
 
     @classmethod
     def uniform(cls, s: Value) -> PerAxis:
         return cls(s, s)
 
     def roughness(self, f: RoughnessMap) -> Roughness:
-        return Roughness(f.roughness(self.uu), f.roughness(self.vv), 0.0)
+        return Roughness(f.roughness(self.uu, self.vv), f.roughness(self.vv, self.uu), 0.0)
 
     def matrix(self) -> tuple[Value, Value, Value]:
         return self.uu, 0.0 * self.uu, self.vv
@@ -116,7 +117,7 @@ class Covariance(Variance):
 
     @classmethod
     def of(cls, roughness: Roughness, f: RoughnessMap) -> Covariance:
-        u, v = f.variance(roughness.alpha_u), f.variance(roughness.alpha_v)
+        u, v = f.variance(roughness.alpha_u, roughness.alpha_v), f.variance(roughness.alpha_v, roughness.alpha_u)
         c, s = ops.cos(roughness.rotation), ops.sin(roughness.rotation)
         return cls(u * c * c + v * s * s, (u - v) * c * s, u * s * s + v * c * c)
 
@@ -131,7 +132,7 @@ class Covariance(Variance):
         turned = radius > 1e-9 * mean
         rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
         u, v = mean + radius, ops.maximum(mean - radius, 0.0)
-        return Roughness(f.roughness(u), f.roughness(v), rotation)
+        return Roughness(f.roughness(u, v), f.roughness(v, u), rotation)
 
     def matrix(self) -> tuple[Value, Value, Value]:
         return self.xx, self.xy, self.yy

@@ -8,9 +8,7 @@ from typing import Any
 from velatura import kernel, tables
 from velatura.binding import Binding
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT, SWITCHES, adding, mixture, named
-from velatura.model.diffuse import Base, under, with_mean_reflectance
-from velatura.model.prepare import Prepared, prepare, variance_kind
+from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
 
 
 @kernel.plugin("layered")
@@ -28,10 +26,12 @@ def make(mi: Any) -> type:
                 `layer0_rotation`, `layer1_depth`, `layer1_sigma_a`, `layer1_sigma_s`, `layer1_g`, ...
             exterior (number, default 1): absolute index above.
             model (string, default belcour2018): one of `velatura.MODELS`.
-            reflectance, tir, map, scale, medium (strings): switches of the model.
+            reflectance, tir, map, scale, medium, form, fetch, lobes (strings): switches of the model.
 
-        One lobe per interface, over a diffuse base if there is one; reflection only. Wholly
-        smooth, uniform stacks reflect as a mirror does.
+        One reflected lobe per interface, over a diffuse base if there is one. A stack that ends in a dielectric
+        transmits one lobe more, and is lit from both sides; the index above is `exterior`, that below is the last one,
+        or `exterior` again where the material is `thin`. Wholly smooth, uniform stacks reflect as a mirror does, and
+        refract as a pane.
         """
 
         def __init__(self, properties: Any) -> None:
@@ -39,6 +39,7 @@ def make(mi: Any) -> type:
             switches = {name: str(properties[name]) for name in SWITCHES if name in properties}
             chosen = str(properties["model"]) if "model" in properties else DEFAULT
             self.model = named(chosen, **switches)
+            self.exceptions = self.model.exceptions
             if self.model.channels == "separate":
                 raise InvalidInput(
                     "channels=separate: only for lobes and inverse, since a BSDF has one lobe for all colours"
@@ -62,22 +63,29 @@ def make(mi: Any) -> type:
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
             flat = {**binding.stack.flat(), **self._looked_at()}
             self.variance = variance_kind(kinds, {**flat, **binding.images})
-            self.prepared: Prepared | None = None
+            self.body: bsdf.Body | None = None
             if binding.uniform:
                 number = mi.Float if dr.is_jit_v(mi.Float) else None
-                layers = prepare(kinds, binding.values(), self.model, self.variance, number=number)
-                dr.eval(layers)
-                self.prepared = with_mean_reflectance(layers, self._settled)
-                dr.eval(self.prepared)
+                self.body = self._prepared(binding.values(), number=number, settle=self._settled)
+                dr.eval(self.body)
+            # Say how light leaves
             smooth = all(value == 0.0 for name, value in flat.items() if "_alpha_" in name)
             clear = all(value == 0.0 for name, value in flat.items() if name.endswith("_sigma_s"))
             self.delta = smooth and clear and binding.uniform and "diffuse" not in kinds
-            self.kind = mi.BSDFFlags.DeltaReflection if self.delta else mi.BSDFFlags.GlossyReflection
-            varying = mi.BSDFFlags.SpatiallyVarying if not binding.uniform else mi.BSDFFlags.Empty
-            flags = self.kind | mi.BSDFFlags.FrontSide | varying
-            turned = mi.BSDFFlags.Anisotropic
-            self.m_components = [flags if self.variance.__name__ == "Isotropic" else flags | turned]
-            self.m_flags = self.m_components[0]
+            self.transmits = binding.stack.transmits
+            common = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.Empty if binding.uniform else mi.BSDFFlags.SpatiallyVarying)
+            if self.variance.__name__ != "Isotropic":
+                common |= mi.BSDFFlags.Anisotropic
+            self.kinds = [mi.BSDFFlags.DeltaReflection if self.delta else mi.BSDFFlags.GlossyReflection]
+            if self.transmits:
+                common |= mi.BSDFFlags.BackSide | mi.BSDFFlags.NonSymmetric
+                self.kinds += [mi.BSDFFlags.DeltaTransmission if self.delta else mi.BSDFFlags.GlossyTransmission]
+            self.m_components = [kind | common for kind in self.kinds]
+            self.m_flags = self.m_components[0] | self.m_components[-1]
+
+        def _prepared(self, values: Any, **options: Any) -> bsdf.Body:
+            stack = self.binding.stack
+            return bsdf.body(stack.kinds, values, stack.thin, self.model, self.variance, **options)
 
         def _settled(self, value: Any) -> Any:
             dr.make_opaque(value)
@@ -93,32 +101,26 @@ def make(mi: Any) -> type:
                     numbers[name] = float(value) if isinstance(value, float) else float(value[0])
             return numbers
 
-        def _lobes(self, si: Any, active: Any) -> tuple[list[adding.Lobe], Base | None]:
-            prepared = self.prepared
-            if prepared is None:
-                values = self.binding.at(si, active)
-                layers = prepare(self.binding.stack.kinds, values, self.model, self.variance, constant=False)
-                prepared = with_mean_reflectance(layers)
-            reflected, transmitted = adding.lobes(prepared, tuple(si.wi))
-            return reflected, under(prepared, transmitted)
+        def _body(self, si: Any, active: Any) -> bsdf.Body:
+            return self.body or self._prepared(self.binding.at(si, active), constant=False)
 
         # What a BSDF is asked
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            asked, body, wi = self._asked(ctx), self._body(si, active), tuple(si.wi)
             bs = mi.BSDFSample3f()
-            active = active & (si.wi.z > 0)
-            if not ctx.is_enabled(self.kind, 0):
-                return bs, mi.UnpolarizedSpectrum(0)
-            lobes, base = self._lobes(si, active)
-            bs.eta, bs.sampled_component, bs.sampled_type = 1.0, 0, mi.UInt32(+self.kind)
             if self.delta:
-                bs.wo, bs.pdf = mi.reflect(si.wi), 1.0
-                energy = sum((lobe.energy for lobe in lobes), mi.UnpolarizedSpectrum(0))
-                return bs, dr.select(active, energy, 0)
-            bs.wo = mi.Vector3f(*mixture.sample(lobes, base, tuple(si.wi), sample1, sample2.x, sample2.y))
-            value, bs.pdf = mixture.eval_pdf(lobes, base, tuple(si.wi), tuple(bs.wo))
-            active = active & (bs.pdf > 0)
-            return bs, dr.select(active, mi.UnpolarizedSpectrum(value) / dr.maximum(bs.pdf, 1e-30), 0)
+                drawn, bs.eta, bs.pdf, weight = bsdf.sample_smooth(body, wi, sample1, asked)
+                bs.wo = mi.Vector3f(*drawn)
+            else:
+                drawn, bs.eta = bsdf.sample(body, wi, sample1, sample2.x, sample2.y, asked)
+                bs.wo = mi.Vector3f(*drawn)
+                value, bs.pdf = bsdf.eval_pdf(body, wi, drawn, asked)
+                weight = value / dr.maximum(bs.pdf, 1e-30)
+            through = si.wi.z * bs.wo.z < 0
+            bs.sampled_component = dr.select(through, mi.UInt32(1), mi.UInt32(0))
+            bs.sampled_type = dr.select(through, mi.UInt32(+self.kinds[-1]), mi.UInt32(+self.kinds[0]))
+            return bs, dr.select(active & (bs.pdf > 0), mi.UnpolarizedSpectrum(weight), 0)
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval_pdf(ctx, si, wo, active)[0]
@@ -127,10 +129,15 @@ def make(mi: Any) -> type:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            if self.delta or not ctx.is_enabled(self.kind, 0):
+            if self.delta:
                 return mi.UnpolarizedSpectrum(0), mi.Float(0)
-            value, pdf = mixture.eval_pdf(*self._lobes(si, active), tuple(si.wi), tuple(wo))
+            value, pdf = bsdf.eval_pdf(self._body(si, active), tuple(si.wi), tuple(wo), self._asked(ctx))
             return mi.UnpolarizedSpectrum(value) & active, dr.select(active, pdf, 0)
+
+        def _asked(self, ctx: Any) -> bsdf.Asked:
+            """Whether reflection and transmission are wanted, and of what."""
+            wanted = [ctx.is_enabled(kind, component) for component, kind in enumerate(self.kinds)]
+            return bsdf.Asked(wanted[0], self.transmits and wanted[-1], ctx.mode == mi.TransportMode.Radiance)
 
         def to_string(self) -> str:
             return f"Layered[model={self.model.name}, kinds={', '.join(self.binding.stack.kinds)}]"

@@ -18,6 +18,7 @@ from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
 
 ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
+EXCEPTIONS = frozenset({"lossless"})  # laws of `velatura.checks`: light that is reflected twice, or passes, is lost
 
 Values = Mapping[str, Value]
 
@@ -38,6 +39,8 @@ def make(mi: Any) -> type:
         Light reflects once, at one of the interfaces; media absorb and do not scatter; nothing is transmitted.
         Interfaces of roughness below 0.001 are evaluated as of that.
         """
+
+        exceptions = EXCEPTIONS
 
         def __init__(self, properties: Any) -> None:
             mi.BSDF.__init__(self, properties)

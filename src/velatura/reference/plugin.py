@@ -17,6 +17,11 @@ from velatura.reference.walk import walk
 
 _MAX_DEPTH = 1000
 
+#: Laws of `velatura.checks` that cannot hold: `pdf` is not the density of `sample`, and `eval` is an estimate. Nor is
+#: anything lossless where light that meets a second facet of an interface is lost.
+EXCEPTIONS = frozenset({"normalisation", "chi-square", "weights"})
+LOSS = frozenset({"lossless"})
+
 
 @kernel.plugin("layered_reference")
 def make(mi: Any) -> type:
@@ -51,6 +56,7 @@ def make(mi: Any) -> type:
             self.seed = _integer("seed", chosen["seed"], 0, 2**32 - 1)
             self.max_depth = _integer("max_depth", chosen["max_depth"], 1, 10**6)
             self.microsurface = _switch("microsurface", chosen["microsurface"])
+            self.exceptions = EXCEPTIONS if self.microsurface else EXCEPTIONS | LOSS
             self.binding = Binding(mi, properties, set(options))
             self._update()
 

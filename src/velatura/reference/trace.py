@@ -13,7 +13,7 @@ from velatura import kernel
 from velatura.errors import InvalidInput
 from velatura.reference.layers import Layers, from_values
 from velatura.reference.walk import walk
-from velatura.stack import Named, Stack, Texture, rgb
+from velatura.stack import Named, Stack, Varying, rgb
 
 Array = NDArray[np.floating]
 
@@ -107,8 +107,8 @@ def _layers(stack: Stack, microsurface: bool) -> Layers:
 def _numbers(stack: Stack) -> Mapping[str, float | tuple[float, float, float]]:
     numbers = {}
     for name, value in stack.flat().items():
-        if isinstance(value, Texture):
-            raise InvalidInput(f"{name}: is a texture, and statistics are those of one point; replace it by a number")
+        if isinstance(value, Varying):
+            raise InvalidInput(f"{name}: is a {value.what}, and statistics are those of one point; replace it by a number")
         numbers[name] = rgb(value) if isinstance(value, Named) else value
     return numbers
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, join, lathe, rounded
+from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, flattened, join, lathe, rounded
 
 
 class View(NamedTuple):
@@ -51,11 +51,23 @@ def wedges() -> Surface:
     return join(*(_wedge(slope).moved((0.58 * i - 1.16, 0.0, 0.0)) for i, slope in enumerate((15, 30, 45, 60, 75))))
 
 
+@functools.cache
+def lid() -> Surface:
+    """A low round dome that lies flat, with texture coordinates as seen from above: for brushing of all kinds."""
+    slope, edge, curvature = 20.0, 0.06, 3.0
+    dome = arc((0.0, 0.0), curvature, 90.0 - slope, 90.0, step=1.0)
+    rim = (curvature - edge) * _direction(90.0 - slope)
+    top = lathe(np.concatenate([arc(rim, edge, 0.0, 90.0 - slope, step=10.0), dome[1:]]))
+    below = lathe(np.concatenate([[[0.0, rim[1] - edge]], arc(rim, edge, -90.0, 0.0, step=10.0)]))
+    return join(flattened(top), below).moved((0.0, edge - rim[1], 0.0))
+
+
 #: What `scene` may name, besides the file of a Mitsuba scene.
 OBJECTS = {
     "ball": Object(ball, View((0.0, 2.6, 7.2), (0.0, 1.0, 0.0), 19.5)),
     "sphere": Object(sphere, View((0.0, 2.2, 7.2), (0.0, 0.95, 0.0), 19.5)),
     "wedges": Object(wedges, View((2.6, 2.6, 6.6), (0.0, 0.4, 0.0), 23.0)),
+    "lid": Object(lid, View((0.0, 6.0, 4.0), (0.0, 0.1, 0.0), 21.0)),
 }
 
 

@@ -37,6 +37,7 @@ def render(
 
     Raises:
         InvalidInput, MissingTool: as `scene_dict`; also for spp < 1.
+        KeyboardInterrupt: on Ctrl-C, between two passes or within one.
     """
     if spp < 1:
         raise InvalidInput(f"spp is {spp}, and must be at least 1")
@@ -47,11 +48,21 @@ def render(
 
     total, done = np.zeros(1, np.float32), 0
     for samples, pass_seed in zip(passes, seeds):
-        total = total + np.float32(samples) * np.array(mi.render(loaded, spp=samples, seed=int(pass_seed)))
+        total = total + np.float32(samples) * _rendered(mi, loaded, samples, int(pass_seed))
         done += samples
         if progress:
             progress(done, spp)
     return _rgb(total / np.float32(spp))
+
+
+def _rendered(mi: Any, scene: Any, spp: int, seed: int) -> NDArray[np.float32]:
+    """One pass; Mitsuba, when interrupted, may raise an error of its own instead, as Dr.Jit does in its callbacks."""
+    try:
+        return np.array(mi.render(scene, spp=spp, seed=seed))
+    except RuntimeError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            raise KeyboardInterrupt from None
+        raise
 
 
 def _rgb(image: NDArray[np.float32]) -> NDArray[np.float32]:

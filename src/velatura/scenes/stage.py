@@ -37,8 +37,8 @@ def scene_dict(
     """A scene for `mi.load_dict`, to be rendered as it is or changed first.
 
     Args:
-        scene: "ball", "sphere", "wedges", or a Mitsuba scene file (.xml), in which every shape whose bsdf has the id
-            "material" gets the material, and which keeps its own cameras, integrator and lights.
+        scene: "ball", "sphere", "wedges", "lid", or a Mitsuba scene file (.xml), in which every shape whose bsdf has
+            the id "material" gets the material, and which keeps its own cameras, integrator and lights.
         env: "studio", "sky", "furnace", or an .exr or .hdr file; None means a scene file's own lights, or else the
             studio. In the furnace the object floats alone, so that a material that loses no light vanishes.
         bsdf: a `mi.BSDF`, or the dictionary of one.

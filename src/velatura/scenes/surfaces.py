@@ -8,7 +8,7 @@ looks like an edge is a curve of small radius.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,6 +49,13 @@ def lathe(profile: Array, segments: int = 96) -> Surface:
     azimuth = np.linspace(-np.pi, np.pi, segments + 1)[:, None]
     outwards = np.sin(azimuth) * _X + np.cos(azimuth) * _Z
     return _sweep(profile, outwards, np.zeros_like(outwards))
+
+
+def flattened(surface: Surface) -> Surface:
+    """The surface with texture coordinates as seen from above, u along x and v along z, over its width and depth."""
+    low, high = surface.positions.min(axis=0), surface.positions.max(axis=0)
+    plan = (surface.positions - low) / (high - low)
+    return replace(surface, uv=plan[:, [0, 2]])
 
 
 def extrude(profile: Array, width: float) -> Surface:

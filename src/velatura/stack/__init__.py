@@ -5,10 +5,11 @@ from velatura.stack.io import dumps, load, loads, preset, presets, save
 from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, is_colour
 from velatura.stack.spectra import Named, names, rgb, spectrum
 from velatura.stack.stack import Stack
-from velatura.stack.values import RGB, Texture
+from velatura.stack.values import RGB, Brushing, Texture, Varying
 
 __all__ = [
     "RGB",
+    "Brushing",
     "Diffuse",
     "Interface",
     "Kind",
@@ -18,6 +19,7 @@ __all__ = [
     "Stack",
     "Texture",
     "Value",
+    "Varying",
     "dumps",
     "is_colour",
     "json_schema",

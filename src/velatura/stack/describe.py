@@ -7,7 +7,7 @@ from typing import Any
 from velatura.stack.layers import LAYERS
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.stack import Stack
-from velatura.stack.values import Texture
+from velatura.stack.values import Brushing, Texture
 
 
 def json_schema() -> dict[str, Any]:
@@ -20,7 +20,10 @@ def json_schema() -> dict[str, Any]:
         "title": "Velatura material",
         **material,
         "required": ["layers"],
-        "$defs": {"texture": {**_keys(Texture), "required": ["texture"]}},
+        "$defs": {
+            "texture": {**_keys(Texture), "required": ["texture"]},
+            "brushing": {**_keys(Brushing), "required": ["brushing"]},
+        },
     }
 
 
@@ -30,7 +33,7 @@ def parameter_table() -> str:
         "| where | key | value | unit | range | default | texture | gradient | meaning |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    models: dict[str, type[Record]] = {"material": Stack, **LAYERS, "texture": Texture}
+    models: dict[str, type[Record]] = {"material": Stack, **LAYERS, "texture": Texture, "brushing": Brushing}
     for where, model in models.items():
         for key, parameter in parameters(model).items():
             lines.append(_row(where, key, parameter, model.model_fields[key].default))

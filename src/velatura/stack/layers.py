@@ -8,10 +8,10 @@ from pydantic import model_validator
 
 from velatura.stack.schema import Record, parameters
 from velatura.stack.spectra import MIRROR, Named, names
-from velatura.stack.values import RGB, Colour, Conductor, Index, Pair, Scalar, Texture
+from velatura.stack.values import RGB, Angle, Brushing, Colour, Conductor, Index, Pair, Scalar, Texture
 
 Kind: TypeAlias = Literal["dielectric", "conductor", "mirror", "medium", "diffuse"]
-Value: TypeAlias = float | RGB | Named | Texture
+Value: TypeAlias = float | RGB | Named | Texture | Brushing
 
 
 class Interface(Record):
@@ -37,8 +37,8 @@ class Interface(Record):
         Pair("GGX roughness along the tangent and the bitangent", low=0, high=1),
     ] = 0.0
     rotation: Annotated[
-        float | Texture,
-        Scalar("turn of the tangent, anticlockwise seen from outside, from dp/du", unit="degrees"),
+        float | Texture | Brushing,
+        Angle("turn of the tangent, anticlockwise seen from outside, from dp/du", unit="degrees"),
     ] = 0.0
 
     @model_validator(mode="after")

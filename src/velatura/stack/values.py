@@ -186,6 +186,20 @@ class Scalar(Parameter):
         return [number]
 
 
+class Angle(Scalar):
+    """A number, a texture, or the angle of a field of directions."""
+
+    what = "a number, a brushing"
+
+    def check(self, value: Any) -> Any:
+        if isinstance(value, Mapping) and "brushing" in value:
+            return Brushing.from_dict(value)
+        return value if isinstance(value, Brushing) else super().check(value)
+
+    def _forms(self) -> list[dict[str, Any]]:
+        return [*super()._forms(), {"$ref": "#/$defs/brushing"}]
+
+
 class Colour(Scalar):
     """A number for all channels, or one for each of red, green and blue."""
 
@@ -255,12 +269,20 @@ class Pair(Scalar):
         return [number, {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}]
 
 
-class Texture(Record):
+class Varying(Record):
+    """A value that differs from point to point of a surface."""
+
+    what: ClassVar[str]
+
+
+class Texture(Varying):
     """A number or colour read from an image: `scale * texel + offset`.
 
     Values outside the parameter's range after scale and offset are the reader's business to clamp: the image is not
     opened here.
     """
+
+    what: ClassVar[str] = "texture"
 
     texture: Annotated[Path, File("image file, relative to the material file")]
     channel: Annotated[
@@ -269,3 +291,19 @@ class Texture(Record):
     scale: Annotated[float, Scalar("factor on the texel", texturable=False, differentiable=False)] = 1.0
     offset: Annotated[float, Scalar("added after the factor", texturable=False, differentiable=False)] = 0.0
     encoding: Annotated[str, Choice("how the texel is stored", options=("linear", "srgb"))] = "linear"
+
+
+class Brushing(Varying):
+    """The angle of a field of directions on a surface: away from a centre, or around it.
+
+    An image of angles would be torn where they pass from 360 degrees to 0.
+    """
+
+    what: ClassVar[str] = "brushing"
+
+    brushing: Annotated[
+        str, Choice("where the tangent runs: away from the centre, or around it", options=("radial", "concentric"))
+    ]
+    u: Annotated[float, Scalar("centre, in texture coordinates", texturable=False, differentiable=False)] = 0.5
+    v: Annotated[float, Scalar("centre, in texture coordinates", texturable=False, differentiable=False)] = 0.5
+    offset: Annotated[float, Scalar("added to the angle", unit="degrees", texturable=False, differentiable=False)] = 0.0

@@ -2,7 +2,9 @@
 
 from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, fgd_sheet, mirror_row, tir, tir_sheet
 from velatura.tables.sheet import Average
+from velatura.tables.split_sum import schlick_row
 from velatura.tables.store import FILE, Table, Tables, load, save
+from velatura.tables.stretched import drawn_albedo
 
 __all__ = [
     "FILE",
@@ -12,11 +14,13 @@ __all__ = [
     "Tables",
     "conductor_row",
     "dielectric_row",
+    "drawn_albedo",
     "fgd",
     "fgd_sheet",
     "load",
     "mirror_row",
     "save",
+    "schlick_row",
     "tir",
     "tir_sheet",
 ]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import prod
 
 import numpy as np
 
@@ -21,10 +22,11 @@ from velatura.tables.store import Table, Tables
 
 @dataclass(frozen=True)
 class Row:
-    """Fresnel of one relative index at the nodes of a low-rank table.
+    """Fresnel of one relative index at the nodes of a low-rank table, raised to the powers that the table names.
 
     `denser` and `rarer` tell whether the relative index can be above and below 1 (for metals: whether it can be
-    anywhere but, and in, the corner kappa < eta < 1): what cannot be is not looked up.
+    anywhere but, and in, the corner kappa < eta < 1): what cannot be is not looked up. `multiple` is whether light may
+    bounce between the facets before it leaves.
     """
 
     table: Table
@@ -33,22 +35,23 @@ class Row:
     kappa: Value | None
     denser: bool = True
     rarer: bool = True
+    multiple: bool = False
 
 
-def dielectric_row(tables: Tables, eta: Value, constant: bool = False) -> Row:
+def dielectric_row(tables: Tables, eta: Value, constant: bool = False, multiple: bool = False) -> Row:
     """Row of a dielectric of relative index eta > 0; `constant` says that eta may be looked at now."""
-    nodes = tables.dielectric.nodes
-    reflectance = [fresnel.dielectric(c, eta) for c in nodes]
+    table = tables.dielectric_multi if multiple else tables.dielectric
+    reflectance = _raised(table, [fresnel.dielectric(c, eta) for c in table.nodes])
     denser, rarer = _sides(eta < 1) if constant else (True, True)
-    return Row(tables.dielectric, reflectance, eta, None, denser, rarer)
+    return Row(table, reflectance, eta, None, denser, rarer, multiple)
 
 
-def conductor_row(tables: Tables, eta: Value, kappa: Value, constant: bool = False) -> Row:
+def conductor_row(tables: Tables, eta: Value, kappa: Value, constant: bool = False, multiple: bool = False) -> Row:
     """Row of a conductor of relative index eta + i kappa."""
-    nodes = tables.conductor.nodes
-    reflectance = [fresnel.conductor(c, eta, kappa) for c in nodes]
+    table = tables.conductor_multi if multiple else tables.conductor
+    reflectance = _raised(table, [fresnel.conductor(c, eta, kappa) for c in table.nodes])
     denser, rarer = _sides(_in_corner(eta, kappa)) if constant else (True, True)
-    return Row(tables.conductor, reflectance, eta, kappa, denser, rarer)
+    return Row(table, reflectance, eta, kappa, denser, rarer, multiple)
 
 
 def mirror_row(tables: Tables) -> Row:
@@ -57,12 +60,13 @@ def mirror_row(tables: Tables) -> Row:
 
 
 def fgd(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
-    """Single-scatter directional albedo of a GGX interface (Belcour 2018, Eq. 2), shape of colour against direction."""
+    """Directional albedo of a GGX interface (Belcour 2018, Eq. 2 and 4.1), shape of colour against direction."""
     channels = ops.interpolate(row.table, coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha))
     above = _dot(channels, row.reflectance)
     if not row.rarer:
         return above
-    below = _dot(channels, [1.0] * len(channels)) * _mean_fresnel_inside(tables, row, cos_theta, alpha)
+    of_mirror = 1.0 if row.multiple else _dot(channels, [1.0] * len(channels))
+    below = of_mirror * _mean_fresnel_inside(tables, row, cos_theta, alpha)
     if not row.denser:
         return below
     return ops.select(row.eta < 1 if row.kappa is None else _in_corner(row.eta, row.kappa), below, above)
@@ -102,11 +106,19 @@ def tir_sheet(tables: Tables, form: str, eta: Value, number: type) -> Average:
 
 def _mean_fresnel_inside(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
     if row.kappa is None:
-        return _fetch_inside(tables.inside, row.eta, cos_theta, alpha)[0]
-    channels = _fetch_inside(tables.absorbing_inside, row.eta, cos_theta, alpha)
+        inside = tables.inside_multi if row.multiple else tables.inside
+        return _fetch_inside(inside, row.eta, cos_theta, alpha)[0]
+    absorbing = tables.absorbing_inside_multi if row.multiple else tables.absorbing_inside
+    channels = _fetch_inside(absorbing, row.eta, cos_theta, alpha)
     theta_c = _critical_angle(row.eta)
-    angles = [coordinates.to_angle(x, theta_c) for x in tables.absorbing_inside.nodes]
-    return 1 - _dot(channels, [1 - fresnel.conductor(c, row.eta, row.kappa) for c in angles])
+    angles = [coordinates.to_angle(x, theta_c) for x in absorbing.nodes]
+    reflectance = _raised(absorbing, [fresnel.conductor(c, row.eta, row.kappa) for c in angles])
+    return 1 - _dot(channels, [1 - f for f in reflectance])
+
+
+def _raised(table: Table, reflectance: Sequence[Value]) -> list[Value]:
+    """Fresnel at the nodes of a table to the table's powers."""
+    return [prod([f] * n) for f, n in zip(reflectance, table.powers or (1,) * len(reflectance))]
 
 
 def _fetch_inside(table: Table, eta: Value, cos_theta: Value, alpha: Value) -> list[Value]:

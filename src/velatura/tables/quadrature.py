@@ -5,6 +5,8 @@ The average of a function of one microfacet reflection, weighted as in the direc
     FGD = 1/pi int_0^1 du int_0^pi dphi  F(wi.h) G1(wi) G1(wo) (wi.h) / (cos_theta cos_theta_h),
     tan(theta_h) = alpha sqrt(u / (1-u)).
 
+As one meeting among many, a reflection leaves by height-correlated masking G2 in place of G1(wi) G1(wo).
+
 The integrand bends where wo reaches the horizon and where wi.h passes the critical angle. Both curves are known, so
 both integrals are split there, and Gauss-Legendre nodes are drawn towards the ends of every piece, which flattens the
 square root that Fresnel has at the critical angle.
@@ -50,18 +52,19 @@ def average(
     alpha: np.ndarray,
     *indices: np.ndarray,
     nodes: int = NODES,
+    correlated: bool = False,
     progress: Progress = ignore,
 ) -> np.ndarray:
     """What `of(reflections, *indices)` makes of every point, all of shape (points,), the results joined.
 
     The first of the indices, if there are any, is a relative index, and what is averaged may bend where the cosine
-    named by `bend` passes its critical angle.
+    named by `bend` passes its critical angle. Masking is height-`correlated`, or separable.
     """
     cos_critical = np.sqrt(np.maximum(1 - indices[0] ** 2, 0)) if indices else np.zeros(len(alpha))
     results = []
     for start in range(0, len(alpha), CHUNK):
         chunk = slice(start, start + CHUNK)
-        r = reflections(cos_theta[chunk], alpha[chunk], cos_critical[chunk], bend, nodes)
+        r = reflections(cos_theta[chunk], alpha[chunk], cos_critical[chunk], bend, nodes, correlated)
         results.append(of(r, *(index[chunk, None] for index in indices)))
         progress(min(1.0, (start + CHUNK) / len(alpha)))
     return np.concatenate(results)
@@ -83,7 +86,7 @@ def _split(edges: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def reflections(
-    cos_theta: np.ndarray, alpha: np.ndarray, cos_critical: np.ndarray, bend: str, nodes: int
+    cos_theta: np.ndarray, alpha: np.ndarray, cos_critical: np.ndarray, bend: str, nodes: int, correlated: bool = False
 ) -> Reflections:
     """Quadrature at points (cos_theta, alpha > 0) of shape (points,).
 
@@ -123,7 +126,10 @@ def reflections(
     cos_d = (cos_i * cos_h)[..., None] + (sin_i * sin_h)[..., None] * np.cos(phi)
     cos_d = np.clip(cos_d, 0, 1)
     cos_o = np.clip(2 * cos_d * cos_h[..., None] - cos_i[..., None], 0, 1)
-    g = _masking(cos_i, alpha)[..., None] * _masking(cos_o, alpha[..., None])
+    g_i, g_o = _masking(cos_i, alpha)[..., None], _masking(cos_o, alpha[..., None])
+    g = g_i * g_o
+    if correlated:
+        g = g / np.maximum(g_i + g_o - g, 1e-30)
     weight = weight_u[..., None] * weight_phi / pi * g * cos_d / (cos_i * cos_h)[..., None]
     flat = (len(cos_theta), -1)
     return Reflections(weight.reshape(flat), cos_d.reshape(flat), cos_o.reshape(flat))

@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from velatura.optics import fresnel
-from velatura.tables import yardstick
-from velatura.tables.build import build, mean_transmittance_out, share_in_cone
-from velatura.tables.fetch import conductor_row, dielectric_row, fgd, tir
+from velatura.tables import stretched, walks, yardstick
+from velatura.tables.build import build
+from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, tir
+from velatura.tables.many import bin_cosines
+from velatura.tables.once import mean_transmittance_out, share_in_cone
 from velatura.tables.quadrature import Progress, Reflections, average, ignore
 from velatura.tables.store import Table, Tables
 
 POINTS = 2000  # per table
+WALKED, PATHS = 60, 16384  # points, and paths for each, where light bounces between the facets: a noise of 5e-4
 NODES = 16  # of the truth, on every piece of an integral: good to 1e-5
 
 BUILDING = 0.8  # of the whole time
@@ -25,7 +28,8 @@ def report(progress: Progress = ignore, with_yardstick: bool = False) -> list[di
     """One row per table: `table`, `shape`, `bytes`, `rank`, `build_s`, `max_error`, `rms_error`.
 
     Rank is None where nothing is factored. Errors are those of the look-ups that a table serves, at seeded points with
-    cosine and roughness in [.02, 1], relative index in [.05, 4] and extinction in [0, 4].
+    cosine and roughness in [.02, 1], relative index in [.05, 4] and extinction in [0, 4]; at a few of them, against
+    walks, where light bounces between the facets.
     """
     built = build(lambda done: progress(BUILDING * done))
     rows = []
@@ -48,6 +52,20 @@ def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
     def conductor(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
         return fgd(tables, conductor_row(tables, eta, kappa), cos_theta, alpha) - _albedo(eta, kappa)
 
+    def drawn() -> np.ndarray:
+        x, y = alpha[:WALKED], 0.02 + 0.98 * eta[:WALKED]
+        truth = stretched.albedo(cos_theta[:WALKED, None], x[:, None], y[:, None], 1 << 17)
+        return stretched.drawn_albedo(tables, cos_theta[:WALKED], x, y) - truth
+
+    def many(row: Row, eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+        return fgd(tables, row, cos_theta, alpha)[:WALKED] - _albedo_many(eta, kappa)
+
+    def many_dielectric(eta: np.ndarray) -> np.ndarray:
+        return many(dielectric_row(tables, eta, multiple=True), eta, 0 * eta)
+
+    def many_conductor(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+        return many(conductor_row(tables, eta, kappa, multiple=True), eta, kappa)
+
     def leaving(form: str, of: Callable[..., np.ndarray], eta: np.ndarray) -> np.ndarray:
         return tir(tables, form, eta, cos_theta, alpha) - average(of, "cos_o", cos_theta, alpha, eta, nodes=NODES)
 
@@ -56,9 +74,14 @@ def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
         "conductor": lambda: conductor(index, metal),
         "inside": lambda: dielectric(below),
         "absorbing_inside": lambda: conductor(below, below * kappa),
+        "dielectric_multi": lambda: many_dielectric(above),
+        "conductor_multi": lambda: many_conductor(index, metal),
+        "inside_multi": lambda: many_dielectric(below),
+        "absorbing_inside_multi": lambda: many_conductor(below, below * kappa),
         "tir_published": lambda: leaving("published", mean_transmittance_out, below),
         "tir_published_outside": lambda: leaving("published", mean_transmittance_out, above),
         "tir_clean": lambda: leaving("clean", share_in_cone, below),
+        "drawn": drawn,
     }
 
 
@@ -77,12 +100,26 @@ def _points() -> tuple[np.ndarray, ...]:
     return tuple(np.random.default_rng(0).uniform(low, 1.0, (POINTS, 4)).T)
 
 
-def _albedo(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+def _albedo(eta: np.ndarray, kappa: np.ndarray, correlated: bool = False) -> np.ndarray:
     def reflected(r: Reflections, eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
         return (r.weight * fresnel.conductor(r.cos_d, eta, kappa)).sum(axis=1)
 
     cos_theta, alpha, *_ = _points()
-    return average(reflected, "cos_d", cos_theta, alpha, eta, kappa, nodes=NODES)
+    return average(reflected, "cos_d", cos_theta, alpha, eta, kappa, nodes=NODES, correlated=correlated)
+
+
+def _albedo_many(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
+    cos_theta, alpha, *_ = _points()
+    rng = np.random.default_rng(1)
+    later = []
+    for i in range(WALKED):
+        point = slice(i, i + 1)
+        if kappa[i] > 0:
+            curve = fresnel.conductor(bin_cosines(), eta[point], kappa[point])
+            later.append(walks.reflected_by_metals(cos_theta[i], alpha[i], curve, PATHS, rng)[0])
+        else:
+            later.append(walks.reflected_later(cos_theta[point], alpha[point], eta[point], PATHS, rng))
+    return _albedo(eta, kappa, correlated=True)[:WALKED] + np.concatenate(later)
 
 
 def _row(name: str, table: Table, seconds: float, errors: np.ndarray) -> dict[str, Any]:

@@ -19,11 +19,12 @@ class Table:
     """Single-precision values at the nodes i/(N-1) of a two- or three-dimensional grid, channels on the last axis.
 
     `nodes` tell the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in
-    three dimensions coordinates on the angular axis.
+    three dimensions coordinates on the angular axis; `powers` to which it is raised there, 1 where there are none.
     """
 
     data: np.ndarray
     nodes: tuple[float, ...] = ()
+    powers: tuple[int, ...] = ()
     _textures: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -55,9 +56,14 @@ class Tables:
     conductor: Table
     inside: Table
     absorbing_inside: Table
+    dielectric_multi: Table
+    conductor_multi: Table
+    inside_multi: Table
+    absorbing_inside_multi: Table
     tir_published: Table
     tir_published_outside: Table
     tir_clean: Table
+    drawn: Table
 
     def upload(self, dialect: Any) -> None:
         """Make all textures of a Dr.Jit module now, as they cannot be made while a kernel is being recorded."""
@@ -74,6 +80,7 @@ def save(tables: Tables, path: Path = FILE) -> None:
     for name, table in tables.items():
         arrays[name] = table.data
         arrays[f"{name}.nodes"] = np.array(table.nodes)
+        arrays[f"{name}.powers"] = np.array(table.powers, int)
     with whole(path) as unfinished, unfinished.open("wb") as file:
         np.savez_compressed(file, **arrays)
 
@@ -82,6 +89,9 @@ def save(tables: Tables, path: Path = FILE) -> None:
 def load() -> Tables:
     """The tables shipped with the package."""
     with np.load(FILE) as arrays:
-        return Tables(
-            **{f.name: Table(arrays[f.name], tuple(arrays[f"{f.name}.nodes"].tolist())) for f in fields(Tables)}
-        )
+        return Tables(**{f.name: _read(arrays, f.name) for f in fields(Tables)})
+
+
+def _read(arrays: Any, name: str) -> Table:
+    nodes, powers = (tuple(arrays[f"{name}.{part}"].tolist()) for part in ("nodes", "powers"))
+    return Table(arrays[name], nodes, powers)

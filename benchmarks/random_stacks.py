@@ -1,0 +1,61 @@
+"""How rough models say that the base of a stack looks, against random walks through stacks drawn at random.
+
+    python benchmarks/random_stacks.py [--stacks 90] [--paths 300000] [--seed 0]
+
+Stacks have one to three dielectrics, of an index in 1.1 to 2.2, over a metal of eta in 0.2 to 2 and k in 1 to 5; every
+alpha lies in 0.01 to 0.5. Of the lobe of the metal, the equivalent alpha at four cosines of incidence is compared with
+that of every named model, and with that of two roughness maps for which all else is the same. Printed: the mean of
+|log(alpha / true alpha)|, and in parentheses that of the logarithm itself, the bias.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+
+import velatura as vt
+from velatura.stack import Interface, Stack
+
+COSINES = (1.0, 0.75, 0.5, 0.3)
+PLAIN: dict[str, Any] = {"model": "belcour2018", "reflectance": "fresnel", "tir": "off", "scale": "shipped"}
+ROWS: dict[str, dict[str, Any]] = {
+    **{f"{name} map, fresnel, no TIR": {**PLAIN, "map": name} for name in ("belcour", "weier")},
+    **{model.name: {"model": model.name} for model in vt.MODELS},
+}
+
+
+def random_stack(rng: np.random.Generator) -> Stack:
+    """Dielectrics over a metal, as described above."""
+    count = rng.integers(1, 4)
+    coats = [Interface(eta=rng.uniform(1.1, 2.2), alpha=rng.uniform(0.01, 0.5)) for _ in range(count)]
+    return Stack([*coats, Interface(eta=rng.uniform(0.2, 2.0), k=rng.uniform(1.0, 5.0), alpha=rng.uniform(0.01, 0.5))])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--stacks", type=int, default=90)
+    parser.add_argument("--paths", type=int, default=300_000)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+
+    # Walk
+    rng = np.random.default_rng(options.seed)
+    stacks = [random_stack(rng) for _ in range(options.stacks)]
+    truths = [vt.reference.statistics(stack, COSINES, paths=options.paths, seed=options.seed) for stack in stacks]
+    alphas = np.array([truth.alpha[-1][0] for truth in truths])
+    noise = np.array([truth.standard_error.alpha[-1][0] for truth in truths if truth.standard_error]) / alphas
+    print(f"{options.stacks} stacks, {options.paths} paths each; the truth's noise {noise.mean():.4f}, relative")
+
+    # Compare
+    print(f"{'cosine of incidence':36s}" + "".join(f"{cosine:18g}" for cosine in COSINES))
+    for name, choices in ROWS.items():
+        modelled = np.array([vt.lobes(stack, COSINES, **choices).alpha[-1][0] for stack in stacks])
+        errors = np.log(np.maximum(modelled, 1e-3) / alphas)
+        cells = (f"{size:.3f} ({bias:+.3f})" for size, bias in zip(abs(errors).mean(axis=0), errors.mean(axis=0)))
+        print(f"{name:36s}" + "".join(f"{cell:>18s}" for cell in cells))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""`velatura explore`: stacks that look alike head-on, by how they differ at grazing angles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from velatura.cli import invert, progress
+from velatura.errors import InvalidInput
+
+COLUMNS = 4  # of the contact sheet
+
+
+def explore(
+    target: invert.TargetFile,
+    sheet: Annotated[bool, typer.Option("--sheet", help="Render the stacks to one picture.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="F", help="The sheet; else TARGET with -sheet.png, here.")
+    ] = None,
+    count: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Stacks.")] = 8,
+    env: Annotated[
+        str, typer.Option(metavar="NAME|F", help="studio, sky, furnace, or an .hdr or .exr file.")
+    ] = "studio",
+    spp: Annotated[int, typer.Option(min=1, max=2**16, metavar="N", help="Samples per pixel.")] = 32,
+    size: Annotated[int, typer.Option(min=16, max=2048, metavar="N", help="Pixels of each picture.")] = 192,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random stacks.")] = 0,
+    model: invert.ModelName = None,
+    settings: invert.Switches = None,
+) -> None:
+    """List stacks that share their lobes, sorted by their difference at grazing angles."""
+    # Refuse what cannot work before anything slow begins
+    import numpy as np
+
+    from velatura import inverse
+
+    wanted, name, switches = invert.read(target, model, settings)
+    path = _sheet(output or Path(f"{Path(target).stem}-sheet.png")) if sheet else None
+    if output and not sheet:
+        raise InvalidInput("-o: is for the sheet; add --sheet")
+
+    # Sort them by how much more or less they reflect than the first
+    found = inverse.alternatives(wanted, count, name, seed, **switches)
+    seen = [inverse.grazing(solution.stack, solution.model) for solution in found]
+    apart = [float(np.abs(energy - seen[0]).mean()) for energy in seen]
+    order = np.argsort(apart, kind="stable")
+    for n in order:
+        print(f"{apart[n]:.4f}  {_told(found[n])}")
+    if path:
+        labels = [f"difference {apart[n]:.3f}" for n in order]
+        _render([found[n].stack for n in order], labels, path, found[0].model, env, spp, size, seed)
+        print(path)
+
+
+def _sheet(path: Path) -> Path:
+    from velatura import comparison
+
+    comparison.check_figure(path)
+    return path
+
+
+def _told(solution: Any) -> str:
+    """A stack in a line, from the top: absorption, index and roughness of every interface."""
+    import numpy as np
+
+    def colour(value: Any) -> str:
+        numbers = [f"{x:.3g}" for x in np.ravel(value)]
+        return numbers[0] if len(set(numbers)) == 1 else "[" + ", ".join(numbers) + "]"
+
+    parts = []
+    for layers in solution.layers:
+        tau = f"tau {colour(layers.tau)} | " if np.max(layers.tau) > 1e-6 else ""
+        k = f" + {colour(layers.kappa)}i" if layers.kappa is not None else ""
+        parts.append(f"{tau}eta {colour(layers.eta)}{k} alpha {colour(layers.alpha)}")
+    return " | ".join(parts)
+
+
+def _render(
+    stacks: list[Any], labels: list[str], path: Path, model: Any, env: str, spp: int, size: int, seed: int
+) -> None:
+    import velatura
+    from velatura import inverse
+    from velatura.figures import canvas
+
+    # A renderer knows only lobes that are blurred alike in all colours
+    seen = model.with_switches(channels="mean")
+    rows = -(-len(stacks) // COLUMNS)
+    columns = min(len(stacks), COLUMNS)
+    figure = canvas.canvas(2.4 * columns, 2.7 * rows)
+    with progress.bar(f"Rendering {path.name}") as advance:
+        for n, (stack, label) in enumerate(zip(stacks, labels), 1):
+            image = velatura.render(inverse.on_black(stack), "sphere", env, spp, (size, size), seen, seed)
+            canvas.show(figure.add_subplot(rows, columns, n), image, label)
+            advance(n, len(stacks))
+    canvas.save(figure, path)

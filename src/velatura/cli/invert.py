@@ -1,0 +1,170 @@
+"""`velatura invert`: the stacks that give the lobes that are asked for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from velatura.cli import options
+from velatura.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from velatura.inverse import Solution, Target
+
+ENDINGS = (".yaml", ".yml", ".json")
+
+TargetFile = Annotated[str, typer.Argument(metavar="TARGET", help="A target file (YAML or JSON).")]
+ModelName = Annotated[str | None, typer.Option("--model", metavar="NAME", help="The named model; else bati2021.")]
+Switches = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="A switch of the model (tir=off); may be repeated."),
+]
+
+
+def invert(
+    target: TargetFile,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="F", help="A material file, or a folder for --count of them."),
+    ] = None,
+    count: Annotated[int, typer.Option(min=1, max=1000, metavar="N", help="Stacks, the later ones at random.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random stacks.")] = 0,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the classes, to TARGET with .png, here.")] = False,
+    model: ModelName = None,
+    settings: Switches = None,
+    as_json: options.Json = False,
+) -> None:
+    """Find stacks that have given lobes at normal incidence."""
+    # Refuse what cannot work before anything slow begins
+    from velatura import inverse
+    from velatura.inverse import Infeasible
+
+    wanted, name, switches = read(target, model, settings)
+    folder = _folder(output, count)
+    picture = _picture(target) if plot else None
+
+    try:
+        found = inverse.alternatives(wanted, count, name, seed, **switches)
+    except Infeasible as error:
+        if as_json:
+            nearest = error.nearest.to_dict() if error.nearest else None
+            print(json.dumps({"feasible": False, "why": error.why, "nearest": nearest}, allow_nan=False))
+        raise
+    paths = _write(found, output, folder, Path(target).stem)
+    if picture:
+        draw_classes(found[0], picture)
+
+    if as_json:
+        first = found[0]
+        classes = [members.to_dict() for members in first.classes]
+        report = {"feasible": True, "stack": first.stack.to_dict(), "class": {"lobes": classes}}
+        print(json.dumps(report | ({"stacks": [s.stack.to_dict() for s in found]} if count > 1 else {})))
+        return
+    from rich.console import Console
+
+    for solution in found:
+        Console().print(_table(solution))
+    for path in [*paths, *([picture] if picture else [])]:
+        print(path)
+
+
+def read(target: str, model: str | None, settings: list[str] | None) -> tuple[Target, str, dict[str, str]]:
+    """The target that the user named, the model, and its switches. Raises `InvalidInput`."""
+    from velatura import inverse
+    from velatura.model import SWITCHES
+    from velatura.stack.schema import unknown
+
+    switches = {}
+    for setting in settings or ():
+        key, _, value = setting.partition("=")
+        if key not in SWITCHES:
+            raise InvalidInput(f"--set {key}: {unknown('switch', key, SWITCHES)}")
+        switches[key] = value
+    return inverse.load_target(target), model or inverse.MODEL, switches
+
+
+def draw_classes(solution: Solution, path: Path) -> None:
+    """A picture of every lobe's class, written whole or not at all."""
+    from matplotlib.figure import Figure
+
+    from velatura import files
+    from velatura.inverse import plots
+
+    figure = Figure(figsize=(5 * len(solution.classes), 4.5), layout="constrained")
+    layers = iter(solution.layers)
+    for n, (members, lobe) in enumerate(zip(solution.classes, solution.target.lobes), 1):
+        axes = figure.add_subplot(1, len(solution.classes), n, title=f"lobe {n}")
+        plots.draw(axes, members, tuple(next(layers) for _ in range(lobe.interfaces)))
+    with files.whole(path) as unfinished:
+        figure.savefig(unfinished, dpi=120)
+
+
+def _folder(output: Path | None, count: int) -> Path | None:
+    """The folder to write to, None for one file or none at all."""
+    from velatura import files
+
+    if output is None:
+        return None
+    if output.suffix.lower() in ENDINGS:
+        if count > 1:
+            raise InvalidInput(f"{output}: is one file; -o needs a folder for {count} stacks")
+        files.check_writable(output, "a material file", ENDINGS)
+        return None
+    if output.exists() and not output.is_dir():
+        raise InvalidInput(f"{output}: is a file; -o needs a folder, or a name that ends in {', '.join(ENDINGS)}")
+    files.check_folder(output if output.is_dir() else output.parent, str(output))
+    return output
+
+
+def _picture(target: str) -> Path:
+    from velatura import files
+
+    return files.check_writable(Path(f"{Path(target).stem}.png"), "a picture", (".png",))
+
+
+def _write(found: list[Solution], output: Path | None, folder: Path | None, stem: str) -> list[Path]:
+    from velatura.stack import save
+
+    if output is None:
+        return []
+    if folder is None:
+        paths = [output]
+    else:
+        folder.mkdir(exist_ok=True)
+        paths = [folder / f"{stem}-{n}.yaml" for n in range(1, len(found) + 1)]
+    for solution, path in zip(found, paths):
+        save(solution.stack, path)
+    return paths
+
+
+def _table(solution: Solution) -> Table:
+    """A row per interface: what lies above it, and what it is."""
+    from rich.table import Table
+    from rich.text import Text
+
+    title = f"{solution.target.name or 'stack'} ({solution.model.name})"
+    table = Table("lobe", "", title=Text(title), title_justify="left")
+    for column in ("tau above", "eta", "k", "alpha"):
+        table.add_column(column, justify="right")
+    layers = iter(solution.layers)
+    for n, lobe in enumerate(solution.target.lobes, 1):
+        for k in range(lobe.interfaces):
+            part = next(layers)
+            cells = (_cell(x) for x in (part.tau, part.eta, part.kappa, part.alpha))
+            table.add_row(str(n) if k == 0 else "", part.kind, *cells)
+        table.add_section()
+    return table
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    import numpy as np
+
+    numbers = [f"{x:.4f}" for x in np.ravel(value)]
+    return numbers[0] if len(set(numbers)) == 1 else " ".join(numbers)

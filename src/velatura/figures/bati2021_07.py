@@ -1,0 +1,77 @@
+"""Bati et al. 2021, figure 7: the smooth pairs of dielectrics without absorption that reflect the same.
+
+Every class is a closed curve over the two indices, of which the part in [1, 4] is physical. (a) A reflectance of 0.15
+in air, with the points that have a name; (b) other reflectances; (c) other media above. The curves are the closed form;
+what is within bounds is what the model's own recursion finds. The values of (b) and (c) are chosen here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura.figures import canvas
+from velatura.inverse import Above, EquivalenceClass, sets
+from velatura.model import named
+
+ENERGIES, MEDIA = (0.05, 0.15, 0.3, 0.45), (1.0, 1.5, 2.0)
+MODEL = named("bati2021", reflectance="fresnel")
+
+
+def compute(
+    energies: Sequence[float] = ENERGIES,
+    media: Sequence[float] = MEDIA,
+    count: int = 200,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """For every `part`, `energy` and `eta_0` the whole `curve`, what of it is `inside` bounds, and its named `points`.
+
+    All are points (eta_1, eta_2). `deviation` is the largest distance of what is inside, found by the model, from the
+    closed form.
+    """
+    cases = [("a", 0.15, 1.0), *(("b", e, 1.0) for e in energies), *(("c", 0.15, eta_0) for eta_0 in media)]
+    numbers: dict[str, Any] = {"cases": [], "deviation": 0.0}
+    for part, energy, eta_0 in canvas.track(cases, progress):
+        members = EquivalenceClass(Above.nothing(MODEL, eta_0), np.full((1, 1), energy), 0.0, 2)
+        inside = [curve.tolist() for curve in members.boundary(count)]
+        for eta_1, eta_2 in (point for found in inside for point in found):
+            y = np.cosh(np.log(eta_1 / eta_0)) + np.cosh(np.log(eta_2 / eta_1))
+            numbers["deviation"] = max(numbers["deviation"], float(abs(y * (1 - energy) / 2 - 1)))
+        case: dict[str, Any] = {"part": part, "energy": energy, "eta_0": eta_0}
+        case["curve"] = [list(p) for p in sets.curve(eta_0, energy)]
+        named_points = {name: [list(p) for p in points] for name, points in sets.points(eta_0, energy).items()}
+        numbers["cases"].append({**case, "inside": inside, "points": named_points})
+    return numbers
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """The curves in three plots, what is physical drawn thick.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(13, 4.6)
+    plots = {"a": "R = 0.15 in air", "b": "other energies", "c": "other media above"}
+    for axes, (part, title) in zip(figure.subplots(1, 3), plots.items()):
+        cases = [case for case in numbers["cases"] if case["part"] == part]
+        for n, case in enumerate(cases):
+            label = f"R {case['energy']:g}, eta 0 {case['eta_0']:g}"
+            axes.plot(*np.transpose(case["curve"]), color=f"C{n}", linewidth=1, linestyle="--", label=label)
+            for points in case["inside"]:
+                axes.plot(*np.transpose(points), color=f"C{n}", linewidth=2.5)
+        axes.plot((0, 7), (0, 7), color="0.8", linewidth=1, zorder=0)
+        axes.fill_between((1, 4), 1, 4, color="0.95", zorder=-1)
+        axes.set(title=f"({part}) {title}", xlabel="eta 1", ylabel="eta 2", xlim=(0, 4.5), ylim=(0, 4.5))
+        axes.legend(fontsize="small", loc="lower right")
+    for name, points in numbers["cases"][0]["points"].items():
+        figure.axes[0].plot(*np.transpose(points), "ko", markersize=5)
+        for point in points:
+            figure.axes[0].annotate(name, point, xytext=(5, 3), textcoords="offset points", fontsize="x-small")
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "bati2021-07.png")

@@ -1,0 +1,92 @@
+"""Belcour 2018, figure 6: a rough interface refracts into a narrower lobe than it reflects into.
+
+Lobes are energies per area of the projected disc, in the plane of incidence, without Fresnel, scaled to 1 at their
+highest. Incidence is at 30 degrees, as printed; index (1.5) and alpha (0.1) are chosen here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura.figures import canvas
+from velatura.figures.bounces import Array
+from velatura.optics import ggx, refraction
+from velatura.optics.ggx import Direction
+
+ETA, ALPHA, ANGLE = 1.5, 0.1, 30.0
+
+
+def reflected(x: Array, sine: float, alpha: float) -> Array:
+    """What a rough mirror sends to the points x of the disc, in the plane of incidence, on the side of the mirror."""
+    wi, wo = (sine, 0.0, np.sqrt(1 - sine**2)), (-x, 0.0, np.sqrt(1 - x * x))
+    return _lobe(wi, wo, alpha, 1.0)
+
+
+def refracted(x: Array, sine: float, alpha: float, eta: float) -> Array:
+    """What a rough interface to the relative index eta transmits to the points x of the disc below, straight on."""
+    wi, wo = (sine, 0.0, np.sqrt(1 - sine**2)), (-x, 0.0, -np.sqrt(1 - x * x))
+    return _lobe(wi, wo, alpha, eta)
+
+
+def _lobe(wi: Direction, wo: Direction, alpha: float, eta: float) -> Array:
+    h = refraction.half_vector(wi, wo, eta)
+    cos_i, cos_o = ggx.dot(wi, h), ggx.dot(wo, h)
+    seen = (cos_i > 0) & (cos_o * wo[2] > 0)
+    visible = ggx.ndf(h, alpha, alpha) * ggx.masking((wo[0], wo[1], np.abs(wo[2])), alpha, alpha)
+    density = visible * cos_i * refraction.jacobian(cos_i, cos_o, eta) / np.abs(wo[2])
+    lobe = np.asarray(np.where(seen, density, 0.0))
+    return lobe / lobe.max()
+
+
+def width(x: Array, lobe: Array) -> float:
+    """Where the lobe is higher than half of its height, on the disc; it ends at the horizon."""
+    x, lobe = np.pad(x, 1, mode="edge"), np.pad(lobe, 1)
+    inside = np.flatnonzero(lobe >= 0.5)
+    ends = []
+    for i, j in ((inside[0], inside[0] - 1), (inside[-1], inside[-1] + 1)):
+        share = (lobe[i] - 0.5) / (lobe[i] - lobe[j])
+        ends.append(x[i] + share * (x[j] - x[i]))
+    return float(ends[1] - ends[0])
+
+
+def compute(
+    eta: float = ETA,
+    alpha: float = ALPHA,
+    angle: float = ANGLE,
+    count: int = 2001,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Over `sine`, the outgoing one, both lobes, and the `width` of each at half its height."""
+    sine = float(np.sin(np.radians(angle)))
+    x = np.linspace(-1, 1, count + 2)[1:-1]
+    lobes = {"reflected": reflected(x, sine, alpha), "refracted": refracted(x, sine, alpha, eta)}
+    if progress:
+        progress(1, 1)
+    return {
+        "sine": x.tolist(),
+        **{name: lobe.tolist() for name, lobe in lobes.items()},
+        "width": {name: width(x, lobe) for name, lobe in lobes.items()},
+    }
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """Both lobes over the sine of the outgoing angle.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(6, 4)
+    axes = figure.subplots()
+    for name, colour in (("reflected", "C3"), ("refracted", "C0")):
+        axes.plot(numbers["sine"], numbers[name], color=colour, label=f"{name}, width {numbers['width'][name]:.3f}")
+    axes.set(title=f"index {ETA:g}, alpha {ALPHA:g}, incidence {ANGLE:g}°", xlabel="sine of the outgoing angle")
+    axes.legend()
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "belcour2018-06.png")

@@ -1,0 +1,56 @@
+"""Belcour 2018, figure 20: from the variances of one and two bounces to the roughness that two equal bounces have.
+
+The variances are those of figure 3. What is fitted to the outcome is in `linear-space`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura.figures import belcour2018_03, canvas
+from velatura.figures.bounces import equivalent
+from velatura.model.maps import MAPS
+
+ALPHAS = np.concatenate([np.geomspace(5e-3, 0.1, 12)[:-1], np.linspace(0.1, 1, 37)])
+
+
+def compute(count: int = 2**15, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+    """Figure 3's `alpha`, `one` and `two`, and the `equivalent` roughness of two bounces, None where none is as wide.
+
+    `belcour` is what the map of the paper says instead.
+    """
+    found = belcour2018_03.compute(ALPHAS.tolist(), count, progress)
+    double = equivalent(found["two"], found["one"], ALPHAS)
+    f = MAPS["belcour"]
+    return {
+        **{name: found[name] for name in ("alpha", "one", "two")},
+        "equivalent": [float(x) if np.isfinite(x) else None for x in double],
+        "belcour": f.roughness(2 * f.variance(ALPHAS)).tolist(),
+    }
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """The variances, and the roughness that follows from them.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(9, 4)
+    left, right = figure.subplots(1, 2)
+    for name, colour in (("one", "C0"), ("two", "C3")):
+        left.plot(numbers["alpha"], numbers[name], color=colour, label=f"{name} bounce(s)")
+    left.set(title="variance on the disc", xlabel="alpha")
+    right.plot(numbers["alpha"], np.array(numbers["equivalent"], float), color="C3", label="two bounces")
+    right.plot(numbers["alpha"], numbers["belcour"], color="C0", linestyle="--", label="belcour's map")
+    right.set(title="equivalent roughness", xlabel="alpha of both surfaces", ylim=(0, 1))
+    left.legend()
+    right.legend()
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "belcour2018-20.png")

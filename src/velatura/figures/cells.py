@@ -1,0 +1,107 @@
+"""Figures of pictures: stacks by name, each rendered by models and by the truth, and the lobe of its last interface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from velatura import reference
+from velatura.api import lobes
+from velatura.comparison.account import along
+from velatura.figures import canvas
+from velatura.stack import Stack, Varying
+
+COSINES = (1.0, 0.7, 0.4, 0.2)
+SAMPLES = 4 * canvas.SAMPLES  # of a pixel: reflected highlights are noisy
+PATHS = 200_000
+
+Columns = Mapping[str, tuple[str, Mapping[str, str]]]  # by title: a model, and its choices
+
+
+class Quality(NamedTuple):
+    """Pixels along a side of a picture, samples of each, and paths of a walk."""
+
+    size: int = canvas.SIZE
+    spp: int = SAMPLES
+    paths: int = PATHS
+
+
+def compute(
+    stacks: Mapping[str, Stack],
+    columns: Columns,
+    quality: Quality,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
+    scene: str = "sphere",
+    env: str = "studio",
+) -> dict[str, Any]:
+    """A list of `cells` by `name`, with the `rmse` and `mean` radiance of each column, and their `pictures`.
+
+    The RMSE is freed of noise. Where a stack does not vary over the surface, `alpha` is that of its last interface's
+    lobe by column and by `walk`, and `energy` its energy: lists over `cos`, alpha of pairs along the true lobe's axes.
+
+    Raises:
+        InvalidInput, MissingTool: as `vt.render`.
+    """
+    numbers: dict[str, Any] = {"cos": list(COSINES), "cells": [], "pictures": []}
+    for name, stack in canvas.track(list(stacks.items()), progress):
+        images = {"reference": canvas.pictures(scene, stack, "reference", env, quality.size, quality.spp, seed)}
+        for title, (model, choices) in columns.items():
+            images[title] = canvas.pictures(scene, stack, model, env, quality.size, quality.spp, seed, **choices)
+        cell: dict[str, Any] = {"name": name}
+        cell["rmse"] = {title: canvas.rmse(images[title], images["reference"]) for title in columns}
+        cell["mean"] = {title: float(halves.mean()) for title, halves in images.items()}
+        if not any(isinstance(value, Varying) for value in stack.flat().values()):
+            cell |= _last_lobe(stack, columns, quality.paths, seed)
+        numbers["cells"].append(cell)
+        numbers["pictures"].append({title: halves.mean(axis=0).tolist() for title, halves in images.items()})
+    return numbers
+
+
+def _last_lobe(stack: Stack, columns: Columns, paths: int, seed: int) -> dict[str, Any]:
+    true = _last(reference.statistics(stack, COSINES, 0.0, paths, seed))
+    told = {"walk": true}
+    for title, (model, choices) in columns.items():
+        told[title] = along(_last(lobes(stack, COSINES, model=model, **choices)), true)
+    return {
+        "alpha": {title: lobe.alpha.T.tolist() for title, lobe in told.items()},
+        "energy": {title: lobe.energy.mean(axis=0).tolist() for title, lobe in told.items()},
+    }
+
+
+def _last(found: Any) -> reference.Lobe:
+    """The last of the reflected lobes, without what only walks know."""
+    unknown = np.full(1, np.nan)
+    return reference.Lobe(found.energy[-1], found.alpha[-1], found.rotation[-1], unknown, unknown)
+
+
+def alpha(cell: Mapping[str, Any], title: str) -> Any:
+    """The roughness of a cell's last lobe as an array (cosines, 2)."""
+    return np.array(cell["alpha"][title])
+
+
+def draw(numbers: dict[str, Any], path: str | Path, exposure: float = 1.0, bound: float = 0.2) -> None:
+    """For each cell the truth, and for each model its picture, and what it has too much or too little, up to a bound.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    cells = numbers["cells"]
+    titles = [title for title in numbers["pictures"][0] if title != "reference"]
+    count = 1 + 2 * len(titles)
+    # Let cells be columns where they are many, else rows
+    wide = len(cells) >= count
+    rows, columns = (count, len(cells)) if wide else (len(cells), count)
+    figure = canvas.canvas(2.4 * columns + 0.6, 2.5 * rows)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    for line, cell, seen in zip(axes.T if wide else axes, cells, numbers["pictures"]):
+        canvas.show(line[0], exposure * np.array(seen["reference"]), f"reference, {cell['name']}")
+        for n, title in enumerate(titles):
+            canvas.show(line[2 * n + 1], exposure * np.array(seen[title]), title)
+            rmse = f"RMSE {cell['rmse'][title]:.4f}"
+            drawn = canvas.show_difference(line[2 * n + 2], seen[title], seen["reference"], bound, rmse)
+    figure.colorbar(drawn, ax=axes[-1, :], shrink=0.8, label="minus the reference")
+    canvas.save(figure, path)

@@ -1,0 +1,33 @@
+"""Weier & Belcour 2020, figure 7: the equivalent roughness of two bounces, by their map and by that of Belcour 2018.
+
+The curves are those of figure 4 of Belcour 2018.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from velatura.figures import canvas
+from velatura.figures.belcour2018_04 import NAMES, compute, draw_curves
+
+__all__ = ["compute", "draw"]
+
+LOW = 0.5  # of the enlarged part
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """A row for each width; by column both maps, and each enlarged where roughness is low.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(15, 8)
+    for row, width in zip(figure.subplots(2, 4), ("variance", "median")):
+        for n, (top, name) in enumerate((top, name) for top in (1.0, LOW) for name in NAMES):
+            draw_curves(row[n], numbers, width, name, top)
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "weier2020-07.png")

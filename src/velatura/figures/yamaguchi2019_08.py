@@ -1,0 +1,55 @@
+"""Yamaguchi et al. 2019, figure 8: three layers, and a medium between two, over a metal.
+
+(a) is (d) of figure 4, (b) has a smooth dielectric of index 1.2 above, (c) a medium between the layers with g = 0.9
+and the printed coefficients. Chosen are the roughnesses, brushed in straight lines on a sphere, and the depth of the
+medium, 0.5. The medium is as published: it blurs all light, scattered or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from velatura.figures import canvas, cells
+from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, stack
+from velatura.stack import Interface, Medium, Stack
+
+MEDIUM = Medium(depth=0.5, sigma_a=(0.01, 1.0, 0.01), sigma_s=(0.01, 1.0, 0.01), g=0.9)
+COAT, METAL = stack(SPREAD, 90.0, SPREAD, 0.0).interfaces
+STACKS = {
+    "(a)": Stack([COAT, METAL]),
+    "(b)": Stack([Interface(eta=1.2), COAT, METAL]),
+    "(c)": Stack([COAT, MEDIUM, METAL]),
+}
+
+
+def compute(
+    stacks: Sequence[str] = tuple(STACKS),
+    size: int = canvas.SIZE,
+    spp: int = cells.SAMPLES,
+    paths: int = cells.PATHS,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """A cell for each of the materials: see `cells.compute`.
+
+    Raises:
+        InvalidInput, MissingTool: as `vt.render`.
+    """
+    return cells.compute(
+        {name: STACKS[name] for name in stacks}, COLUMNS, cells.Quality(size, spp, paths), seed, progress
+    )
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """A column for each material: the truth, the model, and what it has too much or too little.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    cells.draw(numbers, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "yamaguchi2019-08.png")

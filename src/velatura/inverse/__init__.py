@@ -1,0 +1,40 @@
+"""Inverse design: the stacks that give the lobes that are asked for at normal incidence.
+
+After Bati, Pacanowski & Barla 2021, "An Inverse Method for the Exploration of Layered Material Appearance". Stacks are
+read by the model's own recursion, so that what is found holds for the model that renders it.
+"""
+
+from velatura.inverse import sets
+from velatura.inverse.above import Above, Layers
+from velatura.inverse.coats import Coated, coat
+from velatura.inverse.equivalence import EquivalenceClass
+from velatura.inverse.explain import Direction, Infeasible
+from velatura.inverse.interface import MODEL, Choice, invert_interface
+from velatura.inverse.pair import Pair, invert_pair
+from velatura.inverse.stacks import Solution, alternatives, grazing, invert_stack, on_black
+from velatura.inverse.target import Fixed, Lobe, Target, load_target
+
+__all__ = [
+    "MODEL",
+    "Above",
+    "Choice",
+    "Coated",
+    "Direction",
+    "EquivalenceClass",
+    "Fixed",
+    "Infeasible",
+    "Layers",
+    "Lobe",
+    "Pair",
+    "Solution",
+    "Target",
+    "alternatives",
+    "coat",
+    "grazing",
+    "invert_interface",
+    "invert_pair",
+    "invert_stack",
+    "load_target",
+    "on_black",
+    "sets",
+]

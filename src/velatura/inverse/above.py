@@ -1,0 +1,249 @@
+"""What lies above an interface that is sought: N stacks at normal incidence, summed up by the model's own adding.
+
+Colours are arrays of shape (C, N) or (1, N), other quantities (N,); a number is the same for all stacks.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.model import Model, adding, lobes, operators, prepare
+from velatura.model.maps import MAPS, RoughnessMap
+from velatura.model.prepare import Prepared, PreparedInterface
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.ops import Value
+from velatura.stack import Interface, Layer, Medium
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+NORMAL = (0.0, 0.0, 1.0)
+MANY = 256  # interfaces that are worth sorting
+CLEAR = 1e-9  # an optical depth below this is written as no medium at all
+
+
+@dataclass(frozen=True)
+class Layers:
+    """N interfaces of one kind ("dielectric", "conductor" or "mirror"), each with the medium above it.
+
+    eta, kappa: absolute indices below, (1, N) or (C, N), kappa None for a dielectric. roughness: GGX, each (N,).
+    tau: optical depths at normal incidence of the media above, (C, N) or a number. margins: by name of a constraint,
+    (N,), negative where it is broken.
+    """
+
+    kind: str
+    eta: Value
+    kappa: Value  # or None
+    roughness: Roughness
+    tau: Value
+    margins: dict[str, Array] = dataclasses.field(default_factory=dict)
+
+    @property
+    def alpha(self) -> Value:
+        """Roughness along the first axis."""
+        return self.roughness.alpha_u
+
+    @property
+    def feasible(self) -> Mask:
+        """Whether all constraints hold, (N,) of bool."""
+        return np.logical_and.reduce(np.broadcast_arrays(*(margin >= 0 for margin in self.margins.values())))
+
+    def take(self, index: Any) -> Layers:
+        """Some of the N."""
+        return take(self, index)
+
+    def with_margins(self, **margins: Array) -> Layers:
+        """With further constraints."""
+        return dataclasses.replace(self, margins={**self.margins, **margins})
+
+    def written(self, n: int) -> list[Layer]:
+        """The n-th as layers of a material: the medium above unless it is clear, and the interface."""
+        absorbs = np.where(np.asarray(self.tau) < CLEAR, 0.0, self.tau)
+        tau, eta, kappa = (_plain(value, n) for value in (absorbs, self.eta, self.kappa))
+        u, v, rotation = (_plain(value, n) for value in self.roughness)
+        media: list[Layer] = [] if np.max(tau) == 0 else [Medium(sigma_a=tau)]
+        alpha = u if u == v else (u, v)
+        index = {"conductor": "mirror"} if self.kind == "mirror" else {"eta": eta, "k": kappa}
+        return [*media, Interface(**index, alpha=alpha, rotation=float(np.degrees(rotation)) if u != v else 0.0)]
+
+
+@dataclass(frozen=True)
+class Above:
+    """N stacks that end in a medium of absolute index eta, (1, N) or a number.
+
+    `over` is the index above their last interface, which total internal reflection depends on; None where there is no
+    interface yet. `exterior` and `path`, index and layers above, serve a model that reads whole stacks only.
+    """
+
+    model: Model
+    state: adding.State
+    eta: Value
+    over: Value | None = None
+    variance: type[Variance] = Isotropic
+    exterior: Value = 1.0
+    path: tuple[Layers, ...] = ()
+
+    @classmethod
+    def nothing(cls, model: Model, exterior: Value = 1.0, variance: type[Variance] = Isotropic) -> Above:
+        """Only the exterior medium."""
+        prepared = Prepared(model, (), variance, MAPS[model.map])
+        return cls(model, adding.top(prepared, 1.0), exterior, None, variance, exterior)
+
+    @property
+    def f(self) -> RoughnessMap:
+        """The model's roughness map."""
+        return MAPS[self.model.map]
+
+    @property
+    def adder(self) -> Model:
+        """The model, or where its recursion is not that of the papers, one of theirs for solutions to start from."""
+        if self.model.calibrations is None:
+            return self.model
+        return dataclasses.replace(self.model, calibrations=None, tir="off")
+
+    def prepared(self, layers: Layers) -> Prepared:
+        """The interfaces as the next layer of each stack."""
+        kinds: tuple[str, ...] = (layers.kind,)
+        values = {"exterior": self.eta}
+        if self.over is not None and self.adder.tir != "off":
+            # The interface above is there for its indices alone, which total reflection depends on
+            kinds, values = ("dielectric", layers.kind), {"exterior": self.over, "layer0_eta": self.eta}
+            values |= {"layer0_alpha_u": 0.0, "layer0_alpha_v": 0.0, "layer0_rotation": 0.0}
+        values |= _interface(layers, len(kinds) - 1)
+        return prepare(kinds, values, self.adder, self.variance)
+
+    def reflectance(self, layers: Layers) -> Value:
+        """Energy that the interfaces reflect of light from the stack, of shape of eta or (C, N)."""
+        # Denser and rarer dielectrics need different tables; many are looked up apart
+        if np.size(layers.eta) > MANY and np.shape(layers.eta) == (1, *np.shape(layers.alpha)):
+            rarer = np.broadcast_to(layers.eta < self.eta, layers.eta.shape)[0]
+            if rarer.any() and not rarer.all():
+                parts = [(side, self.take(side)._reflectance(layers.take(side))) for side in (rarer, ~rarer)]
+                found = np.empty((max(part.shape[0] for _, part in parts), len(rarer)))
+                for side, part in parts:
+                    found[:, side] = part
+                return found
+        return self._reflectance(layers)
+
+    def _reflectance(self, layers: Layers) -> Value:
+        prepared = self.prepared(layers)
+        last = prepared.layers[-1]
+        assert isinstance(last, PreparedInterface)
+        return operators.interface(prepared, last, 1.0, self.state.s_t0i, NORMAL).r_12
+
+    def through(self, tau: Value) -> Above:
+        """The stacks with an absorbing medium below them."""
+        if np.ndim(tau) == 0 and tau == 0:
+            return self
+        values = {"exterior": self.eta, **_medium(tau, 0)}
+        prepared = prepare(("medium",), values, self.adder, self.variance)
+        state, _ = adding.add(prepared, self.state, prepared.layers[-1], NORMAL)
+        return dataclasses.replace(self, state=state)
+
+    def below(self, layers: Layers) -> tuple[Above, adding.Lobe]:
+        """The stacks with the media and interfaces below them, and the lobes that these reflect."""
+        above = self.through(layers.tau)
+        prepared = above.prepared(layers)
+        state, lobe = adding.add(prepared, above.state, prepared.layers[-1], NORMAL)
+        assert lobe is not None
+        below = dataclasses.replace(above, state=state, eta=layers.eta, over=self.eta)
+        if self.model.calibrations is None:
+            return below, lobe
+        path = (*self.path, layers)
+        return dataclasses.replace(below, path=path), self._read(path)
+
+    def _read(self, path: tuple[Layers, ...]) -> adding.Lobe:
+        """The last lobe of whole stacks."""
+        kinds: list[str] = []
+        values: dict[str, Value] = {"exterior": self.exterior}
+        for layers in path:
+            if np.any(layers.tau):
+                values |= _medium(layers.tau, len(kinds))
+                kinds.append("medium")
+            values |= _interface(layers, len(kinds))
+            kinds.append(layers.kind)
+        lobe = lobes(prepare(kinds, values, self.model, self.variance), NORMAL)[0][-1]
+        return dataclasses.replace(lobe, variance=self.variance_of(lobe.roughness))
+
+    def variance_of(self, roughness: Roughness) -> Variance:
+        """The variance of a GGX lobe, along the axes of the frame where there are two."""
+        if self.variance is PerAxis:
+            xx, _, yy = Covariance.of(roughness, self.f).matrix()
+            return PerAxis(xx, yy)
+        return self.variance.of(roughness, self.f)
+
+    def take(self, index: Any) -> Above:
+        """Some of the N."""
+        return take(self, index)
+
+
+def _interface(layers: Layers, n: int) -> dict[str, Value]:
+    """Interfaces as flat values of layer n."""
+    u, v, rotation = layers.roughness
+    own = {"alpha_u": u, "alpha_v": v, "rotation": rotation * (180 / np.pi)}
+    if layers.kind != "mirror":
+        own["eta"] = layers.eta
+    if layers.kind == "conductor":
+        own["k"] = layers.kappa
+    return {f"layer{n}_{key}": value for key, value in own.items()}
+
+
+def _medium(tau: Value, n: int) -> dict[str, Value]:
+    """Media that absorb as flat values of layer n."""
+    return {f"layer{n}_depth": 1.0, f"layer{n}_sigma_a": tau, f"layer{n}_sigma_s": 0.0, f"layer{n}_g": 0.0}
+
+
+def take(value: Any, index: Any) -> Any:
+    """Some of the N of all arrays in a record; what is the same for all stays."""
+    return mapped(value, lambda x: x[..., index] if x.ndim and x.shape[-1] != 1 else x)
+
+
+def mapped(value: Any, change: Callable[[np.ndarray], np.ndarray]) -> Any:
+    """A record with all its arrays changed."""
+    if isinstance(value, np.ndarray):
+        return change(value)
+    if isinstance(value, Roughness):
+        return Roughness(*(mapped(x, change) for x in value))
+    if isinstance(value, tuple):
+        return tuple(mapped(entry, change) for entry in value)
+    if isinstance(value, dict):
+        return {key: mapped(entry, change) for key, entry in value.items()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, Model | type):
+        fields = {f.name: mapped(getattr(value, f.name), change) for f in dataclasses.fields(value)}
+        return dataclasses.replace(value, **fields)
+    return value
+
+
+def _plain(value: Value | None, n: int) -> Any:
+    """The n-th colour as a number, or as three where they differ."""
+    if value is None:
+        return None
+    colour = np.atleast_2d(value)
+    numbers = tuple(float(x) for x in colour[:, n if colour.shape[-1] > 1 else 0])
+    return numbers[0] if len(set(numbers)) == 1 else numbers
+
+
+def join(parts: list[Any], counts: list[int]) -> Any:
+    """One record of the N1, N2, ... stacks of records of the same kind; a number must be the same in all."""
+    first = next((part for part in parts if isinstance(part, np.ndarray)), parts[0])
+    if isinstance(first, np.ndarray):
+        parts = [np.atleast_1d(part) for part in parts]
+        lead = np.broadcast_shapes(*(np.shape(x)[:-1] for x in parts))
+        return np.concatenate([np.broadcast_to(x, (*lead, count)) for x, count in zip(parts, counts)], axis=-1)
+    if isinstance(first, Roughness):
+        return Roughness(*(join(list(entries), counts) for entries in zip(*parts)))
+    if isinstance(first, tuple):
+        return tuple(join(list(entries), counts) for entries in zip(*parts))
+    if isinstance(first, dict):
+        unbounded = np.full(1, np.inf)  # a constraint that only some parts have
+        return {key: join([part.get(key, unbounded) for part in parts], counts) for key in set().union(*parts)}
+    if dataclasses.is_dataclass(first) and not isinstance(first, Model | type):
+        fields = {f.name: join([getattr(p, f.name) for p in parts], counts) for f in dataclasses.fields(first)}
+        return dataclasses.replace(first, **fields)
+    return first

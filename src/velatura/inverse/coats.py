@@ -1,0 +1,145 @@
+"""A coat on a material, with or without changing what is seen of the material (Bati et al. 2021, figure 14)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from velatura.errors import InvalidInput, NoSolution
+from velatura.inverse import interface
+from velatura.inverse.above import NORMAL, Above, Array, Layers, join
+from velatura.inverse.equivalence import dislike
+from velatura.inverse.explain import REASONS
+from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_index
+from velatura.inverse.stacks import Partial, pruned
+from velatura.model import Model, lobes, named, prepare, variance_kind
+from velatura.model.statistics import Statistics, number, statistics
+from velatura.model.variance import Roughness
+from velatura.optics import fresnel
+from velatura.stack import Diffuse, Interface, Layer, Medium, Stack
+
+KEEP = 64  # partial stacks that are followed
+
+
+@dataclass(frozen=True)
+class Coated:
+    """A coated stack, and the lobes at normal incidence without and with the coat: those of the stack come last."""
+
+    stack: Stack
+    before: Statistics
+    after: Statistics
+
+    def change(self) -> list[dict[str, list[float]]]:
+        """For every interface of the bare material energy (rgb) and roughness (two axes), before and after."""
+        rows = []
+        for k, energy in enumerate(self.before.energy):
+            rows.append(
+                {
+                    "energy_before": energy[:, 0].tolist(),
+                    "energy_after": self.after.energy[k + 1][:, 0].tolist(),
+                    "alpha_before": self.before.alpha[k][..., 0].tolist(),
+                    "alpha_after": self.after.alpha[k + 1][..., 0].tolist(),
+                }
+            )
+        return rows
+
+
+def coat(
+    stack: Stack,
+    eta: float = 1.5,
+    alpha: float = 0.0,
+    keep_appearance: bool = False,
+    eta_max: float = 4.0,
+    model: str | Model = MODEL,
+    **switches: str,
+) -> Coated:
+    """A material under a dielectric coat.
+
+    Args:
+        eta, alpha: absolute index and roughness of the coat.
+        keep_appearance: change the material below, so that its lobes at normal incidence keep energy and variance.
+        eta_max: largest index that a dielectric may be given.
+
+    Raises:
+        InvalidInput: a texture, an index or a roughness outside its range, an unknown model or switch.
+        NoSolution: no material keeps the appearance; the message names the layer and the constraint.
+    """
+    chosen = named(model, **switches)
+    top = Interface(eta=eta, alpha=alpha)
+    if keep_appearance:
+        below: tuple[Layer, ...] = _kept(
+            stack, Layers("dielectric", eta, None, Roughness(alpha, alpha, 0.0), 0.0), eta_max, chosen
+        )
+    else:
+        below = stack.layers
+        if isinstance(below[0], Medium):
+            raise InvalidInput("layer 0 (medium): is above all interfaces; a coat goes below it, not on it")
+    coated = Stack([top, *below], name=f"{stack.name or 'material'}, coated", exterior=stack.exterior, thin=stack.thin)
+    return Coated(coated, *(statistics(one, 1.0, model=chosen) for one in (stack, coated)))
+
+
+def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
+    """The layers that give below a coat the lobes that those of the stack give bare."""
+    # Read the lobes of the bare stack
+    flat = stack.flat()
+    values = {key: number(key, value) for key, value in flat.items()}
+    kind = variance_kind(stack.kinds, flat)
+    prepared = prepare(stack.kinds, values, model, kind)
+    wanted, _ = lobes(prepared, NORMAL)
+
+    # Solve for its interfaces, from the top
+    above, _ = Above.nothing(model, stack.exterior, kind).below(top)
+    paths, remaining = Partial(above, (), np.zeros(1)), iter(wanted)
+    for n, layer in enumerate(stack.layers):
+        where = f"layer {n} ({type(layer).__name__.lower()})"
+        if isinstance(layer, Medium):
+            if np.any(values[f"layer{n}_sigma_s"] > 0):
+                raise NoSolution(f"{where}: scatters light; an appearance is kept of media that only absorb")
+        elif isinstance(layer, Interface):
+            lobe, own = next(remaining), _choices(stack, values, n, eta_max)
+            energy, variance = np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)
+            found = []
+            for rank, choice in enumerate(own):
+                part = interface.solve(paths.above, energy, variance, choice)
+                cost = paths.cost + rank + dislike(paths.above.eta, part.layers)
+                found.append(Partial(part.below, (*paths.layers, part.layers), cost))
+            tried = join(found, [len(part.cost) for part in found])
+            paths = pruned(tried, 1, KEEP)
+            if not len(paths.cost):
+                raise NoSolution(f"{where}: cannot keep its appearance under the coat: {_reason(tried, eta_max)}")
+    best = paths.take(np.array([np.argmin(paths.cost)]))
+    solved = [layer for layers in best.layers for layer in layers.written(0)]
+    return (*solved, *(layer for layer in stack.layers if isinstance(layer, Diffuse)))
+
+
+def _choices(stack: Stack, values: dict[str, Array], n: int, eta_max: float) -> Sequence[Choice]:
+    """What a layer may become, as it is first: the same index, one on the same side, one on the other side."""
+    kind = stack.kinds[n]
+    if kind == "mirror":
+        return [Choice("mirror", tau=0.0)]
+    eta = values[f"layer{n}_eta"]
+    eta_1 = _index_above(stack, values, n)
+    if kind == "conductor":
+        relative, kappa = eta / eta_1, values[f"layer{n}_k"] / eta_1
+        low, high = (conductor_index(fresnel.normal_incidence(relative, kappa), t) for t in (0.0, 1.0))
+        tint = np.clip((relative - low) / np.maximum(high - low, 1e-12), 0, 1)
+        return [Choice("conductor", tint=tint)]
+    sides = (DENSER, RARER) if np.mean(eta) >= np.mean(eta_1) else (RARER, DENSER)
+    bounded = max(eta_max, float(np.max(eta)))
+    same = Choice(eta=eta, eta_max=bounded)
+    return [same, *(Choice(side=side, eta_max=bounded) for side in sides)]
+
+
+def _index_above(stack: Stack, values: dict[str, Array], n: int) -> Array:
+    above = [i for i in range(n) if stack.kinds[i] == "dielectric"]
+    return values[f"layer{above[-1]}_eta"] if above else np.full((1, 1), stack.exterior)
+
+
+def _reason(tried: Partial, eta_max: float) -> str:
+    """The constraint that the best attempt breaks most."""
+    margins = tried.layers[-1].margins
+    names, values = list(margins), np.array(np.broadcast_arrays(*margins.values()))
+    best = values[:, np.argmax(np.minimum(values, 0).sum(axis=0))]
+    return REASONS[names[int(np.argmin(best))]].format(eta_max=eta_max)

@@ -1,0 +1,362 @@
+"""One interface below any stack: its index, roughness and the absorption above it, from the lobe that it must give.
+
+Everything is at normal incidence. Nothing is iterated but for what a model's averages make implicit: an index from its
+directional albedo, and what total internal reflection does to the light from below.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from velatura import ops
+from velatura.inverse.above import Above, Array, Layers, take
+from velatura.inverse.roots import false_position
+from velatura.inverse.target import BLUR
+from velatura.model import Model, named
+from velatura.model.variance import Isotropic, Roughness, Variance
+from velatura.ops import Value
+from velatura.optics import fresnel
+
+MODEL = "bati2021"
+DENSER, RARER = 1, -1
+SLACK = 1e-9  # by which a constraint may be broken: the rounding of what was solved
+NEGLIGIBLE = 1e-7  # the same for what is solved numerically
+ENERGY_MIN = 1e-9  # of a lobe in a channel; less is not told from nothing
+CONDUCTOR_MIN = 3 - 2 * np.sqrt(2)  # a conductor (k >= eta) reflects more
+CONDUCTOR_MAX = 1 - 1e-6  # beyond which indices of a metal have no bound
+ROUNDS, ENOUGH = 40, 1e-7  # of corrections where a model's own reading differs from the closed form
+MISSED = 1e-6  # what remains after them is no solution
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is decided about an interface: its kind, and whatever of it is free.
+
+    side: of the two indices that reflect the same, the denser (1) or the rarer one (-1); (N,) or a number.
+    eta, kappa, tau: given values, None where they are sought; absorption that is sought is as little as can be.
+    tint: 0..1 between the bounds of a conductor's eta (Bati et al. 2021, Eqs. 9-10).
+    absorbs: whether the medium above may absorb at all. eta_max: largest index of a dielectric.
+    """
+
+    kind: str = "dielectric"
+    side: Value = DENSER
+    eta: Value | None = None
+    kappa: Value | None = None
+    tau: Value | None = None
+    tint: Value = 0.5
+    absorbs: bool = True
+    eta_max: float = 4.0
+
+
+DIELECTRIC = Choice()
+
+
+@dataclass(frozen=True)
+class Found:
+    """N interfaces, the stacks that they complete, and the lobes that these read of them."""
+
+    layers: Layers
+    below: Above
+    energy: Array
+    variance: Variance
+
+    def take(self, index: Any) -> Found:
+        """Some of the N."""
+        return take(self, index)
+
+
+def invert_interface(
+    energy: ArrayLike,
+    variance: ArrayLike = 0.0,
+    *,
+    exterior: ArrayLike = 1.0,
+    above: Above | None = None,
+    choice: Choice = DIELECTRIC,
+    model: str | Model = MODEL,
+    **switches: str,
+) -> Layers:
+    """The interfaces that give lobes of these energies and variances.
+
+    Args:
+        energy: colours (C, N), or (N,) or a number for one channel.
+        variance: (N,) or a number, in the space of Belcour's roughness map.
+        exterior: index of the medium above, where nothing else is there; (N,) or a number.
+        above: the stacks above; None for the exterior medium alone.
+        choice: the kind of interface, which of the two indices of a dielectric, and what is given of it.
+
+    The answer holds for every target whether it is feasible, and by which margins.
+
+    Raises:
+        InvalidInput: an unknown model or switch.
+    """
+    e = np.atleast_2d(np.asarray(energy, float))
+    if above is None:
+        above = Above.nothing(named(model, **switches), as_index(exterior))
+        choice = dataclasses.replace(choice, absorbs=choice.tau is not None)
+    return solve(above, e, Isotropic(np.asarray(own_variance(above, variance))), choice).layers
+
+
+def own_variance(above: Above, variance: ArrayLike) -> Value:
+    """A variance of Belcour's map in the space of the model's."""
+    if above.f is BLUR:
+        return np.asarray(variance, float)
+    return above.f.variance(BLUR.roughness(np.asarray(variance, float)))
+
+
+def solve(above: Above, energy: Array, variance: Variance, choice: Choice) -> Found:
+    """The interfaces whose lobes, read by the model itself, have these energies (C, N) and variances (N,).
+
+    The closed form is exact unless light is totally reflected from inside; then it is asked for what makes up for the
+    difference, until nothing is missing.
+    """
+    energy = np.maximum(energy, ENERGY_MIN)
+    bright = attenuated(above, energy)
+    want_e, want_s = energy, variance
+    before = None
+    for _ in range(ROUNDS):
+        layers = _closed_form(above, want_e, want_s, bright, choice)
+        below, lobe = above.below(layers)
+        read = at_brightest(above, lobe.variance, bright)
+        missing, apart = energy / np.maximum(lobe.energy, ops.TINY), variance + read * -1.0
+        off = np.maximum(np.max(np.abs(missing - 1), axis=0), _size(apart))
+        if not np.any(layers.feasible & (off > ENOUGH)):
+            break
+        before, want_e, want_s = (
+            (want_s, read),
+            want_e * np.clip(missing, 0.5, 2.0),
+            _secant(want_s, read, apart, before),
+        )
+    layers = layers.with_margins(model=np.where(layers.feasible & (off > MISSED), -off, 0.0))
+    return Found(layers, below, lobe.energy, read)
+
+
+def with_index(above: Above, eta: Value, tau: Value, variance: Variance, paired: Array | None = None) -> Found:
+    """The dielectrics of given index whose lobes have these variances, whatever their energy.
+
+    The roughness depends on the light that bounces above, that on the reflectance, and that on the roughness.
+
+    Args:
+        paired: energy of the pair whose upper interface this is, for Algorithm 5 as Bati et al. 2021 print it: then
+            the whole pair's reflectance tells the light that bounces above, and the variance is missed by a little.
+    """
+    lit = above.through(tau)
+    smooth = np.atleast_2d(fresnel.normal_incidence(eta / above.eta))
+    r = smooth if paired is None else attenuated(lit, paired)
+    s_r = reflected(lit, variance, r, r)
+    before = None
+    for _ in range(ROUNDS):
+        layers = Layers("dielectric", eta, None, floor(s_r).roughness(above.f), tau)
+        below, lobe = above.below(layers)
+        bright = attenuated(above, lobe.energy)
+        read = at_brightest(above, lobe.variance, bright)
+        apart = variance + read * -1.0
+        off = _size(apart)
+        if paired is not None or not np.any((off > 0.1 * ENOUGH) & (least(s_r) >= 0)):
+            break
+        slope = at_brightest_value(above, lit.state.j_0i, bright)
+        before, s_r = (s_r, read), _secant(s_r, read, apart, before, slope)
+    blur = margin(least(s_r), ENOUGH)
+    missed = np.where((off > MISSED) & (blur >= 0) & (paired is None), -off, 0.0)
+    return Found(layers.with_margins(blur=blur, model=missed), below, lobe.energy, read)
+
+
+def _secant(
+    x: Variance, read: Variance, apart: Variance, before: tuple[Variance, Variance] | None, slope: Value = 1.0
+) -> Variance:
+    """What to ask for instead of x, of which `read` was read, so that nothing is missing; `before`: the last such pair.
+
+    `slope` is what is known of it at first.
+    """
+    entries = []
+    for n, (now, y, miss) in enumerate(zip(*(vars(s).values() for s in (x, read, apart)))):
+        own = slope
+        if before is not None:
+            x_0, y_0 = (list(vars(s).values())[n] for s in before)
+            moved = np.abs(now - x_0) > ops.TINY
+            own = np.where(moved, np.clip((y - y_0) / np.where(moved, now - x_0, 1.0), 0.2 * slope, 20 * slope), slope)
+        entries.append(now + miss / own)
+    return type(x)(*entries)
+
+
+def _size(s: Variance) -> Array:
+    return np.max([np.broadcast_to(np.abs(x), np.shape(s.matrix()[0])) for x in vars(s).values()], axis=0)
+
+
+def _closed_form(above: Above, energy: Array, variance: Variance, bright: Array, choice: Choice) -> Layers:
+    """The one formula for an interface below any state (Bati et al. 2021, Eqs. 11, 15, 18 and 19 in one)."""
+    # Give absorption that is pinned to what lies above
+    if choice.tau is not None:
+        above = above.through(choice.tau)
+    r = attenuated(above, energy)
+    s_r = reflected(above, variance, r, bright)
+    roughness = floor(s_r).roughness(above.f)
+
+    # Find its index, and what absorption must take away
+    solver = _conductor if choice.kind == "conductor" else dielectric
+    if choice.kind == "mirror":
+        layers = Layers("mirror", 1.0, None, roughness, 0.0)
+    else:
+        layers = solver(above, r, roughness, choice)
+    margins = {"blur": margin(least(s_r)), **layers.margins}
+    tau = 0.5 * np.log(np.maximum(above.reflectance(layers), ops.TINY) / r)
+    if choice.tau is not None or not choice.absorbs:
+        margins["colour"] = margin(-np.max(np.abs(tau), axis=0), NEGLIGIBLE)
+        tau = choice.tau if choice.tau is not None else 0.0
+    else:
+        margins["absorption"] = margin(np.min(tau, axis=0), NEGLIGIBLE)
+        tau = np.where((tau < 0) & (tau >= -NEGLIGIBLE), 0.0, tau)
+    return dataclasses.replace(layers, tau=tau, margins=margins)
+
+
+def attenuated(above: Above, energy: Array) -> Array:
+    """What an interface must reflect, seen through the medium above it, for a lobe of that energy (Eq. 18)."""
+    state = above.state
+    return 1 / (state.t_0i * state.t_i0 / np.maximum(energy, ENERGY_MIN) + state.r_i0)
+
+
+def reflected(above: Above, variance: Variance, r: Array, bright: Array) -> Variance:
+    """The variance of an interface's own reflection, for a lobe of that variance (Eq. 19).
+
+    r: its reflectance (C, N). bright: the brightest channel of this is the one whose variance is asked for, where every
+    channel has its own.
+    """
+    state = above.state
+    bounces = state.r_i0 * r / np.maximum(1 - state.r_i0 * r, ops.TINY)
+    m = np.mean(bounces, axis=0) if above.model.channels == "mean" else at_brightest_value(above, bounces, bright)
+    up, down, inner = (at_brightest(above, s, bright) for s in (state.s_ti0, state.s_t0i, state.s_ri0))
+    j = at_brightest_value(above, state.j_0i, bright)
+    return ((variance + up * -1.0) * (1 / j) + down * -1.0 + inner * (-1.0 * m)) * (1 / (1 + m))
+
+
+def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
+    """The dielectric that reflects r in the channel that needs most, and no less in the others."""
+
+    def layers(eta: Value) -> Layers:
+        return Layers("dielectric", eta, None, roughness, 0.0)
+
+    if choice.eta is not None:
+        return layers(as_index(choice.eta)).with_margins(index=within(choice.eta, choice.eta_max))
+
+    denser = np.broadcast_to(np.asarray(choice.side) > 0, np.broadcast_shapes(np.shape(choice.side), r.shape[1:]))
+
+    def index(u: Array) -> Array:
+        """Of reflectance u at normal incidence when smooth (Eq. 7)."""
+        root = np.sqrt(u)
+        ratio = (1 + root) / (1 - root)
+        return above.eta * np.where(denser, ratio, 1 / ratio)[None]
+
+    def excess(u: Array) -> Array:
+        return np.min(above.reflectance(layers(index(u))) / r, axis=0) - 1
+
+    ratio = np.mean(np.atleast_2d(np.where(denser, choice.eta_max, 1.0) / above.eta), axis=0)
+    exists = np.where(denser, ratio >= 1, ratio <= 1)
+    u_max = np.where(exists, ((ratio - 1) / (ratio + 1)) ** 2, 0.0)
+    most = np.where(u_max > 0, excess(u_max), -1.0)
+    u = false_position(excess, np.zeros_like(u_max), u_max, np.full_like(u_max, -1.0), most)
+    solved = np.where(most < 0, u_max, u)
+    return layers(index(solved)).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))
+
+
+def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
+    """The conductor that reflects r in every channel (Eqs. 8-10, and numerically where it is rough)."""
+    eta_1 = above.eta
+    pinned = None if choice.eta is None else _colour(choice.eta) / eta_1
+    given = None if choice.kappa is None else _colour(choice.kappa) / eta_1
+
+    def indices(u: Array) -> tuple[Array, Array]:
+        """Relative eta and kappa of reflectance u when smooth."""
+        if given is not None:
+            # eta below kappa, the lower root of Eq. 1
+            b = (1 + u) / (1 - u)
+            n = b - np.sqrt(np.maximum(b * b - 1 - given * given, 0))
+            return n, np.broadcast_to(given, n.shape)
+        n = conductor_index(u, choice.tint) if pinned is None else np.broadcast_to(pinned, u.shape)
+        return n, np.sqrt(np.maximum(u * (n + 1) ** 2 - (n - 1) ** 2, 0) / (1 - u))
+
+    def layers(n: Value, k: Value) -> Layers:
+        return Layers("conductor", n * eta_1, k * eta_1, roughness, 0.0)
+
+    if pinned is not None and given is not None:
+        both = np.broadcast_arrays(pinned, given, np.empty((1, r.shape[-1])))
+        bound = margin(np.min(both[1] - both[0], axis=0))
+        return layers(both[0], both[1]).with_margins(index=bound)
+
+    def excess(u: Array) -> Array:
+        return above.reflectance(layers(*indices(u))) / r - 1
+
+    low, high = np.full(r.shape, CONDUCTOR_MIN + 1e-12), np.full(r.shape, CONDUCTOR_MAX)
+    if given is not None:  # eta from kappa down to almost nothing
+        k2 = np.broadcast_to(given * given, r.shape)
+        n = np.sqrt(k2)
+        low = ((n - 1) ** 2 + k2) / ((n + 1) ** 2 + k2)
+        high = np.full(r.shape, 1 - 1e-9)
+    elif pinned is not None:  # kappa from eta upwards
+        n = np.broadcast_to(pinned, r.shape)
+        low = ((n - 1) ** 2 + n * n) / ((n + 1) ** 2 + n * n)
+    least, most = excess(low), excess(high)
+    u = false_position(excess, low, high, least, most)
+    margins = {"energy": margin(np.min(most, axis=0), NEGLIGIBLE)}
+    if not choice.absorbs or choice.tau is not None:
+        margins["metal"] = margin(np.min(-least, axis=0), NEGLIGIBLE)
+    return layers(*indices(u)).with_margins(**margins)
+
+
+def conductor_index(reflectance: Value, tint: Value) -> Value:
+    """Relative eta of a conductor of that reflectance between its bounds (Eqs. 9-10)."""
+    low = (1 - reflectance) / (1 + reflectance)
+    root = ops.sqrt(6 * reflectance - 1 - reflectance * reflectance)
+    high = (1 + reflectance + root) / (2 * (1 - reflectance))
+    return low + tint * (high - low)
+
+
+def at_brightest(above: Above, s: Variance, bright: Array) -> Variance:
+    """The variance of the channel where `bright` is largest, if every channel has its own."""
+    return type(s)(*(at_brightest_value(above, x, bright) for x in vars(s).values()))
+
+
+def at_brightest_value(above: Above, x: Value, bright: Array) -> Value:
+    """x, (C, N), at the channel where `bright` is largest, the first of equal ones."""
+    if above.model.channels == "mean" or np.ndim(x) < 2:
+        return x
+    shape = np.broadcast_shapes(np.shape(x), np.shape(bright))
+    brightest = np.argmax(np.round(np.broadcast_to(bright, shape), 9), axis=0)
+    return np.take_along_axis(np.broadcast_to(x, shape), brightest[None], axis=0)[0]
+
+
+def within(eta: Value, eta_max: float) -> Array:
+    """The margin of an index, (1, N) or a number, within the bounds of a dielectric."""
+    return margin(np.min(np.atleast_2d(np.minimum(eta - 1, eta_max - eta)), axis=0))
+
+
+def as_index(eta: ArrayLike) -> Value:
+    """An index as a colour (1, N), or a number."""
+    eta = np.asarray(eta, float)
+    return float(eta) if eta.ndim == 0 else np.atleast_2d(eta)
+
+
+def _colour(value: Any) -> Value:
+    """A number or colour that is the same for all N, or is a colour already."""
+    value = np.asarray(value, float)
+    return value[:, None] if value.ndim == 1 else value
+
+
+def floor(s: Variance) -> Variance:
+    """The variance, nowhere below 0."""
+    return type(s)(*(np.maximum(x, 0.0) for x in vars(s).values())) if isinstance(s, Isotropic) else s
+
+
+def least(s: Variance) -> Array:
+    """The smallest variance along any axis."""
+    xx, xy, yy = s.matrix()
+    return np.atleast_1d((xx + yy) / 2 - np.hypot((xx - yy) / 2, xy))
+
+
+def margin(x: ArrayLike, slack: float = SLACK) -> Array:
+    """A margin that rounding does not break."""
+    x = np.atleast_1d(np.asarray(x, float))
+    return np.where((x < 0) & (x >= -slack), 0.0, np.nan_to_num(x, nan=-np.inf))

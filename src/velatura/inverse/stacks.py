@@ -1,0 +1,280 @@
+"""Lobes to stacks: any number of lobes, of one or two interfaces each, from the top (Bati et al. 2021, Algorithm 2).
+
+Every lobe leaves choices open: which of two indices, and of a pair the index between its interfaces. What is chosen
+above decides what is possible below, so that many partial stacks are followed at once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura.inverse import interface, pair
+from velatura.inverse.above import Above, Array, Layers, take
+from velatura.inverse.equivalence import EquivalenceClass, dislike
+from velatura.inverse.interface import DENSER, MODEL, RARER, Choice
+from velatura.inverse.target import Lobe, Target, read
+from velatura.model import Model, named
+from velatura.model.statistics import statistics
+from velatura.model.variance import Isotropic
+from velatura.stack import Diffuse, Stack
+
+EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
+GRAZING = (0.5, 0.4, 0.3, 0.2, 0.1)  # cosines at which members of a class may differ
+ALPHA_APART = 1e-4  # by which a roughness may miss the one that is fixed
+
+
+@dataclass(frozen=True)
+class Partial:
+    """N partial stacks: their layers, what is below them, how far they are from what is preferred."""
+
+    above: Above
+    layers: tuple[Layers, ...]
+    cost: Array
+
+    def take(self, index: np.ndarray) -> Partial:
+        """Some of the N."""
+        if np.array_equal(index, np.arange(len(self.cost))):
+            return self
+        return Partial(self.above.take(index), tuple(layers.take(index) for layers in self.layers), self.cost[index])
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A stack that gives the lobes of a target, and the classes that its parts were chosen from."""
+
+    target: Target
+    model: Model
+    layers: tuple[Layers, ...]
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The material."""
+        written = [layer for layers in self.layers for layer in layers.written(0)]
+        return Stack(written, name=self.target.name, exterior=self.target.exterior)
+
+    @cached_property
+    def classes(self) -> tuple[EquivalenceClass, ...]:
+        """For every lobe all that could stand in its place, below the layers chosen above it."""
+        above, layers, found = start(self.target, self.model), iter(self.layers), []
+        for n, lobe in enumerate(self.target.lobes):
+            found.append(class_of(above, lobe, self.target, first=n == 0))
+            for _ in range(lobe.interfaces):
+                above, _read = above.below(next(layers))
+        return tuple(found)
+
+
+def invert_stack(
+    target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
+    model: str | Model = MODEL,
+    **switches: str,
+) -> Solution:
+    """A stack whose lobes at normal incidence are those of the target.
+
+    Args:
+        target: a target, the mapping of a target file, its lobes alone, or a file.
+        model: that is to read the stack; its `channels` are the target's, where that says so.
+
+    Raises:
+        InvalidInput: not a target, or an unknown model or switch.
+        Infeasible: there is no such stack; the error says why, and which targets near it can be reached.
+    """
+    wanted = read(target)
+    chosen = model_of(wanted, model, **switches)
+    found = search(wanted, chosen)
+    if found is None:
+        from velatura.inverse.explain import infeasible
+
+        raise infeasible(wanted, chosen)
+    return found
+
+
+def model_of(target: Target, model: str | Model, **switches: str) -> Model:
+    """The model that reads a target's stacks."""
+    return named(model, **({"channels": target.channels} if target.channels else {}), **switches)
+
+
+def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Solution | None:
+    """The preferred one of the stacks that are found with the least effort that finds any."""
+    if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
+        return None
+    for spread, keep in efforts:
+        paths = None
+        for paths in follow(target, model, spread, keep):
+            if not len(paths.cost):
+                break
+        if paths is not None and len(paths.cost):
+            best = paths.take(np.array([np.argmin(paths.cost)]))
+            return Solution(target, model, best.layers)
+        if not any(_open(lobe) for lobe in target.lobes):
+            break
+    return None
+
+
+def alternatives(
+    target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
+    count: int,
+    model: str | Model = MODEL,
+    seed: int = 0,
+    **switches: str,
+) -> list[Solution]:
+    """Stacks that all have the lobes of a target: the one of `invert_stack`, then others drawn at random.
+
+    Fewer than `count` where the target leaves nothing open.
+
+    Raises:
+        InvalidInput, Infeasible: as `invert_stack`.
+    """
+    first = invert_stack(target, model, **switches)
+    rng = np.random.default_rng(seed)
+    found = [first]
+    *_, paths = follow(first.target, first.model, *EFFORTS[1])
+    for n in rng.integers(len(paths.cost), size=4 * count):
+        if len(found) == count:
+            break
+        drawn = _last_redrawn(Solution(first.target, first.model, paths.take(np.array([n])).layers), rng)
+        if drawn is not None and all(drawn.stack != other.stack for other in found):
+            found.append(drawn)
+    return found
+
+
+def _last_redrawn(solution: Solution, rng: np.random.Generator) -> Solution | None:
+    """With the last lobe given by another member of its class, on which no other lobe depends."""
+    lobe, last = solution.target.lobes[-1], solution.classes[-1]
+    if lobe.base == "conductor":
+        tint = rng.random()
+        last = dataclasses.replace(last, choice=dataclasses.replace(last.choice, tint=tint))
+    indices = last.sample(1, int(rng.integers(2**31)))
+    if not len(indices):
+        return None
+    layers = last.member(*indices.T)
+    if not all(part.feasible.all() for part in layers):
+        return None
+    return dataclasses.replace(solution, layers=(*solution.layers[: -lobe.interfaces], *layers))
+
+
+def on_black(stack: Stack) -> Stack:
+    """A stack that ends in a dielectric, on a base that absorbs what it transmits: it shows by reflection alone."""
+    return Stack([*stack.layers, Diffuse(albedo=0.0)], exterior=stack.exterior) if stack.transmits else stack
+
+
+def grazing(stack: Stack, model: str | Model = MODEL) -> Array:
+    """Energy of all lobes together at grazing angles, (3, len(GRAZING))."""
+    return np.sum(statistics(stack, GRAZING, model=model).energy, axis=0)
+
+
+def follow(target: Target, model: Model, spread: int, keep: int) -> Iterator[Partial]:
+    """The partial stacks after every lobe."""
+    paths = beginning(target, model)
+    for n, lobe in enumerate(target.lobes):
+        paths = pruned(extended(paths, lobe, target, spread, first=n == 0), lobe.interfaces, keep)
+        yield paths
+
+
+def beginning(target: Target, model: Model) -> Partial:
+    """No layer at all."""
+    return Partial(start(target, model), (), np.zeros(1))
+
+
+def pruned(tried: Partial, interfaces: int, keep: int) -> Partial:
+    """The feasible ones of those that some interfaces were just added to, not more than can be followed."""
+    feasible = np.logical_and.reduce(np.broadcast_arrays(*(layers.feasible for layers in tried.layers[-interfaces:])))
+    return _thinned(tried.take(np.flatnonzero(np.broadcast_to(feasible, tried.cost.shape))), keep)
+
+
+def start(target: Target, model: Model) -> Above:
+    """Only the exterior medium."""
+    return Above.nothing(model, target.exterior)
+
+
+def class_of(above: Above, lobe: Lobe, target: Target, first: bool) -> EquivalenceClass:
+    """The class of one lobe below given layers."""
+    last = lobe.interfaces - 1
+    return EquivalenceClass(
+        above=above,
+        energy=np.array(lobe.colour)[:, None],
+        variance=float(above.f.variance(lobe.roughness)),
+        interfaces=lobe.interfaces,
+        tau=0.0 if lobe.interfaces == 1 or (tau := _pinned(lobe, "tau", 0)) is None else tau,
+        choice=_choice(lobe, last, target, absorbs=last > 0 or not first),
+    )
+
+
+def extended(paths: Partial, lobe: Lobe, target: Target, spread: int, first: bool) -> Partial:
+    """All partial stacks with all that a lobe leaves open, feasible or not."""
+    variance = Isotropic(np.atleast_1d(paths.above.f.variance(lobe.roughness)))
+    energy = np.array(lobe.colour)[:, None]
+    choice = _choice(lobe, lobe.interfaces - 1, target, absorbs=lobe.interfaces == 2 or not first)
+
+    # Let the index between two interfaces run, that of the medium above included, where the upper one vanishes
+    if lobe.interfaces == 2:
+        count = len(paths.cost)
+        pinned = lobe.fixed.of("eta", 0)
+        tried = np.array([pinned]) if pinned is not None else np.geomspace(1, target.eta_max, spread)
+        eta = np.tile(tried, count)
+        if pinned is None:
+            eta = np.r_[eta, np.broadcast_to(paths.above.eta, (1, count))[0]]
+        index = np.r_[np.repeat(np.arange(count), len(tried)), np.arange(count)][: len(eta)]
+        paths, eta = paths.take(index), eta[None]
+        tau = _pinned(lobe, "tau", 0)
+        upper = pair.top(paths.above, energy, variance, eta, 0.0 if tau is None else tau, target.eta_max)
+        layers = _held(upper.layers, lobe, 0)
+        paths = Partial(upper.below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
+        energy = energy - upper.energy
+
+    # Take either index of the interface that gives what is left
+    if choice.kind == "dielectric" and choice.eta is None:
+        count = len(paths.cost)
+        index = np.tile(np.arange(count), 2)
+        paths, energy = paths.take(index), take(energy, index)
+        choice = dataclasses.replace(choice, side=np.repeat([DENSER, RARER], count))
+    lower = interface.solve(paths.above, energy, variance, choice)
+    layers = _held(lower.layers, lobe, lobe.interfaces - 1)
+    return Partial(lower.below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
+
+
+def _open(lobe: Lobe) -> bool:
+    return lobe.interfaces == 2 and lobe.fixed.of("eta", 0) is None
+
+
+def _choice(lobe: Lobe, n: int, target: Target, absorbs: bool) -> Choice:
+    return Choice(
+        kind=lobe.base,
+        eta=_pinned(lobe, "eta", n),
+        kappa=_pinned(lobe, "k", n),
+        tau=_pinned(lobe, "tau", n),
+        tint=lobe.tint,
+        absorbs=absorbs,
+        eta_max=target.eta_max,
+    )
+
+
+def _pinned(lobe: Lobe, key: str, n: int) -> Any:
+    """What is fixed of an interface as a colour, None where it is free."""
+    value = lobe.fixed.of(key, n)
+    return value if value is None else np.reshape(np.asarray(value, float), (-1, 1))
+
+
+def _held(layers: Layers, lobe: Lobe, n: int) -> Layers:
+    """With the constraint that a roughness which is fixed is the one that the target needs."""
+    alpha = lobe.fixed.of("alpha", n)
+    if alpha is None:
+        return layers
+    return layers.with_margins(fixed=interface.margin(ALPHA_APART - np.abs(layers.alpha - alpha)))
+
+
+def _thinned(paths: Partial, keep: int) -> Partial:
+    """Of many partial stacks the half that is preferred most, and others evenly over the rest."""
+    count = len(paths.cost)
+    if count <= keep:
+        return paths
+    order = np.argsort(paths.cost, kind="stable")
+    rest = np.sort(order[keep // 2 :])
+    others = rest[np.linspace(0, len(rest) - 1, keep - keep // 2).astype(int)]
+    return paths.take(np.r_[order[: keep // 2], others])

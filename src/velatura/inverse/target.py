@@ -1,0 +1,222 @@
+"""What is asked for: lobes from the top, each by its energy and its blur, and what the answer must keep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import model_validator
+
+from velatura.errors import InvalidInput
+from velatura.model.maps import MAPS
+from velatura.stack import RGB
+from velatura.stack.io import _FORMATS, _format, _parse, _reason
+from velatura.stack.schema import Parameter, Record, show
+from velatura.stack.values import Choice, Colour, Scalar, Text
+
+BLUR = MAPS["belcour"]  # in whose space a target's variance is given
+
+
+@dataclass(frozen=True)
+class Count(Parameter):
+    """A whole number in a range."""
+
+    low: int = 1
+    high: int = 1
+
+    @property
+    def values(self) -> str:
+        return " or ".join(map(str, range(self.low, self.high + 1)))
+
+    def check(self, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not self.low <= value <= self.high:
+            raise self.refuse(value)
+        return value
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "integer", "minimum": self.low, "maximum": self.high}
+
+
+@dataclass(frozen=True)
+class Entries(Parameter):
+    """A list with a value or null for each interface of a lobe."""
+
+    entry: Parameter = field(default_factory=lambda: Scalar(""))
+
+    @property
+    def values(self) -> str:
+        return f"a list that holds for each interface null or {self.entry.values}"
+
+    def check(self, value: Any) -> tuple[Any, ...]:
+        if not isinstance(value, list | tuple):
+            raise self.refuse(value)
+        return tuple(None if entry is None else self.entry.check(entry) for entry in value)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "array", "items": {"anyOf": [self.entry.json_schema(), {"type": "null"}]}}
+
+
+def _number(doc: str, low: float = 0.0, **options: Any) -> Scalar:
+    return Scalar(doc, low=low, texturable=False, differentiable=False, **options)
+
+
+def _colour(doc: str, **options: Any) -> Colour:
+    return Colour(doc, low=0.0, texturable=False, differentiable=False, **options)
+
+
+class Fixed(Record):
+    """What the user will not have changed: an entry for each interface of the lobe, from the top, null where free."""
+
+    eta: Annotated[tuple[Any, ...], Entries("absolute indices", entry=_colour("", strict=True))] = ()
+    k: Annotated[tuple[Any, ...], Entries("absolute extinctions", entry=_colour(""))] = ()
+    alpha: Annotated[tuple[Any, ...], Entries("GGX roughnesses", entry=_number("", high=1.0))] = ()
+    tau: Annotated[tuple[Any, ...], Entries("optical depths of the media above", entry=_colour(""))] = ()
+
+    def of(self, key: str, interface: int) -> Any:
+        """The value that an interface of the lobe must keep, None where it is free."""
+        entries = getattr(self, key)
+        return entries[interface] if entries else None
+
+
+class Lobe(Record):
+    """A lobe: its energy, its blur (`alpha`, or `variance` in the space of Belcour's map), and what makes it."""
+
+    energy: Annotated[float | RGB, _colour("energy at normal incidence")]
+    alpha: Annotated[float | None, _number("GGX roughness of the lobe", high=1.0)] = None
+    variance: Annotated[float | None, _number("variance of the lobe, in place of alpha")] = None
+    interfaces: Annotated[int, Count("interfaces that make the lobe", low=1, high=2)] = 1
+    base: Annotated[str, Choice("what its last interface is", options=("dielectric", "conductor"))] = "dielectric"
+    tint: Annotated[
+        float, _number("of a conductor: from the strongest edge tint (0) to the strongest extinction", high=1.0)
+    ] = 0.5
+    fixed: Fixed = Fixed()
+
+    def __init__(self, **fields: Any) -> None:
+        kept = fields.get("fixed")
+        if kept is not None and not isinstance(kept, Fixed):
+            if not isinstance(kept, Mapping):
+                raise InvalidInput(f"fixed: must hold keys and lists, got {show(kept)}")
+            try:
+                fields["fixed"] = Fixed.from_dict(kept)
+            except InvalidInput as error:
+                raise InvalidInput(f"fixed: {error}") from None
+        super().__init__(**fields)
+
+    @model_validator(mode="after")
+    def _one_way_to_say_it(self) -> Lobe:
+        if self.alpha is not None and self.variance is not None:
+            raise ValueError("variance: not together with alpha; write one of them")
+        for key, entries in self.fixed:
+            if entries and len(entries) != self.interfaces:
+                wanted = f"must hold an entry for each interface, {self.interfaces}, got {len(entries)}"
+                raise ValueError(f"fixed: {key}: {wanted}")
+        dielectrics = self.interfaces - (self.base == "conductor")
+        for n in range(dielectrics):
+            if self.fixed.of("k", n) is not None:
+                raise ValueError("fixed: k: only for the last interface of a lobe with base: conductor")
+            if isinstance(self.fixed.of("eta", n), tuple):
+                raise ValueError("fixed: eta: of a dielectric must be one number for all channels")
+        return self
+
+    @property
+    def roughness(self) -> float:
+        """GGX roughness of the lobe."""
+        if self.variance is not None:
+            return float(BLUR.roughness(self.variance))
+        return self.alpha or 0.0
+
+    @property
+    def colour(self) -> RGB:
+        """Energy of the three channels."""
+        return self.energy if isinstance(self.energy, tuple) else (self.energy,) * 3
+
+
+class Target(Record):
+    """Lobes from the top down, frozen and validated.
+
+    Raises:
+        InvalidInput: in one line that names lobe, key and allowed range.
+    """
+
+    name: Annotated[str, Text("name of the material")] = ""
+    exterior: Annotated[float, _number("absolute index of refraction above", strict=True)] = 1.0
+    eta_max: Annotated[float, _number("largest index of a dielectric", low=1.0, strict=True)] = 4.0
+    channels: Annotated[
+        str | None,
+        Choice("one variance for all colours or the brightest one's; else the model's", ("mean", "separate")),
+    ] = None
+    lobes: tuple[Lobe, ...]
+
+    def __init__(self, lobes: Iterable[Lobe | Mapping[str, Any]] = (), **options: Any) -> None:
+        if isinstance(lobes, str | Mapping) or not isinstance(lobes, Iterable):
+            raise InvalidInput(f"lobes: must be a list of lobes, got {show(lobes)}")
+        super().__init__(lobes=tuple(_lobe(n, entry) for n, entry in enumerate(lobes, 1)), **options)
+
+    @model_validator(mode="after")
+    def _lobes_fit_together(self) -> Target:
+        if not self.lobes:
+            raise ValueError("lobes: must hold at least one lobe")
+        for n, lobe in enumerate(self.lobes[:-1], 1):
+            if lobe.base == "conductor":
+                raise ValueError(f"lobe {n}: base: only the last lobe may have a conductor, nothing lies below it")
+        return self
+
+    @classmethod
+    def from_dict(cls, fields: Any) -> Target:
+        """The target described by a mapping as it stands in a file.
+
+        Raises:
+            InvalidInput: in one line that names lobe, key and allowed range.
+        """
+        if not isinstance(fields, Mapping):
+            raise InvalidInput(f"must hold the keys of a target, lobes above all, got {show(fields)}")
+        return super().from_dict(fields)
+
+    def with_lobe(self, index: int, **changes: Any) -> Target:
+        """This target with some values of one lobe changed."""
+        lobes = list(self.lobes)
+        lobes[index] = lobes[index].model_copy(update=changes)
+        return self.model_copy(update={"lobes": tuple(lobes)})
+
+
+def load_target(path: str | Path) -> Target:
+    """The target in a file (.yaml, .yml or .json).
+
+    Raises:
+        InvalidInput: no such file, or what is in it is not a target; one line that names the file.
+    """
+    path = Path(path)
+    _format(path)
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+        return Target.from_dict(_parse(text, _FORMATS[path.suffix.lower()]))
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from None
+    except UnicodeDecodeError as error:
+        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
+    except RecursionError:
+        raise InvalidInput(f"{path}: is nested too deeply") from None
+    except (OSError, ValueError) as error:
+        raise InvalidInput(f"{path}: cannot be read: {_reason(error)}") from None
+
+
+def read(target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path) -> Target:
+    """A target as it is, from a mapping, from its lobes alone, or from a file."""
+    if isinstance(target, Target):
+        return target
+    if isinstance(target, str | Path):
+        return load_target(target)
+    return Target.from_dict(target if isinstance(target, Mapping) else {"lobes": target})
+
+
+def _lobe(number: int, entry: Any) -> Lobe:
+    if isinstance(entry, Lobe):
+        return entry
+    if not isinstance(entry, Mapping):
+        raise InvalidInput(f"lobe {number}: must hold keys and values, got {show(entry)}")
+    try:
+        return Lobe.from_dict(entry)
+    except InvalidInput as error:
+        raise InvalidInput(f"lobe {number}: {error}") from None

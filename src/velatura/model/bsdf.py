@@ -1,0 +1,262 @@
+"""A stack as a BSDF: lobes on both sides of it, seen from either side, in the forward and in the symmetric form.
+
+Reflected lobes and a diffuse base are a mixture about the mirror direction of wi. The transmitted lobe is a mixture in
+the medium beyond: the refracted direction, turned up, is reflected about a normal, and the outcome turned down (the
+fake refraction of Belcour 2018, 4.2). The forward form takes all lobes from wi. The symmetric form samples those, and
+takes the value from the lobes of a direction that only changes its sign when wi and wo are exchanged (6.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from velatura import ops
+from velatura.model import memo, mixture, recursion
+from velatura.model.adding import Lobe
+from velatura.model.diffuse import Base, Settle, as_it_is, under, with_means
+from velatura.model.merge import merged
+from velatura.model.models import Model
+from velatura.model.prepare import Prepared, prepare
+from velatura.model.sides import turned_over, with_index_below
+from velatura.model.variance import Isotropic, Roughness, Variance
+from velatura.ops import Value
+from velatura.optics import fresnel, ggx
+from velatura.optics.ggx import Direction
+
+
+@dataclass(frozen=True)
+class Body:
+    """A stack prepared from above and, where it transmits, from below (else None).
+
+    `eta` is the index below over the index above, one for all colours; 1 where nothing is transmitted. `lobes_above`
+    and `lobes_below` tell the lobes on either side, for a direction turned up.
+    """
+
+    above: Prepared
+    below: Prepared | None
+    eta: Value
+    lobes_above: memo.Lobes
+    lobes_below: memo.Lobes
+
+
+@dataclass(frozen=True)
+class Scattered:
+    """What light from one direction becomes; `eta` is the index of the medium beyond over that on its own side.
+
+    Nothing is transmitted where Snell's law has no solution.
+    """
+
+    reflected: Sequence[Lobe]
+    base: Base | None
+    transmitted: Lobe | None
+    eta: Value
+
+    def share(self, asked: Asked) -> Value:
+        """Of samples that are transmitted."""
+        if self.transmitted is None or not asked.transmission:
+            return 0.0
+        if not asked.reflection:
+            return 1.0
+        through = ops.mean(self.transmitted.energy)
+        return ops.divide(through, through + sum(ops.mean(lobe.energy) for lobe in self.reflected))
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of a BSDF: reflection, transmission or both; of radiance, which the index scales, or not."""
+
+    reflection: bool = True
+    transmission: bool = True
+    radiance: bool = True
+
+
+def body(
+    kinds: Sequence[str],
+    values: Mapping[str, Value],
+    thin: bool,
+    model: Model,
+    variance: type[Variance],
+    constant: bool = True,
+    number: type | None = None,
+    settle: Settle = as_it_is,
+) -> Body:
+    """Constants of a stack for both of its sides; arguments as `Stack`, `prepare` and `with_means`."""
+
+    def lobes(prepared: Prepared) -> memo.Lobes:
+        # Without axes they depend on the cosine alone
+        added = partial(_lobes, prepared)
+        if number is None or variance is not Isotropic:
+            return added
+        return memo.sample(added, prepared, number, type(values["exterior"]))
+
+    values = with_index_below(kinds, values, thin)
+    above = with_means(prepare(kinds, values, model, variance, constant, number), settle)
+    if kinds[-1] != "dielectric":
+        from_above = lobes(above)
+        return Body(above, None, 1.0, from_above, from_above)
+    below = prepare(*turned_over(kinds, values), model, variance, constant, number)
+    eta = ops.mean(values[f"layer{len(kinds) - 1}_eta"]) / ops.mean(values["exterior"])
+    return Body(above, below, eta, lobes(above), lobes(below))
+
+
+def scattered(stack: Body, wi: Direction) -> Scattered:
+    """The lobes for light from wi, which comes from below only where the stack transmits."""
+    turned = _upright(wi, wi)
+    reflected, passed = stack.lobes_above(turned)
+    if stack.below is None:
+        return Scattered(reflected, under(stack.above, turned), None, 1.0)
+    from_above = wi[2] > 0
+    reflected_below, passed_below = stack.lobes_below(turned)
+    eta = ops.select(from_above, stack.eta, 1 / stack.eta)
+    through = _chosen(from_above, passed, passed_below)
+    through = replace(through, energy=ops.select(_refracted(turned, eta)[2] > 0, through.energy, 0.0))
+    reflected = [_chosen(from_above, a, b) for a, b in zip(reflected, reflected_below)]
+    return Scattered(reflected, None, through, eta)
+
+
+def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; 0 from below an opaque stack."""
+    seen, i, o = scattered(stack, wi), _upright(wi, wi), _upright(wo, wi)
+    symmetric = stack.above.model.form == "symmetric"
+    reflected, passed = exchangeable(stack, wi, wo) if symmetric else (seen.reflected, seen.transmitted)
+
+    # Reflect
+    value, density = mixture.eval_pdf(seen.reflected, seen.base, i, o, reflected)
+    if seen.transmitted is None or passed is None:
+        lit = (wi[2] > 0) & asked.reflection
+        return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
+
+    # Transmit, as a reflection in the medium beyond; radiance is squeezed into the cone there
+    i_beyond, o_beyond = _refracted(i, seen.eta), _down(o)
+    through, density_through = mixture.eval_pdf([seen.transmitted], None, i_beyond, o_beyond)
+    if symmetric:
+        # In the medium below whichever way light goes
+        i_below, o_below = _pair_below(stack, wi, wo)
+        through, _ = mixture.eval_pdf([passed], None, i_below, o_below)
+        through = through * ops.divide(o_beyond[2], o_below[2])
+        through = through * ops.select(wi[2] > 0, 1.0, seen.eta * seen.eta)
+    if asked.radiance:
+        through = through / (seen.eta * seen.eta)
+
+    # Choose what is asked for
+    share, passes = seen.share(asked), o[2] < 0
+    value = ops.select(passes, through if asked.transmission else 0.0, value if asked.reflection else 0.0)
+    return value, ops.select(passes, share * density_through, (1 - share) * density)
+
+
+def sample(
+    stack: Body, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = Asked()
+) -> tuple[Direction, Value]:
+    """A direction wo from uniform numbers, and the index on its side over that on the side of wi.
+
+    Where light cannot go the way that is drawn, `eval_pdf` is 0.
+    """
+    seen, i = scattered(stack, wi), _upright(wi, wi)
+    share = seen.share(asked)
+    if seen.transmitted is None:
+        return mixture.sample(seen.reflected, seen.base, i, u, u1, u2), 1.0
+    passes = u < share
+    u = ops.divide(ops.select(passes, u, u - share), ops.select(passes, share, 1 - share))
+    o = mixture.sample(seen.reflected, seen.base, i, u, u1, u2)
+    beyond = _down(mixture.sample([seen.transmitted], None, _refracted(i, seen.eta), u, u1, u2))
+    x, y, z = _chosen_direction(passes, beyond, o)
+    # A direction that has missed its side belongs to no lobe
+    z = ops.select(passes, ops.minimum(z, 0.0), ops.maximum(z, 0.0))
+    return _upright((x, y, z), wi), ops.select(passes, seen.eta, 1.0)
+
+
+def sample_smooth(
+    stack: Body, wi: Direction, u: Value, asked: Asked = Asked()
+) -> tuple[Direction, Value, Value, Value]:
+    """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
+    seen, i = scattered(stack, wi), _upright(wi, wi)
+    share = seen.share(asked)
+    reflected = sum((lobe.energy for lobe in seen.reflected[1:]), seen.reflected[0].energy)
+    if seen.transmitted is None:
+        lit = (wi[2] > 0) & asked.reflection
+        return (-i[0], -i[1], i[2]), 1.0, ops.select(lit, 1.0, 0.0), reflected
+    passes = u < share
+    x, y, z = _refracted(i, seen.eta)
+    o = _chosen_direction(passes, (-x, -y, -z), (-i[0], -i[1], i[2]))
+    through = seen.transmitted.energy / (seen.eta * seen.eta) if asked.radiance else seen.transmitted.energy
+    probability = ops.select(passes, share, (1 - share) if asked.reflection else 0.0)
+    weight = ops.divide(ops.select(passes, through, reflected), probability)
+    return _upright(o, wi), ops.select(passes, seen.eta, 1.0), probability, weight
+
+
+# The symmetric form
+
+
+def exchangeable(stack: Body, wi: Direction, wo: Direction) -> tuple[Sequence[Lobe], Lobe | None]:
+    """The lobes, reflected and transmitted, that the symmetric form takes its value from: of half the angle between wi
+    and wo."""
+    i, o = _upright(wi, wi), _upright(wo, wi)
+    half = _difference(i, o)
+    if stack.below is None:
+        return stack.lobes_above(half)[0], None
+    half_below = _difference(*_pair_below(stack, wi, wo))
+    seen = _chosen_direction(o[2] > 0, half, _refracted(half_below, 1 / stack.eta))
+    reflected, passed = stack.lobes_above(seen)
+    reflected_below, _ = stack.lobes_below(half)
+    return [_chosen(wi[2] > 0, a, b) for a, b in zip(reflected, reflected_below)], passed
+
+
+def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:
+    """The reflected lobes that the model evaluates, and the transmitted one."""
+    reflected, passed = recursion.lobes(prepared, w)
+    return merged(prepared, reflected), passed
+
+
+def _difference(wi: Direction, wo: Direction) -> Direction:
+    """A direction as far from the normal as wi and wo are from the one halfway, along their difference.
+
+    It is wi where the normal is halfway.
+    """
+    x, y = wi[0] - wo[0], wi[1] - wo[1]
+    cos_d = ops.sqrt(ops.clip(0.5 + 0.5 * ggx.dot(wi, wo), 0.0, 1.0))
+    scale = ops.divide(ops.sqrt(1 - cos_d * cos_d), ops.sqrt(x * x + y * y))
+    return scale * x, scale * y, cos_d
+
+
+def _pair_below(stack: Body, wi: Direction, wo: Direction) -> tuple[Direction, Direction]:
+    """Light that is transmitted, as it is in the medium below: wi and wo turned up, the one from above refracted."""
+    i, o = _upright(wi, wi), _down(_upright(wo, wi))
+    from_above = wi[2] > 0
+    i_below = _chosen_direction(from_above, _refracted(i, stack.eta), i)
+    return i_below, _chosen_direction(from_above, o, _refracted(o, stack.eta))
+
+
+# Directions on either side
+
+
+def _upright(w: Direction, wi: Direction) -> Direction:
+    """As seen by somebody for whom wi comes from above."""
+    return w[0], w[1], ops.select(wi[2] < 0, -w[2], w[2])
+
+
+def _down(w: Direction) -> Direction:
+    return w[0], w[1], -w[2]
+
+
+def _refracted(w: Direction, eta: Value) -> Direction:
+    """The refracted direction turned up; its height is 0 where light is totally reflected."""
+    return w[0] / eta, w[1] / eta, fresnel.cos_transmitted(w[2], eta)
+
+
+def _chosen_direction(where: Value, a: Direction, b: Direction) -> Direction:
+    x, y, z = (ops.select(where, p, q) for p, q in zip(a, b))
+    return x, y, z
+
+
+def _chosen(where: Value, a: Lobe, b: Lobe) -> Lobe:
+    variance = type(a.variance)(
+        *(ops.select(where, p, q) for p, q in zip(vars(a.variance).values(), vars(b.variance).values()))
+    )
+    roughness = Roughness(*(ops.select(where, p, q) for p, q in zip(a.roughness, b.roughness)))
+    facets = None
+    if a.facets is not None and b.facets is not None:
+        facets = replace(a.facets, eta=ops.select(where, a.facets.eta, b.facets.eta))
+    gain = ops.select(where, a.gain, b.gain)
+    return Lobe(ops.select(where, a.energy, b.energy), variance, roughness, gain, facets)

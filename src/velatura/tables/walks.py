@@ -1,0 +1,136 @@
+"""Light that meets several facets of one rough interface: walks through the Smith microsurface (Heitz et al. 2016).
+
+What comes of a walk at each meeting is summed as an expectation: of the light that leaves, the share that it leaves
+with; of the light between a reflection and a refraction, both. Only the facets are drawn, those of the first meetings
+from a Sobol sequence. So a few thousand walks know a directional albedo to a thousandth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import qmc
+
+from velatura.optics import fresnel, ggx, microsurface, refraction
+from velatura.optics.ggx import Direction
+
+QUASI_RANDOM = 4  # meetings whose numbers come from the sequence; later ones, which matter less, draw random numbers
+FAINT = 0.05  # weight below which walks are ended at random, and the others take their weight
+MOST_MEETINGS = 1000
+
+Array = np.ndarray
+
+
+class Walks:
+    """Walks for light that comes from above at (cos_theta, alpha > 0), both of shape (points,), single precision.
+
+    One entry per walk: the point it belongs to, direction of travel, rank of its height, both as seen from its own
+    medium (which is upside down for light that is not `outside`), and weight.
+    """
+
+    def __init__(self, cos_theta: Array, alpha: Array, paths: int, rng: np.random.Generator):
+        self.rng, self.paths, self.meetings = rng, paths, 0
+        self.point = np.repeat(np.arange(len(alpha)), paths)
+        self.alpha = alpha.astype(np.float32)[self.point]
+        cosine = cos_theta.astype(np.float32)[self.point]
+        self.w: Direction = -np.sqrt(1 - cosine**2), np.zeros_like(cosine), -cosine
+        self.rank = np.ones_like(cosine)
+        self.weight = np.ones_like(cosine)
+        self.outside = np.ones(len(cosine), bool)
+        self._path = np.arange(len(cosine))
+        sequences = [qmc.Sobol(3 * QUASI_RANDOM, seed=rng).random(paths) for _ in alpha]
+        self._numbers = np.minimum(np.concatenate(sequences).T.astype(np.float32), np.float32(1 - 2**-24))
+        self._meets = np.ones_like(cosine)
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+    def leave(self) -> Array:
+        """Weight that leaves the interface now, per walk; what stays is left in the walks."""
+        self._meets = 1 - microsurface.escape(self.w, self.rank, self.alpha, self.alpha)
+        leaving = self.weight * (1 - self._meets)
+        self.weight = self.weight * self._meets
+        return leaving
+
+    def end_faint(self) -> Array:
+        """End some of the faint walks; indices of those that go on."""
+        kept = np.flatnonzero(self.weight > FAINT * self.rng.random(len(self), dtype=np.float32))
+        self.weight = np.maximum(self.weight, np.float32(FAINT))
+        self._take(kept)
+        return kept
+
+    def meet(self) -> tuple[Direction, Direction]:
+        """Fly to the next facets; directions towards where light came from, and normals."""
+        u = self._draw()
+        rank = microsurface.fly(self.w, self.rank, self.alpha, self.alpha, u[0] * self._meets)
+        self.rank = np.minimum(rank, 1)
+        self.meetings += 1
+        i = reverse(self.w)
+        return i, ggx.sample_visible(i, self.alpha, self.alpha, u[1], u[2])
+
+    def reflect(self, i: Direction, h: Direction) -> None:
+        self.w = ggx.reflect(i, h)
+
+    def scatter(self, i: Direction, h: Direction, eta: Array) -> None:
+        """Reflect and refract: two walks out of each one; `eta` by point, as seen from above."""
+        eta_here = eta.astype(np.float32)[self.point]
+        eta_here = np.where(self.outside, eta_here, 1 / eta_here)
+        reflectance = fresnel.dielectric(np.clip(ggx.dot(i, h), 0, 1), eta_here)
+        refracted = reverse(refraction.refract(i, h, eta_here))
+        self._take(np.tile(np.arange(len(self)), 2))
+        x, y, z = map(np.concatenate, zip(ggx.reflect(i, h), refracted))
+        self.w = x, y, z
+        self.weight *= np.concatenate([reflectance, 1 - reflectance])
+        # What is refracted sees the surface upside down
+        below = len(reflectance)
+        self.rank[below:] = 1 - self.rank[below:]
+        self.outside[below:] ^= True
+
+    def _take(self, index: Array) -> None:
+        self.w = self.w[0][index], self.w[1][index], self.w[2][index]
+        for name in ("point", "alpha", "rank", "weight", "outside", "_path", "_meets"):
+            setattr(self, name, getattr(self, name)[index])
+
+    def _draw(self) -> Array:
+        if self.meetings < QUASI_RANDOM:
+            return self._numbers[3 * self.meetings : 3 * self.meetings + 3, self._path]
+        return self.rng.random((3, len(self)), dtype=np.float32)
+
+
+def reverse(w: Direction) -> Direction:
+    return -w[0], -w[1], -w[2]
+
+
+def reflected_later(cos_theta: Array, alpha: Array, eta: Array, paths: int, rng: np.random.Generator) -> Array:
+    """Energy that a dielectric of relative index eta reflects after more than one meeting, shape (points,)."""
+    walks = Walks(cos_theta, alpha, paths, rng)
+    energy = np.zeros(len(alpha))
+    while len(walks) and walks.meetings < MOST_MEETINGS:
+        walks.scatter(*walks.meet(), eta)
+        leaving = np.where(walks.outside, walks.leave(), 0)
+        if walks.meetings > 1:
+            energy += np.bincount(walks.point, leaving, minlength=len(energy))
+        walks.end_faint()
+    return energy / paths
+
+
+def reflected_by_metals(
+    cos_theta: float, alpha: float, curves: Array, paths: int, rng: np.random.Generator
+) -> tuple[Array, float]:
+    """The same at one point, for some conductors, and for a mirror.
+
+    `curves`, shape (bins, conductors), are Fresnel at the middles of bins equal in the square root of the cosine.
+    """
+    walks = Walks(np.array([cos_theta]), np.array([alpha]), paths, rng)
+    curves, product = curves.astype(np.float32), np.ones((paths, curves.shape[1]), np.float32)
+    energy, of_mirror = np.zeros(curves.shape[1]), 0.0
+    while len(walks) and walks.meetings < MOST_MEETINGS:
+        i, h = walks.meet()
+        walks.reflect(i, h)
+        place = np.sqrt(np.clip(ggx.dot(i, h), 0, 1)) * len(curves)
+        product *= curves[np.minimum(place.astype(int), len(curves) - 1)]
+        leaving = walks.leave()
+        if walks.meetings > 1:
+            energy += leaving @ product
+            of_mirror += leaving.sum(dtype=float)
+        product = product[walks.end_faint()]
+    return energy / paths, of_mirror / paths

@@ -1,0 +1,72 @@
+"""Fields of directions on a surface: what a brushed material says at a point is what a turned one says there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+from velatura.stack import Brushing, Interface, Stack
+
+mi: Any = kernel.mitsuba("llvm_ad_rgb")
+import drjit as dr  # noqa: E402
+
+
+def brushed(rotation: Any) -> Any:
+    return vt.bsdf(Stack([Interface(conductor="Al", alpha=(0.05, 0.4), rotation=rotation)]), "yamaguchi2019")
+
+
+_kept: list[Any] = []  # Mitsuba follows pointers to scenes and materials that Python alone holds
+
+
+def seen(shape: dict[str, Any], at: list[list[float]]) -> Any:
+    """What a ray from above meets at points (x, y) of a shape."""
+    scene = mi.load_dict({"type": "scene", "shape": shape})
+    _kept.append(scene)
+    origin = mi.Point3f(*np.transpose([[x, y, 2.0] for x, y in at]).astype(np.float32))
+    return scene.ray_intersect(mi.Ray3f(origin, mi.Vector3f(0, 0, -1)))
+
+
+def value(rotation: Any, si: Any, wi: list[float], wo: list[float]) -> Any:
+    """f |cos| for directions in the world's coordinates, one column a point."""
+    bsdf = brushed(rotation)
+    _kept.append(bsdf)
+    si.wi = si.to_local(dr.normalize(mi.Vector3f(*wi)))
+    return np.array(bsdf.eval(mi.BSDFContext(), si, si.to_local(dr.normalize(mi.Vector3f(*wo)))))
+
+
+@pytest.mark.parametrize(("field", "across"), [("radial", 0), ("concentric", 90)])
+@pytest.mark.parametrize("shape", ["rectangle", "mirrored", "disk"])
+def test_a_field_is_the_rotation_that_it_names_at_every_point(shape: str, field: str, across: float) -> None:
+    """Expected: the tangent runs away from the centre or around it in space, whatever the texture coordinates do."""
+    angles = np.array([-170, -80, 20, 135])
+    points = [[0.6 * np.cos(a), 0.6 * np.sin(a)] for a in np.deg2rad(angles)]
+    flip = mi.ScalarTransform4f().scale([-1, 1, 1]) if shape == "mirrored" else mi.ScalarTransform4f()
+    described = {"type": "disk" if shape == "disk" else "rectangle", "to_world": flip}
+    # On a disk, coordinates are polar, and the tangent runs away from the middle as it is
+    rotation = across if shape == "disk" else Brushing(brushing=field, offset=10)
+    offset = 0 if shape == "disk" else 10
+    plain = {"type": "rectangle"}
+    wi, wo = [0.3, 0.1, 1.0], [-0.5, 0.4, 1.0]
+    found = value(rotation, seen(described, points), wi, wo)
+    for i, (angle, point) in enumerate(zip(angles, points)):
+        turned = value(float(angle + across + offset), seen(plain, [point]), wi, wo)
+        np.testing.assert_allclose(found[:, i], turned[:, 0], rtol=2e-4, atol=1e-6)
+
+
+def test_a_field_has_no_seam() -> None:
+    """Expected: on both sides of where its angle jumps by a turn, the material is the same."""
+    si = seen({"type": "rectangle"}, [[-0.5, 1e-5], [-0.5, -1e-5]])
+    found = value(Brushing(brushing="radial"), si, [0.2, 0.3, 1], [0.1, -0.5, 1])
+    np.testing.assert_allclose(found[:, 0], found[:, 1], rtol=1e-3)
+
+
+def test_a_field_is_finite_at_its_centre_and_without_texture_coordinates() -> None:
+    si = dr.zeros(mi.SurfaceInteraction3f, 2)
+    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
+    assert np.isfinite(value(Brushing(brushing="radial"), si, [0, 0.1, 1], [0, 0, 1])).all()
+    si = seen({"type": "rectangle"}, [[0.0, 0.0], [1e-20, 0.0]])
+    assert np.isfinite(value(Brushing(brushing="radial"), si, [0, 0.1, 1], [0, 0, 1])).all()

@@ -1,0 +1,157 @@
+"""Inverse design as a user types it.
+
+Rationale: the functions are tested elsewhere; here, that targets become material files that the other verbs read, that
+nothing is written when there is no stack, and that every failure is one line with its exit status.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import velatura as vt
+
+Run = Callable[..., tuple[int, str, str]]
+
+TARGET = """name: Hazy metal
+lobes:
+  - {energy: 0.1, alpha: 0, interfaces: 1}
+  - {energy: [0.35, 0.25, 0.3], variance: 0.04, interfaces: 1, base: conductor}
+"""
+PAIR = "lobes:\n  - {energy: [0.09, 0.09, 0.15], variance: 0.03, interfaces: 2}\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with targets in it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hazy.yaml").write_text(TARGET)
+    (tmp_path / "pair.yaml").write_text(PAIR)
+    (tmp_path / "bright.yaml").write_text("lobes:\n  - {energy: 0.6}\n")
+    return tmp_path
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()} - {"hazy.yaml", "pair.yaml", "bright.yaml"}
+
+
+def test_a_target_becomes_a_material(run: Run, folder: Path) -> None:
+    """Expected: the file is a material whose lobes are those that were asked for."""
+    status, out, err = run("invert", "hazy.yaml", "-o", "stack.yaml")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[-1] == "stack.yaml"
+    stack = vt.load("stack.yaml")
+    assert (stack.name, stack.kinds) == ("Hazy metal", ("dielectric", "conductor"))
+    found = vt.lobes(stack, 1.0, model="bati2021")
+    assert found.energy[1][:, 0] == pytest.approx([0.35, 0.25, 0.3], abs=1e-6)
+    assert found.covariance[1][0, 0] == pytest.approx(0.04, abs=1e-6)
+    assert run("lobes", "stack.yaml")[0] == 0
+
+
+def test_the_answer_as_json(run: Run, folder: Path) -> None:
+    """Expected: one object with the material and the class; nothing written."""
+    status, out, _ = run("invert", "pair.yaml", "--json", "--set", "reflectance=fresnel")
+    report = json.loads(out)
+    assert status == 0
+    assert report["feasible"] is True
+    assert vt.Stack.from_dict(report["stack"]).kinds == ("dielectric", "medium", "dielectric")
+    (lobe,) = report["class"]["lobes"]
+    assert lobe["eta_1"][0][0] == 1
+    assert len(lobe["channels"]) == 3
+    assert files(folder) == set()
+
+
+def test_several_stacks_and_the_class_as_a_picture(run: Run, folder: Path) -> None:
+    """Expected: as many files as asked for, all with the same lobes head-on, and a picture by the target's name."""
+    status, out, _ = run("invert", "pair.yaml", "--count", "3", "-o", "stacks", "--plot")
+    assert status == 0
+    assert files(folder) == {"stacks", "pair.png"}
+    paths = sorted((folder / "stacks").iterdir())
+    assert [path.name for path in paths] == ["pair-1.yaml", "pair-2.yaml", "pair-3.yaml"]
+    for path in paths:
+        found = vt.lobes(vt.load(path), 1.0, model="bati2021")
+        assert (found.energy[0] + found.energy[1])[:, 0] == pytest.approx([0.09, 0.09, 0.15], abs=1e-6)
+    assert "pair.png" in out
+
+
+def test_what_cannot_be_exits_with_3(run: Run, folder: Path) -> None:
+    """Expected: one line that says why and what is possible, the same as JSON, and nothing written."""
+    status, out, err = run("invert", "bright.yaml", "-o", "stack.yaml", "--plot")
+    assert (status, out) == (3, "")
+    assert err == "velatura: no stack: lobe 1: no index up to 4 reflects as much (possible: lobe 1 energy 0.36)\n"
+    status, out, _ = run("invert", "bright.yaml", "--json")
+    report = json.loads(out)
+    assert (status, report["feasible"]) == (3, False)
+    assert report["nearest"]["lobes"][0]["energy"] == pytest.approx(0.36, abs=1e-3)
+    assert files(folder) == set()
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("lobes:\n  - {energy: -1}\n", "bad.yaml: lobe 1: energy: must be at least 0, got -1"),
+        ("lobes:\n  - {energy: .nan}\n", "bad.yaml: lobe 1: energy: must be finite, got nan"),
+        ("lobes:\n  - {enrgy: 1}\n", "bad.yaml: lobe 1: unknown key 'enrgy' (did you mean energy?)"),
+        ("lobs: []\n", "bad.yaml: unknown key 'lobs' (did you mean lobes?)"),
+        ("{", "bad.yaml: line 1: is not valid YAML: expected the node content, but found '<stream end>'"),
+    ],
+)
+def test_what_is_no_target_exits_with_2(run: Run, folder: Path, text: str, line: str) -> None:
+    """Expected: one line that names the file and the key, and nothing written."""
+    (folder / "bad.yaml").write_text(text)
+    status, out, err = run("invert", "bad.yaml", "-o", "stack.yaml")
+    assert (status, out, err) == (2, "", f"velatura: {line}\n")
+    assert files(folder) == {"bad.yaml"}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("invert", "none.yaml"),
+        ("invert", "hazy.yaml", "--set", "tirr=off"),
+        ("invert", "hazy.yaml", "--set", "tir=maybe"),
+        ("invert", "hazy.yaml", "--model", "belcour"),
+        ("invert", "hazy.yaml", "-o", "one.yaml", "--count", "2"),
+        ("invert", "hazy.yaml", "-o", "no/folder/here"),
+        ("coat", "coated-gold", "--eta", "-1"),
+        ("coat", "coated-gold", "-o", "coated.txt"),
+        ("explore", "hazy.yaml", "-o", "sheet.png"),
+        ("explore", "hazy.yaml", "--sheet", "-o", "sheet.txt"),
+    ],
+)
+def test_wrong_arguments_exit_with_2(run: Run, folder: Path, arguments: tuple[str, ...]) -> None:
+    """Expected: one line, and nothing written."""
+    status, out, err = run(*arguments)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert files(folder) == set()
+
+
+def test_a_coat_that_keeps_the_appearance(run: Run, folder: Path) -> None:
+    """Expected: lobes that stay within 1e-4, a material on disk; without the switch, a report of what changes."""
+    status, out, _ = run("coat", "coated-gold", "--alpha", "0.02", "--keep-appearance", "-o", "kept.yaml", "--json")
+    report = json.loads(out)
+    assert status == 0
+    for lobe in report["lobes"]:
+        assert lobe["energy_after"] == pytest.approx(lobe["energy_before"], abs=1e-4)
+        assert lobe["alpha_after"] == pytest.approx(lobe["alpha_before"], abs=1e-4)
+    assert len(vt.load("kept.yaml").interfaces) == 3
+    report = json.loads(run("coat", "coated-gold", "--json")[1])
+    assert any(lobe["energy_after"] != pytest.approx(lobe["energy_before"], abs=1e-3) for lobe in report["lobes"])
+    status, _, err = run("coat", "coated-gold", "--alpha", "0.5", "--keep-appearance", "-o", "rough.yaml")
+    assert status == 3
+    assert err.startswith("velatura: layer 0 (interface): cannot keep its appearance under the coat: ")
+    assert files(folder) == {"kept.yaml"}
+
+
+def test_stacks_by_their_difference_at_grazing_angles(run: Run, folder: Path) -> None:
+    """Expected: a line for each stack, from the same to the most different; and a sheet of renders."""
+    status, out, _ = run("explore", "pair.yaml", "--count", "3")
+    apart = [float(line.split()[0]) for line in out.splitlines()]
+    assert (status, len(apart), apart[0]) == (0, 3, 0)
+    assert apart == sorted(apart)
+    assert run("explore", "pair.yaml", "--count", "2", "--sheet", "--size", "16", "--spp", "1")[0] == 0
+    assert (folder / "pair-sheet.png").read_bytes().startswith(b"\x89PNG")
