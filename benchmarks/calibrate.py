@@ -38,6 +38,8 @@ FAINT = 2e-3  # energy of lobes whose roughness is not looked at
 NOISY = 0.05  # relative error of a true roughness, likewise
 OUTLYING = 0.08  # logarithm of a ratio beyond which it counts less
 
+LARGEST = {"rare": 1.0, "entering": 5.0}  # of constants that have an upper bound
+
 RIVALS: dict[str, dict[str, Any]] = {
     "velatura": {"model": "velatura"},
     "belcour2018": {"model": "belcour2018"},
@@ -106,10 +108,10 @@ def errors(stack: Stack, truth: Any, model: Model) -> tuple[Array, Array, Array,
         names = {f.name: getattr(truth, f.name)[k] for f in dataclasses.fields(Lobe)}
         true, nothing = Lobe(**names), np.full_like(names["mean"], np.nan)
         mine = Lobe(found.energy[k], found.alpha[k], found.rotation[k], nothing, nothing)
-        alpha = along(mine, true).alpha
+        alpha, widest = along(mine, true).alpha, np.minimum(true.alpha, 1.0)  # a GGX lobe gets no wider
         clear = (truth.standard_error.alpha[k] < NOISY * true.alpha) & (energy.mean(axis=0) > FAINT) & (alpha > 0)
         clear &= true.alpha > FAINT
-        width = np.where(clear, np.log(np.where(clear, alpha, 1) / np.where(clear, true.alpha, 1)), np.nan)
+        width = np.where(clear, np.log(np.where(clear, alpha, 1) / np.where(clear, widest, 1)), np.nan)
         widths.append(0 * width if k == 0 and model.calibrations else width)
         seen = energy > FAINT
         energies.append(np.where(seen, np.log(np.maximum(mine.energy, 1e-9) / np.where(seen, energy, 1)), np.nan))
@@ -121,7 +123,7 @@ def errors(stack: Stack, truth: Any, model: Model) -> tuple[Array, Array, Array,
 def fitted(truths: list[tuple[Stack, Any]], model: Model, start: Calibration) -> tuple[Calibration, Calibration]:
     """The constants that fit best, and their standard errors."""
     names = [f.name for f in dataclasses.fields(Calibration) if getattr(start, f.name) != 0]
-    x_0 = np.array([getattr(start, name) for name in names])
+    x_0 = np.array([min(getattr(start, name), 0.999 * LARGEST.get(name, 40.0)) for name in names])
 
     def residuals(x: Array) -> Array:
         calibration = dataclasses.replace(start, **dict(zip(names, x.tolist())))
@@ -133,10 +135,10 @@ def fitted(truths: list[tuple[Stack, Any]], model: Model, start: Calibration) ->
             rows += [(np.nan_to_num(part) * WEIGHTS).ravel() for part in parts]
         return np.clip(np.concatenate(rows), -1.5, 1.5)
 
-    found = least_squares(
-        residuals, x_0, bounds=(0, 40), x_scale=np.maximum(x_0, 0.1), loss="soft_l1", f_scale=OUTLYING,
-        diff_step=1e-3, max_nfev=12, verbose=2,
-    )  # fmt: skip
+    largest = [LARGEST.get(name, 40.0) for name in names]
+    scale = np.maximum(x_0, 0.1)
+    options: dict[str, Any] = {"loss": "soft_l1", "f_scale": OUTLYING, "diff_step": 1e-3, "max_nfev": 8, "verbose": 1}
+    found = least_squares(residuals, x_0, bounds=(0, largest), x_scale=scale, **options)
     noise = 2 * found.cost / max(np.count_nonzero(found.fun) - len(names), 1)
     sigma = np.sqrt(np.diag(np.linalg.pinv(found.jac.T @ found.jac)) * noise)
     nothing = {name: 0.0 for name in vars(start)}

@@ -9,6 +9,7 @@ materials, and read by `vt.lobes`. Times are the best of several runs.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -145,7 +146,7 @@ def configuration() -> float:
             {"energy": [0.025, 0.045, 0.05], "variance": 0.028, "interfaces": 2, "fixed": {"eta": [1.45, 3.3]}},
         ]
     }
-    return best(lambda: invert_stack(target), 30)
+    return best(lambda: invert_stack(target), 100)
 
 
 def pairs(count: int = 1 << 17) -> float:
@@ -182,6 +183,7 @@ def main() -> int:
         name = f"{model.name} ({model.reflectance}, tir {model.tir}, {model.channels})"
         print(f"{name}: {done} targets, energy to {energy:.1e}, variance to {variance:.1e} (bound {EXACT:g})")
 
+    print(f"load when times are taken: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     seconds, rate, grid = configuration(), pairs(), reach()
     print(f"one configuration of figure 17: {1e3 * seconds:.1f} ms (bound {1e3 * CONFIGURATION:g})")
     print(f"rough coloured pairs: {rate:.3g} a second on two cores (bound {PAIRS:g})")

@@ -3,7 +3,7 @@
 The material ball fills over 60 % of a 512x512 picture under an environment map, 64 spp, path with max_depth 4; model
 defaults with tables and total internal reflection on. Beside it: `eval_pdf` alone, and textured parameters.
 
-    python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb]
+    python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb] [--model NAME]
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ from __future__ import annotations
 import argparse
 import time
 from statistics import median
+from typing import Any
 
 import numpy as np
 
 import velatura as vt
 from velatura import kernel
+from velatura.model import DEFAULT
 from velatura.scenes import scene_dict
 
 ZOOM = 1.25
@@ -28,7 +30,7 @@ def stacks() -> dict[str, vt.Stack]:
     return {"two interfaces": vt.Stack([coats[0], metal]), "five interfaces": vt.Stack([*coats, metal])}
 
 
-def textured(mi, stack: vt.Stack):
+def textured(mi, stack: vt.Stack, model: str):
     """The stack with the roughness and the index of its coat from a texture."""
     rng = np.random.default_rng(0)
 
@@ -38,20 +40,34 @@ def textured(mi, stack: vt.Stack):
 
     material = vt.stack.dumps(stack, "json")
     maps = {"layer0_alpha": image(0.02, 0.1), "layer0_eta": image(1.4, 1.6)}
-    return mi.load_dict({"type": "layered", "material": material, **maps})
+    return mi.load_dict({"type": "layered", "material": material, "model": model, **maps})
 
 
-def bsdfs(mi) -> dict:
+def bsdfs(mi, model: str) -> dict:
     """By name, the yardstick first."""
     found = {"principled": mi.load_dict({"type": "principled", "roughness": 0.2, "metallic": 0.8, "clearcoat": 0.5})}
-    found |= {name: vt.bsdf(stack) for name, stack in stacks().items()}
-    found["two, textured"] = textured(mi, stacks()["two interfaces"])
+    found |= {name: vt.bsdf(stack, model=model) for name, stack in stacks().items()}
+    found["two, textured"] = textured(mi, stacks()["two interfaces"], model)
     return found
 
 
-def interleaved(jobs: dict, rounds: int) -> dict[str, float]:
-    """Median over rounds of each job's time over the first one's in the same round."""
-    times: dict[str, list[float]] = {name: [] for name in jobs}
+def picture(mi, bsdf, size: int, spp: int):
+    """What renders the ball once, for a seed."""
+    import drjit as dr
+
+    description = scene_dict("ball", "studio", bsdf, (size, size), ZOOM)
+    scene = mi.load_dict({**description, "integrator": {"type": "path", "max_depth": 4}})
+
+    def job(seed: int) -> None:
+        dr.eval(mi.render(scene, spp=spp, seed=seed))
+        dr.sync_thread()
+
+    return job
+
+
+def timed(jobs: dict, rounds: int) -> dict[Any, list[float]]:
+    """Seconds that each job takes, interleaved, once per round."""
+    times: dict[Any, list[float]] = {name: [] for name in jobs}
     for job in jobs.values():
         job(0)  # compile
     for number in range(rounds):
@@ -59,6 +75,12 @@ def interleaved(jobs: dict, rounds: int) -> dict[str, float]:
             start = time.perf_counter()
             job(number + 1)
             times[name].append(time.perf_counter() - start)
+    return times
+
+
+def interleaved(jobs: dict, rounds: int) -> dict[str, float]:
+    """Median over rounds of each job's time over the first one's in the same round."""
+    times = timed(jobs, rounds)
     first = next(iter(times.values()))
     return {name: median(t / f for t, f in zip(values, first)) for name, values in times.items()}
 
@@ -69,22 +91,13 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--size", type=int, default=512)
     parser.add_argument("--variant", default="llvm_ad_rgb")
+    parser.add_argument("--model", default=DEFAULT)
     arguments = parser.parse_args()
     mi = kernel.mitsuba(arguments.variant)
     import drjit as dr
 
     vt.register()
-    materials = bsdfs(mi)
-
-    def picture(bsdf):
-        description = scene_dict("ball", "studio", bsdf, (arguments.size, arguments.size), ZOOM)
-        scene = mi.load_dict({**description, "integrator": {"type": "path", "max_depth": 4}})
-
-        def job(seed: int) -> None:
-            dr.eval(mi.render(scene, spp=arguments.spp, seed=seed))
-            dr.sync_thread()
-
-        return job
+    materials = bsdfs(mi, arguments.model)
 
     def evaluation(bsdf, count: int = 1 << 22):
         rng = mi.PCG32(count)
@@ -99,7 +112,10 @@ def main() -> None:
 
         return job
 
-    for title, make in (("render", picture), ("eval_pdf", evaluation)):
+    def render(bsdf):
+        return picture(mi, bsdf, arguments.size, arguments.spp)
+
+    for title, make in (("render", render), ("eval_pdf", evaluation)):
         ratios = interleaved({name: make(bsdf) for name, bsdf in materials.items()}, arguments.rounds)
         for name, ratio in ratios.items():
             print(f"{title:10s} {name:16s} {ratio:.3f}", flush=True)

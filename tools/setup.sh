@@ -50,6 +50,11 @@ fi
 say "installing velatura${1:+[$1]} into .venv (the first time takes a minute or two)"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".${1:+[$1]}"
 
+# Install a browser, which the shaders are tested in
+if [ "${1:-}" = dev ] && ! command -v chromium chromium-browser google-chrome >/dev/null; then
+  (apt_install chromium chromium-browser) || say "without Chromium, tests/browser is skipped"
+fi
+
 # Install LLVM; Mitsuba compiles its kernels with it
 llvm_works || apt_install libllvm19 libllvm{22,21,20} libllvm{18,17}{,t64}
 .venv/bin/velatura doctor >&2

@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 
-_PARTS = ("checks", "comparison", "inverse", "kernel", "model", "reference", "scenes", "stack", "tables")
+_PARTS = ("checks", "comparison", "inverse", "kernel", "model", "reference", "scenes", "shader", "stack", "tables")
 
 
 def __getattr__(name: str) -> Any:

@@ -30,6 +30,10 @@ from velatura.stack import (
 from velatura.stack import rgb as rgb_of
 from velatura.stack.schema import parameters
 
+#: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
+#: quarter of the mean of the three curves that make sRGB of a spectrum under D65.
+STEERING_NM = (445.0, 525.0, 585.0, 620.0)
+
 #: What stands in the stack for a value that a plugin got as a texture object.
 _STAND_IN = {"alpha_u": 0.1, "alpha_v": 0.1, "eta": 1.5, "k": 1.0}
 
@@ -40,22 +44,21 @@ class Image:
 
     texture: Any
     colour: bool
-    channel: int | None = None
     scale: float = 1.0
     offset: float = 0.0
     low: float = -np.inf
     high: float = np.inf
 
-    def at(self, mi: Any, si: Any, active: Any) -> Any:
+    @property
+    def varies(self) -> bool:
+        """Whether the value changes from point to point."""
+        return bool(self.texture.is_spatially_varying())
+
+    def at(self, si: Any, active: Any) -> Any:
         """The value at a surface point: a colour or spectrum, or a number."""
         import drjit as dr
 
-        if self.colour:
-            value = self.texture.eval(si, active)
-        elif self.channel is None:
-            value = self.texture.eval_1(si, active)
-        else:
-            value = self.texture.eval_3(si, active)[self.channel]
+        value = self.texture.eval(si, active) if self.colour else self.texture.eval_1(si, active)
         return dr.clip(value * self.scale + self.offset, self.low, self.high)
 
 
@@ -64,8 +67,10 @@ class Field:
     """Directions away from a centre of the texture coordinates, or around it, as degrees from dp/du."""
 
     brushing: Brushing
+    colour: bool = False
+    varies: bool = True
 
-    def at(self, mi: Any, si: Any, active: Any) -> Any:
+    def at(self, si: Any, active: Any) -> Any:
         """The angle at a surface point; 0 more than the offset where the surface has no texture coordinates."""
         import drjit as dr
 
@@ -86,6 +91,7 @@ class Binding:
         stack: the material as described; textures given as objects have a number standing in.
         constants: Dr.Jit values by flat name.
         images: textures, spectra and fields by flat name.
+        steering: colours of those that are the same everywhere, at `STEERING_NM`; in spectral variants.
 
     Raises:
         InvalidInput: in one line, whatever a material file would be refused for, and unknown names.
@@ -107,18 +113,60 @@ class Binding:
             self.stack = Stack.from_flat(None, {**numbers, **stand_ins})
         self.constants: dict[str, Any] = {}
         self.images: dict[str, Image | Field] = {}
-        for name, value in self.stack.flat().items():
-            self._bind(name, objects.get(name, value))
+        values = {**self.stack.flat(), **objects}
+        for name, value in values.items():
+            along = name.replace("_alpha_v", "_alpha_u")
+            if along != name and along in self.images and value == values[along]:
+                self.images[name] = self.images[along]  # so that the interface stays isotropic
+            else:
+                self._bind(name, value)
+        self.steering: dict[str, Any] = {}
+        self.update()
 
     @property
     def uniform(self) -> bool:
         """Whether no value changes from point to point, or with the wavelengths of a ray."""
         return not self.images
 
+    @property
+    def varies(self) -> bool:
+        """Whether any value changes from point to point."""
+        return any(image.varies for image in self.images.values())
+
+    def update(self) -> None:
+        """Work out what steers, after any value has changed."""
+        import drjit as dr
+
+        if self.mi.is_spectral:
+            si = self._at_fixed_wavelengths(dr.zeros(self.mi.SurfaceInteraction3f))
+            flat = [name for name, image in self.images.items() if image.colour and not image.varies]
+            self.steering = {name: self.images[name].at(si, True) for name in flat}
+            dr.make_opaque(self.steering)
+
     def at(self, si: Any, active: Any) -> dict[str, Any]:
         """All values at a surface point by flat name."""
-        found = {name: image.at(self.mi, si, active) for name, image in self.images.items()}
+        found = {name: image.at(si, active) for name, image in self.images.items()}
         return {**self.values(), **found}
+
+    def steered(self, si: Any, active: Any) -> dict[str, Any]:
+        """As `at`, but spectra are at fixed wavelengths and then at those of the ray, as `velatura.ops` has them.
+
+        So the shape of a lobe does not depend on which wavelengths a ray carries.
+        """
+        values = self.at(si, active)
+        if not self.mi.is_spectral:
+            return values
+        fixed = self._at_fixed_wavelengths(si)
+        spectra = {name: image for name, image in self.images.items() if image.colour}
+        for name, image in spectra.items():
+            steering = self.steering[name] if name in self.steering else image.at(fixed, active)
+            values[name] = self.mi.ArrayXf([*steering, *values[name]])
+        return {**values, **self.constants}
+
+    def _at_fixed_wavelengths(self, si: Any) -> Any:
+        fixed = self.mi.SurfaceInteraction3f(si)
+        fixed.wavelengths = type(si.wavelengths)(*STEERING_NM)
+        return fixed
 
     def values(self) -> dict[str, Any]:
         """The constants by flat name, colours as colours."""
@@ -143,48 +191,75 @@ class Binding:
     # How a value of the stack becomes one of Mitsuba's
 
     def _bind(self, name: str, value: Any) -> None:
-        key, mi = _key(name), self.mi
-        colour = is_colour(name)
+        mi = self.mi
         if isinstance(value, mi.Object):
-            self.images[name] = Image(value, colour, None, **_range(key))
+            self.images[name] = self._object(name, value)
         elif isinstance(value, Texture):
             self.images[name] = self._image(name, value)
         elif isinstance(value, Brushing):
             self.images[name] = Field(value)
-        elif colour and mi.is_spectral and not isinstance(value, float):
-            self.images[name] = self._spectrum(value)
+        elif is_colour(name) and mi.is_spectral and not isinstance(value, float):
+            self.images[name] = self._spectrum(name, value)
         else:
             value = rgb_of(value) if isinstance(value, Named) else value
             self.constants[name] = mi.Color3f(*value) if isinstance(value, tuple) else mi.Float(value)
 
-    def _image(self, name: str, image: Texture) -> Image:
-        key = _key(name)
-        raw = image.encoding == "linear"
-        try:
-            texture = self.mi.load_dict({"type": "bitmap", "filename": str(image.texture), "raw": raw})
-        except RuntimeError:
-            raise InvalidInput(f"{name}: the texture {image.texture} is no image that Mitsuba can read") from None
-        colour = is_colour(name) and image.channel in (None, "rgb")
-        channels = self.mi.traverse(texture)["data"].shape[-1]
-        channel = None if colour or channels == 1 else "rgba".index(image.channel or "r")
-        return Image(texture, colour, channel, image.scale, image.offset, **_range(key))
+    def _object(self, name: str, texture: Any) -> Image:
+        import drjit as dr
 
-    def _spectrum(self, value: Any) -> Image:
+        image = Image(texture, is_colour(name), **_range(name))
+        try:
+            image.at(dr.zeros(self.mi.SurfaceInteraction3f), True)
+        except (RuntimeError, AttributeError, TypeError):
+            what = "colours" if image.colour else "numbers"
+            raise InvalidInput(f"{name}: needs a texture of {what} in the variant {self.mi.variant()}") from None
+        return image
+
+    def _image(self, name: str, image: Texture) -> Image:
+        colour = is_colour(name) and image.channel in (None, "rgb")
+        texels, scale = _texels(self.mi, name, image, colour), image.scale
+        upsampled = self.mi.is_spectral and texels.shape[-1] == 3
+        if upsampled:
+            peak = max(float(texels.max()), 1.0)
+            texels, scale = np.clip(texels / peak, 0, 1), scale * peak
+        texture = {"type": "bitmap", "bitmap": self.mi.Bitmap(texels), "raw": not upsampled}
+        return Image(self.mi.load_dict(texture), colour, scale, image.offset, **_range(name))
+
+    def _spectrum(self, name: str, value: Any) -> Image:
+        limits = _range(name)
         if isinstance(value, Named):
             nm, values = spectrum(value)
             pairs = list(zip(nm.tolist(), values.tolist()))
-            return Image(self.mi.load_dict({"type": "spectrum", "value": pairs}), True)
-        peak = 2 * max(*value, 1e-6)  # Mitsuba finds smooth spectra for colours up to 1
+            return Image(self.mi.load_dict({"type": "spectrum", "value": pairs}), True, **limits)
+        # Mitsuba finds spectra for colours up to 1, and smooth ones for those well below
+        peak = 1.0 if limits["high"] <= 1 else 2 * max(*value, 1e-6)
         scaled = [channel / peak for channel in value]
-        return Image(self.mi.load_dict({"type": "rgb", "value": scaled}), True, scale=peak)
+        return Image(self.mi.load_dict({"type": "rgb", "value": scaled}), True, peak, **limits)
+
+
+def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
+    """Linear texels of an image, shape (height, width, 3), or 1 for numbers and grey."""
+    try:
+        read = mi.Bitmap(str(image.texture))
+        read.set_srgb_gamma(image.encoding == "srgb")
+        texels = np.array(read.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=False))
+    except RuntimeError:
+        raise InvalidInput(f"{name}: the texture {image.texture} is no image that Mitsuba can read") from None
+    if not np.isfinite(texels).all():
+        raise InvalidInput(f"{name}: the texture {image.texture} has texels that are not finite")
+    # Tell colours from opacity, which stands last
+    texels = texels.reshape(*texels.shape[:2], -1)
+    channels = {1: "r", 2: "ra", 3: "rgb", 4: "rgba"}.get(texels.shape[-1], "")
+    grey = "g" not in channels
+    wanted = ("r" if grey else "rgb") if colour else (image.channel or "r")
+    wanted = "r" if grey and wanted in "rgb" else wanted
+    if not channels or not set(wanted) <= set(channels):
+        raise InvalidInput(f"{name}: the texture {image.texture} has no channel {wanted}, only {channels or 'others'}")
+    return np.ascontiguousarray(texels[..., [channels.index(c) for c in wanted]])
 
 
 def _described(material: str) -> Stack:
     return loads(material, "material.json") if material.lstrip().startswith("{") else load(material)
-
-
-def _key(name: str) -> str:
-    return name.partition("_")[2] if name.startswith("layer") else name
 
 
 def _plain(value: Any) -> Any:
@@ -197,8 +272,9 @@ def _plain(value: Any) -> Any:
         raise InvalidInput(f"expected a number, a colour or a texture, got {type(value).__name__}") from None
 
 
-def _range(key: str) -> dict[str, float]:
-    """Range of a value, a little inside where its ends are excluded."""
+def _range(name: str) -> dict[str, float]:
+    """Range of the value of that flat name, a little inside where its ends are excluded."""
+    key = name.partition("_")[2]
     declared = {k: p for model in (Interface, Medium, Diffuse) for k, p in parameters(model).items()}
     parameter: Any = declared["alpha" if key.startswith("alpha") else key]
     margin = 1e-3 if parameter.strict else 0.0

@@ -9,9 +9,10 @@ inside a renderer and is differentiable. The types of the arguments choose the d
 - values of a class with a `dialect` of its own, alone or mixed with floats and NumPy arrays, give values of that class
   (the recorder's, which print as shader code).
 
-Colour is the leading axis of an array; a float is the same in all channels. `sqrt` and `divide` clamp arguments outside
-their domain instead of answering NaN, so that the branch which a `select` throws away poisons neither
-value nor gradient.
+Colour is the leading axis of an array; a float is the same in all channels. A Dr.Jit array with any number of channels
+is a spectrum: half of it at fixed wavelengths, whose `mean` stands for all light, and half at those of a ray. `sqrt`
+and `divide` clamp arguments outside their domain instead of answering NaN, so that the branch which a `select` throws
+away poisons neither value nor gradient.
 """
 
 from __future__ import annotations
@@ -99,19 +100,21 @@ class _DrJit:
         self._dr = dr
 
     def _is_colour(self, x: Value) -> bool:
-        return self._dr.size_v(x) > 1  # an array of lanes has a dynamic size, which reads -1
+        return self._dr.is_array_v(x) and (self._dr.depth_v(x) > 1 or not self._dr.is_jit_v(x))
 
     def mean(self, x: Value) -> Value:
-        return self._dr.mean(x) if self._is_colour(x) else x
+        if not self._is_colour(x):
+            return x
+        return self._dr.mean(x[: len(x) // 2] if self._dr.size_v(x) < 0 else x)
 
     def maximum_channel(self, x: Value) -> Value:
         return self._dr.max(x) if self._is_colour(x) else x
 
     def interpolate(self, table: Gridded, coordinates: Sequence[Value]) -> list[Value]:
-        colour = next((type(x) for x in coordinates if self._is_colour(x)), None)
+        colour = next((x for x in coordinates if self._is_colour(x)), None)
         if colour is not None:
-            channels = [[x[c] if self._is_colour(x) else x for x in coordinates] for c in range(len(colour()))]
-            return [colour(*values) for values in zip(*(interpolate(table, *x) for x in channels))]
+            channels = [[x[c] if self._is_colour(x) else x for x in coordinates] for c in range(len(colour))]
+            return [type(colour)(list(values)) for values in zip(*(interpolate(table, *x) for x in channels))]
         number = next(type(x) for x in coordinates if not isinstance(x, float))
         texture = table.texture(sys.modules[number.__module__])
         centres = [(x * (n - 1) + 0.5) / n for x, n in zip(coordinates, table.shape)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,6 +19,7 @@ from velatura.figures import (
     belcour2018_21,
     belcour2018_22,
     belcour2018_table2,
+    bounces,
     figure,
     linear_space,
 )
@@ -26,19 +27,69 @@ from velatura.optics import fresnel
 from velatura.stack import Interface, Stack, rgb
 
 Run = Callable[..., tuple[int, str, str]]
+Made = Callable[[str], dict[str, Any]]
 
 SMALL: dict[str, dict[str, Any]] = {
+    "before-after": {"presets": ("frosted-metal",), "size": 16, "spp": 2},
+    "bati2021-01": {"size": 16, "spp": 2},
+    "bati2021-04": {"count": 8},
+    "bati2021-05": {"size": 16, "spp": 2},
+    "bati2021-06": {"alphas": (0.1,), "count": 20},
     "bati2021-07": {"count": 20},
+    "bati2021-08": {"ratios": (1.5,), "count": 10},
+    "bati2021-09": {"energies": (0.3,), "count": 40},
+    "bati2021-10": {"size": 16, "spp": 2},
+    "bati2021-11": {"alphas": (0.1,), "count": 20},
+    "bati2021-12": {"count": 32},
+    "bati2021-14": {"size": 16, "spp": 2},
+    "bati2021-15": {"size": 16, "spp": 2},
+    "bati2021-16": {"size": 16, "spp": 2},
     "bati2021-17": {"size": 16, "spp": 2},
+    "bati2021-18": {"size": 16, "spp": 2},
+    "bati2021-19": {"size": 16, "spp": 2},
+    "bati2021-20": {"size": 16, "spp": 2},
+    "bati2021-21": {"size": 16, "spp": 2},
+    "bati2021-22": {"size": 16, "spp": 2},
+    "bati2021-23": {"size": 16, "spp": 2},
+    "bati2021-24": {"size": 16, "spp": 2},
     "bati2021-25": {"targets": ("15 c", "16"), "paths": 20_000},
+    "belcour2018-03": {"alphas": (0.1, 1.0), "count": 2**16},
+    "belcour2018-04": {"first": (0.0, 0.2, 0.8), "second": (0.0, 0.1, 0.3, 0.9)},
+    "belcour2018-05": {"alphas": (0.02, 0.5), "sines": (0.0, 0.6), "paths": 40_000},
+    "belcour2018-06": {},
+    "belcour2018-07": {"alpha": 0.02, "angles": (0, 60), "count": 8001},
+    "belcour2018-08": {"depths": (0.0, 1.0), "asymmetries": (0.5, 0.7, 0.8, 0.95)},
     "belcour2018-11": {"alpha": 0.01, "size": 32, "spp": 32, "paths": 100_000},
     "belcour2018-12": {"angles": (0, 60), "size": 32, "spp": 8, "paths": 60_000},
     "belcour2018-13": {"size": 96, "spp": 32, "paths": 60_000},
+    "belcour2018-14": {"names": ("depth 0.5",), "size": 24, "spp": 32, "paths": 40_000},
+    "belcour2018-15": {"materials": ("two layers",), "size": 24, "spp": 32},
+    "belcour2018-16": {"size": 24, "spp": 32},
+    "belcour2018-17": {"size": 24, "spp": 32, "paths": 60_000},
     "belcour2018-19": {"alphas": (0.1, 1.0), "size": 32, "spp": 8, "paths": 100_000},
+    "belcour2018-20": {"count": 2**13},
     "belcour2018-21": {"alphas": (0, 0.5, 0.9), "angles": (0, 70), "paths": 60_000},
     "belcour2018-22": {"coats": (0.1,), "metals": ("gold",), "size": 48, "spp": 64, "paths": 60_000},
-    "belcour2018-table2": {"size": 32, "spp": 16, "repeats": 1},
+    "belcour2018-table2": {"names": ("frosted metal", "dragon"), "size": 32, "spp": 16, "repeats": 1},
     "linear-space": {"count": 2**14},
+    "weier2020-04": {"count": 300},
+    "weier2020-05": {"side": 9, "count": 1024},
+    "weier2020-06": {"alphas": (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.6, 0.8, 1.0), "count": 2**13},
+    "weier2020-07": {"first": (0.1,), "second": (0.1, 0.2, 0.6)},
+    "weier2020-08": {"size": 24, "spp": 32, "paths": 100_000},
+    "weier2020-09": {"size": 24, "spp": 32, "paths": 60_000},
+    "weier2020-10": {"names": ("metal 0.01, 0.01", "metal 0.3, 0.3"), "size": 24, "spp": 32, "paths": 60_000},
+    "weier2020-11": {"names": ("coat 0.05, 0.5",), "size": 24, "spp": 32, "paths": 60_000},
+    "weier2020-13": {"size": 24, "spp": 32, "paths": 60_000},
+    "weier2020-14": {"paths": 300_000},
+    "weier2020-table2": {"size": 24, "spp": 16, "repeats": 1},
+    "yamaguchi2019-02": {},
+    "yamaguchi2019-03": {"angles": (0, 45), "count": 800},
+    "yamaguchi2019-04": {"names": ("(b)",), "size": 32, "spp": 32},
+    "yamaguchi2019-05": {"counts": (4,), "size": 16, "repeats": 1},
+    "yamaguchi2019-06": {"names": ("(b)",), "size": 24, "spp": 32, "paths": 60_000},
+    "yamaguchi2019-07": {"names": ("60°",), "size": 24, "spp": 32, "paths": 60_000},
+    "yamaguchi2019-08": {"names": ("(b)", "(c)"), "size": 24, "spp": 32, "paths": 60_000},
 }
 
 
@@ -48,6 +99,20 @@ def drawn(module: Any, numbers: dict[str, Any], folder: Path) -> None:
     module.draw(numbers, folder / "figure.png")
     (found,) = folder.iterdir()
     assert found.name == "figure.png" and found.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Made:
+    """Computes a figure, quickly, and draws it; returns its numbers."""
+
+    def make(name: str) -> dict[str, Any]:
+        (folder := tmp_path / name).mkdir()
+        module = figure(name)
+        numbers: dict[str, Any] = cast(Any, module).compute(**SMALL[name])
+        drawn(module, numbers, folder)
+        return numbers
+
+    return make
 
 
 def test_colour_saturates_as_light_bounces(tmp_path: Path) -> None:
@@ -135,7 +200,7 @@ def test_the_model_costs_more_than_the_baseline_and_tells_more(tmp_path: Path) -
     numbers = belcour2018_table2.compute(**SMALL["belcour2018-table2"])
     found = numbers["scenes"]
     assert {name: list(scene["ratio"]) for name, scene in found.items()} == {
-        name: list(belcour2018_table2.COLUMNS) for name in belcour2018_table2.SCENES
+        name: list(belcour2018_table2.COLUMNS) for name in SMALL["belcour2018-table2"]["names"]
     }
     assert all(seconds > 0 for scene in found.values() for seconds in scene["seconds"].values())
     # The model is nearer to the walk than the baseline is, in all that is seen
@@ -161,6 +226,206 @@ def test_the_roughness_maps_come_out_of_two_bounces(tmp_path: Path) -> None:
     median = dict(zip(found["median"]["alpha"], found["median"]["equivalent"]))
     assert median[0.001] / 0.001 == pytest.approx(1.671, rel=0.01)
     drawn(linear_space, found, tmp_path)
+
+
+# The linear space, and one interface
+
+
+def test_variance_of_one_and_two_bounces(made: Made) -> None:
+    """Belcour 2018, figures 3 and 20. Expected: at alpha 1 what the integral says; two are wider, up to .9."""
+    found = made("belcour2018-03")
+    assert found["one"][1] == pytest.approx(1 / (12 * (1 - np.log(2))), rel=2e-3)
+    assert found["two"][0] > 1.7 * found["one"][0]
+    found = made("belcour2018-20")
+    alpha, equivalent, told = (np.array(found[name], float) for name in ("alpha", "equivalent", "belcour"))
+    part = (alpha > 0.1) & (alpha < 0.5)
+    assert np.all(abs(told - equivalent)[part] < 0.025)
+    assert np.all(equivalent[alpha < 0.8] > alpha[alpha < 0.8])
+
+
+def test_two_bounces_are_equivalent_to_one(made: Made) -> None:
+    """Belcour 2018, figure 4, and Weier & Belcour 2020, figure 7. Expected: both maps do well where both are smooth.
+
+    A mirror changes nothing. Where one surface is rough the bounces are less wide than any map says.
+    """
+    found = made("belcour2018-04")
+    mirror, smooth, rough = found["curves"]
+    for name in ("variance", "median", "belcour", "weier"):
+        np.testing.assert_allclose(mirror[name], found["second"], atol=5e-3)
+    assert all(np.max(list(errors.values())) < 0.02 for errors in found["error"].values())
+    assert rough["variance"][2] < 0.7 < 0.8 < rough["belcour"][2] < rough["weier"][2]
+    assert smooth["variance"] == sorted(smooth["variance"])
+    # The later map is the better one
+    for errors in made("weier2020-07")["error"].values():
+        assert errors["weier"] < 0.6 * errors["belcour"]
+
+
+def test_what_a_rough_interface_refracts(made: Made) -> None:
+    """Belcour 2018, figures 5 to 7. Expected: Snell's mean and Eq. 10's width where alpha is low."""
+    found = made("belcour2018-05")
+    sharp, blurred = ([c for c in found["curves"] if c["alpha"] == alpha] for alpha in (0.02, 0.5))
+    for curve in sharp:
+        np.testing.assert_allclose(curve["mean"], curve["snell"], atol=6e-3)
+    assert all(curve["mean"][1] > curve["snell"][1] + 0.02 for curve in blurred[:3])
+    # A lobe is as wide as the slopes are times the Jacobian: 2 cos, and its share by Eq. 10
+    widths = made("belcour2018-06")["width"]
+    cosine = np.cos(np.radians(30))
+    below = np.sqrt(1 - (0.5 / 1.5) ** 2)
+    assert widths["refracted"] / widths["reflected"] == pytest.approx((below - cosine / 1.5) / (2 * cosine), rel=0.02)
+    for curve in made("belcour2018-07")["curves"]:
+        width = curve["width"]
+        np.testing.assert_allclose(width["angles"], width["refracted"], rtol=0.01)
+        assert width["shipped"][0] == pytest.approx(width["refracted"][0], rel=0.01)
+        assert len(curve["angle"]) == 1 or width["shipped"][1] < 0.75 * width["refracted"][1]
+
+
+def test_how_rough_a_medium_looks(made: Made) -> None:
+    """Belcour 2018, figure 8. Expected: the fit is that of variances from g = .7 on; absorption narrows a wide lobe.
+
+    The median of scattering angles is known, and so is the roughness of which half of all normals are less steep.
+    """
+    found = made("belcour2018-08")
+    variance, model, g = np.array(found["variance"], float), np.array(found["model"]), np.array(found["g"])
+    np.testing.assert_allclose(model[1:3], variance[0, 1:3], rtol=0.04)
+    assert model[0] < 0.9 * variance[0, 0]
+    assert variance[1, 0] < 0.6 * variance[0, 0]
+    x = g[-1]
+    forwards = (1 - x) / (2 * x) * ((1 + x) / np.sqrt(1 + x * x) - 1)  # what is scattered backwards
+    share = forwards + (1 - forwards) / 2
+    cosine = (1 + x * x - ((1 - x * x) / (1 + x * (2 * share - 1))) ** 2) / (2 * x)
+    assert found["median"][0][-1] == pytest.approx(np.tan(np.arccos(cosine) / 2), rel=0.02)
+
+
+def test_lobes_on_the_disc_keep_to_the_axes(made: Made) -> None:
+    """Weier & Belcour 2020, figure 4; Yamaguchi et al. 2019, figures 2 and 3. Expected: so unless rough and grazing."""
+    cells = made("weier2020-04")["cells"]
+    assert all(abs(cell["turn"]) < 1e-6 for cell in cells if cell["phi"] == 0)
+    turns = {(cell["alpha"][0], cell["theta"]): abs(cell["turn"]) for cell in cells if cell["phi"]}
+    assert turns[0.05, 45] < 0.3 and turns[0.1, 45] < 2 and turns[0.1, 70] > 4
+    found = made("yamaguchi2019-02")
+    assert abs(found["reflected"]["turn"]) < 0.3
+    assert found["reflected"]["size"] / found["normals"]["size"] == pytest.approx(found["size_by_jacobian"], rel=0.02)
+    found = made("yamaguchi2019-03")
+    for name in ("reflected", "refracted"):
+        np.testing.assert_allclose(found[name]["size"], found[name]["jacobian"], rtol=0.03)
+        np.testing.assert_allclose(found[name]["aspect"], found["normals"]["aspect"], rtol=0.05)
+
+
+def test_the_stretched_fetch_knows_of_the_azimuth(made: Made) -> None:
+    """Weier & Belcour 2020, figure 5. Expected: its error is a fraction of the isotropic fetch's."""
+    found = made("weier2020-05")
+    error = {name: values[0] for name, values in found["error"].items()}
+    assert error["averaged"] < error["stretched"] < 0.3 * error["isotropic"]
+    # Along the normal Schlick's Fresnel hardly varies over the facets
+    _, kept = bounces.bounce(bounces.along(bounces.NORMAL, 2**12), 1e-3, 0.5, *bounces.uniform(2**12)[:2])
+    assert found["albedo"]["truth"][4][4] == pytest.approx(0.04 * kept.mean(), rel=0.02)
+
+
+def test_two_anisotropic_bounces(made: Made) -> None:
+    """Weier & Belcour 2020, figure 6. Expected: both fits are close where alpha is low; one axis knows of the other."""
+    found = made("weier2020-06")
+    assert max(found["error"].values()) < 0.015
+    assert found["error_above"]["weier-2d"] < 0.8 * found["error_above"]["weier"]
+    assert found["variance"][-1][-1] == pytest.approx(1 / (12 * (1 - np.log(2))), rel=0.01)
+    # Not borne out: not even a smooth axis is left alone by the other one
+    smooth = found["variance"][found["alpha"].index(0.1)]
+    assert smooth[-1] < 0.5 * smooth[0]
+
+
+# Layers, brushed or not
+
+
+def alpha(cell: dict[str, Any], title: str) -> Any:
+    """The roughness of a cell's last lobe, of shape (cosines, 2), over that of the walk."""
+    return np.divide(cell["alpha"][title], cell["alpha"]["walk"])
+
+
+def test_the_map_of_weier_is_nearer_to_the_truth(made: Made) -> None:
+    """Weier & Belcour 2020, figures 8 and 9. Expected: nearer than Belcour's, in sum; the fit over both axes still."""
+    (cell,) = made("weier2020-08")["cells"]
+    misses = {name: abs(np.log(alpha(cell, name))).mean(axis=1) for name in ("belcour", "weier")}
+    assert misses["weier"][:3].sum() < misses["belcour"][:3].sum() < 0.5
+    assert misses["weier"][0] < 0.08
+    (cell,) = made("weier2020-09")["cells"]
+    misses = {name: abs(np.log(alpha(cell, name)))[:3].sum() for name in ("weier", "weier-2d")}
+    assert misses["weier-2d"] < 0.8 * misses["weier"]
+
+
+def test_weier_is_close_unless_rough_and_grazing(made: Made) -> None:
+    """Weier & Belcour 2020, figures 10, 11 and 13. Expected: the rougher the coat and the flatter, the wider."""
+    smooth, rough = made("weier2020-10")["cells"]
+    assert np.all(abs(alpha(smooth, "weier2020")[:3] - 1) < 0.1)
+    ratio = alpha(rough, "weier2020")
+    assert np.all(abs(ratio[0] - 1) < 0.06) and np.all(ratio[2] > 1.2)
+    (coated,) = made("weier2020-11")["cells"]
+    ratio = alpha(coated, "weier2020")
+    assert ratio[0, 1] > 1.2 and ratio[2, 1] > 1.5
+    (brushed,) = made("weier2020-13")["cells"]
+    ratio = alpha(brushed, "weier2020")
+    assert np.all(abs(ratio[0] - 1) < 0.1) and np.all(ratio[3] > 1.6)
+    # What is known: the coat reflects .04 along the normal, and the metal nearly all
+    assert brushed["energy"]["weier2020"][0] == pytest.approx(0.96, abs=5e-3)
+
+
+def test_opposing_anisotropies_make_a_diamond(made: Made) -> None:
+    """Weier & Belcour 2020, figure 14. Expected: 1 for any GGX lobe, more for the truth, whose widths are right."""
+    found = made("weier2020-14")
+    assert found["model"]["diagonal"] == pytest.approx(1, abs=0.01)
+    assert found["walk"]["diagonal"] > 1.1
+    np.testing.assert_allclose(found["model"]["alpha"], found["walk"]["alpha"], rtol=0.1)
+
+
+def test_layers_are_brushed_each_in_its_own_way(made: Made) -> None:
+    """Yamaguchi et al. 2019, figures 4, 6, 7 and 8. Expected: as the truth along the normal, not at the rim."""
+    (cell,) = made("yamaguchi2019-04")["cells"]
+    assert cell["mean"]["yamaguchi2019"] == pytest.approx(cell["mean"]["reference"], rel=0.05)
+    (brushed,) = made("yamaguchi2019-06")["cells"]
+    (turned,) = made("yamaguchi2019-07")["cells"]
+    coated, scattering = made("yamaguchi2019-08")["cells"]
+    for cell in (brushed, turned, coated):
+        assert np.all(abs(alpha(cell, "yamaguchi2019")[0] - 1) < 0.1)
+        assert np.any(abs(alpha(cell, "yamaguchi2019")[3] - 1) > 0.1)
+    # Not borne out: the medium, as published, blurs all light, and hides the brushing
+    assert np.all(alpha(scattering, "yamaguchi2019")[0] > (1.1, 1.6))
+
+
+def test_scattering_over_gold_blurs_and_does_not_darken(made: Made) -> None:
+    """Belcour 2018, figure 14. Expected: the published medium darkens; the truth absorbs nothing, and does not."""
+    (cell,) = made("belcour2018-14")["cells"]
+    energy = {title: values[0] for title, values in cell["energy"].items()}
+    assert energy["shipped"] < 0.8 * energy["walk"] and energy["doubled"] > 0.93 * energy["walk"]
+    assert cell["mean"]["shipped"] < 0.65 * cell["mean"]["reference"]
+    assert cell["alpha"]["shipped"][0][0] > 2 * cell["alpha"]["walk"][0][0]
+
+
+def test_textured_plates_and_ball(made: Made) -> None:
+    """Belcour 2018, figures 15 and 16. Expected: about as bright as the truth, in both forms."""
+    for cell in [*made("belcour2018-15")["cells"], *made("belcour2018-16")["cells"]]:
+        truth = cell["mean"].pop("reference")
+        assert all(mean == pytest.approx(truth, rel=0.12) for mean in cell["mean"].values())
+
+
+def test_the_variant_for_real_time_is_brighter_at_grazing_angles(made: Made) -> None:
+    """Belcour 2018, figure 17. Expected: so, because of its split sum; both are close to the truth elsewhere."""
+    (cell,) = made("belcour2018-17")["cells"]
+    energy = {title: np.array(values) for title, values in cell["energy"].items()}
+    assert np.all(energy["realtime"][1:] > 1.05 * energy["forward"][1:])
+    np.testing.assert_allclose(energy["forward"][:3], energy["walk"][:3], rtol=0.03)
+    assert np.all(abs(alpha(cell, "realtime")[0] - 1) < 0.05)
+
+
+def test_what_anisotropy_costs(made: Made) -> None:
+    """Weier & Belcour 2020, table 2, and Yamaguchi et al. 2019, figure 5. Seconds are the machine's.
+
+    Expected: on an isotropic material both models paint nearly the same picture.
+    """
+    found = made("weier2020-table2")
+    means = [np.mean(image) for image in found["pictures"]["area light"].values()]
+    assert means[0] == pytest.approx(means[1], rel=0.03)
+    assert all(min(scene["seconds"].values()) > 0 for scene in found["scenes"].values())
+    found = made("yamaguchi2019-05")
+    one, other = (found["seconds"][name][0] for name in ("anisotropic", "textured"))
+    assert found["overhead"][0] == pytest.approx(one / other - 1) and min(one, other) > 0
 
 
 # The verb

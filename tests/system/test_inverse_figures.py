@@ -7,8 +7,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
-from velatura.figures import bati2021_07, bati2021_17, bati2021_25
+from velatura.figures import (
+    bati2021_01,
+    bati2021_04,
+    bati2021_05,
+    bati2021_06,
+    bati2021_07,
+    bati2021_08,
+    bati2021_09,
+    bati2021_10,
+    bati2021_11,
+    bati2021_12,
+    bati2021_14,
+    bati2021_15,
+    bati2021_16,
+    bati2021_17,
+    bati2021_18,
+    bati2021_19,
+    bati2021_20,
+    bati2021_21,
+    bati2021_22,
+    bati2021_23,
+    bati2021_24,
+    bati2021_25,
+    canvas,
+    looks,
+)
 
 
 def drawn(module: Any, numbers: dict[str, Any], folder: Path) -> None:
@@ -58,3 +84,182 @@ def test_lobes_obtained_are_those_expected(tmp_path: Path) -> None:
         energy = row["energy"]
         assert np.allclose(energy["walk"], energy["expected"], rtol=0.05)
     drawn(bati2021_25, found, tmp_path)
+
+
+def test_one_interface_has_two_roots_or_a_curve(tmp_path: Path) -> None:
+    """Figure 4. Expected: what is inverted reflects what was asked for; the lower root from (1+r)/(1-r) on, r^2 = R."""
+    found = bati2021_04.compute(count=31)
+    assert found["deviation"] < 1e-8
+    eta_0 = np.array(found["eta_0"])
+    for case in found["dielectrics"]:
+        root = case["reflectance"] ** 0.5
+        bound = (1 + root) / (1 - root)
+        assert [eta is not None for eta in case["rarer"]] == (eta_0 >= bound).tolist()
+        assert [eta is not None for eta in case["denser"]] == (eta_0 * bound <= 4).tolist()
+    for case in found["conductors"]:
+        r = case["reflectance"]
+        bounds = (1 - r) / (1 + r), (1 + r + (6 * r - 1 - r * r) ** 0.5) / (2 * (1 - r))
+        assert np.allclose(np.array(case["eta"])[[0, -1]] / case["eta_0"], bounds)
+        assert case["k"][-1] == pytest.approx(case["eta"][-1])
+    drawn(bati2021_04, found, tmp_path)
+
+
+def test_fresnel_is_close_where_the_paper_says_so(tmp_path: Path) -> None:
+    """Figure 6: a good approximation above 1 for low roughness, not below 1 for an alpha above .1."""
+    found = bati2021_06.compute(alphas=(0.01, 0.1, 0.2), count=60)
+    low, middle, high = found["rough"]
+    assert low["denser"] < 1e-3 and middle["denser"] < 0.02
+    assert high["rarer"] > 0.3 and high["rarer"] > 5 * high["denser"]
+    drawn(bati2021_06, found, tmp_path)
+
+
+def test_the_slab_gains_most_at_grazing_angles(tmp_path: Path) -> None:
+    """Figure 8. Expected: nothing is gained head-on; no physical pair gains as much as the slab."""
+    found = bati2021_08.compute(count=45)
+    gain = {point["name"]: np.array(point["gain"]) for point in found["points"]}
+    assert all(abs(values[0]) < 1e-9 for values in gain.values())
+    assert max(gain, key=lambda name: gain[name].max()) == "slab"
+    assert min(values.min() for values in gain.values()) < -0.03
+    drawn(bati2021_08, found, tmp_path)
+
+
+def test_first_indices_of_smooth_pairs(tmp_path: Path) -> None:
+    """Figure 9: the listed sets, which the depths over both indices bear out."""
+    found = bati2021_09.compute(count=60)
+    listed = [[[1, 2.264]], [[1, 1.1791], [2.4488, 3.4221]], [[3.3367, 4]]]
+    for case, spans in zip(found["classes"], listed):
+        assert np.allclose(case["eta_1"], spans, atol=5e-4)
+        some = np.any(np.array(case["depth"], float) >= 0, axis=1)
+        inside = np.any(
+            [(np.array(found["eta"]) >= a) & (np.array(found["eta"]) <= b) for a, b in case["eta_1"]], axis=0
+        )
+        assert np.count_nonzero(some != inside) <= 2  # where a grid misses the tip of a class
+    drawn(bati2021_09, found, tmp_path)
+
+
+def test_rough_classes_end(tmp_path: Path) -> None:
+    """Figure 11: the known end at an alpha of .01; the rougher the pair, the later it comes."""
+    found = bati2021_11.compute(count=20)
+    ends = [row["ends"][-1][1] for row in found["classes"]]
+    assert ends[0] == pytest.approx(2.0786, abs=2e-3)
+    assert ends == sorted(ends)
+    drawn(bati2021_11, found, tmp_path)
+
+
+def test_colours_have_part_of_their_classes_in_common(tmp_path: Path) -> None:
+    """Figure 12: the listed set."""
+    found = bati2021_12.compute(count=40)
+    assert np.allclose(found["eta_1"], [[1, 1.79958], [2.11396, 2.57927]], atol=1e-4)
+    assert 0 < found["share"] < min(channel["share"] for channel in found["channels"])
+    drawn(bati2021_12, found, tmp_path)
+
+
+# Pictures. What they are of is tested without rendering, which costs most; one is rendered.
+
+
+@pytest.fixture
+def unlit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every picture is black."""
+    monkeypatch.setattr(canvas, "pictures", lambda *args, **options: np.zeros((2, 4, 4, 3)))
+
+
+def lobe(numbers: dict[str, Any], name: str, n: int) -> tuple[Any, float]:
+    """Energy (rgb) and variance of a stack's n-th lobe head-on."""
+    look = next(look for look in numbers["looks"] if look["name"] == name)
+    return np.array(look["energies"][n][0]), look["variances"][n][0]
+
+
+def test_members_of_a_class_differ_at_grazing_angles(unlit: None, tmp_path: Path) -> None:
+    """Figures 5, 10, 15 and 16. Expected: alike head-on; at grazing angles as captioned."""
+    found, at = bati2021_05.compute(), looks.GRAZING
+    for a, b in (("a denser", "a rarer"), ("b grey", "b green edge"), ("c grey", "c green edge")):
+        assert np.allclose(looks.energy(found, a), looks.energy(found, b), atol=1e-6)
+    air, coated = (looks.energy(found, f"{part} green edge", at) for part in "bc")
+    assert air[1] / air[0] > 1.3 > 1.1 > coated[1] / coated[0] > 1.01
+    drawn(bati2021_05, found, tmp_path)
+
+    found = bati2021_10.compute()
+    # The tables know Fresnel, of which the closed forms are, to 1e-5
+    assert all(np.allclose(look["energy"][0], 0.15, atol=1e-4) for look in found["looks"])
+    assert looks.energy(found, "a slab", at)[0] > 1.2 * looks.energy(found, "a one interface", at)[0]
+    for part in "bc":
+        assert looks.energy(found, f"{part} absorbing", at)[0] < 0.95 * looks.energy(found, f"{part} clear", at)[0]
+
+    found = bati2021_15.compute()
+    for name in ("15 a", "15 b", "15 c"):
+        low, high = (looks.energy(found, f"{name}, {depth}", at) for depth in ("low", "high"))
+        assert np.all(high < low)
+    low, high = (looks.energy(found, f"15 b, {depth}", looks.COSINES.index(0.4)) for depth in ("low", "high"))
+    assert low[2] / low[0] > 1.1 * high[2] / high[0]
+
+    found = bati2021_16.compute()
+    assert all(np.allclose(look["energy"][0], 0.45, atol=1e-6) for look in found["looks"])
+    pink = {name: red / green for name in bati2021_16.CHOICES for red, green, _ in [looks.energy(found, name, at)]}
+    assert pink["reference"] == pytest.approx(1) and pink["a"] == pytest.approx(1)
+    assert pink["c"] > pink["b"] > 1.05
+
+
+def test_a_coat_that_keeps_what_is_below(unlit: None) -> None:
+    """Figure 14. Expected: the kept lobes are the bare ones; a naive coat blurs (a), and splits the lobe of (b)."""
+    found = bati2021_14.compute()
+    for name, count in (("14 a", 1), ("14 b", 2)):
+        for n in range(count):
+            bare, kept = lobe(found, f"{name}, bare", n), lobe(found, f"{name}, kept", n + 1)
+            assert np.allclose(bare[0], kept[0], atol=1e-4) and bare[1] == pytest.approx(kept[1], abs=1e-4)
+    assert lobe(found, "14 a, coated", 1)[1] > 1.8 * 0.03
+    first, second = (lobe(found, "14 b, coated", n)[1] for n in (1, 2))
+    assert first > 1.3 * second
+
+
+def test_lobes_are_what_was_asked_for(unlit: None) -> None:
+    """Figures 18 to 22. Expected: colour, blur and haze as captioned."""
+    found = bati2021_18.compute()
+    assert np.allclose(looks.energy(found, "18 a, more saturated"), [0.01, 0.06, 0.11], atol=1e-6)
+    assert [lobe(found, name, 0)[1] for name in bati2021_18.TARGETS] == pytest.approx([0.05] * 3 + [0, 0.15], abs=1e-6)
+
+    found = bati2021_19.compute()
+    bases = [look["stack"]["layers"][-1]["interface"] for look in found["looks"]]
+    assert all(np.allclose(base["eta"], bases[0]["eta"], atol=1e-6) for base in bases)
+    assert [base["alpha"] for base in bases] == sorted(base["alpha"] for base in bases)
+
+    found = bati2021_20.compute()
+    upper = {name: sum(lobe(found, name, n)[0] for n in (0, 1)) for name in bati2021_20.TARGETS}
+    lower = {name: lobe(found, name, 2)[0] for name in bati2021_20.TARGETS}
+    assert np.allclose(upper["20 left"], lower["20 right"], atol=1e-6)
+    assert np.allclose(upper["20 right"], lower["20 left"], atol=1e-6)
+
+    found = bati2021_21.compute()
+    for n in (0, 1):
+        assert lobe(found, "21 left", n)[1] == pytest.approx(lobe(found, "21 right", 1 - n)[1], abs=1e-6)
+
+    found = bati2021_22.compute()
+    top, middle, bottom = (looks.energy(found, name) for name in bati2021_22.TARGETS)
+    assert np.allclose(bottom, top + middle - 0.03, atol=1e-6)
+
+
+def test_what_is_transmitted_is_a_by_product(unlit: None, tmp_path: Path) -> None:
+    """Figure 23. Expected: the same reflection head-on; less passes where more is absorbed."""
+    found = bati2021_23.compute()
+    low, high = (found[name] for name in bati2021_23.NAMES.values())
+    assert np.allclose(low["reflected"][0], high["reflected"][0], atol=1e-6)
+    assert np.all(np.array(high["transmitted"][0]) < 0.8 * np.array(low["transmitted"][0]))
+    drawn(bati2021_23, found, tmp_path)
+
+
+def test_the_gallery_shows_pairs(unlit: None) -> None:
+    """Figure 1. Expected: the coat of (c) and the edge of (b) leave the lobes below, and the grey, as they are."""
+    found = bati2021_01.compute()
+    assert len(found["looks"]) == 8
+    assert np.allclose(lobe(found, "c", 0)[0], lobe(found, "c, coated", 1)[0], atol=1e-4)
+    assert np.allclose(looks.energy(found, "b"), looks.energy(found, "b, pink edge"), atol=1e-6)
+
+
+def test_a_diffuse_base_shows_through_the_pair(tmp_path: Path) -> None:
+    """Figure 24, rendered. Expected: grey is brighter than black; an orange base looks bluer than its albedo."""
+    found = bati2021_24.compute(size=16, spp=4)
+    black, grey, orange = (np.mean(picture, axis=(0, 1)) for picture in found["pictures"])
+    assert np.all(grey > black)
+    assert np.all(orange < grey + 0.02)
+    blue = (orange - black)[2] / (orange - black)[0], 0.1 / 0.5
+    assert blue[0] > 2 * blue[1]
+    drawn(bati2021_24, found, tmp_path)

@@ -109,13 +109,15 @@ def test_eval_pdf_and_sample_agree(name: str) -> None:
     assert np.allclose(np.array(weight) * np.array(pdf), value, rtol=1e-3, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", SIX)
-def test_the_plugin_is_the_model_that_numpy_runs(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "model"), [*((name, "belcour2018") for name in SIX), ("coated-rough-metal", "velatura")]
+)
+def test_the_plugin_is_the_model_that_numpy_runs(name: str, model: str) -> None:
     """In single precision, with averages sampled once per material: within 1 % where the lobes are."""
     stack, ctx = vt.preset(name), mi.BSDFContext()
     flat = stack.flat()
     values = {key: number(key, value) for key, value in flat.items()}
-    body = bsdf.body(stack.kinds, values, stack.thin, named("belcour2018"), variance_kind(stack.kinds, flat))
+    body = bsdf.body(stack.kinds, values, stack.thin, named(model), variance_kind(stack.kinds, flat))
     rng, n = np.random.default_rng(11), 2000
     cos_theta, phi = rng.uniform(0.05, 1, n), rng.uniform(0, 2 * np.pi, n)
     sin_theta = np.sqrt(1 - cos_theta**2)
@@ -124,7 +126,7 @@ def test_the_plugin_is_the_model_that_numpy_runs(name: str) -> None:
     value, pdf = bsdf.eval_pdf(body, wi, wo)
     si = dr.zeros(mi.SurfaceInteraction3f, n)
     si.wi = mi.Vector3f(*wi)
-    found, found_pdf = vt.bsdf(stack).eval_pdf(ctx, si, mi.Vector3f(*wo))
+    found, found_pdf = vt.bsdf(stack, model=model).eval_pdf(ctx, si, mi.Vector3f(*wo))
     # Half an ulp of a direction moves the sharpest lobes by more than that, in few places
     for ours, theirs in ((np.array(found), value), (np.array(found_pdf), pdf)):
         off = np.abs(ours - theirs) > 0.01 * np.abs(theirs) + 1e-4
@@ -134,7 +136,7 @@ def test_the_plugin_is_the_model_that_numpy_runs(name: str) -> None:
 def test_one_metal_is_roughconductor() -> None:
     eta, k = (0.2, 0.92, 1.1), (3.9, 2.45, 2.14)
     stack = vt.Stack([vt.Interface(eta=eta, k=k, alpha=(0.1, 0.3))])
-    ours = vt.bsdf(stack, reflectance="fresnel")
+    ours = vt.bsdf(stack, model="belcour2018", reflectance="fresnel")
     theirs = mi.load_dict(
         {
             "type": "roughconductor",
@@ -154,7 +156,7 @@ def test_one_metal_is_roughconductor() -> None:
 
 
 def test_a_smooth_stack_is_a_mirror_of_all_its_lobes() -> None:
-    bsdf, ctx = vt.bsdf("furnace", reflectance="fresnel"), mi.BSDFContext()
+    bsdf, ctx = vt.bsdf("furnace", model="belcour2018", reflectance="fresnel"), mi.BSDFContext()
     si = interaction(direction(0.5, 0.3))
     bs, weight = bsdf.sample(ctx, si, 0.3, mi.Point2f(0.2, 0.7))
     assert mi.has_flag(bsdf.flags(), mi.BSDFFlags.DeltaReflection)
@@ -166,7 +168,7 @@ def test_a_smooth_stack_is_a_mirror_of_all_its_lobes() -> None:
 def test_white_paint_under_a_smooth_coat_loses_nothing() -> None:
     """Albedo of the base and of the coat, by sampling; standard error 1e-3."""
     stack = vt.Stack([vt.Interface(eta=1.5), vt.Diffuse(albedo=1.0)])
-    bsdf, n = vt.bsdf(stack, reflectance="fresnel"), 200_000
+    bsdf, n = vt.bsdf(stack), 200_000
     rng = np.random.default_rng(5)
     si = dr.zeros(mi.SurfaceInteraction3f, n)
     si.wi = interaction(direction(0.6, 0.3)).wi
@@ -240,7 +242,8 @@ def test_in_a_scene_file(tmp_path) -> None:
           </sensor>
           <emitter type="constant"/>
           <shape type="sphere"><bsdf type="layered"><string name="material" value="frosted-metal"/>
-            <float name="layer0_alpha" value="0.2"/><string name="tir" value="off"/></bsdf></shape>
+            <string name="model" value="belcour2018"/><float name="layer0_alpha" value="0.2"/>
+            <string name="tir" value="off"/></bsdf></shape>
         </scene>""")
     image = np.array(mi.render(scene, spp=4))
     assert np.isfinite(image).all() and image.max() <= 1.01
@@ -345,7 +348,7 @@ def test_what_the_plugin_refuses_is_one_line(tmp_path) -> None:
     with pytest.raises(InvalidInput, match=r"^layer0_alpha_u: the texture .*text\.png is no image"):
         vt.bsdf(textured)
     with pytest.raises(InvalidInput, match=r"^channels=separate: only for lobes and inverse, .*$"):
-        vt.bsdf("coated-gold", channels="separate")
+        vt.bsdf("coated-gold", model="belcour2018", channels="separate")
 
 
 def test_the_scalar_variant_agrees() -> None:
@@ -353,11 +356,12 @@ def test_the_scalar_variant_agrees() -> None:
     points = [(direction(c, p), direction(d, q)) for c, p, d, q in rng.uniform(0.1, 0.95, (4, 4))]
     ctx = mi.BSDFContext()
     expected = [
-        np.array(vt.bsdf("coated-gold").eval(ctx, interaction(wi), mi.Vector3f(*wo))).ravel() for wi, wo in points
+        np.array(vt.bsdf("coated-gold", model="belcour2018").eval(ctx, interaction(wi), mi.Vector3f(*wo))).ravel()
+        for wi, wo in points
     ]
     try:
         scalar = kernel.mitsuba("scalar_rgb")
-        bsdf, ctx = vt.bsdf("coated-gold"), scalar.BSDFContext()
+        bsdf, ctx = vt.bsdf("coated-gold", model="belcour2018"), scalar.BSDFContext()
         for (wi, wo), value in zip(points, expected):
             si = scalar.SurfaceInteraction3f()
             si.wi = dr.normalize(scalar.Vector3f(wi))

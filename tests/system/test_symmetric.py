@@ -52,9 +52,10 @@ def brightness(scene: Any, integrator: str, spp: int) -> np.ndarray:
 
 def test_light_may_be_followed_from_either_end() -> None:
     """Expected: `path` and `ptracer` paint the same picture with the symmetric form (false alarms 1 in 10^4, by Welch's
-    test over rounds), and pictures that differ by over 30 % with the forward form (43 % measured)."""
+    test over rounds), and pictures that differ by over 30 % with the forward form of the
+    first paper (43 % measured)."""
     for form, same in (("symmetric", True), ("forward", False)):
-        scene = scene_of(vt.bsdf(BRUSHED, form=form))
+        scene = scene_of(vt.bsdf(BRUSHED, model="belcour2018", form=form))
         ours, theirs = brightness(scene, "path", 256), brightness(scene, "ptracer", 2048)
         p_value = stats.ttest_ind(ours, theirs, equal_var=False).pvalue
         apart = abs(theirs.mean() / ours.mean() - 1)
@@ -62,6 +63,56 @@ def test_light_may_be_followed_from_either_end() -> None:
             assert p_value > FALSE_ALARMS, (ours, theirs)
         else:
             assert apart > 0.3 and p_value < FALSE_ALARMS, (ours, theirs)
+
+
+def albedo(stack: vt.Stack, cos_theta: float, form: str, side: int = 1, n: int = 2**20) -> np.ndarray:
+    """Of a BSDF of `velatura` by (its samples + the cosine)/2, so that what samples hardly meet is seen; without the
+    index that scales radiance."""
+    bsdf, rng, context = vt.bsdf(stack, model="velatura", form=form), mi.PCG32(n), mi.BSDFContext()
+    context.mode = mi.TransportMode.Importance
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(mi.Float(np.sqrt(1 - cos_theta**2)), 0, side * cos_theta)
+    u, u_1, u_2, v, v_1, v_2 = (rng.next_float32() for _ in range(6))
+    drawn, _ = bsdf.sample(context, si, v_1, mi.Point2f(v_2, u), True)
+    spread = mi.warp.square_to_cosine_hemisphere(mi.Point2f(u_1, u_2))
+    spread.z *= side
+    wo = mi.Vector3f(*(np.where(np.array(v) < 0.5, np.array(a), np.array(b)) for a, b in zip(drawn.wo, spread)))
+    value, pdf = (np.array(x) for x in bsdf.eval_pdf(context, si, wo))
+    density = 0.5 * pdf + 0.5 * np.maximum(side * np.array(wo.z), 0) / np.pi
+    return np.asarray((value / np.maximum(density, 1e-12)).mean(axis=1))
+
+
+@pytest.mark.parametrize("name", ["furnace-rough", "turned-brushing", "frosted-glass"])
+def test_what_is_drawn_is_the_energy_of_the_lobes(name: str) -> None:
+    """Both forms of `velatura`, isotropic, with turned axes, and transmitting: the albedo of the forward form within
+    0.5 %, of the symmetric one within 1 % (0.5 % in the furnace), which is off by 2 to 15 % without its factors.
+    Standard errors are 0.1 % or so."""
+    stack = vt.preset(name)
+    for cos_theta in (1.0, 0.7, 0.3):
+        lobes = vt.lobes(stack, cos_theta, model="velatura")
+        through = lobes.transmitted.energy if lobes.transmitted else 0.0
+        expected = (sum(lobes.energy) + through)[:, 0]
+        for form in ("forward", "symmetric"):
+            bound = 0.005 if form == "forward" or name == "furnace-rough" else 0.01
+            np.testing.assert_allclose(
+                albedo(stack, cos_theta, form), expected, rtol=bound, err_msg=f"{form} {cos_theta}"
+            )
+
+
+def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change() -> None:
+    """Those that sample lobes, which take longest to compile."""
+    import drjit as dr
+
+    def kernels(alpha: float) -> list[Any]:
+        dr.kernel_history_clear()
+        stack = vt.Stack([vt.Interface(eta=1.5, alpha=(alpha, 0.2)), vt.Interface(conductor="Au", alpha=0.3)])
+        vt.bsdf(stack, form="symmetric")
+        dr.sync_thread()
+        return [kernel for kernel in dr.kernel_history([dr.KernelType.JIT]) if kernel["size"] > 2**14]
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        first, again = kernels(0.1), kernels(0.15)
+    assert {kernel["hash"] for kernel in again} == {kernel["hash"] for kernel in first} != set()
 
 
 def test_the_laws() -> None:
@@ -86,7 +137,9 @@ def test_the_plugin_is_the_model_that_numpy_runs(name: str) -> None:
     value, pdf = bsdf.eval_pdf(body, wi, wo)
     si = mi.SurfaceInteraction3f()
     si.wi = mi.Vector3f(*wi)
-    found, found_pdf = vt.bsdf(stack, form="symmetric").eval_pdf(mi.BSDFContext(), si, mi.Vector3f(*wo))
+    found, found_pdf = vt.bsdf(stack, model="belcour2018", form="symmetric").eval_pdf(
+        mi.BSDFContext(), si, mi.Vector3f(*wo)
+    )
     for ours, theirs in ((np.array(found), value), (np.array(found_pdf), pdf)):
         off = np.abs(ours - theirs) > 0.01 * np.abs(theirs) + 1e-4
         assert off.mean() < 0.02

@@ -16,7 +16,7 @@ import drjit as dr  # noqa: E402
 GLASS = vt.Stack([vt.Interface(eta=1.5)])
 PANE = vt.Stack([vt.Interface(eta=1.5), vt.Interface(eta=1.5)], thin=True)
 ROUGH = vt.Stack([vt.Interface(eta=1.5, alpha=0.02)])
-PLAIN = {"reflectance": "fresnel", "tir": "off"}
+PLAIN = {"model": "belcour2018", "reflectance": "fresnel", "tir": "off"}
 
 
 def interaction(cos_theta: Any, count: int = 1) -> Any:

@@ -14,7 +14,7 @@ from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Target, alternatives, coat, grazing, invert_stack, load_target
 from velatura.inverse.targets import FIGURES, INFEASIBLE
 from velatura.model import MODELS, Model, named
-from velatura.stack import Interface, Medium, Stack, dumps, loads, preset
+from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, loads, preset
 
 PLAIN = named("bati2021", reflectance="fresnel")
 AVERAGED = named("bati2021")
@@ -116,6 +116,13 @@ def test_alternatives_share_their_lobes_and_differ_at_grazing_angles() -> None:
     assert max(float(np.abs(energy - seen[0]).mean()) for energy in seen) > 0.01
 
 
+def test_alternatives_of_a_conductor_differ_in_tint() -> None:
+    """Its class has no free index."""
+    found = alternatives(FIGURES["19 b"], 3)
+    assert len({solution.stack.interfaces[-1].eta for solution in found}) == 3
+    assert len(found[0].classes[-1].sample(4)) == 4
+
+
 # What is fixed, and what cannot be -----------------------------------------------------------------------------------
 
 
@@ -133,6 +140,19 @@ def test_what_is_fixed_stays() -> None:
     assert stack.interfaces[0].eta == 1.5
     assert stack.layers[1] == Medium(sigma_a=0.1)
     assert stack.interfaces[1].eta == pytest.approx((1.2, 1.4, 1.4))
+
+
+@pytest.mark.parametrize("model", [AVERAGED, named("belcour2018"), named("velatura")], ids=lambda m: m.name)
+def test_the_index_follows_from_a_fixed_lower_roughness(model: Model) -> None:
+    """Of a pair below a coat the lower roughness depends on the index between its interfaces."""
+    pair = {"energy": [0.09, 0.09, 0.12], "alpha": 0.06, "interfaces": 2}
+    lobes = [{"energy": 0.03, "alpha": 0}, pair]
+    free = invert_stack(lobes, model).layers[-1].alpha
+    wanted = 0.8 * float(np.ravel(free)[0])
+    target = Target([lobes[0], pair | {"fixed": {"alpha": [None, wanted]}}])
+    found = invert_stack(target, model)
+    assert float(np.ravel(found.layers[-1].alpha)[0]) == pytest.approx(wanted, abs=1e-4)
+    assert max(read(target, found.stack, model)) < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -211,7 +231,7 @@ def test_target_files(tmp_path: Path) -> None:
     path.write_text("lobes: [\n")
     with pytest.raises(InvalidInput, match=r"t\.yaml: line 2: is not valid YAML"):
         load_target(path)
-    with pytest.raises(InvalidInput, match=r"none\.yaml: cannot be read: no such file"):
+    with pytest.raises(InvalidInput, match=r"none\.yaml: file not found"):
         load_target(tmp_path / "none.yaml")
 
 
@@ -249,6 +269,20 @@ def test_appearance_below_a_coat(name: str, model: Model) -> None:
         assert np.abs(coated.after.energy[k + 1] - energy).max() < 1e-4
         assert np.abs(coated.after.covariance[k + 1] - coated.before.covariance[k]).max() < 1e-4
     assert loads(dumps(coated.stack)) == coated.stack
+
+
+@pytest.mark.parametrize("model", [AVERAGED, named("belcour2018"), named("velatura")], ids=lambda m: m.name)
+def test_a_diffuse_base_keeps_its_energy_below_a_coat(model: Model) -> None:
+    """Expected: as bright through the coat as without; a white base, which cannot be brighter, stays white."""
+    layers = [Interface(eta=1.4, alpha=0.1), Medium(sigma_a=(0.1, 0.2, 0.4)), Diffuse(albedo=(0.5, 0.3, 0.1))]
+    kept, naive = (coat(Stack(layers), 1.6, 0.05, keep_appearance=keep, model=model) for keep in (True, False))
+    assert kept.diffuse is not None and naive.diffuse is not None
+    assert np.allclose(*kept.diffuse, atol=1e-9)
+    assert np.all(naive.diffuse[1] < 0.98 * naive.diffuse[0])
+    assert np.all(np.array(kept.stack.layers[-1].albedo) > (0.5, 0.3, 0.1))
+    white = coat(Stack([Diffuse(albedo=1.0)]), 1.5, keep_appearance=True, model=model)
+    assert white.stack.layers[-1].albedo == pytest.approx(1, abs=1e-9)
+    assert white.diffuse is not None and white.diffuse[0] == pytest.approx(1)
 
 
 def test_coats_that_cannot_be() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -71,6 +74,22 @@ def test_both_forms_agree_where_the_normal_is_halfway() -> None:
     mirror = bsdf.eval_pdf(body, (x, y, z), (-x, -y, z)), bsdf.eval_pdf(other, (x, y, z), (-x, -y, z))
     for a, b in zip(*mirror):
         np.testing.assert_allclose(a, b, rtol=1e-7)
+
+
+def test_the_symmetric_form_of_velatura_keeps_the_energy_of_a_furnace() -> None:
+    """Within 0.5 %; without its factors it loses 4 % at cosine 0.5 and gains 15 % at 0.1. Standard errors are 0.1 %."""
+    body = body_of(vt.preset("furnace-rough"), "velatura", form="symmetric")
+    rng, n = np.random.default_rng(8), 40_000
+    for cos_theta in (1.0, 0.5, 0.1):
+        wi = (np.full(n, np.sqrt(1 - cos_theta**2)), np.zeros(n), np.full(n, cos_theta))
+        wo, _ = bsdf.sample(body, wi, *rng.random((3, n)))
+
+        def albedo(some: bsdf.Body, wi: tuple[Array, Array, Array] = wi, wo: Any = wo) -> float:
+            value, pdf = bsdf.eval_pdf(some, wi, wo)
+            return float(np.mean(value / np.where(pdf > 0, pdf, 1)))
+
+        assert albedo(body) == pytest.approx(1, abs=5e-3)
+        assert cos_theta == 1 or abs(albedo(dataclasses.replace(body, scaling=None)) - 1) > 0.03
 
 
 def test_a_stack_turned_over_twice_is_itself() -> None:

@@ -16,7 +16,8 @@ from velatura.model.statistics import statistics
 from velatura.model.variance import Covariance, Roughness
 from velatura.stack import Interface, Medium, Stack, preset
 
-PLAIN = {"reflectance": "fresnel", "tir": "off"}
+PAPER = {"model": "belcour2018"}  # which has all switches
+PLAIN = {**PAPER, "reflectance": "fresnel", "tir": "off"}
 
 
 def f(alpha: float) -> float:
@@ -133,7 +134,7 @@ def test_one_interface_gives_its_roughness_and_fresnel(alpha: float, cos_theta: 
 @settings(max_examples=20)
 def test_what_is_not_there_changes_nothing(reflectance: str, bound: float, cos_theta: float, alpha: float) -> None:
     coat, metal = Interface(eta=1.5, alpha=0.1), Interface(conductor="Cu", alpha=alpha)
-    switches = {"tir": "off", "medium": "weighted", "reflectance": reflectance}
+    switches = {**PAPER, "tir": "off", "medium": "weighted", "reflectance": reflectance}
     bare = statistics(Stack([coat, metal]), cos_theta, **switches)
     empty = Medium(depth=0, sigma_a=1.0, sigma_s=2.0, g=0.5)
     filled = statistics(Stack([coat, empty, metal]), cos_theta, **switches)
@@ -146,7 +147,7 @@ def test_what_is_not_there_changes_nothing(reflectance: str, bound: float, cos_t
 
 def test_nothing_passes_below_total_reflection() -> None:
     stack = Stack([Interface(eta=1.0, alpha=0.1), Interface(conductor="Au", alpha=0.1)], exterior=1.5)
-    found = statistics(stack, [0.3, 0.1, 0.74], reflectance="fresnel")
+    found = statistics(stack, [0.3, 0.1, 0.74], reflectance="fresnel", **PAPER)
     assert np.allclose(found.energy[0], 1)
     assert np.all(found.energy[1] == 0)
     assert all(np.isfinite(a).all() for a in (*found.alpha, *found.covariance))
@@ -155,13 +156,13 @@ def test_nothing_passes_below_total_reflection() -> None:
 @pytest.mark.parametrize("name", ["furnace", "furnace-rough"])
 @pytest.mark.parametrize("tir", ["off", "published"])
 def test_the_furnace_keeps_all_energy(name: str, tir: str) -> None:
-    found = statistics(preset(name), np.linspace(0.05, 1, 50), reflectance="fresnel", tir=tir)
+    found = statistics(preset(name), np.linspace(0.05, 1, 50), reflectance="fresnel", tir=tir, **PAPER)
     assert np.allclose(sum(found.energy), 1, atol=1e-6)
 
 
 def test_separate_channels_agree_with_their_mean_where_colour_is_none() -> None:
     stack = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=0.3, k=3.0, alpha=0.2)])
-    mean, separate = (statistics(stack, [1.0, 0.4], channels=c) for c in SWITCHES["channels"])
+    mean, separate = (statistics(stack, [1.0, 0.4], channels=c, **PAPER) for c in SWITCHES["channels"])
     for k in range(2):
         assert separate.alpha[k].shape == (3, 2, 2)
         assert np.allclose(separate.alpha[k], mean.alpha[k], rtol=1e-12)
@@ -171,9 +172,10 @@ def test_separate_channels_agree_with_their_mean_where_colour_is_none() -> None:
 def test_one_channel_of_separate_is_the_grey_stack_of_that_channel() -> None:
     eta, k = (0.2, 0.5, 1.4), (3.9, 2.4, 1.7)
     coloured = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=eta, k=k, alpha=0.2)])
-    found = statistics(coloured, [1.0, 0.4], channels="separate")
+    found = statistics(coloured, [1.0, 0.4], channels="separate", **PAPER)
     for c in range(3):
-        grey = statistics(Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=eta[c], k=k[c], alpha=0.2)]), [1.0, 0.4])
+        layers = [Interface(eta=1.5, alpha=0.1), Interface(eta=eta[c], k=k[c], alpha=0.2)]
+        grey = statistics(Stack(layers), [1.0, 0.4], **PAPER)
         assert np.allclose(found.alpha[1][c], grey.alpha[1], rtol=1e-9)
 
 

@@ -16,7 +16,23 @@ from typing import Annotated, cast
 import typer
 
 from velatura import __version__
-from velatura.cli import check, coat, compare, doctor, explore, figure, invert, lobes, presets, render, schema, tables
+from velatura.cli import (
+    check,
+    coat,
+    compare,
+    doctor,
+    explore,
+    export,
+    figure,
+    fit,
+    invert,
+    lobes,
+    presets,
+    render,
+    schema,
+    simplify,
+    tables,
+)
 from velatura.errors import VelaturaError
 
 # What Typer raises for a wrong option; caught, so that it is reported in one line like every other wrong input.
@@ -41,6 +57,9 @@ for verb in (
     invert.invert,
     coat.coat,
     explore.explore,
+    fit.fit,
+    simplify.simplify,
+    export.export,
     figure.figure,
     presets.presets,
     schema.schema,

@@ -13,6 +13,8 @@ from velatura.cli import invert, options
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from velatura.inverse import Coated
+
 
 def coat(
     material: options.Material,
@@ -43,16 +45,25 @@ def coat(
     if output:
         save(coated.stack, output)
     if as_json:
-        print(json.dumps({"stack": coated.stack.to_dict(), "lobes": coated.change()}, allow_nan=False))
+        report = {"stack": coated.stack.to_dict(), "lobes": coated.change(), **_diffuse(coated)}
+        print(json.dumps(report, allow_nan=False))
         return
     from rich.console import Console
 
-    Console().print(_table(coated.change()))
+    Console().print(_table(coated.change(), _diffuse(coated)))
     print(output if output else dumps(coated.stack, "yaml"), end="\n" if output else "")
 
 
-def _table(rows: list[dict[str, Any]]) -> Table:
-    """A row per interface of the bare material."""
+def _diffuse(coated: Coated) -> dict[str, dict[str, list[float]]]:
+    """Energy of a diffuse base, before and after; nothing where there is none."""
+    if coated.diffuse is None:
+        return {}
+    before, after = coated.diffuse
+    return {"diffuse": {"energy_before": before.tolist(), "energy_after": after.tolist()}}
+
+
+def _table(rows: list[dict[str, Any]], diffuse: dict[str, dict[str, list[float]]]) -> Table:
+    """A row per interface of the bare material, and one for a diffuse base."""
     from rich.table import Table
 
     table = Table("lobe", title="At normal incidence, without and with the coat", title_justify="left")
@@ -60,6 +71,8 @@ def _table(rows: list[dict[str, Any]]) -> Table:
         table.add_column(column, justify="right")
     for n, row in enumerate(rows, 1):
         table.add_row(str(n), *(" ".join(f"{x:.4f}" for x in _flat(row[key])) for key in row))
+    for name, row in diffuse.items():
+        table.add_row(name, *(" ".join(f"{x:.4f}" for x in _flat(row[key])) for key in row), "", "")
     return table
 
 

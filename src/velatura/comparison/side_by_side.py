@@ -37,7 +37,7 @@ def compare(
 
     Args:
         stack: a material (a stack, a file, or a preset's name).
-        models: names of models, or models; None means all. `switches` change the choices of each.
+        models: names of models, or models; None means all that have the `switches`, which change the choices of each.
         cos_theta: cosines of the directions of incidence, in (0, 1].
         paths: of the truth, for each direction; at least 2.
         seed: of the truth's random numbers.
@@ -52,7 +52,7 @@ def compare(
     """
     # Refuse what cannot work before anything slow begins
     described = stack if isinstance(stack, Stack) else load(stack)
-    chosen = {m.name: m for m in (named(model, **switches) for model in (MODELS if models is None else models))}
+    chosen = {m.name: m for m in (_every(switches) if models is None else [named(m, **switches) for m in models])}
     if not chosen:
         raise InvalidInput("models: name at least one")
     if paths < 2:
@@ -76,6 +76,19 @@ def compare(
         models={name: _beside(model, truth) for name, model in told.items()},
         pictures=spheres(described, chosen, seed, microsurface, advance) if pictures else None,
     )
+
+
+def _every(switches: dict[str, str]) -> list[Model]:
+    """All named models that have these switches."""
+    found, refusals = [], []
+    for model in MODELS:
+        try:
+            found.append(named(model, **switches))
+        except InvalidInput as refusal:
+            refusals.append(refusal)
+    if not found:
+        raise refusals[0]
+    return found
 
 
 def _beside(model: Account, truth: Account) -> Account:

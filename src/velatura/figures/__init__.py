@@ -4,7 +4,7 @@
 
 A figure is a module with `compute`, which takes what makes it quick or exact (paths, picture sizes, a seed, `progress`)
 and returns plain numbers and lists, and `draw`, which makes a picture of them. What belongs to `pictures` among the
-numbers are pixels, linear RGB in rows.
+numbers are pixels: linear RGB in rows, or one value each.
 """
 
 from __future__ import annotations
@@ -20,17 +20,66 @@ from velatura.stack.schema import show
 Progress = Callable[[int, int], None]
 
 FIGURES = (
+    "before-after",
+    "bati2021-01",
+    "bati2021-04",
+    "bati2021-05",
+    "bati2021-06",
     "bati2021-07",
+    "bati2021-08",
+    "bati2021-09",
+    "bati2021-10",
+    "bati2021-11",
+    "bati2021-12",
+    "bati2021-14",
+    "bati2021-15",
+    "bati2021-16",
     "bati2021-17",
+    "bati2021-18",
+    "bati2021-19",
+    "bati2021-20",
+    "bati2021-21",
+    "bati2021-22",
+    "bati2021-23",
+    "bati2021-24",
     "bati2021-25",
+    "belcour2018-03",
+    "belcour2018-04",
+    "belcour2018-05",
+    "belcour2018-06",
+    "belcour2018-07",
+    "belcour2018-08",
     "belcour2018-11",
     "belcour2018-12",
     "belcour2018-13",
+    "belcour2018-14",
+    "belcour2018-15",
+    "belcour2018-16",
+    "belcour2018-17",
     "belcour2018-19",
+    "belcour2018-20",
     "belcour2018-21",
     "belcour2018-22",
     "belcour2018-table2",
     "linear-space",
+    "weier2020-04",
+    "weier2020-05",
+    "weier2020-06",
+    "weier2020-07",
+    "weier2020-08",
+    "weier2020-09",
+    "weier2020-10",
+    "weier2020-11",
+    "weier2020-13",
+    "weier2020-14",
+    "weier2020-table2",
+    "yamaguchi2019-02",
+    "yamaguchi2019-03",
+    "yamaguchi2019-04",
+    "yamaguchi2019-05",
+    "yamaguchi2019-06",
+    "yamaguchi2019-07",
+    "yamaguchi2019-08",
 )
 
 

@@ -24,7 +24,7 @@ def compute(
 ) -> dict[str, Any]:
     """Over `alpha` the variance along an axis of the disc after `one` and `two` bounces; `count` is that of directions.
 
-    `lobe` is the energy of the lobe on a grid over the disc, from -1 to 1, in rows of x.
+    `pictures` hold the energy of the `lobe` on a grid over the disc, from -1 to 1, in rows of x.
     """
     u = uniform(count)
     numbers: dict[str, Any] = {"alpha": list(alphas), "one": [], "two": []}
@@ -36,7 +36,7 @@ def compute(
     tilted = np.sin(np.radians(ANGLE)), 0.0, np.cos(np.radians(ANGLE))
     directions, energy = bounce(along(tilted, count), LOBE, LOBE, *u[:2])
     grid, _, _ = np.histogram2d(directions[0], directions[1], BINS, ((-1, 1), (-1, 1)), weights=energy / count)
-    return {**numbers, "lobe": grid.tolist()}
+    return {**numbers, "pictures": {"lobe": grid.tolist()}}
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
@@ -47,7 +47,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     """
     figure = canvas.canvas(9, 4)
     left, right = figure.subplots(1, 2)
-    left.imshow(np.transpose(numbers["lobe"]), origin="lower", extent=(-1, 1, -1, 1), cmap="Blues")
+    left.imshow(np.transpose(numbers["pictures"]["lobe"]), origin="lower", extent=(-1, 1, -1, 1), cmap="Blues")
     left.plot(*np.array([np.cos(t := np.linspace(0, 2 * np.pi, 200)), np.sin(t)]), color="0.5", linewidth=1)
     left.plot([np.sin(np.radians(ANGLE))], [0], "kx")
     left.set(title=f"alpha {LOBE:g}, incidence {ANGLE}° (cross)", xlabel="x", ylabel="y", aspect="equal")

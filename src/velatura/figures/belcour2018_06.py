@@ -12,34 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
-from velatura.figures.bounces import Array
-from velatura.optics import ggx, refraction
-from velatura.optics.ggx import Direction
+from velatura.figures import canvas, disc
+from velatura.figures.disc import Array
 
 ETA, ALPHA, ANGLE = 1.5, 0.1, 30.0
-
-
-def reflected(x: Array, sine: float, alpha: float) -> Array:
-    """What a rough mirror sends to the points x of the disc, in the plane of incidence, on the side of the mirror."""
-    wi, wo = (sine, 0.0, np.sqrt(1 - sine**2)), (-x, 0.0, np.sqrt(1 - x * x))
-    return _lobe(wi, wo, alpha, 1.0)
-
-
-def refracted(x: Array, sine: float, alpha: float, eta: float) -> Array:
-    """What a rough interface to the relative index eta transmits to the points x of the disc below, straight on."""
-    wi, wo = (sine, 0.0, np.sqrt(1 - sine**2)), (-x, 0.0, -np.sqrt(1 - x * x))
-    return _lobe(wi, wo, alpha, eta)
-
-
-def _lobe(wi: Direction, wo: Direction, alpha: float, eta: float) -> Array:
-    h = refraction.half_vector(wi, wo, eta)
-    cos_i, cos_o = ggx.dot(wi, h), ggx.dot(wo, h)
-    seen = (cos_i > 0) & (cos_o * wo[2] > 0)
-    visible = ggx.ndf(h, alpha, alpha) * ggx.masking((wo[0], wo[1], np.abs(wo[2])), alpha, alpha)
-    density = visible * cos_i * refraction.jacobian(cos_i, cos_o, eta) / np.abs(wo[2])
-    lobe = np.asarray(np.where(seen, density, 0.0))
-    return lobe / lobe.max()
 
 
 def width(x: Array, lobe: Array) -> float:
@@ -57,13 +33,16 @@ def compute(
     eta: float = ETA,
     alpha: float = ALPHA,
     angle: float = ANGLE,
-    count: int = 2001,
+    count: int = 1001,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
     """Over `sine`, the outgoing one, both lobes, and the `width` of each at half its height."""
-    sine = float(np.sin(np.radians(angle)))
-    x = np.linspace(-1, 1, count + 2)[1:-1]
-    lobes = {"reflected": reflected(x, sine, alpha), "refracted": refracted(x, sine, alpha, eta)}
+    x, wi = np.linspace(-1, 1, count + 2)[1:-1], disc.incidence(angle, 180)
+    zero = np.zeros_like(x)
+    lobes = {
+        "reflected": disc.reflected(wi, x, zero, alpha, alpha),
+        "refracted": disc.refracted(wi, x, zero, alpha, alpha, eta),
+    }
     if progress:
         progress(1, 1)
     return {

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from velatura.api import lobes
-from velatura.figures import canvas
-from velatura.figures.belcour2018_06 import ALPHA, reflected, refracted, width
+from velatura.figures import canvas, disc
+from velatura.figures.belcour2018_06 import ALPHA, width
 from velatura.stack import Interface, Stack
 
 ANGLES = tuple(range(0, 85, 5))  # degrees
@@ -36,7 +36,7 @@ def compute(
     `lobes` are those of the first at 30 degrees, over `sine`.
     """
     x = np.linspace(-1, 1, count + 2)[1:-1]
-    numbers: dict[str, Any] = {"curves": [], "sine": x.tolist()}
+    numbers: dict[str, Any] = {"curves": [], "sine": x[::10].tolist()}
     for above, below in canvas.track(INDICES, progress):
         n = below / above
         inside = [float(angle) for angle in angles if np.sin(np.radians(angle)) < 0.98 * min(n, 1)]
@@ -44,16 +44,19 @@ def compute(
         widths = {name: [width(x, lobe[name]) for lobe in each] for name in ("refracted", *SCALES)}
         numbers["curves"].append({"above": above, "below": below, "angle": inside, "width": widths})
     shown = _lobes(x, *INDICES[0], alpha, SHOWN)
-    return {**numbers, "lobes": {name: lobe.tolist() for name, lobe in shown.items()}}
+    return {**numbers, "lobes": {name: lobe[::10].tolist() for name, lobe in shown.items()}}
 
 
 def _lobes(x: Any, above: float, below: float, alpha: float, angle: float) -> dict[str, Any]:
-    sine, stack = float(np.sin(np.radians(angle))), Stack([Interface(eta=below, alpha=alpha)], exterior=above)
-    found = {"refracted": refracted(x, sine, alpha, below / above)}
+    stack = Stack([Interface(eta=below, alpha=alpha)], exterior=above)
+    sine, zero = float(np.sin(np.radians(angle))), np.zeros_like(x)
+    found = {"refracted": disc.refracted(disc.incidence(angle, 180), x, zero, alpha, alpha, below / above)}
+    inside = disc.incidence(np.degrees(np.arcsin(sine * above / below)), 180)
     for scale in SCALES:
         told = lobes(stack, np.sqrt(1 - sine**2), model="belcour2018", reflectance="fgd", scale=scale).transmitted
         assert told is not None
-        found[scale] = reflected(x, sine * above / below, float(told.alpha[0, 0]))
+        scaled = float(told.alpha[0, 0])
+        found[scale] = disc.reflected(inside, x, zero, scaled, scaled)
     return found
 
 

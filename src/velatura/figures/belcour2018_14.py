@@ -6,11 +6,7 @@ object, a hollow ball, are chosen here. Beside the medium as published stands th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, cells
+from velatura.figures import cells
 from velatura.stack import Interface, Medium, Stack
 
 DEPTHS = (0.1, 0.5, 1.0)
@@ -26,30 +22,10 @@ def stack(depth: float) -> Stack:
     return Stack([medium, Interface(conductor="Au", alpha=0.01)])
 
 
-def compute(
-    depths: Sequence[float] = DEPTHS,
-    size: int = canvas.SIZE,
-    spp: int = cells.SAMPLES,
-    paths: int = cells.PATHS,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """A cell for each depth: see `cells.compute`.
+STACKS = {f"depth {depth:g}": stack(depth) for depth in DEPTHS}
 
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
-    stacks = {f"depth {depth:g}": stack(depth) for depth in depths}
-    return cells.compute(stacks, COLUMNS, cells.Quality(size, spp, paths), seed, progress, "ball")
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each depth: the truth, and beside it both media and what they have too much or too little.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    cells.draw(numbers, path)
+_FIGURE = cells.Cells(STACKS, COLUMNS, "ball")
+compute, draw = _FIGURE.compute, _FIGURE.draw
 
 
 if __name__ == "__main__":

@@ -10,8 +10,7 @@ tables then (`reflectance=fresnel`, `tir=off`). Seconds are those of this machin
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +44,7 @@ PAPER = {
 
 
 def compute(
+    names: Sequence[str] = tuple(SCENES),
     size: int = 256,
     spp: int = 16,
     repeats: int = 5,
@@ -59,7 +59,7 @@ def compute(
         InvalidInput, MissingTool: as `vt.render`.
     """
     numbers: dict[str, Any] = {"scenes": {}, "pictures": {}}
-    for name in canvas.track(list(SCENES), progress):
+    for name in canvas.track(names, progress):
         images, seconds = _rendered(name, size, spp, repeats, seed)
         ratio = {column: time / seconds["weidlich_wilkie"] for column, time in seconds.items()}
         mean = {column: float(image.mean()) for column, image in images.items()}
@@ -78,16 +78,7 @@ def _rendered(name: str, size: int, spp: int, repeats: int, seed: int) -> tuple[
         described = scenes.scene_dict(shape, env, bsdf, (size, size))
         integrator = described["integrator"]
         loaded[column] = mi.load_dict(described | {"integrator": integrator | ({"max_depth": depth} if depth else {})})
-    images: dict[str, list[Any]] = {column: [] for column in COLUMNS}
-    times: dict[str, list[float]] = {column: [] for column in COLUMNS}
-    for i in range(repeats + 1):
-        for column, scene in loaded.items():
-            start = time.perf_counter()
-            images[column].append(np.array(mi.render(scene, spp=spp, seed=seed + i)))
-            times[column].append(time.perf_counter() - start)
-    # The first one compiles
-    seconds = {column: float(np.median(each[1:])) for column, each in times.items()}
-    return {column: np.mean(each, axis=0) for column, each in images.items()}, seconds
+    return canvas.timed(loaded, spp, repeats, seed)
 
 
 def _for(model: str, stack: Stack) -> Stack:
@@ -106,7 +97,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         InvalidInput: the file cannot be written.
     """
     figure = canvas.canvas(15, 9)
-    rows = figure.subplots(len(SCENES), len(COLUMNS) + 1, width_ratios=(1,) * len(COLUMNS) + (1.4,))
+    rows = figure.subplots(len(numbers["scenes"]), len(COLUMNS) + 1, width_ratios=(1,) * len(COLUMNS) + (1.4,))
     for row, (name, found) in zip(rows, numbers["scenes"].items()):
         for plot, column in zip(row, COLUMNS):
             image = 0.5 * np.array(numbers["pictures"][name][column])

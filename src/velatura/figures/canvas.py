@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from velatura import api, files, scenes
+from velatura import api, files, kernel, scenes
 from velatura.checks.probe import Probe, Samples
 from velatura.comparison import check_figure
-from velatura.stack import Stack
+from velatura.stack import Stack, Texture
 
 Array = NDArray[np.floating]
 Item = TypeVar("Item")
@@ -47,6 +48,28 @@ def pictures(scene: str, stack: Stack, model: str, env: str, size: int, spp: int
     numbers = np.random.default_rng([seed, *model.encode()]).integers(2**31, size=2)
     halves = [scenes.render(made, scene, env, max(spp // 2, 1), (size, size), int(number)) for number in numbers]
     return np.array(halves)
+
+
+def texture(path: Path, image: ArrayLike) -> Texture:
+    """An image (height, width) of numbers or (height, width, 3) of colours, written to an .exr, as a texture."""
+    pixels = np.asarray(image, np.float32)
+    scenes.write_image(pixels if pixels.ndim == 3 else np.repeat(pixels[..., None], 3, axis=-1), path)
+    return Texture(texture=path, channel="rgb" if pixels.ndim == 3 else "r")
+
+
+def timed(loaded: Mapping[str, Any], spp: int, repeats: int, seed: int) -> tuple[dict[str, Array], dict[str, float]]:
+    """The pictures of Mitsuba scenes, each the mean of all, and the median of their seconds; scenes take turns."""
+    mi = kernel.mitsuba()
+    images: dict[str, list[Array]] = {name: [] for name in loaded}
+    times: dict[str, list[float]] = {name: [] for name in loaded}
+    for i in range(repeats + 1):
+        for name, scene in loaded.items():
+            start = time.perf_counter()
+            images[name].append(np.array(mi.render(scene, spp=spp, seed=seed + i)))
+            times[name].append(time.perf_counter() - start)
+    # The first one compiles
+    seconds = {name: float(np.median(each[1:])) for name, each in times.items()}
+    return {name: np.mean(each, axis=0) for name, each in images.items()}, seconds
 
 
 def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **switches: Any) -> Samples:

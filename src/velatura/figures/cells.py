@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,6 +28,41 @@ class Quality(NamedTuple):
     size: int = canvas.SIZE
     spp: int = SAMPLES
     paths: int = PATHS
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A figure of cells: its stacks by name, its columns, the object, and how bright its pictures are drawn."""
+
+    stacks: Mapping[str, Stack]
+    columns: Columns
+    scene: str = "sphere"
+    exposure: float = 1.0
+
+    def compute(
+        self,
+        names: Collection[str] | None = None,
+        size: int = canvas.SIZE,
+        spp: int = SAMPLES,
+        paths: int = PATHS,
+        seed: int = 0,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> dict[str, Any]:
+        """A cell for each stack, or for those named: see `cells.compute`.
+
+        Raises:
+            InvalidInput, MissingTool: as `vt.render`.
+        """
+        chosen = {name: stack for name, stack in self.stacks.items() if names is None or name in names}
+        return compute(chosen, self.columns, Quality(size, spp, paths), seed, progress, self.scene)
+
+    def draw(self, numbers: dict[str, Any], path: str | Path) -> None:
+        """The truth, each model, and what that has too much or too little.
+
+        Raises:
+            InvalidInput: the file cannot be written.
+        """
+        draw(numbers, path, self.exposure)
 
 
 def compute(
@@ -65,7 +101,7 @@ def _last_lobe(stack: Stack, columns: Columns, paths: int, seed: int) -> dict[st
     true = _last(reference.statistics(stack, COSINES, 0.0, paths, seed))
     told = {"walk": true}
     for title, (model, choices) in columns.items():
-        told[title] = along(_last(lobes(stack, COSINES, model=model, **choices)), true)
+        told[title] = along(_last(lobes(stack, COSINES, 0.0, model, **choices)), true)
     return {
         "alpha": {title: lobe.alpha.T.tolist() for title, lobe in told.items()},
         "energy": {title: lobe.energy.mean(axis=0).tolist() for title, lobe in told.items()},

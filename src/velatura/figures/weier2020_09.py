@@ -6,11 +6,7 @@ latitude and 0.4 across them. Both columns are the model `weier2020` and differ 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, cells
+from velatura.figures import cells
 from velatura.figures.weier2020_10 import stack
 
 STACKS = {"metal 0.05, 0.4": stack((0.05, 0.05), (0.05, 0.4))}
@@ -18,29 +14,8 @@ COLUMNS: cells.Columns = {
     name: ("weier2020", {"reflectance": "fresnel", "tir": "off", "map": name}) for name in ("weier-2d", "weier")
 }
 
-
-def compute(
-    size: int = canvas.SIZE,
-    spp: int = cells.SAMPLES,
-    paths: int = cells.PATHS,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """One cell with two columns: see `cells.compute`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
-    return cells.compute(STACKS, COLUMNS, cells.Quality(size, spp, paths), seed, progress)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The truth, and beside it each map's picture and what it has too much or too little.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    cells.draw(numbers, path, exposure=0.4)
+_FIGURE = cells.Cells(STACKS, COLUMNS, exposure=0.4)
+compute, draw = _FIGURE.compute, _FIGURE.draw
 
 
 if __name__ == "__main__":

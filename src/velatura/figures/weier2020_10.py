@@ -6,11 +6,7 @@ metal are not legible in the paper and chosen here, as are the sphere, brushed a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, cells
+from velatura.figures import cells
 from velatura.stack import Interface, Stack
 
 ALPHAS = ((0.01, 0.01), (0.01, 0.1), (0.1, 0.1), (0.1, 0.3), (0.3, 0.3), (0.05, 0.5))
@@ -22,30 +18,10 @@ def stack(coat: tuple[float, float], metal: tuple[float, float]) -> Stack:
     return Stack([Interface(eta=1.5, alpha=coat), Interface(eta=0.001, k=1.0, alpha=metal)])
 
 
-def compute(
-    alphas: Sequence[tuple[float, float]] = ALPHAS,
-    size: int = canvas.SIZE,
-    spp: int = cells.SAMPLES,
-    paths: int = cells.PATHS,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """A cell for each roughness of the metal: see `cells.compute`.
+STACKS = {f"metal {u:g}, {v:g}": stack((0.05, 0.05), (u, v)) for u, v in ALPHAS}
 
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
-    stacks = {f"metal {u:g}, {v:g}": stack((0.05, 0.05), (u, v)) for u, v in alphas}
-    return cells.compute(stacks, COLUMNS, cells.Quality(size, spp, paths), seed, progress)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A column for each roughness: the truth, the model, and what it has too much or too little.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    cells.draw(numbers, path, exposure=0.4)
+_FIGURE = cells.Cells(STACKS, COLUMNS, exposure=0.4)
+compute, draw = _FIGURE.compute, _FIGURE.draw
 
 
 if __name__ == "__main__":

@@ -7,11 +7,9 @@ are brushed, in which fields and how roughly is not legible in the paper, and ch
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
-from velatura.figures import canvas, cells
+from velatura.figures import cells
 from velatura.stack import Brushing, Interface, Stack
 
 RADIAL, CONCENTRIC = Brushing(brushing="radial"), Brushing(brushing="concentric")
@@ -24,42 +22,18 @@ def stack(coat: float | tuple[float, float], turn: Any, metal: float | tuple[flo
     return Stack([Interface(eta=1.49, alpha=coat, rotation=turn), Interface(eta=eta, k=k, alpha=metal, rotation=below)])
 
 
-_COPPER = Interface(eta=(0.143, 0.373, 1.444), k=(3.983, 2.387, 1.602), alpha=SPREAD, rotation=-45.0)
+_GOLD = Interface(eta=(0.143, 0.373, 1.444), k=(3.983, 2.387, 1.602), alpha=SPREAD, rotation=-45.0)
 STACKS = {
     "(a)": stack(0.1, 0.0, 0.1, 0.0),
     "(b)": stack(0.05, 0.0, SPREAD, CONCENTRIC),
     "(c)": stack(SPREAD, RADIAL, 0.05, 0.0),
     "(d)": stack(SPREAD, RADIAL, SPREAD, CONCENTRIC),
-    "(e)": Stack([Interface(eta=1.49, alpha=SPREAD, rotation=45.0), _COPPER]),
+    "(e)": Stack([Interface(eta=1.49, alpha=SPREAD, rotation=45.0), _GOLD]),
 }
 COLUMNS: cells.Columns = {"yamaguchi2019": ("yamaguchi2019", {"reflectance": "fresnel", "tir": "off"})}
 
-
-def compute(
-    stacks: Sequence[str] = tuple(STACKS),
-    size: int = canvas.SIZE,
-    spp: int = cells.SAMPLES,
-    paths: int = cells.PATHS,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """A cell for each of the materials: see `cells.compute`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
-    return cells.compute(
-        {name: STACKS[name] for name in stacks}, COLUMNS, cells.Quality(size, spp, paths), seed, progress, "lid"
-    )
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A column for each material: the truth, the model, and what it has too much or too little.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    cells.draw(numbers, path)
+_FIGURE = cells.Cells(STACKS, COLUMNS, "lid")
+compute, draw = _FIGURE.compute, _FIGURE.draw
 
 
 if __name__ == "__main__":

@@ -6,40 +6,14 @@ circles of latitude.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, cells
+from velatura.figures import cells
 from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, stack
 
 GAPS = (90, 60, 30)  # degrees
+STACKS = {f"{gap:g}°": stack(SPREAD, float(gap), SPREAD, 0.0) for gap in GAPS}
 
-
-def compute(
-    gaps: Sequence[float] = GAPS,
-    size: int = canvas.SIZE,
-    spp: int = cells.SAMPLES,
-    paths: int = cells.PATHS,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """A cell for each gap: see `cells.compute`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
-    stacks = {f"{gap:g}°": stack(SPREAD, float(gap), SPREAD, 0.0) for gap in gaps}
-    return cells.compute(stacks, COLUMNS, cells.Quality(size, spp, paths), seed, progress)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A column for each gap: the truth, the model, and what it has too much or too little.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    cells.draw(numbers, path)
+_FIGURE = cells.Cells(STACKS, COLUMNS)
+compute, draw = _FIGURE.compute, _FIGURE.draw
 
 
 if __name__ == "__main__":

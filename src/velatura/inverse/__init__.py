@@ -6,9 +6,12 @@ read by the model's own recursion, so that what is found holds for the model tha
 
 from velatura.inverse import sets
 from velatura.inverse.above import Above, Layers
+from velatura.inverse.angles import Directions, ReflectanceTable, load_table, table_of
 from velatura.inverse.coats import Coated, coat
+from velatura.inverse.descent import Fit, fit
 from velatura.inverse.equivalence import EquivalenceClass
 from velatura.inverse.explain import Direction, Infeasible
+from velatura.inverse.fitting import fit_target, simplify
 from velatura.inverse.interface import MODEL, Choice, invert_interface
 from velatura.inverse.pair import Pair, invert_pair
 from velatura.inverse.stacks import Solution, alternatives, grazing, invert_stack, on_black
@@ -20,21 +23,29 @@ __all__ = [
     "Choice",
     "Coated",
     "Direction",
+    "Directions",
     "EquivalenceClass",
+    "Fit",
     "Fixed",
     "Infeasible",
     "Layers",
     "Lobe",
     "Pair",
+    "ReflectanceTable",
     "Solution",
     "Target",
     "alternatives",
     "coat",
+    "fit",
+    "fit_target",
     "grazing",
     "invert_interface",
     "invert_pair",
     "invert_stack",
+    "load_table",
     "load_target",
     "on_black",
     "sets",
+    "simplify",
+    "table_of",
 ]

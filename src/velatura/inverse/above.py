@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,7 @@ class Layers:
     @property
     def feasible(self) -> Mask:
         """Whether all constraints hold, (N,) of bool."""
-        return np.logical_and.reduce(np.broadcast_arrays(*(margin >= 0 for margin in self.margins.values())))
+        return reduce(np.logical_and, (margin >= 0 for margin in self.margins.values()))
 
     def take(self, index: Any) -> Layers:
         """Some of the N."""
@@ -107,8 +108,9 @@ class Above:
             return self.model
         return dataclasses.replace(self.model, calibrations=None, tir="off")
 
-    def prepared(self, layers: Layers) -> Prepared:
-        """The interfaces as the next layer of each stack."""
+    def prepared(self, layers: Layers, reflectance: Value | None = None) -> Prepared:
+        """The interfaces as the next layer of each stack; `reflectance` where that is known already."""
+        model = self.adder if reflectance is None else dataclasses.replace(self.adder, reflectance="fresnel")
         kinds: tuple[str, ...] = (layers.kind,)
         values = {"exterior": self.eta}
         if self.over is not None and self.adder.tir != "off":
@@ -116,7 +118,13 @@ class Above:
             kinds, values = ("dielectric", layers.kind), {"exterior": self.over, "layer0_eta": self.eta}
             values |= {"layer0_alpha_u": 0.0, "layer0_alpha_v": 0.0, "layer0_rotation": 0.0}
         values |= _interface(layers, len(kinds) - 1)
-        return prepare(kinds, values, self.adder, self.variance)
+        prepared = prepare(kinds, values, model, self.variance)
+        if reflectance is None:
+            return prepared
+        last = prepared.layers[-1]
+        assert isinstance(last, PreparedInterface)
+        last = dataclasses.replace(last, reflectance=lambda cos_theta, alpha: reflectance)
+        return dataclasses.replace(prepared, layers=(*prepared.layers[:-1], last))
 
     def reflectance(self, layers: Layers) -> Value:
         """Energy that the interfaces reflect of light from the stack, of shape of eta or (C, N)."""
@@ -138,18 +146,20 @@ class Above:
         return operators.interface(prepared, last, 1.0, self.state.s_t0i, NORMAL).r_12
 
     def through(self, tau: Value) -> Above:
-        """The stacks with an absorbing medium below them."""
+        """The stacks with an absorbing medium below them, which blurs nothing."""
         if np.ndim(tau) == 0 and tau == 0:
             return self
-        values = {"exterior": self.eta, **_medium(tau, 0)}
-        prepared = prepare(("medium",), values, self.adder, self.variance)
-        state, _ = adding.add(prepared, self.state, prepared.layers[-1], NORMAL)
-        return dataclasses.replace(self, state=state)
+        t, state = np.exp(-np.asarray(tau)), self.state
+        passed = {"r_i0": state.r_i0 * t * t, "t_0i": state.t_0i * t, "t_i0": state.t_i0 * t}
+        return dataclasses.replace(self, state=dataclasses.replace(state, **passed))
 
-    def below(self, layers: Layers) -> tuple[Above, adding.Lobe]:
-        """The stacks with the media and interfaces below them, and the lobes that these reflect."""
+    def below(self, layers: Layers, reflectance: Value | None = None) -> tuple[Above, adding.Lobe]:
+        """The stacks with the media and interfaces below them, and the lobes that these reflect.
+
+        `reflectance` is what `reflectance` has found of the interfaces, where that was asked.
+        """
         above = self.through(layers.tau)
-        prepared = above.prepared(layers)
+        prepared = above.prepared(layers, reflectance)
         state, lobe = adding.add(prepared, above.state, prepared.layers[-1], NORMAL)
         assert lobe is not None
         below = dataclasses.replace(above, state=state, eta=layers.eta, over=self.eta)

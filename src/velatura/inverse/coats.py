@@ -10,11 +10,13 @@ import numpy as np
 from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import interface
 from velatura.inverse.above import NORMAL, Above, Array, Layers, join
+from velatura.inverse.descent import written
 from velatura.inverse.equivalence import dislike
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_index
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import Model, lobes, named, prepare, variance_kind
+from velatura.model.diffuse import under, with_means
 from velatura.model.statistics import Statistics, number, statistics
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
@@ -25,11 +27,15 @@ KEEP = 64  # partial stacks that are followed
 
 @dataclass(frozen=True)
 class Coated:
-    """A coated stack, and the lobes at normal incidence without and with the coat: those of the stack come last."""
+    """A coated stack, and the lobes at normal incidence without and with the coat: those of the stack come last.
+
+    diffuse: energy (3,) that a diffuse base scatters back up, without and with the coat; None without one.
+    """
 
     stack: Stack
     before: Statistics
     after: Statistics
+    diffuse: tuple[Array, Array] | None
 
     def change(self) -> list[dict[str, list[float]]]:
         """For every interface of the bare material energy (rgb) and roughness (two axes), before and after."""
@@ -59,7 +65,8 @@ def coat(
 
     Args:
         eta, alpha: absolute index and roughness of the coat.
-        keep_appearance: change the material below, so that its lobes at normal incidence keep energy and variance.
+        keep_appearance: change the material below, so that its lobes at normal incidence keep energy and variance, and
+            a diffuse base its energy, unless it would have to be brighter than white.
         eta_max: largest index that a dielectric may be given.
 
     Raises:
@@ -77,7 +84,14 @@ def coat(
         if isinstance(below[0], Medium):
             raise InvalidInput("layer 0 (medium): is above all interfaces; a coat goes below it, not on it")
     coated = Stack([top, *below], name=f"{stack.name or 'material'}, coated", exterior=stack.exterior, thin=stack.thin)
-    return Coated(coated, *(statistics(one, 1.0, model=chosen) for one in (stack, coated)))
+    before, after = (statistics(one, 1.0, model=chosen) for one in (stack, coated))
+    diffuse = None
+    if isinstance(stack.layers[-1], Diffuse):
+        wanted = _scattered(stack, chosen)
+        if keep_appearance:
+            coated = _with_albedo(coated, wanted, chosen)
+        diffuse = wanted, _scattered(coated, chosen)
+    return Coated(coated, before, after, diffuse)
 
 
 def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
@@ -112,6 +126,29 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Laye
     best = paths.take(np.array([np.argmin(paths.cost)]))
     solved = [layer for layers in best.layers for layer in layers.written(0)]
     return (*solved, *(layer for layer in stack.layers if isinstance(layer, Diffuse)))
+
+
+def _scattered(stack: Stack, model: Model) -> Array:
+    """Energy of a diffuse base at normal incidence, (3,)."""
+    flat = stack.flat()
+    values = {key: number(key, value) for key, value in flat.items()}
+    prepared = with_means(prepare(stack.kinds, values, model, variance_kind(stack.kinds, flat)))
+    base = under(prepared, NORMAL)
+    assert base is not None
+    return np.broadcast_to(base.energy, (3, 1))[:, 0]
+
+
+def _with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
+    """The stack with the albedo of its base that gives this energy, or the nearest to it.
+
+    Of an albedo a the energy is p a / (1 - q a), with what passes, p, and what comes back to the base, q.
+    """
+    name = f"layer{len(stack.layers) - 1}_albedo"
+    half, white = (_scattered(stack.replace(**{name: albedo}), model) for albedo in (0.5, 1.0))
+    q = (white - 2 * half) / (white - half)
+    p = white * (1 - q)
+    albedo = np.clip(wanted / (p + q * wanted), 0, 1)
+    return stack.replace(**{name: written(albedo)})
 
 
 def _choices(stack: Stack, values: dict[str, Array], n: int, eta_max: float) -> Sequence[Choice]:

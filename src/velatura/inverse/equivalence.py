@@ -133,8 +133,10 @@ class EquivalenceClass:
 
         Empty, of shape (0, free), where the class is.
         """
+        if not self.free:
+            return np.empty((0 if self.empty else count, 0))
         rng = np.random.default_rng(seed)
-        columns = _draw(self.indices_1(), rng.random(count)) if self.free else np.empty(0)
+        columns = _draw(self.indices_1(), rng.random(count))
         if self.free < 2 or not len(columns):
             return columns.reshape(-1, self.free)
         rarer, denser = self._roots(None, columns)

@@ -119,8 +119,8 @@ def solve(above: Above, energy: Array, variance: Variance, choice: Choice) -> Fo
     want_e, want_s = energy, variance
     before = None
     for _ in range(ROUNDS):
-        layers = _closed_form(above, want_e, want_s, bright, choice)
-        below, lobe = above.below(layers)
+        layers, reflectance = _closed_form(above, want_e, want_s, bright, choice)
+        below, lobe = above.below(layers, reflectance)
         read = at_brightest(above, lobe.variance, bright)
         missing, apart = energy / np.maximum(lobe.energy, ops.TINY), variance + read * -1.0
         off = np.maximum(np.max(np.abs(missing - 1), axis=0), _size(apart))
@@ -187,8 +187,13 @@ def _size(s: Variance) -> Array:
     return np.max([np.broadcast_to(np.abs(x), np.shape(s.matrix()[0])) for x in vars(s).values()], axis=0)
 
 
-def _closed_form(above: Above, energy: Array, variance: Variance, bright: Array, choice: Choice) -> Layers:
-    """The one formula for an interface below any state (Bati et al. 2021, Eqs. 11, 15, 18 and 19 in one)."""
+def _closed_form(
+    above: Above, energy: Array, variance: Variance, bright: Array, choice: Choice
+) -> tuple[Layers, Value]:
+    """The one formula for an interface below any state (Bati et al. 2021, Eqs. 11, 15, 18 and 19 in one).
+
+    Returns the interfaces, and what they reflect.
+    """
     # Give absorption that is pinned to what lies above
     if choice.tau is not None:
         above = above.through(choice.tau)
@@ -203,14 +208,15 @@ def _closed_form(above: Above, energy: Array, variance: Variance, bright: Array,
     else:
         layers = solver(above, r, roughness, choice)
     margins = {"blur": margin(least(s_r)), **layers.margins}
-    tau = 0.5 * np.log(np.maximum(above.reflectance(layers), ops.TINY) / r)
+    reflectance = above.reflectance(layers)
+    tau = 0.5 * np.log(np.maximum(reflectance, ops.TINY) / r)
     if choice.tau is not None or not choice.absorbs:
         margins["colour"] = margin(-np.max(np.abs(tau), axis=0), NEGLIGIBLE)
         tau = choice.tau if choice.tau is not None else 0.0
     else:
         margins["absorption"] = margin(np.min(tau, axis=0), NEGLIGIBLE)
         tau = np.where((tau < 0) & (tau >= -NEGLIGIBLE), 0.0, tau)
-    return dataclasses.replace(layers, tau=tau, margins=margins)
+    return dataclasses.replace(layers, tau=tau, margins=margins), reflectance
 
 
 def attenuated(above: Above, energy: Array) -> Array:
@@ -246,7 +252,7 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
 
     def index(u: Array) -> Array:
         """Of reflectance u at normal incidence when smooth (Eq. 7)."""
-        root = np.sqrt(u)
+        root = np.sqrt(np.maximum(u, 0.0))  # of what rounding makes less than nothing
         ratio = (1 + root) / (1 - root)
         return above.eta * np.where(denser, ratio, 1 / ratio)[None]
 
@@ -359,4 +365,4 @@ def least(s: Variance) -> Array:
 def margin(x: ArrayLike, slack: float = SLACK) -> Array:
     """A margin that rounding does not break."""
     x = np.atleast_1d(np.asarray(x, float))
-    return np.where((x < 0) & (x >= -slack), 0.0, np.nan_to_num(x, nan=-np.inf))
+    return np.where(x >= -slack, np.maximum(x, 0.0), np.where(x < 0, x, -np.inf))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from velatura.inverse import interface, pair
 from velatura.inverse.above import Above, Array, Layers, take
 from velatura.inverse.equivalence import EquivalenceClass, dislike
 from velatura.inverse.interface import DENSER, MODEL, RARER, Choice
+from velatura.inverse.roots import false_position
 from velatura.inverse.target import Lobe, Target, read
 from velatura.model import Model, named
 from velatura.model.statistics import statistics
@@ -27,7 +28,7 @@ from velatura.stack import Diffuse, Stack
 
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
 GRAZING = (0.5, 0.4, 0.3, 0.2, 0.1)  # cosines at which members of a class may differ
-ALPHA_APART = 1e-4  # by which a roughness may miss the one that is fixed
+ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that is fixed, and may where that is sought
 
 
 @dataclass(frozen=True)
@@ -184,7 +185,7 @@ def beginning(target: Target, model: Model) -> Partial:
 
 def pruned(tried: Partial, interfaces: int, keep: int) -> Partial:
     """The feasible ones of those that some interfaces were just added to, not more than can be followed."""
-    feasible = np.logical_and.reduce(np.broadcast_arrays(*(layers.feasible for layers in tried.layers[-interfaces:])))
+    feasible = reduce(np.logical_and, (layers.feasible for layers in tried.layers[-interfaces:]))
     return _thinned(tried.take(np.flatnonzero(np.broadcast_to(feasible, tried.cost.shape))), keep)
 
 
@@ -221,8 +222,10 @@ def extended(paths: Partial, lobe: Lobe, target: Target, spread: int, first: boo
         if pinned is None:
             eta = np.r_[eta, np.broadcast_to(paths.above.eta, (1, count))[0]]
         index = np.r_[np.repeat(np.arange(count), len(tried)), np.arange(count)][: len(eta)]
-        paths, eta = paths.take(index), eta[None]
         tau = _pinned(lobe, "tau", 0)
+        if pinned is None and lobe.fixed.of("alpha", 1) is not None:
+            index, eta = _of_fixed_roughness(paths, lobe, variance, choice, tried)
+        paths, eta = paths.take(index), eta[None]
         upper = pair.top(paths.above, energy, variance, eta, 0.0 if tau is None else tau, target.eta_max)
         layers = _held(upper.layers, lobe, 0)
         paths = Partial(upper.below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
@@ -237,6 +240,32 @@ def extended(paths: Partial, lobe: Lobe, target: Target, spread: int, first: boo
     lower = interface.solve(paths.above, energy, variance, choice)
     layers = _held(lower.layers, lobe, lobe.interfaces - 1)
     return Partial(lower.below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
+
+
+def _of_fixed_roughness(
+    paths: Partial, lobe: Lobe, variance: Isotropic, choice: Choice, tried: Array
+) -> tuple[np.ndarray, Array]:
+    """Indices between the interfaces for which the lower one is as rough as is fixed, and below which stack."""
+    energy, alpha, tau = np.array(lobe.colour)[:, None], lobe.fixed.of("alpha", 1), _pinned(lobe, "tau", 0)
+    count = len(paths.cost)
+
+    def apart(index: np.ndarray, eta: Array) -> Array:
+        above = paths.above.take(index)
+        _, lower = pair.solve(above, energy, variance, eta[None], 0.0 if tau is None else tau, choice)
+        return np.broadcast_to(lower.layers.alpha, eta.shape) - alpha
+
+    # Where the roughness passes the fixed one between the indices that are tried, and where it is that one throughout
+    index, eta = np.repeat(np.arange(count), len(tried)), np.tile(tried, count)
+    miss = apart(index, eta)
+    same = np.abs(miss) <= ALPHA_APART
+    steps = miss.reshape(count, -1)
+    passes = np.flatnonzero(np.pad((steps[:, 1:] < 0) != (steps[:, :-1] < 0), ((0, 0), (0, 1))))
+    if not len(passes):
+        return index[same], eta[same]
+    found = false_position(
+        lambda x: apart(index[passes], x), eta[passes], eta[passes + 1], miss[passes], miss[passes + 1], ENOUGH
+    )
+    return np.r_[index[same], index[passes]], np.r_[eta[same], found]
 
 
 def _open(lobe: Lobe) -> bool:

@@ -11,8 +11,7 @@ from pydantic import model_validator
 
 from velatura.errors import InvalidInput
 from velatura.model.maps import MAPS
-from velatura.stack import RGB
-from velatura.stack.io import _FORMATS, _format, _parse, _reason
+from velatura.stack import RGB, io
 from velatura.stack.schema import Parameter, Record, show
 from velatura.stack.values import Choice, Colour, Scalar, Text
 
@@ -187,19 +186,11 @@ def load_target(path: str | Path) -> Target:
     Raises:
         InvalidInput: no such file, or what is in it is not a target; one line that names the file.
     """
-    path = Path(path)
-    _format(path)
+    fields = io.read(path, "a target file")
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-        return Target.from_dict(_parse(text, _FORMATS[path.suffix.lower()]))
+        return Target.from_dict(fields)
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from None
-    except UnicodeDecodeError as error:
-        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
-    except RecursionError:
-        raise InvalidInput(f"{path}: is nested too deeply") from None
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: cannot be read: {_reason(error)}") from None
 
 
 def read(target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path) -> Target:

@@ -12,13 +12,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from velatura import ops
-from velatura.model import memo, mixture, recursion
+from velatura.model import memo, mixture, recursion, scaling
 from velatura.model.adding import Lobe
 from velatura.model.diffuse import Base, Settle, as_it_is, under, with_means
 from velatura.model.merge import merged
 from velatura.model.models import Model
 from velatura.model.prepare import Prepared, prepare
+from velatura.model.scaling import Scaling
 from velatura.model.sides import turned_over, with_index_below
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
@@ -31,7 +34,8 @@ class Body:
     """A stack prepared from above and, where it transmits, from below (else None).
 
     `eta` is the index below over the index above, one for all colours; 1 where nothing is transmitted. `lobes_above`
-    and `lobes_below` tell the lobes on either side, for a direction turned up.
+    and `lobes_below` tell the lobes on either side, for a direction turned up. `scaling` keeps the energy of the
+    symmetric form; None where it is as published.
     """
 
     above: Prepared
@@ -39,6 +43,7 @@ class Body:
     eta: Value
     lobes_above: memo.Lobes
     lobes_below: memo.Lobes
+    scaling: Scaling | None = None
 
 
 @dataclass(frozen=True)
@@ -85,20 +90,20 @@ def body(
     """Constants of a stack for both of its sides; arguments as `Stack`, `prepare` and `with_means`."""
 
     def lobes(prepared: Prepared) -> memo.Lobes:
-        # Without axes they depend on the cosine alone
         added = partial(_lobes, prepared)
-        if number is None or variance is not Isotropic:
-            return added
-        return memo.sample(added, prepared, number, type(values["exterior"]))
+        return memo.sample(added, prepared, number, type(values["exterior"]), transmits) if number else added
 
+    transmits = kinds[-1] == "dielectric"
     values = with_index_below(kinds, values, thin)
     above = with_means(prepare(kinds, values, model, variance, constant, number), settle)
-    if kinds[-1] != "dielectric":
+    if not transmits:
         from_above = lobes(above)
-        return Body(above, None, 1.0, from_above, from_above)
+        opaque = Body(above, None, 1.0, from_above, from_above)
+        return balanced(opaque, values["exterior"], number) if constant else opaque
     below = prepare(*turned_over(kinds, values), model, variance, constant, number)
     eta = ops.mean(values[f"layer{len(kinds) - 1}_eta"]) / ops.mean(values["exterior"])
-    return Body(above, below, eta, lobes(above), lobes(below))
+    pane = Body(above, below, eta, lobes(above), lobes(below))
+    return balanced(pane, values["exterior"], number) if constant else pane
 
 
 def scattered(stack: Body, wi: Direction) -> Scattered:
@@ -109,6 +114,7 @@ def scattered(stack: Body, wi: Direction) -> Scattered:
         return Scattered(reflected, under(stack.above, turned), None, 1.0)
     from_above = wi[2] > 0
     reflected_below, passed_below = stack.lobes_below(turned)
+    assert passed is not None and passed_below is not None
     eta = ops.select(from_above, stack.eta, 1 / stack.eta)
     through = _chosen(from_above, passed, passed_below)
     through = replace(through, energy=ops.select(_refracted(turned, eta)[2] > 0, through.energy, 0.0))
@@ -195,12 +201,55 @@ def exchangeable(stack: Body, wi: Direction, wo: Direction) -> tuple[Sequence[Lo
     i, o = _upright(wi, wi), _upright(wo, wi)
     half = _difference(i, o)
     if stack.below is None:
-        return stack.lobes_above(half)[0], None
+        return _scaled(stack, wi, wo, stack.lobes_above(half)[0]), None
     half_below = _difference(*_pair_below(stack, wi, wo))
     seen = _chosen_direction(o[2] > 0, half, _refracted(half_below, 1 / stack.eta))
     reflected, passed = stack.lobes_above(seen)
     reflected_below, _ = stack.lobes_below(half)
-    return [_chosen(wi[2] > 0, a, b) for a, b in zip(reflected, reflected_below)], passed
+    assert passed is not None
+    *reflected, passed = _scaled(
+        stack, wi, wo, [*(_chosen(wi[2] > 0, a, b) for a, b in zip(reflected, reflected_below)), passed]
+    )
+    return reflected, passed
+
+
+def _scaled(stack: Body, wi: Direction, wo: Direction, lobes: Sequence[Lobe]) -> list[Lobe]:
+    if stack.scaling is None:
+        return list(lobes)
+    factor = stack.scaling(wi) * stack.scaling(wo)
+    return [replace(lobe, gain=lobe.gain * factor) for lobe in lobes]
+
+
+def balanced(stack: Body, exterior: Value, number: type | None) -> Body:
+    """A uniform stack whose symmetric form keeps energy, where its model asks for that.
+
+    Published models stay as they are, and so do Mitsuba's scalar variants.
+    """
+    numpy = isinstance(exterior, (float, np.ndarray))
+    if stack.above.model.form == "forward" or stack.above.model.calibrations is None or not (number or numpy):
+        return stack
+    colour = type(exterior) if number else _channels
+    bare, asked = replace(stack, above=replace(stack.above, base=None)), Asked(radiance=False)
+
+    def sampled(wi: Direction, u: Value, u1: Value, u2: Value) -> tuple[Direction, Value]:
+        wo, _ = sample(bare, wi, u, u1, u2, asked)
+        value, density = eval_pdf(bare, wi, wo, asked)
+        return wo, full(ops.select(density > 0, value / ops.maximum(density, ops.TINY), 0.0), wi)
+
+    def energy(wi: Direction) -> Value:
+        seen = scattered(bare, wi)
+        return full(sum(lobe.energy for lobe in (*seen.reflected, *filter(None, [seen.transmitted]))), wi)
+
+    def full(value: Value, wi: Direction) -> Value:
+        return colour(value + 0 * wi[2])
+
+    isotropic = stack.above.variance is Isotropic
+    return replace(stack, scaling=scaling.balanced(sampled, energy, colour, number, isotropic, stack.below is not None))
+
+
+def _channels(*values: Value) -> np.ndarray:
+    """A colour of NumPy, from its channels or, the same in all or not, from one value."""
+    return np.stack(values) if len(values) > 1 else np.broadcast_to(values[0], (3, np.shape(values[0])[-1]))
 
 
 def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:

@@ -1,63 +1,103 @@
-"""The lobes of a uniform isotropic stack, added up once over the cosine, so that all of them are one fetch."""
+"""The lobes of a uniform stack, added up once over direction, so that all of them are one fetch.
+
+Where all interfaces are isotropic they depend on the cosine alone; else on the azimuth as well, and are the same after
+half a turn.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from velatura import ops
+from velatura.model import mixture
 from velatura.model.adding import Lobe
+from velatura.model.maps import RoughnessMap
 from velatura.model.prepare import Prepared, PreparedInterface
-from velatura.model.variance import Isotropic, PerAxis, Roughness
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.tables import curve
 
-Lobes = Callable[[Direction], tuple[list[Lobe], Lobe]]  # reflected and transmitted, for a direction above the surface
+# Reflected, and transmitted if anything is, for a direction above the surface
+Lobes = Callable[[Direction], tuple[list[Lobe], Lobe | None]]
+
+NORMALS = 256  # over which the albedo of a lobe is averaged
+
+# What is interpolated is roughness itself: matrices of it, so that axes may turn
+_AS_IT_IS = RoughnessMap(lambda along, across: along, lambda along, across: along)
 
 
 @dataclass(frozen=True)
 class Memo:
-    """Energies of type `colour` and roughnesses of all lobes, the transmitted one last.
+    """Energies of type `colour` and roughnesses of all lobes, the transmitted one last if there is one.
 
-    Lobes that have axes of their own, in the plane of incidence and across it, have a gain too; `facets` are those of
-    lobes that are drawn with them.
+    Lobes that have axes of their own have a gain too; `facets` are those of lobes that are drawn with them.
     """
 
     curves: curve.Curves
     colour: type
     prepared: Prepared
-    axes: bool
-    facets: list[PreparedInterface | None]
+    facets: Sequence[PreparedInterface | None]
+    transmits: bool
 
-    def __call__(self, w: Direction) -> tuple[list[Lobe], Lobe]:
-        channels, colours = iter(self.curves(w[2])), len(self.colour())
-        lobes = []
-        for facets in self.facets:
-            energy = self.colour(*(next(channels) for _ in range(colours)))
-            alpha_u = next(channels)
-            if not self.axes:
-                variance = Isotropic(self.prepared.f.variance(alpha_u))
-                lobes.append(Lobe(energy, variance, Roughness(alpha_u, alpha_u, 0.0)))
-                continue
-            roughness = Roughness(alpha_u, next(channels), ops.arctan2(w[1], w[0]))
-            gain = self.colour(*(next(channels) for _ in range(colours)))
-            lobes.append(Lobe(energy, PerAxis.of(roughness, self.prepared.f), roughness, gain, facets))
-        return lobes[:-1], lobes[-1]
+    def __call__(self, w: Direction) -> tuple[list[Lobe], Lobe | None]:
+        channels = iter(self.curves(w))
+        lobes = [self._lobe(w, facets, channels) for facets in self.facets]
+        return (lobes[:-1], lobes[-1]) if self.transmits else (lobes, None)
+
+    def _lobe(self, w: Direction, facets: PreparedInterface | None, channels: Iterator[Value]) -> Lobe:
+        energy = self._colour(channels)
+        if facets is not None:
+            return Lobe(energy, facets.s_r, facets.roughness, self._colour(channels), facets)
+        kind = _kind(self.prepared)
+        roughness = kind(*(next(channels) for _ in kind.__dataclass_fields__)).roughness(_AS_IT_IS)
+        if kind is not Isotropic and self.prepared.variance is Isotropic:
+            roughness = roughness._replace(rotation=ops.arctan2(w[1], w[0]))
+        gain = next(channels) if self.prepared.model.calibrations else 1.0
+        return Lobe(energy, kind.of(roughness, self.prepared.f), roughness, gain)
+
+    def _colour(self, channels: Iterator[Value]) -> Value:
+        return self.colour(*(next(channels) for _ in range(len(self.colour()))))
 
 
-def sample(lobes: Lobes, prepared: Prepared, number: type, colour: type) -> Memo:
-    """The lobes over the cosine, for Dr.Jit's types of numbers and colours."""
-    axes = prepared.model.calibrations is not None
-    facets: list[PreparedInterface | None] = []
+def sample(lobes: Lobes, prepared: Prepared, number: type, colour: type, transmits: bool) -> Memo:
+    """The lobes over direction, for Dr.Jit's types of numbers and colours."""
+    shape = curve.LINE if prepared.variance is Isotropic else curve.PLANE
+    reflected, passed = lobes(curve.directions(shape, number))
+    seen = [*reflected, passed] if transmits and passed is not None else reflected
+    facets = [lobe.facets for lobe in seen]
 
-    def columns(cosine: Value) -> list[Value]:
-        reflected, passed = lobes((ops.sqrt(1 - cosine * cosine), 0.0, cosine))
-        facets[:] = [lobe.facets for lobe in (*reflected, passed)]
-        return [c for lobe in (*reflected, passed) for c in channels(lobe)]
+    def held(seen: Sequence[Lobe]) -> Memo:
+        columns = [column for lobe in seen for column in _columns(lobe, prepared, colour)]
+        return Memo(curve.curves(columns, shape, number), colour, prepared, facets, transmits)
 
-    def channels(lobe: Lobe) -> list[Value]:
-        isotropic = [*colour(lobe.energy), lobe.roughness.alpha_u]
-        return [*isotropic, lobe.roughness.alpha_v, *colour(lobe.gain)] if axes else isotropic
+    memo = held(seen)
+    if prepared.variance is Isotropic or prepared.model.calibrations is None:
+        return memo
+    return held([replace(lobe, gain=gain) for lobe, gain in zip(seen, _gains(memo, seen, number))])
 
-    return Memo(curve.sample(columns, number), colour, prepared, axes, facets)
+
+def _kind(prepared: Prepared) -> type[Variance]:
+    """What holds the roughness of lobes: those of isotropic stacks may have axes, in the plane of incidence."""
+    if prepared.model.calibrations is None:
+        return prepared.variance
+    return PerAxis if prepared.variance is Isotropic else Covariance
+
+
+def _columns(lobe: Lobe, prepared: Prepared, colour: type) -> list[Value]:
+    if lobe.facets is not None:
+        return [*colour(lobe.energy), *colour(lobe.gain)]
+    roughness = vars(_kind(prepared).of(lobe.roughness, _AS_IT_IS)).values()
+    return [*colour(lobe.energy), *roughness, *([lobe.gain] if prepared.model.calibrations else [])]
+
+
+def _gains(memo: Memo, seen: Sequence[Lobe], number: type) -> list[Value]:
+    """Those that give lobes their energy when they are drawn, however they are turned."""
+    x, y, z = curve.directions(memo.curves.shape, number)
+    _, u_1, u_2 = curve.evenly(len(z), NORMALS, number)
+    w = curve.repeated(x, NORMALS), curve.repeated(y, NORMALS), curve.repeated(z, NORMALS)
+    reflected, passed = memo(w)
+    drawn = [mixture.drawn(lobe, w, u_1, u_2) for lobe in [*reflected, *([passed] if passed else [])]]
+    albedos = [curve.averaged(each, NORMALS) for each in drawn]
+    return [ops.divide(lobe.energy if lobe.facets else 1.0, albedo) for lobe, albedo in zip(seen, albedos)]

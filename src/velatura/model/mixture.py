@@ -78,6 +78,14 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
     return x, y, z
 
 
+def drawn(lobe: Lobe, wi: Direction, u1: Value, u2: Value) -> Value:
+    """What a sample of a lobe by itself carries, for a gain of 1: of all light, or without facets of its energy."""
+    alpha_u, alpha_v, i = _in_frame(lobe.roughness, wi)
+    h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
+    fresnel = lobe.facets.reflect(ops.clip(ggx.dot(i, h), 0.0, 1.0)) if lobe.facets else 1.0
+    return fresnel * ggx.masking(ggx.reflect(i, h), alpha_u, alpha_v)
+
+
 def _colour(lobe: Lobe, wi: Direction, h: Direction) -> Value:
     """What a GGX reflection is multiplied by to be the lobe."""
     if lobe.facets is None:

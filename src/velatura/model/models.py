@@ -94,7 +94,10 @@ class Model:
             if value not in SWITCHES[key]:
                 raise InvalidInput(f"{key}: must be one of {', '.join(SWITCHES[key])}, got {value!r}")
             if value not in self._allowed(key):
-                raise InvalidInput(f"{key}={value}: {self.name} has {' and '.join(self._allowed(key))} only")
+                raise InvalidInput(
+                    f"{key}={value}: {self.name} has {' and '.join(self._allowed(key))} only; "
+                    "the models of the papers have all"
+                )
         changes: dict[str, Any] = {**switches}
         return dataclasses.replace(self, **changes)
 
@@ -165,7 +168,7 @@ MODELS: tuple[Model, ...] = (
     ),
 )
 
-DEFAULT = "belcour2018"
+DEFAULT = "velatura"
 
 
 def named(model: str | Model, **switches: str) -> Model:

@@ -27,6 +27,9 @@ from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.ggx import Direction
 
+FAINT = 1e-4  # albedo that the tables' errors come close to
+CONTRAST_MIN = 0.02  # of two indices, below which an interface is hardly there
+
 
 @dataclass(frozen=True)
 class State:
@@ -128,7 +131,9 @@ def _at(
     steep_t = _steepness(k, facets, cos_t)
     moved = [0.5 * (n_below * ops.sqrt(t) - n * ops.sqrt(i)) for t, i in zip(steep_t, steep)]
     s_t = _stretched(facets, moved[0] * moved[0], moved[1] * moved[1])
-    entering, leaving = _kept(cosine, alpha, k.lost_down), _kept(cos_t, alpha, k.lost_up)
+    contrast = ops.absolute(n_below - n) / ops.maximum(n_below, n)
+    entering = _kept(cosine, alpha, contrast, k.lost_down)
+    leaving = _kept(cos_t, alpha, contrast, k.lost_up)
     t_12, t_21 = (1 - r) * entering, (1 - r) * leaving
     passed = (1 - r + r * trapped * (1 - r_again)) * entering
 
@@ -137,7 +142,6 @@ def _at(
     share = 1 / ops.maximum(ops.mean(r + m_ri0), ops.TINY)
     from_above = s_t + s_t + above.s_ri0 + back_and_forth
     lowest = (n <= above.n_exit) & (n < n_below)
-    contrast = ops.absolute(n_below - n) / ops.maximum(n_below, n)
     shadow = 1 / (1 + k.shadowed * alpha * alpha * contrast)
     below = State(
         cos_theta=cos_t,
@@ -233,12 +237,12 @@ def _seen(
     return _stretched(roughness, 1 / (1 + x2 * closed / (x * x)), 1 / (1 + y2 * closed / (y * y)))
 
 
-def _kept(cos_theta: Value, alpha: Value, exponent: float) -> Value:
-    """Share of transmitted light that single scattering does not lose between the facets."""
+def _kept(cos_theta: Value, alpha: Value, contrast: Value, exponent: float) -> Value:
+    """Share of transmitted light that single scattering does not lose between the facets; all, without a contrast."""
     if exponent == 0:
         return 1.0
     once = tables.drawn_albedo(tables.load(), ops.maximum(cos_theta, COS_MIN), alpha, alpha)
-    return ops.power(once, exponent)
+    return ops.power(once, exponent * contrast / (contrast + CONTRAST_MIN))
 
 
 def _narrowed(k: Calibration, s: Variance, n: Value, n_below: Value) -> Variance:
@@ -264,7 +268,7 @@ def _exact(prepared: Prepared, layer: PreparedInterface, plane: _Plane, lobe: Lo
     assert prepared.once is not None
     cosine = ops.maximum(cos_theta, COS_MIN)
     once = prepared.once(cosine, _fetched(plane.seen(layer.s_r), cosine, layer.opaque))
-    gain = ops.divide(lobe.energy, once)
+    gain = ops.select(once > FAINT, ops.divide(lobe.energy, once), 1.0)
     return replace(lobe, variance=layer.s_r, roughness=layer.roughness, gain=gain, facets=layer)
 
 

@@ -131,7 +131,8 @@ class Covariance(Variance):
         radius = ops.sqrt(half * half + self.xy * self.xy)
         turned = radius > 1e-9 * mean
         rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
-        u, v = mean + radius, ops.maximum(mean - radius, 0.0)
+        u = mean + radius
+        v = ops.divide(ops.maximum(self.xx * self.yy - self.xy * self.xy, 0.0), u)  # mean - radius would cancel
         return Roughness(f.roughness(u, v), f.roughness(v, u), rotation)
 
     def matrix(self) -> tuple[Value, Value, Value]:

@@ -9,6 +9,7 @@ from velatura import kernel, tables
 from velatura.binding import Binding
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
+from velatura.plugins import spectral
 
 
 @kernel.plugin("layered")
@@ -59,6 +60,7 @@ def make(mi: Any) -> type:
 
         def _update(self) -> None:
             """Work out what does not depend on direction, and how the surface reflects."""
+            self.binding.update()
             binding, kinds = self.binding, self.binding.stack.kinds
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
             flat = {**binding.stack.flat(), **self._looked_at()}
@@ -68,12 +70,19 @@ def make(mi: Any) -> type:
                 number = mi.Float if dr.is_jit_v(mi.Float) else None
                 self.body = self._prepared(binding.values(), number=number, settle=self._settled)
                 dr.eval(self.body)
+            self.spectra: spectral.Spectra | None = None
+            if not binding.uniform and not binding.varies and dr.is_jit_v(mi.Float):
+                steering = {**binding.values(), **binding.steering}
+                fixed = self._prepared(steering, number=mi.Float, settle=self._settled)
+                dr.eval(fixed)
+                self.spectra = spectral.sample(mi, fixed, self._at_wavelengths)
+                dr.eval(self.spectra.above, self.spectra.below, self.spectra.means)
             # Say how light leaves
             smooth = all(value == 0.0 for name, value in flat.items() if "_alpha_" in name)
             clear = all(value == 0.0 for name, value in flat.items() if name.endswith("_sigma_s"))
-            self.delta = smooth and clear and binding.uniform and "diffuse" not in kinds
+            self.delta = smooth and clear and not binding.varies and "diffuse" not in kinds
             self.transmits = binding.stack.transmits
-            common = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.Empty if binding.uniform else mi.BSDFFlags.SpatiallyVarying)
+            common = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.SpatiallyVarying if binding.varies else mi.BSDFFlags.Empty)
             if self.variance.__name__ != "Isotropic":
                 common |= mi.BSDFFlags.Anisotropic
             self.kinds = [mi.BSDFFlags.DeltaReflection if self.delta else mi.BSDFFlags.GlossyReflection]
@@ -101,8 +110,16 @@ def make(mi: Any) -> type:
                     numbers[name] = float(value) if isinstance(value, float) else float(value[0])
             return numbers
 
+        def _at_wavelengths(self, wavelengths: Any) -> bsdf.Body:
+            si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wavelengths))
+            si.wavelengths = wavelengths
+            return self._prepared(self.binding.steered(si, True), constant=False)
+
         def _body(self, si: Any, active: Any) -> bsdf.Body:
-            return self.body or self._prepared(self.binding.at(si, active), constant=False)
+            if self.body:
+                return self.body
+            body = self._prepared(self.binding.steered(si, active), constant=False)
+            return self.spectra.at(body, si.wavelengths) if self.spectra else body
 
         # What a BSDF is asked
 
@@ -120,7 +137,7 @@ def make(mi: Any) -> type:
             through = si.wi.z * bs.wo.z < 0
             bs.sampled_component = dr.select(through, mi.UInt32(1), mi.UInt32(0))
             bs.sampled_type = dr.select(through, mi.UInt32(+self.kinds[-1]), mi.UInt32(+self.kinds[0]))
-            return bs, dr.select(active & (bs.pdf > 0), mi.UnpolarizedSpectrum(weight), 0)
+            return bs, dr.select(active & (bs.pdf > 0), spectral.carried(mi, weight), 0)
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval_pdf(ctx, si, wo, active)[0]
@@ -132,7 +149,7 @@ def make(mi: Any) -> type:
             if self.delta:
                 return mi.UnpolarizedSpectrum(0), mi.Float(0)
             value, pdf = bsdf.eval_pdf(self._body(si, active), tuple(si.wi), tuple(wo), self._asked(ctx))
-            return mi.UnpolarizedSpectrum(value) & active, dr.select(active, pdf, 0)
+            return spectral.carried(mi, value) & active, dr.select(active, pdf, 0)
 
         def _asked(self, ctx: Any) -> bsdf.Asked:
             """Whether reflection and transmission are wanted, and of what."""

@@ -108,7 +108,9 @@ def _numbers(stack: Stack) -> Mapping[str, float | tuple[float, float, float]]:
     numbers = {}
     for name, value in stack.flat().items():
         if isinstance(value, Varying):
-            raise InvalidInput(f"{name}: is a {value.what}, and statistics are those of one point; replace it by a number")
+            raise InvalidInput(
+                f"{name}: is a {value.what}, and statistics are those of one point; replace it by a number"
+            )
         numbers[name] = rgb(value) if isinstance(value, Named) else value
     return numbers
 

@@ -37,15 +37,7 @@ def load(material: str | Path) -> Stack:
     if os.path.isdir(path):
         raise InvalidInput(f"{path}: is a folder, not a material file")
     _format(path)
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
-    except FileNotFoundError:
-        raise InvalidInput(f"{path}: file not found") from None
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: cannot be read: {_reason(error)}") from None
-    return loads(text, name=str(path), folder=path.parent)
+    return loads(_text(path), name=str(path), folder=path.parent)
 
 
 def loads(text: str, name: str = "material.yaml", folder: str | Path = ".") -> Stack:
@@ -66,6 +58,34 @@ def loads(text: str, name: str = "material.yaml", folder: str | Path = ".") -> S
         raise InvalidInput(f"{name}: {error}") from None
     except RecursionError:
         raise InvalidInput(f"{name}: is nested too deeply") from None
+
+
+def read(path: str | Path, what: str) -> Any:
+    """What a YAML or JSON file holds, unchecked; `what` it should be, "a target file", is for messages.
+
+    Raises:
+        InvalidInput: no such file, or its text is neither; one line that names the file.
+    """
+    path = Path(path)
+    format = _format(path, what)
+    text = _text(path)
+    try:
+        return _parse(text, format)
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {error}") from None
+    except RecursionError:
+        raise InvalidInput(f"{path}: is nested too deeply") from None
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
+    except FileNotFoundError:
+        raise InvalidInput(f"{path}: file not found") from None
+    except (OSError, ValueError) as error:
+        raise InvalidInput(f"{path}: cannot be read: {_reason(error)}") from None
 
 
 def preset(name: str) -> Stack:
@@ -196,9 +216,9 @@ def _with_texture_paths(node: Any, rewrite: Callable[[str], str]) -> Any:
     return [_with_texture_paths(entry, rewrite) for entry in node] if isinstance(node, list) else node
 
 
-def _format(path: Path) -> str:
+def _format(path: Path, what: str = "a material file") -> str:
     if path.suffix.lower() not in _FORMATS:
-        raise InvalidInput(f"{path}: a material file ends in {', '.join(_FORMATS)}")
+        raise InvalidInput(f"{path}: {what} ends in {', '.join(_FORMATS)}")
     return _FORMATS[path.suffix.lower()]
 
 

@@ -1,46 +1,135 @@
-"""Functions of the cosine of one material, sampled once, so that all of them are one fetch."""
+"""Functions of the direction of one material, sampled once, so that all of them are one fetch."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import pi, prod
 from typing import Any
+
+import numpy as np
 
 from velatura import ops
 from velatura.ops import Value
+from velatura.optics.ggx import Direction
 from velatura.tables import coordinates
 
-NODES = 512
+LINE = (512,)  # nodes, where functions depend on the cosine alone
+PLANE = (64, 33)  # nodes over the cosine and the azimuth; the latter one more than a multiple of four
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Values at the nodes, as a texture of Dr.Jit with a channel for each function."""
+    """Values at the nodes: a texture of Dr.Jit, or an array of NumPy, with channels on the last axis."""
 
-    held: Any
-    shape: tuple[int, ...] = (NODES,)
+    data: Any
+    shape: tuple[int, ...]
 
     def texture(self, dialect: Any) -> Any:
-        return self.held
+        return self.data
 
-    def __call__(self, cos_theta: Value) -> list[Value]:
-        return ops.interpolate(self, coordinates.from_cosine(cos_theta))
+    def __call__(self, w: Direction, *others: Value) -> list[Value]:
+        """For a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
+        azimuth = [_from_azimuth(w[0], w[1])] * (len(self.shape) - 1 - len(others))
+        return ops.interpolate(self, coordinates.from_cosine(w[2]), *azimuth, *others)
 
 
-def sample(functions: Callable[[Value], Sequence[Value]], number: type) -> Curves:
-    """The functions at all nodes, in one kernel, for Dr.Jit numbers of that type; differentiable."""
+def directions(shape: tuple[int, ...], number: type | None) -> Direction:
+    """Those at the nodes, for Dr.Jit's type of numbers (None for NumPy). Shape: (cosines,) or (cosines, azimuths)."""
+    index, real = _index(prod(shape), number)
+    turns = prod(shape[1:])
+    cosine = coordinates.to_cosine(real(index // turns) / (shape[0] - 1))
+    sine, phi = ops.sqrt(1 - cosine * cosine), _to_azimuth(real(index % turns) / max(turns - 1, 1))
+    return sine * ops.cos(phi), sine * ops.sin(phi), cosine
+
+
+def curves(columns: Sequence[Value], shape: tuple[int, ...], number: type | None) -> Curves:
+    """Functions by their values at the nodes; differentiable."""
+    count = prod(shape)
+    if number is None:
+        nodes = [np.broadcast_to(column, count) for column in columns]
+        return Curves(np.stack(nodes, axis=-1).reshape(*shape, -1), shape)
     import drjit as dr
 
     dialect: Any = sys.modules[number.__module__]
-    none: Any = dr.zeros(number, NODES)
-    columns = [none + column for column in functions(coordinates.to_cosine(dr.linspace(number, 0, 1, NODES)))]
+    none: Any = dr.zeros(number, count)
+    columns = [none + column for column in columns]
     dr.eval(columns)
     # Interleave
-    flat: Any = dr.zeros(number, NODES * len(columns))
-    row = dr.arange(dialect.UInt32, NODES) * len(columns)
+    flat: Any = dr.zeros(number, count * len(columns))
+    row = dr.arange(dialect.UInt32, count) * len(columns)
     for k, column in enumerate(columns):
         dr.scatter(flat, column, row + k)
     dr.eval(flat)
-    tensor = dialect.TensorXf(flat, (NODES, len(columns)))
-    return Curves(dialect.Texture1f(tensor, use_accel=False, wrap_mode=dr.WrapMode.Clamp))
+    kind = getattr(dialect, f"Texture{len(shape)}f")
+    tensor = dialect.TensorXf(flat, (*shape, len(columns)))
+    return Curves(kind(tensor, use_accel=False, wrap_mode=dr.WrapMode.Clamp), shape)
+
+
+def _index(count: int, number: type | None) -> tuple[Value, Callable[[Value], Value]]:
+    """Integers from 0, and what makes real numbers of them."""
+    if number is None:
+        return np.arange(count, dtype=np.uint32), lambda x: x.astype(float)
+    import drjit as dr
+
+    dialect: Any = sys.modules[number.__module__]
+    return dr.arange(dialect.UInt32, count), number
+
+
+# Azimuths from 0 to pi as 0 to 1, without trigonometry: along the sides of a square instead of a circle
+
+
+def _from_azimuth(x: Value, y: Value) -> Value:
+    c, s = x * x - y * y, 2 * x * y
+    p = ops.divide(c, ops.absolute(c) + ops.absolute(s))
+    return 0.25 * ops.select(s < 0, 3 + p, 1 - p)
+
+
+def _to_azimuth(t: Value) -> Value:
+    back = t > 0.5
+    p = ops.select(back, 4 * t - 3, 1 - 4 * t)
+    s = 1 - ops.absolute(p)
+    return 0.5 * ops.arctan2(ops.select(back, -s, s), p) + ops.select(back, pi, 0.0)
+
+
+# Means over as many samples for every node
+
+
+def evenly(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:
+    """Three uniform numbers for every sample, the same at all nodes, that fill the cube evenly, the last two the square
+    (Roberts' sequence)."""
+    index, real = _index(nodes * samples, number)
+    i = index % samples
+    # Fractions of i x 0.7549 and i x 0.5698, from integers that overflow
+    u_1, u_2 = (real(i * step + 2**31) / 2**32 for step in (3242174889, 2447445414))
+    return (real(i) + 0.5) / samples, u_1, u_2
+
+
+def repeated(values: Value, samples: int) -> Value:
+    """Numbers or colours at the nodes, each as often as there are samples."""
+    if isinstance(values, (float, int, np.ndarray)):
+        return np.repeat(values, samples, axis=-1) if np.ndim(values) else values
+    import drjit as dr
+
+    return dr.repeat(values, samples)
+
+
+def averaged(values: Value, samples: int) -> Value:
+    """Means over the samples of each node."""
+    if isinstance(values, np.ndarray):
+        return values.reshape(*values.shape[:-1], -1, samples).mean(axis=-1)
+    import drjit as dr
+
+    return dr.block_sum(values, samples) / samples
+
+
+def as_constants(*values: Any) -> tuple[Any, ...]:
+    """Values, and tuples of them, as they are now, without their gradients."""
+    if all(isinstance(x, (float, np.ndarray, tuple)) for x in values):
+        return values
+    import drjit as dr
+
+    values = dr.detach(values)
+    dr.eval(values)
+    return values

@@ -5,7 +5,7 @@ What depends on the index alone is a `Row`, made once per material; what depends
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import prod
@@ -18,6 +18,8 @@ from velatura.optics import fresnel
 from velatura.tables import coordinates
 from velatura.tables.sheet import Average, sample
 from velatura.tables.store import Table, Tables
+
+FEW = 256  # numbers of which NumPy takes longer to begin with than to work out
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Row:
 def dielectric_row(tables: Tables, eta: Value, constant: bool = False, multiple: bool = False) -> Row:
     """Row of a dielectric of relative index eta > 0; `constant` says that eta may be looked at now."""
     table = tables.dielectric_multi if multiple else tables.dielectric
-    reflectance = _raised(table, [fresnel.dielectric(c, eta) for c in table.nodes])
+    reflectance = _raised(table, _at_nodes(fresnel.dielectric, table.nodes, eta))
     denser, rarer = _sides(eta < 1) if constant else (True, True)
     return Row(table, reflectance, eta, None, denser, rarer, multiple)
 
@@ -49,7 +51,7 @@ def dielectric_row(tables: Tables, eta: Value, constant: bool = False, multiple:
 def conductor_row(tables: Tables, eta: Value, kappa: Value, constant: bool = False, multiple: bool = False) -> Row:
     """Row of a conductor of relative index eta + i kappa."""
     table = tables.conductor_multi if multiple else tables.conductor
-    reflectance = _raised(table, [fresnel.conductor(c, eta, kappa) for c in table.nodes])
+    reflectance = _raised(table, _at_nodes(fresnel.conductor, table.nodes, eta, kappa))
     denser, rarer = _sides(_in_corner(eta, kappa)) if constant else (True, True)
     return Row(table, reflectance, eta, kappa, denser, rarer, multiple)
 
@@ -114,6 +116,14 @@ def _mean_fresnel_inside(tables: Tables, row: Row, cos_theta: Value, alpha: Valu
     angles = [coordinates.to_angle(x, theta_c) for x in absorbing.nodes]
     reflectance = _raised(absorbing, [fresnel.conductor(c, row.eta, row.kappa) for c in angles])
     return 1 - _dot(channels, [1 - f for f in reflectance])
+
+
+def _at_nodes(reflectance: Callable[..., Value], nodes: Sequence[float], *index: Value) -> Sequence[Value]:
+    """Fresnel at all cosines: of few numbers in NumPy by one call, since there calls are what costs."""
+    if not all(isinstance(x, np.ndarray) and x.size <= FEW for x in index):
+        return [reflectance(c, *index) for c in nodes]
+    found: Sequence[Value] = reflectance(np.reshape(nodes, (-1, *(1,) * max(x.ndim for x in index))), *index)
+    return found
 
 
 def _raised(table: Table, reflectance: Sequence[Value]) -> list[Value]:

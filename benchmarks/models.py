@@ -1,0 +1,74 @@
+"""Render time of models and forms against each other, as ratios of interleaved renders (`benchmarks/render.py`).
+
+A coat over gold, the same stack brushed along one axis, and brushed with axes of their own. Medians over rounds of the
+ratio of two renders of the same round.
+
+    python benchmarks/models.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb]
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+from render import picture, timed
+
+import velatura as vt
+from velatura import kernel
+from velatura.model import MODELS
+
+
+def stacks() -> dict[str, vt.Stack]:
+    """The same stack isotropic, brushed along shared axes, and with each layer's own."""
+    brushings = {"isotropic": ((0.1, 0.1), 0.0), "brushed": ((0.05, 0.2), 0.0), "turned": ((0.05, 0.2), 60.0)}
+    return {
+        name: vt.Stack(
+            [
+                vt.Interface(eta=1.5, alpha=alpha),
+                vt.Medium(sigma_a=(0.1, 0.5, 2.0)),
+                vt.Interface(conductor="Au", alpha=tuple(2 * a for a in alpha), rotation=turn),
+            ]
+        )
+        for name, (alpha, turn) in brushings.items()
+    }
+
+
+def ratios() -> list[tuple[tuple[str, str, str], tuple[str, str, str]]]:
+    """Pairs of jobs (stack, model, form): what is timed, and over what."""
+    names = [model.name for model in MODELS]
+    found = [
+        ((stack, name, "forward"), ("isotropic", name, "forward")) for name in names for stack in ("brushed", "turned")
+    ]
+    found += [
+        ((stack, name, "symmetric"), (stack, name, "forward")) for name in names for stack in ("isotropic", "turned")
+    ]
+    base = "belcour2018"
+    return found + [
+        ((stack, name, "forward"), (stack, base, "forward")) for name in ("realtime", "velatura") for stack in stacks()
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--models", nargs="*", default=[model.name for model in MODELS])
+    parser.add_argument("--variant", default="llvm_ad_rgb")
+    arguments = parser.parse_args()
+    mi = kernel.mitsuba(arguments.variant)
+    vt.register()
+    wanted = [pair for pair in ratios() if all(model in arguments.models for _, model, _ in pair)]
+
+    def job(stack: str, model: str, form: str):
+        return picture(mi, vt.bsdf(stacks()[stack], model=model, form=form), arguments.size, arguments.spp)
+
+    jobs = {key: job(*key) for key in dict.fromkeys(key for pair in wanted for key in pair)}
+    times = timed(jobs, arguments.rounds)
+    for over, under in wanted:
+        label = " ".join(a if a == b else f"{a}/{b}" for a, b in zip(over, under))
+        print(f"{label:40s} {np.median(np.divide(times[over], times[under])):.3f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

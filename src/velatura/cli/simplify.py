@@ -1,0 +1,27 @@
+"""`velatura simplify`: the stack with fewer interfaces that comes closest to a given one."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from velatura.cli import fit, invert, options
+
+
+def simplify(
+    material: options.Material,
+    interfaces: Annotated[int, typer.Option(min=1, metavar="N", help="Interfaces to keep.")],
+    output: fit.Output = None,
+    model: invert.ModelName = None,
+    settings: options.Settings = None,
+    as_json: options.Json = False,
+) -> None:
+    """Find the stack with fewer interfaces that comes closest to a material, and say how close."""
+    # Refuse what cannot work before anything slow begins
+    stack, switches = options.read(material, settings)
+    from velatura import inverse
+
+    fit.check(output)
+    found = inverse.simplify(stack, interfaces, model or inverse.MODEL, **switches)
+    fit.show(found, output, as_json)

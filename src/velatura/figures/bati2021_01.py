@@ -1,0 +1,48 @@
+"""Bati et al. 2021, figure 1: a gallery of materials that were found from the lobes that they shall have.
+
+(a) Colour and sharpness of a pair of dielectrics; (b) the edge of a coated conductor; (c) a coat on a pair that keeps
+its appearance; (d) extent and colour of haze. The object, its light, and the choice of materials are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from velatura.figures import bati2021_14, bati2021_16, canvas, looks
+from velatura.stack import Stack
+
+TARGETS = {"18": "a", "18 b, rough": "a, rough", "19 a": "d", "19 c": "d, more haze"}
+
+
+def stacks() -> dict[str, Stack]:
+    """By name."""
+    found = {TARGETS[name]: stack for name, stack in looks.inverted(tuple(TARGETS)).items()}
+    metals, coats = bati2021_16.stacks(), bati2021_14.stacks()
+    found |= {"b": metals["reference"], "b, pink edge": metals["c"]}
+    found |= {"c": coats["14 b, bare"], "c, coated": coats["14 b, kept"]}
+    return dict(sorted(found.items()))
+
+
+def compute(
+    size: int = canvas.SIZE,
+    spp: int = canvas.SAMPLES,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """As `looks.compute`."""
+    return looks.compute(stacks(), size, spp, seed, progress, "ball")
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """As `looks.draw`.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    looks.draw(numbers, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "bati2021-01.png")

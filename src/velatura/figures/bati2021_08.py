@@ -1,0 +1,72 @@
+"""Bati et al. 2021, figure 8: smooth pairs that reflect 0.15 head-on, by how much more they do at grazing angles.
+
+Points of the closed curve of figure 7, each less the one interface that reflects the same; the slab, whose lower
+interface totally reflects what grazes it, gains most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura.figures import canvas
+from velatura.inverse import sets
+from velatura.model.statistics import statistics
+from velatura.stack import Interface, Stack
+
+ENERGY = 0.15
+RATIOS = (1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2)  # of eta 1, on the branch of the slab and on the other one
+MODEL = "bati2021"
+
+
+def compute(
+    ratios: Sequence[float] = RATIOS, count: int = 90, progress: Callable[[int, int], None] | None = None
+) -> dict[str, Any]:
+    """By `point` its indices (eta_1, eta_2), and its energy over `angles` (degrees) less that of one interface."""
+    points = sets.points(1.0, ENERGY)
+    named = {"slab": points["slab"][0], "one interface": points["matched above"][0]}
+    c = 2 / (1 - ENERGY)
+    for ratio in ratios:
+        apart = np.arccosh(c - np.cosh(np.log(ratio)))
+        for side, eta_2 in (("denser", ratio * np.exp(apart)), ("rarer", ratio * np.exp(-apart))):
+            if eta_2 >= 1:
+                named[f"{side} below, eta 1 {ratio:g}"] = (ratio, float(eta_2))
+    angles = np.linspace(0, 89, count)
+    energies = {}
+    for name, indices in canvas.track(list(named.items()), progress):
+        stack = Stack([Interface(eta=eta) for eta in indices])
+        read = statistics(stack, np.cos(np.radians(angles)), model=MODEL, reflectance="fresnel")
+        energies[name] = np.sum(read.energy, axis=0)[0]
+    rows = [
+        {"name": name, "indices": list(named[name]), "gain": (energy - energies["one interface"]).tolist()}
+        for name, energy in energies.items()
+    ]
+    return {"angles": angles.tolist(), "points": rows}
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """What each point gains over the angle, and where it lies.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(11, 4.6)
+    gains, places = figure.subplots(1, 2, width_ratios=(2, 1))
+    places.plot(*np.transpose(sets.curve(1.0, ENERGY)), color="0.7")
+    for n, point in enumerate(numbers["points"]):
+        colour = f"C{n % 10}"
+        style = "--" if point["name"].startswith("rarer") else "-"
+        gains.plot(numbers["angles"], point["gain"], style, color=colour, label=point["name"])
+        places.plot(*point["indices"], "o", color=colour)
+    gains.axhline(0, color="0.8", linewidth=1)
+    gains.set(xlabel="angle of incidence (°)", ylabel="energy, less that of one interface")
+    gains.legend(fontsize="x-small", ncols=2)
+    places.set(xlabel="eta 1", ylabel="eta 2")
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "bati2021-08.png")

@@ -1,0 +1,56 @@
+"""Bati et al. 2021, figure 10: two stacks each that reflect 0.15 head-on, and differ at grazing angles.
+
+(a) One smooth interface, and a slab, whose lower interface is in air; (b) a smooth pair without and with absorption;
+(c) the same of variance 0.02. The indices of (b) and (c) are chosen here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from velatura.figures import canvas, looks
+from velatura.inverse import invert_stack, sets
+from velatura.stack import Interface, Stack
+
+ENERGY, VARIANCE = 0.15, 0.02
+INDICES = {"clear": (1.2, None), "absorbing": (1.2, 4.0)}  # eta 1 and 2; None: that which needs no absorption
+
+
+def stacks() -> dict[str, Stack]:
+    """By name, in pairs."""
+    points = sets.points(1.0, ENERGY)
+    (one, _), (slab, _) = points["matched below"], points["slab"]
+    found = {
+        "a one interface": Stack([Interface(eta=one[1])]),
+        "a slab": Stack([Interface(eta=slab[0]), Interface(eta=slab[1])]),
+    }
+    for part, variance in (("b", 0.0), ("c", VARIANCE)):
+        for name, indices in INDICES.items():
+            lobe = {"energy": ENERGY, "variance": variance, "interfaces": 2, "fixed": {"eta": list(indices)}}
+            found[f"{part} {name}"] = invert_stack([lobe], looks.MODEL).stack
+    return found
+
+
+def compute(
+    size: int = canvas.SIZE,
+    spp: int = canvas.SAMPLES,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """As `looks.compute`."""
+    return looks.compute(stacks(), size, spp, seed, progress)
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """As `looks.draw`.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    looks.draw(numbers, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "bati2021-10.png")

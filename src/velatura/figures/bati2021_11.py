@@ -1,0 +1,56 @@
+"""Bati et al. 2021, figure 11: rough pairs that reflect 0.2, and where they end, as the lower interface gets smooth.
+
+The roughnesses are chosen here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura.figures import canvas
+from velatura.inverse import Above, EquivalenceClass, sets
+from velatura.model import named
+from velatura.model.maps import MAPS
+
+ENERGY, ALPHAS = 0.2, (0.01, 0.1, 0.2, 0.4)
+MODEL = named("bati2021")
+
+
+def compute(
+    alphas: Sequence[float] = ALPHAS, count: int = 160, progress: Callable[[int, int], None] | None = None
+) -> dict[str, Any]:
+    """By `alpha` the `curves` without absorption, (eta_1, eta_2), and `ends`, the intervals that bound eta_1."""
+    rows = []
+    for alpha in canvas.track(alphas, progress):
+        variance = float(MAPS["belcour"].variance(alpha))
+        members = EquivalenceClass(Above.nothing(MODEL), np.full((1, 1), ENERGY), variance, 2)
+        curves = [curve.tolist() for curve in members.boundary(count)]
+        rows.append({"alpha": alpha, "curves": curves, "ends": [list(span) for span in members.indices_blur()]})
+    return {"energy": ENERGY, "classes": rows}
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """All curves in one plot, with the smooth one and the ends.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(6, 5)
+    axes = figure.subplots()
+    axes.plot(*np.transpose(sets.curve(1.0, numbers["energy"])), "k:", label="smooth")
+    for n, row in enumerate(numbers["classes"]):
+        for m, curve in enumerate(row["curves"]):
+            label = f"alpha {row['alpha']:g}" if m == 0 else None
+            axes.plot(*np.transpose(curve), color=f"C{n}", label=label)
+        axes.axvline(row["ends"][-1][1], color=f"C{n}", linestyle="--", linewidth=0.8)
+    axes.set(xlabel="eta 1", ylabel="eta 2", xlim=(1, 3), ylim=(1, 4.2))
+    axes.legend(fontsize="small")
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "bati2021-11.png")

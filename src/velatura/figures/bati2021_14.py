@@ -1,0 +1,50 @@
+"""Bati et al. 2021, figure 14: a material without a coat, coated, and coated so that its lobes stay as they are.
+
+(a) A coloured conductor; (b) a coloured pair of dielectrics. The coat of (a) has the index 1.5 and an alpha of 0.05;
+that of (b), which the paper does not print, here as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from velatura.figures import canvas, looks
+from velatura.inverse import coat
+from velatura.stack import Stack
+
+ETA, ALPHA = 1.5, 0.05  # of the coat
+
+
+def stacks() -> dict[str, Stack]:
+    """By name, in threes."""
+    found = {}
+    for name, bare in looks.inverted(("14 a", "14 b")).items():
+        found[f"{name}, bare"] = bare
+        found[f"{name}, coated"] = coat(bare, ETA, ALPHA, model=looks.MODEL).stack
+        found[f"{name}, kept"] = coat(bare, ETA, ALPHA, keep_appearance=True, model=looks.MODEL).stack
+    return found
+
+
+def compute(
+    size: int = canvas.SIZE,
+    spp: int = canvas.SAMPLES,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """As `looks.compute`."""
+    return looks.compute(stacks(), size, spp, seed, progress)
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """As `looks.draw`.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    looks.draw(numbers, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "bati2021-14.png")

@@ -1,0 +1,51 @@
+"""Bati et al. 2021, figure 15: pairs of one class with little and with much absorption, alike head-on.
+
+(a) Grey and smooth, (b) coloured and smooth, (c) coloured and rough. The index between the interfaces is 1.2, that
+below them the one that needs least absorption, and 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from velatura.figures import canvas, looks
+from velatura.inverse import invert_stack
+from velatura.inverse.targets import FIGURES
+from velatura.stack import Stack
+
+ETA_1, ETA_2 = 1.2, 4.0
+
+
+def stacks() -> dict[str, Stack]:
+    """By name, in pairs."""
+    found = {}
+    for name in ("15 a", "15 b", "15 c"):
+        members = invert_stack(FIGURES[name], looks.MODEL).classes[0]
+        found[f"{name}, low"] = looks.of_layers(members.member(ETA_1))
+        found[f"{name}, high"] = looks.of_layers(members.member(ETA_1, ETA_2))
+    return found
+
+
+def compute(
+    size: int = canvas.SIZE,
+    spp: int = canvas.SAMPLES,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """As `looks.compute`."""
+    return looks.compute(stacks(), size, spp, seed, progress)
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """As `looks.draw`.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    looks.draw(numbers, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "bati2021-15.png")

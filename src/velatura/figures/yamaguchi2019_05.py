@@ -1,0 +1,82 @@
+"""Yamaguchi et al. 2019, figure 5: what a covariance costs more than a variance, over the samples of a pixel.
+
+The model of Belcour 2018 with the choices of Yamaguchi's, on two isotropic layers, and Yamaguchi's on two brushed ones,
+turned apart; a sphere in the studio. Indices and roughnesses are those chosen for figure 4 (a) and (d). Where nothing
+is anisotropic or textured the lobes are prepared once for all pixels here, which they are not in the paper: `textured`
+has one interface whose roughness is read from an image of a single value. Seconds are those of this machine.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura import kernel, scenes
+from velatura.figures import canvas
+from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, stack
+from velatura.stack import Stack
+
+COUNTS = (16, 32, 64)
+_CHOICES = COLUMNS["yamaguchi2019"][1]
+
+
+def compute(
+    counts: Sequence[int] = COUNTS,
+    size: int = 128,
+    repeats: int = 5,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Over `samples` of a pixel, the `seconds` of a picture (the median of `repeats`) by material.
+
+    `overhead` is what `anisotropic` takes more than `textured`, as a share of the latter.
+
+    Raises:
+        InvalidInput, MissingTool: as `vt.render`.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        texture = canvas.texture(Path(folder) / "alpha.exr", np.full((2, 2), 0.1))
+        isotropic = stack(0.1, 0.0, 0.1, 0.0)
+        materials: dict[str, tuple[Stack, str]] = {
+            "isotropic": (isotropic, "belcour2018"),
+            "textured": (isotropic.replace(layer0_alpha=texture), "belcour2018"),
+            "anisotropic": (stack(SPREAD, 60.0, SPREAD, 0.0), "yamaguchi2019"),
+        }
+        loaded = {}
+        for name, (material, model) in materials.items():
+            bsdf = canvas.bsdf(material, model, **_CHOICES)
+            loaded[name] = kernel.load_dict(scenes.scene_dict("sphere", "studio", bsdf, (size, size)))
+    numbers: dict[str, Any] = {"samples": list(counts), "seconds": {name: [] for name in materials}, "overhead": []}
+    for count in canvas.track(counts, progress):
+        _, seconds = canvas.timed(loaded, count, repeats, seed)
+        for name, value in seconds.items():
+            numbers["seconds"][name].append(value)
+        numbers["overhead"].append(seconds["anisotropic"] / seconds["textured"] - 1)
+    return numbers
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """The seconds, and the overhead, over the samples.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(9, 4)
+    left, right = figure.subplots(1, 2)
+    for name, seconds in numbers["seconds"].items():
+        left.plot(numbers["samples"], seconds, marker=".", label=name)
+    right.plot(numbers["samples"], 100 * np.array(numbers["overhead"]), marker=".", color="C3")
+    right.axhline(2.5, color="0.7", linestyle="--", label="paper, about")
+    left.set(title="seconds of a picture", xlabel="samples of a pixel", ylim=(0, None))
+    right.set(title="overhead (%)", xlabel="samples of a pixel")
+    left.legend()
+    right.legend()
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "yamaguchi2019-05.png")

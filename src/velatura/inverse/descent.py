@@ -1,0 +1,223 @@
+"""Descent: the values of a stack whose reflectance over angles comes closest to a table.
+
+All that is free changes at once, by least squares with the model's own derivatives: differences, of all values in one
+call of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from velatura.inverse import angles
+from velatura.inverse.above import CLEAR, Array
+from velatura.inverse.angles import ReflectanceTable, radiance
+from velatura.model import Model, bsdf, variance_kind
+from velatura.model.mixture import ALPHA_MIN
+from velatura.model.statistics import number
+from velatura.ops import Value
+from velatura.stack import RGB, Layer, Medium, Stack, is_colour
+
+STEP = 1e-5  # of a value, to see how the model changes
+ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: what a round changes, as a share of what there is
+CONDUCTOR, RATIO = (0.02, 30.0), (1e-3, 30.0)  # bounds of a metal's eta, and of its k over that
+DEPTH_MAX = 10.0  # of a medium
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A stack that comes close to a table, and how close.
+
+    error: root mean square of the difference of log(1 + f cos theta_o). by_angle: as `angles.report` has it. errors:
+    what the descents from all starts came to, the best first.
+    """
+
+    stack: Stack
+    model: Model
+    error: float
+    by_angle: list[dict[str, float]]
+    errors: list[float]
+
+
+@dataclass(frozen=True)
+class Free:
+    """A value that may change: the flat names that share it, its channel (None for all alike), its bounds."""
+
+    names: tuple[str, ...]
+    channel: int | None
+    low: float
+    high: float
+    logarithmic: bool
+
+    def shown(self, x: Value) -> Value:
+        """The value of a coordinate."""
+        return np.exp(x) if self.logarithmic else x
+
+    def written(self, x: float) -> float:
+        """As `shown`; what can be no smoother is smooth."""
+        value = float(self.shown(x))
+        return 0.0 if self.low == ALPHA_MIN and value < 1.001 * ALPHA_MIN else value
+
+    def coordinate(self, value: float) -> float:
+        kept = min(max(value, self.low), self.high)
+        return float(np.log(kept)) if self.logarithmic else kept
+
+
+def fit(table: ReflectanceTable, starts: Sequence[Stack], model: Model, eta_max: float = 4.0) -> Fit:
+    """The closest of the stacks that descents from all starts come to.
+
+    Raises:
+        InvalidInput: a texture in a start, which has no one value.
+    """
+    ends = sorted((Descent(table, start, model, eta_max).run() for start in starts), key=lambda end: end[0])
+    stack = ends[0][1]
+    by_angle = angles.report(table, angles.table_of(stack, table.directions, model))
+    return Fit(stack, model, ends[0][0], by_angle, [error for error, _ in ends])
+
+
+@dataclass(frozen=True)
+class Descent:
+    """From one stack: its indices, roughnesses, absorption and albedo change; all else stays."""
+
+    table: ReflectanceTable
+    start: Stack
+    model: Model
+    eta_max: float
+
+    @cached_property
+    def values(self) -> dict[str, Value]:
+        """Of the start: a colour (3, 1, 1), for channels, points and directions, or a float; k over eta for k."""
+        values = {name: number(name, value) for name, value in self.start.flat().items()}
+        values = {name: value[..., None] if is_colour(name) else value for name, value in values.items()}
+        for n in self._metals:
+            values[f"layer{n}_k"] = values[f"layer{n}_k"] / values[f"layer{n}_eta"]
+        return values
+
+    @cached_property
+    def free(self) -> list[Free]:
+        return [free for n, kind in enumerate(self.start.kinds) for free in self._of_layer(n, kind)]
+
+    @cached_property
+    def wanted(self) -> Array:
+        return np.log1p(self.table.value * self.table.directions.wo[2])
+
+    def run(self) -> tuple[float, Stack]:
+        """The error at the end, and the stack."""
+        from scipy.optimize import least_squares
+
+        bounds = np.array([[free.coordinate(free.low), free.coordinate(free.high)] for free in self.free]).T
+        x = np.array([free.coordinate(self._first(free)) for free in self.free])
+        inset = 1e-9 * (bounds[1] - bounds[0])
+        found = least_squares(
+            lambda x: self.residuals(x[None])[0],
+            np.clip(x, bounds[0] + inset, bounds[1] - inset),
+            jac=self.jacobian,
+            bounds=bounds,
+            x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
+            xtol=TOLERANCE,
+            ftol=TOLERANCE,
+            gtol=None,
+            max_nfev=ROUNDS,
+        )
+        # What nothing is gained by stays as it was
+        first = self.residuals(x[None])[0]
+        best, residuals = (x, first) if np.sum(first**2) <= 2 * found.cost else (found.x, found.fun)
+        return float(np.sqrt(np.mean(residuals**2))), self.stack(best)
+
+    def residuals(self, x: Array) -> Array:
+        """By how much log(1 + f cos) is missed, (P, 3 N), at P points x (P, free) (Low et al. 2012)."""
+        values = dict(self.values)
+        for n, free in enumerate(self.free):
+            for name in free.names:
+                values[name] = _changed(values[name], free, free.shown(x[:, n, None]))
+        values = self._with_extinctions(values)
+        kind = variance_kind(self.start.kinds, self.start.flat())
+        seen = bsdf.body(self.start.kinds, values, self.start.thin, self.model, kind)
+        value = radiance(seen, self.table.directions)
+        shape = (3, len(x), len(self.table.directions.theta_i))
+        missed = np.log1p(np.broadcast_to(value, shape)) - self.wanted[:, None]
+        return np.moveaxis(missed, 0, 1).reshape(len(x), -1)
+
+    def jacobian(self, x: Array) -> Array:
+        """Derivatives of the residuals, (3 N, free)."""
+        steps = STEP * np.eye(len(x))
+        ahead, behind = np.split(self.residuals(np.concatenate([x + steps, x - steps])), 2)
+        return ((ahead - behind) / (2 * STEP)).T
+
+    def stack(self, x: Array) -> Stack:
+        """The material at a point; a medium that is clear is left out."""
+        values = {name: np.ravel(value) for name, value in self.values.items()}
+        for free, coordinate in zip(self.free, x):
+            for name in free.names:
+                own = values[name] = np.array(values[name])
+                own[slice(None) if free.channel is None else free.channel] = free.written(coordinate)
+        values = self._with_extinctions(values)
+        changed = {name: written(values[name]) for free in self.free for name in free.names}
+        found = self.start.replace(**changed)
+        layers = [layer for layer in found.layers if not _clear(layer)]
+        return Stack(layers, name=found.name, exterior=found.exterior, thin=found.thin)
+
+    def _of_layer(self, n: int, kind: str) -> list[Free]:
+        name = f"layer{n}_"
+        if kind == "diffuse":
+            return [Free((f"{name}albedo",), c, 0.0, 1.0, False) for c in range(3)]
+        if kind == "medium":
+            depth = self.values[f"{name}depth"]
+            return [Free((f"{name}sigma_a",), c, 0.0, DEPTH_MAX / depth, False) for c in range(3)] if depth > 0 else []
+        u, v = self.values[f"{name}alpha_u"], self.values[f"{name}alpha_v"]
+        axes = [(f"{name}alpha_u", f"{name}alpha_v")] if u == v else [(f"{name}alpha_u",), (f"{name}alpha_v",)]
+        found = [Free(names, None, ALPHA_MIN, 1.0, True) for names in axes]
+        if kind == "dielectric":
+            eta = self.values[f"{name}eta"]
+            channels = range(3) if np.ptp(eta) > 0 else (None,)
+            found += [
+                Free((f"{name}eta",), c, min(1.0, eta.min()), max(self.eta_max, eta.max()), True) for c in channels
+            ]
+        if kind == "conductor":
+            # A conductor has k >= eta, unless it begins with less
+            ratio = np.ravel(self.values[f"{name}k"])
+            found += [Free((f"{name}eta",), c, *CONDUCTOR, True) for c in range(3)]
+            found += [Free((f"{name}k",), c, float(np.clip(ratio[c], RATIO[0], 1)), RATIO[1], True) for c in range(3)]
+        return found
+
+    @property
+    def _metals(self) -> list[int]:
+        return [n for n, kind in enumerate(self.start.kinds) if kind == "conductor"]
+
+    def _with_extinctions(self, values: dict[str, Value]) -> dict[str, Value]:
+        """Values with k, in place of k over eta."""
+        return values | {f"layer{n}_k": values[f"layer{n}_k"] * values[f"layer{n}_eta"] for n in self._metals}
+
+    def _first(self, free: Free) -> float:
+        value = np.ravel(self.values[free.names[0]])
+        return float(np.mean(value) if free.channel is None else value[free.channel])
+
+
+def _changed(value: Value, free: Free, x: Array) -> Value:
+    """A value at several points, (P, 1) of a number, in all or one of the channels of a colour."""
+    if np.ndim(value) == 0:
+        return x
+    if free.channel is None:
+        return x[None]
+    own = np.broadcast_to(value, (3, *x.shape)).copy()
+    own[free.channel] = x
+    return own
+
+
+def written(value: Array) -> float | RGB:
+    """A colour as a material has it: one number where its channels are alike."""
+    if np.ptp(value) == 0:
+        return float(value[0])
+    r, g, b = (float(x) for x in value)
+    return r, g, b
+
+
+def _clear(layer: Layer) -> bool:
+    """Whether it is a medium that does nothing."""
+    if not isinstance(layer, Medium):
+        return False
+    sigma = np.broadcast_arrays(np.asarray(layer.sigma_a, float), np.asarray(layer.sigma_s, float))
+    return bool(np.max(sigma) * number("depth", layer.depth) < CLEAR)

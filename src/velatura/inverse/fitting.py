@@ -1,0 +1,121 @@
+"""Beyond the lobes head-on: stacks that come close to a table over angles, and simpler stacks that come close to one.
+
+The future work that Bati et al. 2021 name in their section 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from velatura.errors import InvalidInput
+from velatura.inverse import angles
+from velatura.inverse.angles import Directions, ReflectanceTable
+from velatura.inverse.descent import Fit, fit, written
+from velatura.inverse.interface import MODEL
+from velatura.inverse.stacks import alternatives, model_of
+from velatura.inverse.target import Target, read
+from velatura.model import Model, named, variance_kind
+from velatura.model.variance import Isotropic
+from velatura.stack import Diffuse, Interface, Layer, Medium, Stack
+
+STARTS = 4
+TRIED = 3  # sets of interfaces from which simplification descends
+
+
+def fit_target(
+    table: ReflectanceTable,
+    target: Target | Sequence[dict[str, object]],
+    starts: int = STARTS,
+    model: str | Model = MODEL,
+    seed: int = 0,
+    **switches: str,
+) -> Fit:
+    """The stack whose reflectance comes closest to a table, by descent from stacks that give a target.
+
+    Args:
+        target: the lobes that the table may have head-on, roughly; they tell how many interfaces there are, and the
+            descents start from stacks that have them.
+        starts: how many of these.
+
+    Raises:
+        InvalidInput, Infeasible: as `invert_stack`.
+    """
+    wanted = read(target)
+    chosen = model_of(wanted, model, **switches)
+    found = alternatives(wanted, starts, chosen, seed)
+    return fit(table, [_with_media(solution.stack) for solution in found], chosen, wanted.eta_max)
+
+
+def simplify(stack: Stack, interfaces: int, model: str | Model = MODEL, eta_max: float = 4.0, **switches: str) -> Fit:
+    """The stack of fewer interfaces whose reflectance comes closest to that of a stack, at all angles.
+
+    It keeps some of the interfaces, the last one if nothing passes it, and a diffuse base; their values, and absorption
+    below each but the last, then descend. Only what is reflected is compared.
+
+    Args:
+        interfaces: how many are kept, at least 1, and fewer than there are.
+
+    Raises:
+        InvalidInput: no such number of interfaces, a texture, an unknown model or switch.
+    """
+    chosen = named(model, **switches)
+    count = len(stack.interfaces)
+    if not 1 <= interfaces < count:
+        raise InvalidInput(
+            f"interfaces: must be at least 1, and fewer than the {count} that there are, got {interfaces}"
+        )
+    turned = variance_kind(stack.kinds, stack.flat()) is not Isotropic
+    table = angles.table_of(stack, Directions.about_lobes(turned), chosen)
+
+    # Descend from the sets of interfaces that come closest as they are
+    opaque = stack.interfaces[-1].opaque
+    sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
+    starts = [_of_some(stack, kept) for kept in sets]
+    errors = [_error(table, start, chosen) for start in starts]
+    best = [starts[n] for n in np.argsort(errors, kind="stable")[:TRIED]]
+    return fit(table, best, chosen, eta_max)
+
+
+def _error(table: ReflectanceTable, start: Stack, model: Model) -> float:
+    """Of a stack as it is."""
+    value, cosine = angles.table_of(start, table.directions, model).value, table.directions.wo[2]
+    return float(np.mean((np.log1p(value * cosine) - np.log1p(table.value * cosine)) ** 2))
+
+
+def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
+    """The stack with some of its interfaces, and one medium for all that lies between two of them."""
+    layers: list[Layer] = []
+    media: list[Medium] = []
+    n = -1
+    for layer in stack.layers:
+        if isinstance(layer, Medium):
+            media.append(layer)
+            continue
+        n += isinstance(layer, Interface)
+        if isinstance(layer, Diffuse) or n in kept:
+            # What lay above the first one that is kept, below one that is not, goes below it
+            if layers or (media and n == 0):
+                layers.append(_merged(media))
+                media = []
+            layers.append(layer)
+    return Stack(layers, name=stack.name, exterior=stack.exterior, thin=stack.thin)
+
+
+def _merged(media: Sequence[Medium]) -> Medium:
+    """One medium of depth 1 with the optical depths of several, clear where there is none, and their mean g."""
+    absorbed, scattered = (
+        np.array([np.broadcast_to(getattr(medium, key), 3) * medium.depth for medium in media]).reshape(-1, 3)
+        for key in ("sigma_a", "sigma_s")
+    )
+    often = scattered.mean(axis=1)
+    g = np.average([medium.g for medium in media], weights=often) if often.sum() > 0 else 0.0
+    sigma_a, sigma_s = (written(depths.sum(axis=0)) for depths in (absorbed, scattered))
+    return Medium(sigma_a=sigma_a, sigma_s=sigma_s, g=float(g))
+
+
+def _with_media(stack: Stack) -> Stack:
+    """The stack with a medium, though it be clear, between all of its layers."""
+    return _of_some(stack, range(len(stack.interfaces)))

@@ -1,0 +1,132 @@
+"""Lobes of a stack that is the same everywhere, in spectral variants: sampled once over direction and wavelength.
+
+Their shapes are those of fixed wavelengths, and so is the share of samples that each gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from velatura import ops
+from velatura.model import bsdf, memo
+from velatura.model.adding import Lobe
+from velatura.model.prepare import Prepared
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+from velatura.tables import curve
+
+BEGIN_NM, END_NM = 360.0, 830.0  # of the wavelengths that Mitsuba renders
+NODES = 48  # over these, a multiple of those of a ray
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """The lobes on one side: those of fixed wavelengths, and the energies of all (gains too, of lobes with facets)."""
+
+    fixed: memo.Memo
+    energies: curve.Curves
+
+    def at(self, prepared: Prepared, mi: Any, place: Any) -> memo.Lobes:
+        """The lobes at the wavelengths of a ray, by their place among all; `prepared` holds the facets there."""
+
+        def lobes(w: Direction) -> tuple[list[Lobe], Lobe | None]:
+            reflected, passed = self.fixed(w)
+            channels = iter(self.energies(w, place))
+
+            def with_spectra(lobe: Lobe) -> Lobe:
+                lobe = replace(lobe, energy=mi.ArrayXf([*lobe.energy, *next(channels)]))
+                if lobe.facets is None:
+                    return lobe
+                gain = mi.ArrayXf([*lobe.gain, *next(channels)])
+                facets: Any = prepared.layers[0]  # only the first interface is drawn with its own
+                return replace(lobe, gain=gain, facets=facets)
+
+            reflected = [with_spectra(lobe) for lobe in reflected]
+            return reflected, with_spectra(passed) if passed else None
+
+        return lobes
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Both sides of a stack, the lower one where it transmits; the means of a diffuse base over wavelength."""
+
+    mi: Any
+    fixed: bsdf.Body
+    above: Side
+    below: Side | None
+    means: curve.Curves | None
+
+    def at(self, body: bsdf.Body, wavelengths_nm: Any) -> bsdf.Body:
+        """The body for a ray, with what was sampled."""
+        place = (wavelengths_nm - BEGIN_NM) / (END_NM - BEGIN_NM)
+        above = self.above.at(body.above, self.mi, place)
+        if self.below is None or body.below is None:
+            return replace(body, above=self._with_means(body.above, place), lobes_above=above, lobes_below=above)
+        return replace(body, lobes_above=above, lobes_below=self.below.at(body.below, self.mi, place))
+
+    def _with_means(self, prepared: Prepared, place: Any) -> Prepared:
+        base = self.fixed.above.base
+        if base is None or prepared.base is None or self.means is None:
+            return prepared
+        fixed = base.mean_reflectance, base.mean_transmittance
+        r, t = (self.mi.ArrayXf([*a, *b]) for a, b in zip(fixed, ops.interpolate(self.means, place)))
+        return replace(prepared, base=replace(prepared.base, mean_reflectance=r, mean_transmittance=t))
+
+
+def sample(mi: Any, fixed: bsdf.Body, body_at: Callable[[Any], bsdf.Body]) -> Spectra:
+    """The spectra of a stack from its body for fixed wavelengths, and from that for those of rays."""
+    above = _side(mi, fixed.lobes_above, lambda nm: body_at(nm).lobes_above)
+    below = _side(mi, fixed.lobes_below, lambda nm: body_at(nm).lobes_below) if fixed.below else None
+    base, means = body_at(_all_wavelengths(mi)).above.base, None
+    if base is not None:
+        columns = [_over_wavelengths(mi, x, 1) for x in (base.mean_reflectance, base.mean_transmittance)]
+        means = curve.curves(columns, (NODES,), mi.Float)
+    return Spectra(mi, fixed, above, below, means)
+
+
+def _side(mi: Any, fixed: memo.Lobes, lobes_at: Callable[[Any], memo.Lobes]) -> Side:
+    import drjit as dr
+
+    # See every direction at all wavelengths
+    assert isinstance(fixed, memo.Memo)
+    shape = fixed.curves.shape
+    w = curve.directions(shape, mi.Float)
+    count, none = dr.width(w[2]), dr.zeros(mi.Float, dr.width(w[2]))
+    wavelengths = _all_wavelengths(mi, count)
+    rays = dr.width(wavelengths) // count
+    x, y, z = (curve.repeated(c + none, rays) for c in w)
+    reflected, passed = lobes_at(wavelengths)((x, y, z))
+
+    # Keep what depends on them
+    seen = [*reflected, *([passed] if fixed.transmits and passed else [])]
+    columns = [c for lobe in seen for c in ([lobe.energy, lobe.gain] if lobe.facets else [lobe.energy])]
+    flat = [_over_wavelengths(mi, column, count) for column in columns]
+    return Side(fixed, curve.curves(flat, (*shape, NODES), mi.Float))
+
+
+def _all_wavelengths(mi: Any, times: int = 1) -> Any:
+    """The nodes, several to a ray, for as many times."""
+    import drjit as dr
+
+    carries = len(mi.UnpolarizedSpectrum())
+    first = dr.tile(dr.arange(mi.Float, NODES // carries), times) * carries
+    step = (END_NM - BEGIN_NM) / (NODES - 1)
+    return mi.UnpolarizedSpectrum([BEGIN_NM + step * (first + i) for i in range(carries)])
+
+
+def _over_wavelengths(mi: Any, colour: Value, times: int) -> Any:
+    """The values at all wavelengths in order, as many times."""
+    import drjit as dr
+
+    carries = len(mi.UnpolarizedSpectrum())
+    return dr.ravel(carried(mi, colour) + dr.zeros(mi.UnpolarizedSpectrum, times * NODES // carries))
+
+
+def carried(mi: Any, colour: Value) -> Any:
+    """What a ray carries of a colour: of a spectrum, the second half."""
+    if isinstance(colour, mi.ArrayXf):
+        colour = list(colour)[len(colour) // 2 :]
+    return mi.UnpolarizedSpectrum(colour)

@@ -1,0 +1,44 @@
+"""Recorded values put in order: equal ones made one, and known ones replaced by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from velatura.ops import Value
+from velatura.shader.symbol import Operand, Symbol, in_order, operand
+
+_COMMUTE = {"add", "multiply", "minimum", "maximum", "both"}
+
+
+@dataclass
+class Graph:
+    """Symbols without duplicates.
+
+    `given` are symbols of another graph that need not be worked out, with what is read in their place.
+    """
+
+    given: Mapping[Symbol, Symbol] = field(default_factory=dict)
+    _known: dict[Hashable, Symbol] = field(default_factory=dict)
+    _chosen: dict[Symbol, Symbol] = field(default_factory=dict)
+
+    def unique(self, outputs: Sequence[Value]) -> list[Operand]:
+        """The outputs, made of symbols of this graph."""
+        for symbol in in_order(outputs):
+            if symbol not in self._chosen:
+                self._chosen[symbol] = self.given[symbol] if symbol in self.given else self._one(symbol)
+        return [self._of(operand(x)) for x in outputs]
+
+    def _of(self, x: Operand) -> Operand:
+        return self._chosen[x] if isinstance(x, Symbol) else x
+
+    def _one(self, symbol: Symbol) -> Symbol:
+        args = tuple(self._of(x) for x in symbol.args)
+        names = [(type(x).__name__, id(x) if isinstance(x, Symbol) else x) for x in args]
+        key = (symbol.op, symbol.detail, *(sorted(names, key=repr) if symbol.op in _COMMUTE else names))
+        found = self._known.setdefault(key, symbol)
+        if found is not symbol:
+            found.hint = found.hint or symbol.hint
+        elif args != symbol.args:
+            found = self._known[key] = symbol.with_args(args)
+        return found

@@ -1,0 +1,127 @@
+"""The model's own functions, recorded for the layers of a stack."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeGuard
+
+from velatura.errors import InvalidInput
+from velatura.model import DEFAULT, Model, bsdf, named, variance_kind
+from velatura.model.variance import Variance
+from velatura.ops import Value
+from velatura.shader import material, source, symbol
+from velatura.shader.graph import Graph
+from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
+from velatura.stack import Stack, is_colour
+from velatura.stack.schema import unknown
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What the model does for a stack: `lobes` from material and wi, the rest from these, wo, and random numbers u.
+
+    Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ...
+    """
+
+    stack: Stack
+    model: Model
+    kinds: Mapping[str, Kind]
+    lobes: Mapping[str, Operand]
+    value: Operand
+    density: Operand
+    drawn: Sequence[Operand]
+
+    @cached_property
+    def symbols(self) -> list[Symbol]:
+        """All that is worked out, and all inputs."""
+        return in_order([*self.lobes.values(), self.value, self.density, *self.drawn])
+
+    @cached_property
+    def read(self) -> dict[str, str]:
+        """The values of the material that anything reads, by flat name, and their place in the struct."""
+        details = {s.detail for s in self.symbols if s.op == "input"}
+        places = {name: material.place(name) for name in self.stack.flat()}
+        return {name: place for name, place in places.items() if f"m.{place}" in details}
+
+
+def record(stack: Stack, model: str | Model = DEFAULT, constant: Collection[str] = (), **switches: str) -> Recording:
+    """The model's functions for a stack; the values named `constant` as they are, all others as inputs.
+
+    Raises:
+        InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture;
+            no interface.
+    """
+    chosen = named(model, **switches)
+    if chosen.channels == "separate":
+        raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
+    if not stack.interfaces:
+        raise InvalidInput("layers: a shader needs an interface, and this material is a diffuse base alone")
+    flat = stack.flat()
+    for name in constant:
+        if name not in flat:
+            raise InvalidInput(f"constant: {unknown('parameter', name, flat)}")
+    values = {name: material.constant(name, flat[name]) if name in constant else _input(name) for name in flat}
+    wi, wo, u = _direction("wi"), _direction("wo"), _direction("u")
+
+    # Run the model
+    with source.naming(Symbol):
+        body = bsdf.body(stack.kinds, values, stack.thin, chosen, variance(stack), constant=False)
+        fields, kinds = _fields(bsdf.scattered(body, wi))
+        value, density = bsdf.eval_pdf(body, wi, wo)
+        drawn, _ = bsdf.sample(body, wi, *u)
+
+    # Read from the lobes what they hold
+    graph = Graph()
+    lobes = dict(zip(fields, graph.unique(list(fields.values()))))
+    held = {x: _held(name, kinds[name], x) for name, x in reversed(lobes.items()) if _worth(x)}
+    rest = Graph(held)
+    evaluated, sampled = rest.unique(graph.unique([value, density])), rest.unique(graph.unique(drawn))
+    return Recording(stack, chosen, kinds, lobes, evaluated[0], evaluated[1], sampled)
+
+
+def _worth(x: Operand) -> TypeGuard[Symbol]:
+    """Whether a value is worth to be kept: neither a constant nor an input."""
+    return isinstance(x, Symbol) and x.op != "input"
+
+
+def _held(name: str, kind: Kind, value: Symbol) -> Symbol:
+    """A value that the struct of the lobes holds, where a number may stand for a colour."""
+    return Symbol("input", (), value.kind, f"l.{name}" if value.kind == kind else f"l.{name}.r")
+
+
+def _direction(name: str) -> tuple[Symbol, Symbol, Symbol]:
+    return symbol.number(f"{name}.x"), symbol.number(f"{name}.y"), symbol.number(f"{name}.z")
+
+
+def _input(name: str) -> Symbol:
+    place = f"m.{material.place(name)}"
+    return symbol.colour(place) if is_colour(name) else symbol.number(place)
+
+
+def variance(stack: Stack) -> type[Variance]:
+    """The kind of variance that the shader of a stack computes with."""
+    return variance_kind(stack.kinds, stack.flat())
+
+
+def _fields(seen: bsdf.Scattered) -> tuple[dict[str, Value], dict[str, Kind]]:
+    """All that is known once wi is, by its place in the struct."""
+    lobes = {f"reflected[{k}]": lobe for k, lobe in enumerate(seen.reflected)}
+    if seen.transmitted is not None:
+        lobes["transmitted"] = seen.transmitted
+    parts = {place: {"energy": lobe.energy, **lobe.roughness._asdict()} for place, lobe in lobes.items()}
+    if any(isinstance(lobe.gain, Symbol) for lobe in lobes.values()):
+        parts = {place: {**parts[place], "gain": lobe.gain} for place, lobe in lobes.items()}
+    fields = {f"{place}.{part}": value for place, all_parts in parts.items() for part, value in all_parts.items()}
+    if seen.base:
+        fields |= {"base_scale": seen.base.scale, "base_energy": seen.base.energy}
+    # A part is a colour in all lobes, where it is in one
+    wide = {"energy", "base_scale", "base_energy"}
+    wide |= {part(name) for name, value in fields.items() if symbol.is_colour(operand(value))}
+    return fields, {name: "colour" if part(name) in wide else "number" for name in fields}
+
+
+def part(name: str) -> str:
+    """What a field of a lobe is: `energy` for `reflected[0].energy`."""
+    return name.rpartition(".")[2]

@@ -1,0 +1,220 @@
+"""The third dialect of `velatura.ops`: values that remember how they were made.
+
+A `Symbol` is a node of an expression: an input, or an operation on other symbols and constants. The functions of the
+model run on symbols as they run on arrays. What does not depend on an input is worked out in Python, so constants fold
+by themselves: constants are floats, or NumPy arrays of three channels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from itertools import count
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from velatura import tables
+from velatura.ops import Value
+from velatura.shader import source
+
+Kind: TypeAlias = Literal["number", "colour", "condition", "conditions", "texels"]
+Operand: TypeAlias = "Symbol | float | bool | tuple[float, ...]"
+
+_serials = count()
+_CONDITIONS = {"less", "greater", "at_most", "at_least", "both"}
+
+
+class Symbol:
+    """A recorded value.
+
+    Args:
+        op: what was done: an elementary function by its name in `ops`, an operator (`add`, `less`, ...), or `input`,
+            `texels`, `value`, `component`, `colour`.
+        args: what it was done to; constants as floats, or as three of them.
+        kind: number, colour, the truth of either, or the channels of a table.
+        detail: name of an input or table, number of a component.
+
+    Attributes:
+        serial: numbers symbols in the order in which they were made.
+        place: the lines of the model that made it.
+        hint: a name that the model gives it.
+    """
+
+    __slots__ = ("args", "detail", "hint", "kind", "op", "place", "serial")
+    __array_ufunc__ = None  # so that NumPy leaves the arithmetic to this class
+
+    dialect: Any
+
+    def __init__(self, op: str, args: tuple[Operand, ...], kind: Kind, detail: Any = None) -> None:
+        self.op, self.args, self.kind, self.detail = op, args, kind, detail
+        self.serial, self.place = next(_serials), source.place()
+        self.hint: str | None = None
+
+    def with_args(self, args: tuple[Operand, ...]) -> Symbol:
+        """The same operation, made at the same place, on other arguments."""
+        other = copy(self)
+        other.args = args
+        return other
+
+    def __add__(self, other: Value) -> Value:
+        return record("add", self, other)
+
+    def __radd__(self, other: Value) -> Value:
+        return record("add", other, self)
+
+    def __sub__(self, other: Value) -> Value:
+        return record("subtract", self, other)
+
+    def __rsub__(self, other: Value) -> Value:
+        return record("subtract", other, self)
+
+    def __mul__(self, other: Value) -> Value:
+        return record("multiply", self, other)
+
+    def __rmul__(self, other: Value) -> Value:
+        return record("multiply", other, self)
+
+    def __truediv__(self, other: Value) -> Value:
+        return record("divide", self, other)
+
+    def __rtruediv__(self, other: Value) -> Value:
+        return record("divide", other, self)
+
+    def __neg__(self) -> Value:
+        return record("negative", self)
+
+    def __lt__(self, other: Value) -> Value:
+        return record("less", self, other)
+
+    def __gt__(self, other: Value) -> Value:
+        return record("greater", self, other)
+
+    def __le__(self, other: Value) -> Value:
+        return record("at_most", self, other)
+
+    def __ge__(self, other: Value) -> Value:
+        return record("at_least", self, other)
+
+    def __and__(self, other: Value) -> Value:
+        return record("both", self, other)
+
+    __rand__ = __and__
+
+    def __bool__(self) -> bool:
+        raise TypeError("a recorded value is neither true nor false: use ops.select")
+
+
+def number(name: str) -> Symbol:
+    """An input that is a number; `name` as the shader has it."""
+    return Symbol("input", (), "number", name)
+
+
+def colour(name: str) -> Symbol:
+    """An input that is a colour."""
+    return Symbol("input", (), "colour", name)
+
+
+def operand(x: Value) -> Operand:
+    """A value as an argument of a symbol."""
+    if isinstance(x, Symbol):
+        return x
+    array = np.asarray(x)
+    if array.ndim:
+        return tuple(float(channel) for channel in array.ravel())
+    return bool(array) if array.dtype == bool else float(array)
+
+
+def is_colour(x: Operand) -> bool:
+    return x.kind in ("colour", "conditions") if isinstance(x, Symbol) else isinstance(x, tuple)
+
+
+def component(x: Operand, channel: int) -> Operand:
+    """One channel of a colour; a number is the same in all channels."""
+    if isinstance(x, tuple):
+        return x[channel]
+    if not isinstance(x, Symbol) or not is_colour(x):
+        return x
+    if x.op == "colour":
+        return x.args[channel]
+    return Symbol("component", (x,), "number" if x.kind == "colour" else "condition", channel)
+
+
+def record(op: str, *values: Value) -> Value:
+    """The symbol of an operation, or what it comes to where that is known."""
+    args = tuple(operand(x) for x in values)
+    known = _known(op, args)
+    if known is not None:
+        return known
+    wide = any(is_colour(x) for x in args)
+    if op in _CONDITIONS:
+        return Symbol(op, args, "conditions" if wide else "condition")
+    return Symbol(op, args, "colour" if wide else "number")
+
+
+def _known(op: str, args: tuple[Operand, ...]) -> Value | None:
+    """What neutral elements make of an operation."""
+    a, b = (*args, None)[:2]
+    neutral = {
+        "add": a if b == 0.0 else b if a == 0.0 else None,
+        "subtract": a if b == 0.0 else None,
+        "multiply": a if b == 1.0 else b if a == 1.0 else 0.0 if 0.0 in (a, b) else None,
+        "divide": a if b == 1.0 else 0.0 if a == 0.0 else None,
+        "both": (b if a else False) if isinstance(a, bool) else (a if b else False) if isinstance(b, bool) else None,
+    }
+    found = neutral.get(op)
+    return np.array(found) if isinstance(found, tuple) else found
+
+
+class Recorder:
+    """The elementary functions on symbols."""
+
+    def __getattr__(self, op: str) -> Callable[..., Value]:
+        if op.startswith("_"):
+            raise AttributeError(op)
+        return lambda *args: record(op, *args)
+
+    def select(self, condition: Value, a: Value, b: Value) -> Value:
+        asked, chosen, other = operand(condition), operand(a), operand(b)
+        if isinstance(asked, tuple):
+            channels = [component(chosen if asked[c] else other, c) for c in range(3)]
+            return channels[0] if channels == [channels[0]] * 3 else Symbol("colour", tuple(channels), "colour")
+        if not isinstance(asked, Symbol):
+            return a if asked else b
+        if chosen is other or (not isinstance(chosen, Symbol) and chosen == other):
+            return a
+        wide = any(is_colour(x) for x in (asked, chosen, other))
+        return Symbol("select", (asked, chosen, other), "colour" if wide else "number")
+
+    def mean(self, x: Symbol) -> Value:
+        return Symbol("mean", (x,), "number") if is_colour(x) else x
+
+    def maximum_channel(self, x: Symbol) -> Value:
+        return Symbol("maximum_channel", (x,), "number") if is_colour(x) else x
+
+    def interpolate(self, table: tables.Table, coordinates: Sequence[Value]) -> list[Value]:
+        args = tuple(operand(x) for x in coordinates)
+        if any(is_colour(x) for x in args):
+            each = (self.interpolate(table, [component(x, c) for x in args]) for c in range(3))
+            return [Symbol("colour", channels, "colour") for channels in zip(*each)]
+        name = next(name for name, known in tables.load().items() if known is table)
+        channels = table.data.shape[-1]
+        if channels == 1:
+            return [Symbol("value", args, "number", name)]
+        texels = Symbol("texels", args, "texels", name)
+        return [Symbol("component", (texels,), "number", c) for c in range(channels)]
+
+
+Symbol.dialect = Recorder()
+
+
+def in_order(outputs: Sequence[Value]) -> list[Symbol]:
+    """All symbols that the outputs are made of, inputs first, arguments before what is made of them."""
+    found: set[Symbol] = set()
+    waiting = [x for x in outputs if isinstance(x, Symbol)]
+    while waiting:
+        symbol = waiting.pop()
+        if symbol not in found:
+            found.add(symbol)
+            waiting.extend(x for x in symbol.args if isinstance(x, Symbol))
+    return sorted(found, key=lambda symbol: (symbol.op != "input", symbol.serial))

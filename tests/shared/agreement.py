@@ -1,0 +1,236 @@
+"""A shader against NumPy: the same random stacks and directions through both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, TypeAlias
+
+import numpy as np
+from chromium import Browser
+
+from velatura.model import bsdf
+from velatura.shader import Recording, Shader, record, shader, variance
+from velatura.stack import Kind, Stack
+
+Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
+
+D: Kind = "dielectric"
+C: Kind = "conductor"
+M: Kind = "mirror"
+S: Kind = "medium"  # it scatters
+L: Kind = "diffuse"  # Lambert's law
+
+#: Kinds of layers from the top.
+SEQUENCES: tuple[tuple[Kind, ...], ...] = (
+    (C,),
+    (M,),
+    (D,),
+    (D, C),
+    (D, M),
+    (D, L),
+    (D, D),
+    (D, S, C),
+    (D, S, D),
+    (D, S, L),
+    (S, C),
+    (D, D, C),
+    (D, D, D),
+    (D, S, D, C),
+    (D, S, D, S, C),
+    (D, D, S, L),
+    (D, D, D, C),
+)
+#: How the roughnesses of the interfaces lie: the same along both axes, along the frame's axes, turned.
+SHAPES = ("round", "straight", "turned")
+PATTERNS = tuple(product(SEQUENCES, SHAPES))
+
+# Variances grow without bound towards a roughness of 1. Beyond .95 along one axis they leave the other axis of a turned
+# interface fewer digits than 1e-4 asks of single precision.
+ROOT_ALPHA_MAX = 0.97
+
+
+@dataclass(frozen=True)
+class Case:
+    """N random stacks of one pattern, with directions: single-precision values by name of the input."""
+
+    stack: Stack
+    values: dict[str, np.ndarray]
+    directions: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Results:
+    """Energies (lobes, 3, N), alphas (lobes, 2, N), value (3, N), density (N,), and sampled directions (3, N)."""
+
+    energy: np.ndarray
+    alpha: np.ndarray
+    value: np.ndarray
+    density: np.ndarray
+    drawn: np.ndarray
+
+
+def random_case(pattern: Pattern, count: int, rng: np.random.Generator) -> Case:
+    """Stacks of a pattern, lit from above, or from either side where they transmit; wo on either side."""
+    kinds, shape = pattern
+    values: dict[str, np.ndarray] = {"exterior": np.ones(count)}
+    for i, kind in enumerate(kinds):
+        values |= {f"layer{i}_{key}": value for key, value in _random_layer(kind, shape, count, rng).items()}
+    stack = Stack.from_flat(kinds, {name: _first(value) for name, value in values.items()} | _mirrors(kinds))
+    below = kinds[-1] == D
+    directions = {"wi": _direction(count, rng, below), "wo": _direction(count, rng, below), "u": rng.random((3, count))}
+    return Case(
+        stack,
+        {name: value.astype(np.float32).astype(float) for name, value in values.items()},
+        {name: value.astype(np.float32).astype(float) for name, value in directions.items()},
+    )
+
+
+def in_numpy(case: Case, recording: Recording) -> Results:
+    """What the model says."""
+    stack = case.stack
+    body = bsdf.body(stack.kinds, case.values, stack.thin, recording.model, variance(stack), constant=False)
+    wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
+    seen = bsdf.scattered(body, wi)
+    lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]
+    value, density = bsdf.eval_pdf(body, wi, wo)
+    drawn, _ = bsdf.sample(body, wi, *u)
+    count = len(density)
+    return Results(
+        np.array([np.broadcast_to(lobe.energy, (3, count)) for lobe in lobes]),
+        np.array([[np.broadcast_to(a, count) for a in lobe.roughness[:2]] for lobe in lobes]),
+        np.broadcast_to(value, (3, count)),
+        density,
+        np.array(np.broadcast_arrays(*drawn)),
+    )
+
+
+def in_browser(case: Case, recording: Recording, made: Shader, browser: Browser) -> tuple[Results, float, float]:
+    """What the shader says, and milliseconds to compile and to draw; a row of pixels for each stack."""
+    lobes = [f"l.{name.removesuffix('.energy')}" for name in recording.lobes if name.endswith(".energy")]
+    answers = [f"vec4({lobe}.energy, {lobe}.alpha_u)" for lobe in lobes]
+    answers += [f"vec4({lobe}.alpha_v)" for lobe in lobes]
+    answers += ["vt_eval_pdf(m, l, wi, wo)", "vec4(vt_sample(m, l, wi, u), 0.0)"]
+    inputs, text = _reading(case, made)
+    cases = "\n".join(f"        case {j}: result = {answer}; break;" for j, answer in enumerate(answers))
+    main = f"""
+uniform highp sampler2D inputs;
+out vec4 result;
+
+float read(int i) {{
+    vec4 texel = texelFetch(inputs, ivec2(i / 4, int(gl_FragCoord.y)), 0);
+    return texel[i % 4];
+}}
+
+void main() {{
+    VtMaterial m;
+{text}
+    VtLobes l = vt_lobes(m, wi);
+    switch (int(gl_FragCoord.x)) {{
+{cases}
+    }}
+}}
+"""
+    textures = {"inputs": inputs, "vt_tables": made.tables}
+    rows = inputs.shape[0]
+    drawn = browser.draw(f"#version 300 es\n{made.text}{main}", textures, len(answers), rows)
+    by_answer = np.moveaxis(drawn.pixels.astype(float), 0, -1)  # (answers, 4, N)
+    n = len(lobes)
+    results = Results(
+        by_answer[:n, :3],
+        np.stack([by_answer[:n, 3], by_answer[n : 2 * n, 0]], axis=1),
+        by_answer[-2, :3],
+        by_answer[-2, 3],
+        by_answer[-1, :3],
+    )
+    return results, drawn.linking, drawn.drawing
+
+
+@dataclass(frozen=True)
+class Differences:
+    """The largest: absolute for energies, alphas and directions, relative for values and densities."""
+
+    energy: float
+    alpha: float
+    value: float
+    density: float
+    drawn: float
+
+
+def differences(truth: Results, found: Results) -> Differences:
+    """Values and densities count where all roughnesses are at least .05; below what shows they count as nothing."""
+    rough = (truth.alpha >= 0.05).all(axis=(0, 1))
+
+    def relative(a: np.ndarray, b: np.ndarray) -> float:
+        return float((np.abs(a - b) / np.maximum(np.abs(a), 1e-6))[..., rough].max(initial=0.0))
+
+    def absolute(a: np.ndarray, b: np.ndarray) -> float:
+        return float(np.abs(a - b).max(initial=0.0))
+
+    return Differences(
+        absolute(truth.energy, found.energy),
+        absolute(truth.alpha, found.alpha),
+        relative(truth.value, found.value),
+        relative(truth.density, found.density),
+        float(np.quantile(np.abs(truth.drawn - found.drawn)[:, rough], 0.99)) if rough.any() else 0.0,
+    )
+
+
+def compare(pattern: Pattern, model: str, count: int, seed: int, browser: Browser, **switches: str) -> Differences:
+    """Random stacks of a pattern through both."""
+    case = random_case(pattern, count, np.random.default_rng(seed))
+    recording, made = record(case.stack, model, **switches), shader(case.stack, model, **switches)
+    found, _, _ = in_browser(case, recording, made, browser)
+    return differences(in_numpy(case, recording), found)
+
+
+def _random_layer(kind: str, shape: str, count: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    def colour(low: float, high: float) -> np.ndarray:
+        return rng.uniform(low, high, (3, count))
+
+    if kind == S:
+        return {
+            "depth": rng.uniform(0, 1, count),
+            "sigma_a": colour(0, 1),
+            "sigma_s": colour(0, 1),
+            "g": rng.uniform(-0.9, 0.95, count),
+        }
+    if kind == L:
+        return {"albedo": colour(0, 1)}
+    alpha_u = rng.uniform(0.01, ROOT_ALPHA_MAX, count) ** 2
+    alpha_v = alpha_u if shape == "round" else rng.uniform(0.01, ROOT_ALPHA_MAX, count) ** 2
+    rotation = rng.uniform(-180, 180, count) if shape == "turned" else np.zeros(count)
+    surface = {"alpha_u": alpha_u, "alpha_v": alpha_v, "rotation": rotation}
+    if kind == M:
+        return surface
+    if kind == C:
+        return {"eta": colour(0.1, 3), "k": colour(0, 5), **surface}
+    return {"eta": rng.uniform(1.05, 2.5, count) + rng.uniform(-0.04, 0.04, (3, count)), **surface}
+
+
+def _direction(count: int, rng: np.random.Generator, below: bool) -> np.ndarray:
+    z, phi = rng.uniform(0.02, 1, count), rng.uniform(0, 2 * np.pi, count)
+    side = np.where(rng.random(count) < 0.5, -1, 1) if below else 1
+    sine = np.sqrt(1 - z * z)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), side * z])
+
+
+def _first(value: np.ndarray) -> Any:
+    return tuple(value[:, 0].tolist()) if value.ndim == 2 else float(value[0])
+
+
+def _mirrors(kinds: tuple[str, ...]) -> dict[str, str]:
+    return {f"layer{i}_conductor": "mirror" for i, kind in enumerate(kinds) if kind == M}
+
+
+def _reading(case: Case, made: Shader) -> tuple[np.ndarray, str]:
+    """A texture with all inputs of a stack in a row, and the statements that read them."""
+    columns: list[np.ndarray] = []
+    lines = []
+    places = {f"m.{place}": case.values[name] for name, place in made.uniforms.items()}
+    for place, value in (places | {f"vec3 {name}": value for name, value in case.directions.items()}).items():
+        channels = [f"read({len(columns) + k})" for k in range(len(np.atleast_2d(value)))]
+        columns += list(np.atleast_2d(value))
+        lines.append(f"    {place} = {channels[0] if len(channels) == 1 else 'vec3(' + ', '.join(channels) + ')'};")
+    texels = np.stack([*columns, *[np.zeros_like(columns[0])] * (-len(columns) % 4)], axis=-1)
+    return texels.reshape(len(columns[0]), -1, 4), "\n".join(lines)

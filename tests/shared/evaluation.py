@@ -1,0 +1,54 @@
+"""What recorded expressions come to, in NumPy."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from velatura import ops, tables
+from velatura.ops import Value
+from velatura.shader.symbol import Operand, Symbol, in_order, operand
+
+_ARITHMETIC: dict[str, Callable[..., Any]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "negative": operator.neg,
+    "both": operator.and_,
+    "less": operator.lt,
+    "greater": operator.gt,
+    "at_most": operator.le,
+    "at_least": operator.ge,
+}
+
+
+def evaluate(outputs: Sequence[Value], values: Mapping[str, Any]) -> list[Any]:
+    """The outputs for values of the inputs: numbers (N,) and colours (3, N)."""
+    done: dict[Symbol, Any] = {}
+
+    def of(x: Operand) -> Any:
+        if isinstance(x, Symbol):
+            return done[x]
+        return np.array(x)[:, None] if isinstance(x, tuple) else x
+
+    for symbol in in_order(outputs):
+        done[symbol] = _evaluated(symbol, [of(x) for x in symbol.args], values)
+    return [of(operand(x)) for x in outputs]
+
+
+def _evaluated(symbol: Symbol, args: list[Any], values: Mapping[str, Any]) -> Any:
+    if symbol.op == "input":
+        return values[symbol.detail]
+    if symbol.op == "component":
+        return args[0][symbol.detail]
+    if symbol.op == "colour":
+        return np.stack(np.broadcast_arrays(*args))
+    if symbol.op in ("texels", "value"):
+        channels = ops.interpolate(getattr(tables.load(), symbol.detail), *args)
+        return channels if symbol.op == "texels" else channels[0]
+    function: Callable[..., Any] = _ARITHMETIC.get(symbol.op) or getattr(ops, symbol.op)
+    return function(*args)

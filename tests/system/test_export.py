@@ -1,0 +1,113 @@
+"""What `velatura export` writes is read back by those that it is written for.
+
+Rationale: an export is only worth something if the other program gets the same material; so each is loaded as its
+readers load it.
+"""
+
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+from velatura.shader import shader
+
+Run = Callable[..., tuple[int, str, str]]
+
+PRESETS = ["coated-gold", "frosted-glass", "varnished-paint", "furnace"]
+
+
+def test_glsl_is_the_shader_with_its_tables_beside(run: Run, tmp_path: Path) -> None:
+    """Expected: the text and the texture that Python makes, the texture as little-endian floats in rows of RGBA."""
+    path = tmp_path / "gold.glsl"
+    arguments = ["--model", "belcour2018", "--constant", "layer0_eta", "--set", "layer0_alpha=0.2", "-o", str(path)]
+    assert run("export", "coated-gold", "--to", "glsl", *arguments)[0] == 0
+    made = shader(vt.preset("coated-gold").replace(layer0_alpha=0.2), "belcour2018", ["layer0_eta"])
+    assert path.read_text() == made.text
+    found = np.frombuffer((tmp_path / "gold.tables.bin").read_bytes(), "<f4")
+    np.testing.assert_array_equal(found.reshape(made.tables.shape), made.tables)
+
+
+def test_without_tables_there_is_one_file(run: Run, tmp_path: Path) -> None:
+    """Expected: a model that looks up no averages needs no texture."""
+    path = tmp_path / "gold.glsl"
+    run("export", "coated-gold", "--to", "glsl", "--model", "weier2020", "--constant", "all", "-o", str(path))
+    assert [entry.name for entry in tmp_path.iterdir()] == ["gold.glsl"]
+    assert "vt_tables" not in path.read_text()
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_json_holds_the_material_and_its_numbers(preset: str, run: Run) -> None:
+    """Expected: the material reads back; the values are numbers, or three where colours differ, metals by name too."""
+    status, out, _ = run("export", preset, "--to", "json", "--set", "tir=off", "--model", "belcour2018")
+    found, stack = json.loads(out), vt.preset(preset)
+    assert status == 0
+    assert vt.Stack.from_dict(found["material"]) == stack
+    assert (found["model"]["name"], found["model"]["tir"]) == ("belcour2018", "off")
+    assert set(found["values"]) == set(stack.flat())
+    again = stack.replace(**{name: value for name, value in found["values"].items() if "layer" in name})
+    for a, b in zip(vt.lobes(stack, 0.5).energy, vt.lobes(again, 0.5).energy):
+        np.testing.assert_allclose(a, b, rtol=1e-12)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_scene_of_mitsuba_can_include_it(preset: str, run: Run, tmp_path: Path) -> None:
+    """Expected: the BSDF of the XML answers as the one that Python makes, switches included."""
+    run("export", preset, "--to", "mitsuba-xml", "--set", "form=symmetric", "-o", str(tmp_path / "material.xml"))
+    expected = vt.bsdf(vt.preset(preset), form="symmetric")
+    mi: Any = kernel.mitsuba()
+    scene = mi.load_string(
+        f"""<scene version="3.0.0"><include filename="{tmp_path / "material.xml"}"/>
+        <shape type="sphere"><ref id="material"/></shape></scene>"""
+    )
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(0.6, 0.0, 0.8)
+    wo = mi.Vector3f(-0.5, 0.1, float(np.sqrt(0.74)))
+    found = scene.shapes()[0].bsdf()
+    a, b = (np.ravel(each.eval(mi.BSDFContext(), si, wo)) for each in (found, expected))
+    np.testing.assert_array_equal(a, b)
+    assert str(found) == str(expected)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_script_runs(preset: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: it describes the same stack, and as a script renders it with the same model to the file named."""
+    path, picture, seen = tmp_path / "material.py", tmp_path / "out.png", []
+    run("export", preset, "--to", "python", "--model", "weier2020", "--set", "tir=clean", "-o", str(path))
+    assert runpy.run_path(str(path))["stack"] == vt.preset(preset)
+
+    def render(stack: vt.Stack, **chosen: str) -> np.ndarray:
+        seen.append((stack, chosen))
+        return np.zeros((2, 2, 3))
+
+    monkeypatch.setattr(vt, "render", render)
+    monkeypatch.setattr(sys, "argv", [str(path), str(picture)])
+    runpy.run_path(str(path), run_name="__main__")
+    assert seen == [(vt.preset(preset), {"model": "weier2020", "tir": "clean"})]
+    assert picture.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["coated-gold", "--to", "obj"], "'obj' is not one of 'glsl', 'json', 'mitsuba-xml', 'python'"),
+        (["coated-gold", "--to", "json", "-o", "gold.yaml"], "gold.yaml: json output ends in .json"),
+        (["coated-gold", "--to", "json", "-o", "nowhere/gold.json"], "nowhere/gold.json: there is no folder nowhere"),
+        (["coated-gold", "--to", "json", "--constant", "all"], "--constant: only for --to glsl"),
+        (["coated-gold", "--to", "glsl", "--constant", "layer9_eta"], "constant: unknown parameter 'layer9_eta'"),
+        (["coated-gold", "--to", "python", "--model", "weier"], "unknown model 'weier' (did you mean weier2020?)"),
+        (["gold", "--to", "json"], "unknown preset 'gold'"),
+    ],
+)
+def test_wrong_input_is_said_in_a_line(arguments: list[str], message: str, run: Run, tmp_path: Path) -> None:
+    status, out, err = run("export", *arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert message in err

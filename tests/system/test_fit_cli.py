@@ -1,0 +1,84 @@
+"""Fitting and simplifying as a user types it: materials that the other verbs read, and one line for each failure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura.inverse import Directions, table_of
+from velatura.model import named
+from velatura.stack import Diffuse, Interface, Stack, save
+
+Run = Callable[..., tuple[int, str, str]]
+
+PAIR = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=1.5, alpha=0.3), Interface(eta=1.0, k=3.0, alpha=0.2)])
+ONE = Stack([Interface(eta=1.8, alpha=0.2)])
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with a material, a table of another one, and targets."""
+    monkeypatch.chdir(tmp_path)
+    save(PAIR, tmp_path / "pair.yaml")
+    angles = [(i, o, phi) for i in (0.0, 30.0, 60.0) for o in (0.0, 20.0, 40.0, 60.0) for phi in (150.0, 180.0)]
+    value = table_of(ONE, Directions.of(*map(np.array, zip(*angles))), named("bati2021")).value
+    rows = [",".join(map(str, (*angle, *rgb))) for angle, rgb in zip(angles, value.T)]
+    (tmp_path / "table.csv").write_text("\n".join(["theta_i,theta_o,phi,r,g,b", *rows]))
+    (tmp_path / "target.yaml").write_text("lobes:\n  - {energy: 0.1, alpha: 0.1}\n")
+    (tmp_path / "bright.yaml").write_text("lobes:\n  - {energy: 0.6}\n")
+    return tmp_path
+
+
+def test_a_table_becomes_a_material(run: Run, folder: Path) -> None:
+    """Expected: the stack that the table is of, in a file that other verbs read."""
+    status, out, err = run("fit", "table.csv", "target.yaml", "-o", "found.yaml")
+    assert (status, err) == (0, "")
+    assert out.splitlines()[-1] == "found.yaml"
+    (found,) = vt.load("found.yaml").interfaces
+    assert (found.eta, found.alpha) == pytest.approx((1.8, 0.2), rel=1e-4)
+
+
+def test_a_material_becomes_a_simpler_one(run: Run, folder: Path) -> None:
+    """Expected: JSON with the material and its error by angle; an interface that does nothing is gone."""
+    status, out, err = run("simplify", "pair.yaml", "--interfaces", "2", "--json")
+    report = json.loads(out)
+    assert (status, err) == (0, "")
+    assert len(vt.Stack.from_dict(report["stack"]).interfaces) == 2
+    assert report["error"] < 1e-4
+    assert len(report["by_angle"]) == 5
+
+
+def test_a_coat_tells_of_a_diffuse_base(run: Run, folder: Path) -> None:
+    """Expected: the energy that is kept, as JSON and as a row of the table."""
+    save(Stack([Interface(eta=1.4), Diffuse(albedo=0.4)]), folder / "plastic.yaml")
+    arguments = ("coat", "plastic.yaml", "--keep-appearance")
+    diffuse = json.loads(run(*arguments, "--json")[1])["diffuse"]
+    assert diffuse["energy_after"] == pytest.approx(diffuse["energy_before"], abs=1e-9)
+    assert "diffuse" in run(*arguments)[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["fit", "none.csv", "target.yaml"], 2, "none.csv: cannot be read"),
+        (["fit", "target.yaml", "target.yaml"], 2, "target.yaml: line 1: must be theta_i"),
+        (["fit", "table.csv", "none.yaml"], 2, "none.yaml"),
+        (["fit", "table.csv", "target.yaml", "-o", "found.txt"], 2, "found.txt: a material file ends in"),
+        (["fit", "table.csv", "bright.yaml", "-o", "found.yaml"], 3, "no stack: lobe 1"),
+        (["simplify", "pair.yaml", "--interfaces", "3"], 2, "interfaces: must be at least 1, and fewer than the 3"),
+        (["simplify", "pair.yaml", "--interfaces", "0"], 2, "--interfaces"),
+        (["simplify", "pair.yaml"], 2, "--interfaces"),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(
+    run: Run, folder: Path, arguments: list[str], status: int, words: str
+) -> None:
+    found, out, err = run(*arguments)
+    assert (found, out) == (status, "")
+    assert err.count("\n") == 1 and words in err
+    assert not (folder / "found.yaml").exists()

@@ -1,0 +1,166 @@
+"""Descent to a table over angles, and to a simpler stack. Truth: stacks that the tables were rendered from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from velatura.errors import InvalidInput
+from velatura.inverse import Directions, Infeasible, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
+from velatura.model import Model, named
+from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, loads
+
+AVERAGED = named("bati2021")
+COATED = Stack(
+    [
+        Interface(eta=1.5, alpha=0.1),
+        Medium(sigma_a=(0.1, 0.3, 0.6)),
+        Interface(eta=(1.2, 1.1, 0.9), k=(3.0, 2.5, 2.0), alpha=0.25),
+    ]
+)
+GUESS = [{"energy": 0.04, "alpha": 0.08}, {"energy": [0.4, 0.3, 0.2], "alpha": 0.2, "base": "conductor"}]
+
+
+def energy(stack: Stack) -> np.ndarray:
+    """Of a metal head-on, which its indices make together."""
+    eta, k = (np.broadcast_to(getattr(stack.interfaces[-1], key), 3) for key in ("eta", "k"))
+    above = stack.interfaces[0].eta
+    return ((eta - above) ** 2 + k**2) / ((eta + above) ** 2 + k**2)
+
+
+def test_a_rendered_table_gives_back_its_stack() -> None:
+    """From a guess that is 25 % off; the metal's two indices and the absorption above it all but trade places."""
+    table = table_of(COATED, Directions.about_lobes(False), AVERAGED)
+    found = fit_target(table, GUESS, starts=2)
+    assert found.error < 1e-4
+    assert found.errors == sorted(found.errors) and len(found.errors) == 2
+    top, base = found.stack.interfaces
+    assert (top.eta, top.alpha) == pytest.approx((1.5, 0.1), rel=1e-3)
+    assert base.alpha == pytest.approx(0.25, rel=1e-3)
+    assert all(row["relative"] < 1e-4 for row in found.by_angle)
+    assert loads(dumps(found.stack)) == found.stack
+
+
+@pytest.mark.parametrize("model", ["belcour2018", "velatura"])
+def test_every_model_descends(model: str) -> None:
+    start = Stack([Interface(eta=1.6, alpha=0.08), Medium(), Interface(eta=1.5, k=3.0, alpha=0.2)])
+    chosen = named(model)
+    found = fit(table_of(COATED, Directions.about_lobes(False), chosen), [start], chosen)
+    assert found.error < 1e-3
+    assert found.stack.interfaces[1].alpha == pytest.approx(0.25, rel=0.01)
+
+
+def test_a_diffuse_base_and_brushing_are_found() -> None:
+    true = Stack([Interface(eta=1.5, alpha=(0.05, 0.2), rotation=30), Diffuse(albedo=(0.5, 0.3, 0.1))])
+    start = true.replace(layer0_alpha_u=0.1, layer0_alpha_v=0.1001, layer0_eta=1.4, layer1_albedo=0.5)
+    found = fit(table_of(true, Directions.about_lobes(True), AVERAGED), [start], AVERAGED)
+    (top,) = found.stack.interfaces
+    assert (top.eta, *top.alpha) == pytest.approx((1.5, 0.05, 0.2), rel=1e-3)
+    assert found.stack.layers[-1].albedo == pytest.approx((0.5, 0.3, 0.1), rel=1e-3)
+
+
+def test_the_symmetric_form_and_grouped_directions_are_the_same_model() -> None:
+    """Of directions in common the lobes are worked out once. Head-on mirror pairs are the same in both forms."""
+    head_on = Directions.of(np.zeros(3), np.zeros(3), np.zeros(3))
+    forward, symmetric = (
+        table_of(COATED, head_on, named("belcour2018", form=form)) for form in ("forward", "symmetric")
+    )
+    assert np.allclose(forward.value, symmetric.value, rtol=1e-10)
+    pairs = Directions.of(np.array([10.0, 40.0, 10.0]), np.array([20.0, 30.0, 5.0]), np.array([180.0, 170.0, 90.0]))
+    together = table_of(COATED, pairs, AVERAGED).value
+    for n in range(3):
+        one = Directions(pairs.wi[:, [n]], pairs.wo[:, [n]], pairs.theta_i[[n]])
+        assert np.allclose(table_of(COATED, one, AVERAGED).value[:, 0], together[:, n], rtol=1e-12)
+
+
+def test_the_table_of_a_lambertian_is_constant() -> None:
+    """Below an index of the exterior's nothing is reflected or lost on the way."""
+    stack = Stack([Diffuse(albedo=0.5)])
+    value = table_of(stack, Directions.about_lobes(False), AVERAGED).value
+    assert np.allclose(value, 0.5 / np.pi)
+
+
+# Simplification ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", [AVERAGED, named("weier2020")], ids=lambda m: m.name)
+def test_an_interface_that_does_nothing_is_left_out(model: Model) -> None:
+    """Its index is that of the medium above it. Directional albedos there are known to 1e-5.
+
+    (Where light is totally reflected, the models look at the index above an interface, so that it makes a difference.)
+    """
+    top, medium, base = COATED.layers
+    stack = Stack([top, Interface(eta=1.5, alpha=0.2), medium, base])
+    found = simplify(stack, 2, model)
+    assert found.error < 1e-5
+    assert len(found.stack.interfaces) == 2
+    assert found.stack.interfaces[0].eta == pytest.approx(1.5, rel=1e-3)
+    assert energy(found.stack) == pytest.approx(energy(COATED), rel=0.02)
+
+
+def test_fewer_interfaces_come_less_close() -> None:
+    stack = Stack([Interface(eta=1.3, alpha=0.05), Medium(sigma_a=0.1), *COATED.layers])
+    two, one = (simplify(stack, count) for count in (2, 1))
+    assert 0 < two.error < one.error
+    assert [row["theta_i"] for row in two.by_angle] == [0, 20, 40, 55, 70]
+    assert all(row["error"] == pytest.approx(row["relative"] * row["wanted"]) for row in two.by_angle)
+
+
+def test_media_of_what_is_left_out_are_kept() -> None:
+    """Their optical depths add up in the medium that stays."""
+    layers = [Interface(eta=1.5, alpha=0.1), Medium(depth=2.0, sigma_a=0.1), Interface(eta=1.5, alpha=0.1)]
+    found = simplify(Stack([*layers, Medium(sigma_a=0.3), Interface(conductor="mirror", alpha=0.2)]), 2)
+    assert found.error < 1e-5
+    assert np.mean(found.stack.layers[1].sigma_a) == pytest.approx(0.5, rel=1e-2)
+
+
+@pytest.mark.parametrize("count", [0, 2, 3])
+def test_how_many_interfaces_are_kept(count: int) -> None:
+    with pytest.raises(InvalidInput, match=f"interfaces: must be at least 1, and fewer than the 2 .* got {count}"):
+        simplify(COATED, count)
+
+
+# Tables --------------------------------------------------------------------------------------------------------------
+
+HEADER = "theta_i,theta_o,phi,r,g,b\n"
+
+
+def test_table_files(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(HEADER + "30,30,180,1,2,3\n0, 45, 0, .1,.1,.1\n\n")
+    table = load_table(path)
+    assert isinstance(table, ReflectanceTable)
+    assert table.value.T.tolist() == [[1, 2, 3], [0.1, 0.1, 0.1]]
+    i, o = table.directions.wi[:, 0], table.directions.wo[:, 0]
+    assert np.allclose(i, [0.5, 0, np.sqrt(0.75)]) and np.allclose(o, [-0.5, 0, np.sqrt(0.75)])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "line 1: must be theta_i,theta_o,phi,r,g,b"),
+        ("theta,phi\n", "line 1: must be theta_i,theta_o,phi,r,g,b"),
+        (HEADER, "holds no directions"),
+        (HEADER + "1,2,3\n", "line 2: must hold 6 numbers, theta_i,theta_o,phi,r,g,b, got 3"),
+        (HEADER + "0,0,0,1,1,1\n90,0,0,1,1,1\n", "line 3: theta_i: must lie in 0 to 90 (excluded) degrees, got 90"),
+        (HEADER + "0,-1,0,1,1,1\n", "line 2: theta_o: must lie in 0 to 90"),
+        (HEADER + "0,0,0,1,x,1\n", "line 2: g: must be a finite number, got 'x'"),
+        (HEADER + "0,0,0,1,nan,1\n", "line 2: g: must be a finite number, got 'nan'"),
+        (HEADER + "0,0,0,1,1,-1\n", "line 2: b: must lie in 0 to 1e+09, got -1"),
+    ],
+)
+def test_what_is_no_table(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text(text)
+    with pytest.raises(InvalidInput) as error:
+        load_table(path)
+    assert str(error.value).startswith(f"{path}: {message}")
+
+
+def test_no_such_table_and_no_such_stack(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match=r"none\.csv: cannot be read: no such file"):
+        load_table(tmp_path / "none.csv")
+    with pytest.raises(Infeasible):
+        fit_target(table_of(COATED, Directions.about_lobes(False), AVERAGED), [{"energy": 0.6}])

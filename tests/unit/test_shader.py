@@ -1,0 +1,225 @@
+"""The recorder: what the model does is recorded, printed, and the same as in NumPy. A browser is not needed here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from agreement import PATTERNS, in_numpy, random_case
+from evaluation import evaluate
+
+import velatura as vt
+from velatura import ops, tables
+from velatura.errors import InvalidInput
+from velatura.shader import Recording, glsl, record, shader
+from velatura.shader.graph import Graph
+from velatura.shader.symbol import Symbol, colour, component, in_order, number
+
+X, Y = np.random.default_rng(1).uniform(0.05, 0.95, (2, 20))
+RGB = np.random.default_rng(2).uniform(0.05, 0.95, (3, 20))
+
+
+def printed(value: Symbol) -> str:
+    """The statements for a value, and the expression that it ends in."""
+    statements, texts = glsl.statements([(value, value.kind)])
+    return "\n".join([*statements, *texts])
+
+
+# Symbols
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda x, y, c: x + 2 * y - c / x,
+        lambda x, y, c: -x * (1 - c) / (y - 2),
+        lambda x, y, c: ops.sqrt(x - y) + ops.exp(-c) + ops.log(x),
+        lambda x, y, c: ops.power(c, x) * ops.sin(x) * ops.cos(c),
+        lambda x, y, c: ops.arctan2(x, c) + ops.absolute(x - y),
+        lambda x, y, c: ops.clip(c, 0.2, x),
+        lambda x, y, c: ops.select((x < y) & (c > 0.5), c, y),
+        lambda x, y, c: ops.select((x <= y) & (x >= 0.1), 1.0, c),
+        lambda x, y, c: ops.divide(x, c - c) * ops.mean(c) * ops.maximum_channel(c),
+        lambda x, y, c: np.array([0.1, 0.2, 0.3])[:, None] * c + x * np.array([0.5, 0.0, 2.0])[:, None],
+        lambda x, y, c: ops.select(np.array([True, False, True])[:, None], x, y) + 0 * c,
+        lambda x, y, c: ops.interpolate(tables.load().dielectric, x, y)[5] + 0 * c,
+        lambda x, y, c: ops.interpolate(tables.load().inside, x, c, y)[0],
+        lambda x, y, c: ops.interpolate(tables.load().absorbing_inside, x, y, c)[8],
+    ],
+)
+def test_what_is_recorded_is_what_is_computed(function) -> None:
+    recorded = function(number("x"), number("y"), colour("c"))
+    found = evaluate([recorded], {"x": X, "y": Y, "c": RGB})[0]
+    expected = function(X, Y, RGB)
+    np.testing.assert_allclose(np.broadcast_to(found, expected.shape), expected, rtol=1e-14)
+
+
+def test_constants_fold_and_neutral_elements_go() -> None:
+    x = number("x")
+    for same in (x + 0, 0.0 + x, x - 0.0, 1 * x, x / 1.0, ops.select(x > 0, x, x), ops.select(True, x, 2.0)):
+        assert same is x
+    for zero in (0.0 * x, x * 0, 0.0 / x):
+        assert zero == 0.0
+    assert ops.select(x > 0, 2.0, 2.0) == 2.0
+    assert (x > 0) & False is False
+    assert ops.mean(x) is x
+    assert component((0.1, 0.2, 0.3), 1) == 0.2
+
+
+def test_the_model_may_not_ask_whether_a_value_holds() -> None:
+    with pytest.raises(TypeError, match=r"ops\.select"):
+        bool(number("x") > 0)
+
+
+def test_equal_values_are_worked_out_once() -> None:
+    x, y = number("x"), number("y")
+    graph = Graph()
+    a, b = graph.unique([ops.exp(x + y) * 2, 2 * ops.exp(y + x)])
+    assert a is b
+    assert len(in_order([a])) == 5  # x, y, the sum, its exponential, the product
+
+
+def test_what_is_given_is_read() -> None:
+    x = number("x")
+    graph = Graph()
+    first, second = graph.unique([ops.exp(x), ops.sqrt(ops.exp(x))])
+    assert isinstance(first, Symbol)
+    (found,) = Graph({first: number("l.first")}).unique([second])
+    assert isinstance(found, Symbol)
+    assert printed(found) == "vt_sqrt(l.first)"
+
+
+# Statements
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (number("x") - (number("y") - 1), "x - (y - 1.0)"),
+        (number("x") / (number("x") * number("y")), "x / (x * y)"),
+        ((number("x") + 1) * -number("y"), "(x + 1.0) * -y"),
+        (ops.clip(number("x"), 0.0, 1.0), "clamp(x, 0.0, 1.0)"),
+        (ops.maximum(number("x"), 1e-15), "max(x, 1e-15)"),
+        (ops.select(number("x") < 0, 1.0, number("x")), "x < 0.0 ? 1.0 : x"),
+        (ops.select(colour("c") < 0.5, 1.0, colour("c")), "mix(c, vec3(1.0), lessThan(c, vec3(0.5)))"),
+        (ops.power(colour("c"), 1.5), "pow(c, vec3(1.5))"),
+        (colour("c") * np.array([0.5, 1.0, 2.0]), "c * vec3(0.5, 1.0, 2.0)"),
+    ],
+)
+def test_operators_bind_as_they_should(value: Symbol, text: str) -> None:
+    assert printed(value) == text
+
+
+def test_what_is_used_twice_has_a_name() -> None:
+    twice = number("x") * number("y")
+    assert printed(twice + ops.exp(twice)) == "float value = x * y;\nvalue + exp(value)"
+
+
+def test_names_and_titles_are_those_of_the_model() -> None:
+    text = shader(vt.preset("coated-gold"), "belcour2018").text
+    assert "// Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 33-36)" in text
+    assert "vec3 bounces = 1.0 / max(1.0 - " in text
+
+
+# Shaders
+
+
+@pytest.mark.parametrize("model", ["belcour2018", "weier2020", "yamaguchi2019", "realtime", "velatura"])
+@pytest.mark.parametrize("pattern", PATTERNS[::13], ids=str)
+def test_a_recording_answers_as_numpy_does(pattern, model: str) -> None:
+    """The expressions that are printed, worked out in double precision, against the functions called directly."""
+    case = random_case(pattern, 40, np.random.default_rng(3))
+    recording = record(case.stack, model)
+    truth = in_numpy(case, recording)
+    values = {f"m.{place}": case.values[name] for name, place in recording.read.items()}
+    values |= {f"{name}.{axis}": w[k] for name, w in case.directions.items() for k, axis in enumerate("xyz")}
+
+    lobes = dict(zip(recording.lobes, evaluate(list(recording.lobes.values()), values)))
+    energies = [np.broadcast_to(value, (3, 40)) for name, value in lobes.items() if name.endswith(".energy")]
+    np.testing.assert_allclose(energies, truth.energy, rtol=1e-12, atol=1e-15)
+
+    values |= {f"l.{name}": value for name, value in lobes.items()}
+    values |= {f"l.{name}.r": value for name, value in lobes.items()}
+    value, density, *drawn = evaluate([recording.value, recording.density, *recording.drawn], values)
+    np.testing.assert_allclose(np.broadcast_to(value, (3, 40)), truth.value, rtol=1e-10, atol=1e-15)
+    np.testing.assert_allclose(density, truth.density, rtol=1e-10, atol=1e-15)
+    np.testing.assert_allclose(drawn, truth.drawn, atol=1e-12)
+
+
+def test_lobes_are_worked_out_once_for_a_direction() -> None:
+    """`eval` and `sample` read what `lobes` leaves: no layer is added up again, and no table is read."""
+    recording = record(vt.preset("varnished-paint"), "belcour2018")
+    assert any(symbol.op == "texels" for symbol in in_order(list(recording.lobes.values())))
+    assert not any(symbol.op in ("texels", "value") for symbol in in_order(list(recording.drawn)))
+    reads = {symbol.detail for symbol in in_order([recording.value]) if symbol.op == "input"}
+    assert {"l.reflected[0].energy.r", "l.reflected[0].energy"} & reads
+    assert "l.base_scale" in reads
+
+
+def test_a_constant_is_no_uniform() -> None:
+    stack = vt.preset("coated-gold")
+    names = ["layer0_eta", "layer2_eta", "layer2_k"]
+    free, fixed = shader(stack, "belcour2018"), shader(stack, "belcour2018", names)
+    assert set(free.uniforms) - set(fixed.uniforms) == set(names)
+    assert len(fixed.text) < 0.8 * len(free.text)
+    assert "m.layer0.eta" not in fixed.text
+
+
+def test_all_constant_leaves_only_directions() -> None:
+    stack = vt.preset("coated-gold")
+    recording = record(stack, constant=list(stack.flat()))
+    assert recording.read == {}
+    found = evaluate([recording.lobes["reflected[1].energy"]], {"wi.x": 0.6, "wi.y": 0.0, "wi.z": 0.8})[0]
+    expected = vt.lobes(stack, cos_theta=0.8, model=recording.model).energy[1]
+    np.testing.assert_allclose(np.reshape(found, (3, 1)), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("constant", "switches", "message"),
+    [
+        (["layer0_ior"], {}, "constant: unknown parameter 'layer0_ior'"),
+        ([], {"tir": "perhaps"}, "tir: must be one of"),
+        ([], {"channels": "separate"}, "channels=separate: only for lobes and inverse"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said_in_a_line(constant, switches, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message) as error:
+        record(vt.preset("coated-gold"), "belcour2018", constant, **switches)
+    assert "\n" not in str(error.value)
+
+
+def test_a_base_alone_has_no_lobes() -> None:
+    with pytest.raises(InvalidInput, match="a shader needs an interface"):
+        record(vt.Stack([vt.Diffuse(albedo=0.5)]))
+
+
+def test_textures_become_samplers(tmp_path: Path) -> None:
+    scratches, wood = tmp_path / "scratches.png", tmp_path / "wood.png"
+    for path in (scratches, wood):
+        path.touch()
+    alpha = {"texture": str(scratches), "scale": 0.5, "offset": 0.1, "channel": "g"}
+    albedo = {"texture": str(wood), "encoding": "srgb"}
+    stack = vt.Stack([vt.Interface(eta=1.5, alpha=alpha), vt.Diffuse(albedo=albedo)])
+    text = shader(stack).text
+    assert f"uniform sampler2D vt_map_layer0_alpha_u; // {scratches}\n" in text
+    assert "m.layer0.alpha_u = clamp(texture(vt_map_layer0_alpha_u, uv).g * 0.5 + 0.1, 0.0, 1.0);" in text
+    assert f"// {wood}, to be decoded from sRGB" in text
+    with pytest.raises(InvalidInput, match="layer0_alpha_u"):
+        shader(stack, constant=["layer0_alpha_u"])
+
+
+def test_the_texture_holds_the_tables() -> None:
+    """Every node of every table, at the place that the readers ask for."""
+    recording: Recording = record(vt.preset("coated-gold"), "belcour2018")
+    names = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
+    flat = shader(vt.preset("coated-gold"), "belcour2018").tables.reshape(-1)
+    start = 0
+    for name, table in tables.load().items():
+        if name in names:
+            channels = table.data.shape[-1]
+            width = channels if channels == 1 else -(-channels // 4) * 4
+            nodes = flat[start : start + width * table.data.size // channels].reshape(*table.shape, width)
+            np.testing.assert_array_equal(nodes[..., :channels], table.data)
+            start += -(-nodes.size // 4) * 4
+    assert not flat[start:].any()
