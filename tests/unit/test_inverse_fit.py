@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,8 +26,8 @@ GUESS = [{"energy": 0.04, "alpha": 0.08}, {"energy": [0.4, 0.3, 0.2], "alpha": 0
 
 def energy(stack: Stack) -> np.ndarray:
     """Of a metal head-on, which its indices make together."""
-    eta, k = (np.broadcast_to(getattr(stack.interfaces[-1], key), 3) for key in ("eta", "k"))
-    above = stack.interfaces[0].eta
+    eta, k = (np.broadcast_to(np.asarray(getattr(stack.interfaces[-1], key), float), 3) for key in ("eta", "k"))
+    above: Any = stack.interfaces[0].eta
     return ((eta - above) ** 2 + k**2) / ((eta + above) ** 2 + k**2)
 
 
@@ -56,9 +57,10 @@ def test_a_diffuse_base_and_brushing_are_found() -> None:
     true = Stack([Interface(eta=1.5, alpha=(0.05, 0.2), rotation=30), Diffuse(albedo=(0.5, 0.3, 0.1))])
     start = true.replace(layer0_alpha_u=0.1, layer0_alpha_v=0.1001, layer0_eta=1.4, layer1_albedo=0.5)
     found = fit(table_of(true, Directions.about_lobes(True), AVERAGED), [start], AVERAGED)
-    (top,) = found.stack.interfaces
+    top: Any = found.stack.interfaces[0]
+    base: Any = found.stack.layers[-1]
     assert (top.eta, *top.alpha) == pytest.approx((1.5, 0.05, 0.2), rel=1e-3)
-    assert found.stack.layers[-1].albedo == pytest.approx((0.5, 0.3, 0.1), rel=1e-3)
+    assert base.albedo == pytest.approx((0.5, 0.3, 0.1), rel=1e-3)
 
 
 def test_the_symmetric_form_and_grouped_directions_are_the_same_model() -> None:
@@ -110,10 +112,11 @@ def test_fewer_interfaces_come_less_close() -> None:
 
 def test_media_of_what_is_left_out_are_kept() -> None:
     """Their optical depths add up in the medium that stays."""
-    layers = [Interface(eta=1.5, alpha=0.1), Medium(depth=2.0, sigma_a=0.1), Interface(eta=1.5, alpha=0.1)]
+    layers: list[Any] = [Interface(eta=1.5, alpha=0.1), Medium(depth=2.0, sigma_a=0.1), Interface(eta=1.5, alpha=0.1)]
     found = simplify(Stack([*layers, Medium(sigma_a=0.3), Interface(conductor="mirror", alpha=0.2)]), 2)
     assert found.error < 1e-5
-    assert np.mean(found.stack.layers[1].sigma_a) == pytest.approx(0.5, rel=1e-2)
+    medium: Any = found.stack.layers[1]
+    assert np.mean(medium.sigma_a) == pytest.approx(0.5, rel=1e-2)
 
 
 @pytest.mark.parametrize("count", [0, 2, 3])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -145,8 +146,8 @@ def test_what_is_fixed_stays() -> None:
 @pytest.mark.parametrize("model", [AVERAGED, named("belcour2018"), named("velatura")], ids=lambda m: m.name)
 def test_the_index_follows_from_a_fixed_lower_roughness(model: Model) -> None:
     """Of a pair below a coat the lower roughness depends on the index between its interfaces."""
-    pair = {"energy": [0.09, 0.09, 0.12], "alpha": 0.06, "interfaces": 2}
-    lobes = [{"energy": 0.03, "alpha": 0}, pair]
+    pair: dict[str, Any] = {"energy": [0.09, 0.09, 0.12], "alpha": 0.06, "interfaces": 2}
+    lobes: list[Any] = [{"energy": 0.03, "alpha": 0}, pair]
     free = invert_stack(lobes, model).layers[-1].alpha
     wanted = 0.8 * float(np.ravel(free)[0])
     target = Target([lobes[0], pair | {"fixed": {"alpha": [None, wanted]}}])
@@ -279,9 +280,10 @@ def test_a_diffuse_base_keeps_its_energy_below_a_coat(model: Model) -> None:
     assert kept.diffuse is not None and naive.diffuse is not None
     assert np.allclose(*kept.diffuse, atol=1e-9)
     assert np.all(naive.diffuse[1] < 0.98 * naive.diffuse[0])
-    assert np.all(np.array(kept.stack.layers[-1].albedo) > (0.5, 0.3, 0.1))
+    assert np.all(np.array(kept.stack.flat()["layer2_albedo"]) > (0.5, 0.3, 0.1))
     white = coat(Stack([Diffuse(albedo=1.0)]), 1.5, keep_appearance=True, model=model)
-    assert white.stack.layers[-1].albedo == pytest.approx(1, abs=1e-9)
+    base: Any = white.stack.layers[-1]
+    assert base.albedo == pytest.approx(1, abs=1e-9)
     assert white.diffuse is not None and white.diffuse[0] == pytest.approx(1)
 
 
