@@ -165,6 +165,17 @@ def test_a_smooth_stack_is_a_mirror_of_all_its_lobes() -> None:
     assert np.all(np.array(bsdf.eval(ctx, si, bs.wo)) == 0)
 
 
+@pytest.mark.parametrize("form", ["forward", "symmetric"])
+def test_paint_alone_is_diffuse(form: str) -> None:
+    bsdf = vt.bsdf(vt.Stack([vt.Diffuse(albedo=(0.5, 0.3, 0.1))]), form=form)
+    si = interaction(direction(0.6, 0.3))
+    found, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, mi.Vector3f(0, 0.6, 0.8))
+    assert np.allclose(np.array(found).ravel() * np.pi, np.array([0.5, 0.3, 0.1]) * 0.8, rtol=1e-5)
+    assert np.allclose(np.array(pdf) * np.pi, 0.8, rtol=1e-5)
+    _, weight = bsdf.sample(mi.BSDFContext(), si, 0.3, mi.Point2f(0.2, 0.7))
+    assert np.allclose(np.array(weight).ravel(), (0.5, 0.3, 0.1), rtol=1e-5)
+
+
 def test_white_paint_under_a_smooth_coat_loses_nothing() -> None:
     """Albedo of the base and of the coat, by sampling; standard error 1e-3."""
     stack = vt.Stack([vt.Interface(eta=1.5), vt.Diffuse(albedo=1.0)])

@@ -91,15 +91,17 @@ def body(
 
     def lobes(prepared: Prepared) -> memo.Lobes:
         added = partial(_lobes, prepared)
-        return memo.sample(added, prepared, number, type(values["exterior"]), transmits) if number else added
+        if number is None or not interfaces:
+            return added
+        return memo.sample(added, prepared, number, type(values["exterior"]), transmits)
 
-    transmits = kinds[-1] == "dielectric"
+    transmits, interfaces = kinds[-1] == "dielectric", set(kinds) - {"medium", "diffuse"}
     values = with_index_below(kinds, values, thin)
     above = with_means(prepare(kinds, values, model, variance, constant, number), settle)
     if not transmits:
         from_above = lobes(above)
         opaque = Body(above, None, 1.0, from_above, from_above)
-        return balanced(opaque, values["exterior"], number) if constant else opaque
+        return balanced(opaque, values["exterior"], number) if constant and interfaces else opaque
     below = prepare(*turned_over(kinds, values), model, variance, constant, number)
     eta = ops.mean(values[f"layer{len(kinds) - 1}_eta"]) / ops.mean(values["exterior"])
     pane = Body(above, below, eta, lobes(above), lobes(below))

@@ -58,7 +58,12 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
 
     The direction may lie below the surface, where `eval_pdf` is 0.
     """
-    # Pick a lobe: of those that begin below u, the last
+    # Scatter at the base
+    radius, phi = ops.sqrt(u1), 2 * pi * u2
+    scattered = radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1)
+    if not lobes:
+        return scattered
+    # Or pick a lobe: of those that begin below u, the last
     shares = probabilities(lobes, base)
     chosen, begin = _bounded(lobes[0].roughness), 0.0
     for lobe, before in zip(lobes[1:], shares):
@@ -70,9 +75,6 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
     wo = ggx.rotate(ggx.reflect(frame_wi, h), -chosen.rotation)
     if not base:
         return wo
-    # Or scatter at the base
-    radius, phi = ops.sqrt(u1), 2 * pi * u2
-    scattered = radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1)
     from_base = u > 1 - shares[-1]
     x, y, z = (ops.select(from_base, a, b) for a, b in zip(scattered, wo))
     return x, y, z
