@@ -56,14 +56,15 @@ class State:
 
 def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
     """The reflected lobes, one per interface from the top, and the lobe transmitted below the last layer."""
-    state, reflected = _down(prepared, wi)
+    plane = _Plane.of(wi)
+    state, reflected = _down(prepared, wi, plane)
     passed = _roughness(_calibration(prepared), state.s_t0i, state.n, state.cos_theta)
-    return reflected, _lobe(prepared, _Plane.of(wi), state.t_0i, passed, state.cos_theta)
+    return reflected, _lobe(prepared, plane, state.t_0i, passed, state.cos_theta)
 
 
 def below(prepared: Prepared, wi: Direction) -> State:
     """The stack with all of its layers, for light from wi."""
-    return _down(prepared, wi)[0]
+    return _down(prepared, wi, _Plane.of(wi))[0]
 
 
 def _calibration(prepared: Prepared) -> Calibration:
@@ -71,10 +72,9 @@ def _calibration(prepared: Prepared) -> Calibration:
     return prepared.model.calibration
 
 
-def _down(prepared: Prepared, wi: Direction) -> tuple[State, list[Lobe]]:
+def _down(prepared: Prepared, wi: Direction, plane: _Plane) -> tuple[State, list[Lobe]]:
     none = (PerAxis if prepared.variance is Isotropic else Covariance).uniform(0.0)
     state = State(wi[2], 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, none, none, none, none, 1.0)
-    plane = _Plane.of(wi)
     reflected: list[Lobe] = []
     for layer in prepared.layers:
         if isinstance(layer, PreparedMedium):
