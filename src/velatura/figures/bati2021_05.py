@@ -7,13 +7,9 @@ leaves little of the difference. The indices of the coats, and which colour diff
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
-from velatura.figures import canvas, looks
+from velatura.figures import looks
 from velatura.inverse import Choice, invert_interface
 from velatura.stack import Interface, Stack
 
@@ -35,23 +31,8 @@ def stacks() -> dict[str, Stack]:
     return found
 
 
-def compute(
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """As `looks.compute`."""
-    return looks.compute(stacks(), size, spp, seed, progress)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """As `looks.draw`.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    looks.draw(numbers, path)
+FIGURE = looks.Looks(stacks)
+compute, draw = FIGURE.compute, FIGURE.draw
 
 
 if __name__ == "__main__":

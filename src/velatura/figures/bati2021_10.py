@@ -6,11 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, looks
+from velatura.figures import looks
 from velatura.inverse import invert_stack, sets
 from velatura.stack import Interface, Stack
 
@@ -33,23 +29,8 @@ def stacks() -> dict[str, Stack]:
     return found
 
 
-def compute(
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """As `looks.compute`."""
-    return looks.compute(stacks(), size, spp, seed, progress)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """As `looks.draw`.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    looks.draw(numbers, path)
+FIGURE = looks.Looks(stacks)
+compute, draw = FIGURE.compute, FIGURE.draw
 
 
 if __name__ == "__main__":

@@ -6,11 +6,7 @@ below them the one that needs least absorption, and 4.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, looks
+from velatura.figures import looks
 from velatura.inverse import invert_stack
 from velatura.inverse.targets import FIGURES
 from velatura.stack import Stack
@@ -28,23 +24,8 @@ def stacks() -> dict[str, Stack]:
     return found
 
 
-def compute(
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """As `looks.compute`."""
-    return looks.compute(stacks(), size, spp, seed, progress)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """As `looks.draw`.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    looks.draw(numbers, path)
+FIGURE = looks.Looks(stacks)
+compute, draw = FIGURE.compute, FIGURE.draw
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,31 @@ from velatura.stack import Stack
 MODEL = "bati2021"
 COSINES = (1.0, 0.8, 0.6, 0.4, 0.3, 0.2, 0.1)
 GRAZING = COSINES.index(0.2)
+
+
+@dataclass(frozen=True)
+class Looks:
+    """A figure of looks alone: what finds its stacks by name."""
+
+    stacks: Callable[[], Mapping[str, Stack]]
+
+    def compute(
+        self,
+        size: int = canvas.SIZE,
+        spp: int = canvas.SAMPLES,
+        seed: int = 0,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> dict[str, Any]:
+        """As `looks.compute`."""
+        return compute(self.stacks(), size, spp, seed, progress)
+
+    def draw(self, numbers: Mapping[str, Any], path: str | Path) -> None:
+        """As `looks.draw`.
+
+        Raises:
+            InvalidInput: the file cannot be written.
+        """
+        draw(numbers, path)
 
 
 def inverted(names: Sequence[str], **switches: Any) -> dict[str, Stack]:
