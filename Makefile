@@ -3,6 +3,8 @@
 .PHONY: help demo test bench docs lint setup
 
 BIN := .venv/bin
+INSTALLED := pyproject.toml tools/setup.sh hatch_build.py
+PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-6s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -13,7 +15,8 @@ demo: .venv/ready ## install, and render the preset coated-gold
 	@echo "The picture is $(CURDIR)/coated-gold.png"
 
 test: lint ## install, and run all checks: ruff, mypy, pytest
-	$(BIN)/pytest -q
+	$(BIN)/pytest -q -n 2 --dist loadfile tests/unit tests/system
+	$(BIN)/pytest -q tests/browser
 
 lint: .venv/ready-dev ## ruff and mypy
 	$(BIN)/ruff check
@@ -29,11 +32,11 @@ docs: .venv/ready-docs ## build the manual into site/
 setup: .venv/ready-dev ## install what development needs, and the pre-commit hooks
 	@$(BIN)/pre-commit install
 
-.venv/ready: pyproject.toml tools/setup.sh
+.venv/ready: $(INSTALLED) $(PAGE)
 	@tools/setup.sh
 	@touch $@
 
 # What development or the manual needs contains what running needs.
-.venv/ready-%: pyproject.toml tools/setup.sh
+.venv/ready-%: $(INSTALLED) $(PAGE)
 	@tools/setup.sh $*
 	@touch .venv/ready $@

@@ -1,7 +1,9 @@
 """Render time of models and forms against each other, as ratios of interleaved renders (`benchmarks/render.py`).
 
-A coat over gold, the same stack brushed along one axis, and brushed with axes of their own. Medians over rounds of the
-ratio of two renders of the same round.
+A coat over gold, the same stack brushed along one axis, and brushed with axes of their own. Of a uniform stack
+the lobes are looked up, whatever made them: with two interfaces all published models run the same kernel, and cost the
+same. What `realtime` saves shows where there are more lobes to merge (`five`), and where they are worked out at every
+point (`textured`). Medians over rounds of the ratio of two renders of the same round.
 
     python benchmarks/models.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb]
 """
@@ -9,9 +11,10 @@ ratio of two renders of the same round.
 from __future__ import annotations
 
 import argparse
+from statistics import median
+from typing import Any
 
-import numpy as np
-from render import picture, timed
+import render
 
 import velatura as vt
 from velatura import kernel
@@ -33,6 +36,14 @@ def stacks() -> dict[str, vt.Stack]:
     }
 
 
+def material(mi: Any, stack: str, model: str, form: str) -> Any:
+    """The BSDF of a job."""
+    if stack == "textured":
+        return render.textured(mi, render.stacks()["two interfaces"], model)
+    uniform = {**stacks(), "five": render.stacks()["five interfaces"]}
+    return vt.bsdf(uniform[stack], model=model, form=form)
+
+
 def ratios() -> list[tuple[tuple[str, str, str], tuple[str, str, str]]]:
     """Pairs of jobs (stack, model, form): what is timed, and over what."""
     names = [model.name for model in MODELS]
@@ -44,7 +55,9 @@ def ratios() -> list[tuple[tuple[str, str, str], tuple[str, str, str]]]:
     ]
     base = "belcour2018"
     return found + [
-        ((stack, name, "forward"), (stack, base, "forward")) for name in ("realtime", "velatura") for stack in stacks()
+        ((stack, name, "forward"), (stack, base, "forward"))
+        for name, against in (("realtime", ("isotropic", "five", "textured")), ("velatura", (*stacks(), "textured")))
+        for stack in against
     ]
 
 
@@ -60,14 +73,12 @@ def main() -> None:
     vt.register()
     wanted = [pair for pair in ratios() if all(model in arguments.models for _, model, _ in pair)]
 
-    def job(stack: str, model: str, form: str):
-        return picture(mi, vt.bsdf(stacks()[stack], model=model, form=form), arguments.size, arguments.spp)
-
-    jobs = {key: job(*key) for key in dict.fromkeys(key for pair in wanted for key in pair)}
-    times = timed(jobs, arguments.rounds)
+    keys = dict.fromkeys(key for pair in wanted for key in pair)
+    jobs = {key: render.picture(mi, material(mi, *key), arguments.size, arguments.spp) for key in keys}
+    times = render.timed(jobs, arguments.rounds)
     for over, under in wanted:
         label = " ".join(a if a == b else f"{a}/{b}" for a, b in zip(over, under))
-        print(f"{label:40s} {np.median(np.divide(times[over], times[under])):.3f}", flush=True)
+        print(f"{label:40s} {median(a / b for a, b in zip(times[over], times[under])):.3f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -6,8 +6,13 @@ import sys
 from collections.abc import Callable
 
 import pytest
+from hypothesis import settings
 
 from velatura.cli import main
+
+# Draw the same examples every time, however long a busy machine takes over them
+settings.register_profile("velatura", deadline=None, derandomize=True)
+settings.load_profile("velatura")
 
 Run = Callable[..., tuple[int, str, str]]
 

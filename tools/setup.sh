@@ -46,7 +46,7 @@ if ! .venv/bin/python -c 'import pip' 2>/dev/null; then
   "$python" -m venv --clear .venv
 fi
 
-# Install the package, editable, with what it depends on
+# Install the package, editable, with what it depends on; that bundles the editor's page as well
 say "installing velatura${1:+[$1]} into .venv (the first time takes a minute or two)"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".${1:+[$1]}"
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from velatura.api import bsdf, check, lobes, register, render
     from velatura.comparison import compare
+    from velatura.editor.widget import Editor as Editor
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Interface, Medium, Stack, Texture, load, preset, presets, save
 
@@ -19,11 +20,13 @@ __version__ = "0.1.0"
 _HOMES = {
     "velatura.api": ("bsdf", "check", "lobes", "register", "render"),
     "velatura.comparison": ("compare",),
+    "velatura.editor.widget": ("Editor",),
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": ("Diffuse", "Interface", "Medium", "Stack", "Texture", "load", "preset", "presets", "save"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
+# Without `Editor`, so that `import *` works where the extra `notebook` is missing
 __all__ = [
     "MODELS",
     "Diffuse",
@@ -57,4 +60,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(_HOME_OF)

@@ -66,7 +66,8 @@ def render(
     """A picture of a material: linear RGB of shape (height, width, 3).
 
     Args:
-        scene: "ball", "sphere", "wedges", "lid", or a Mitsuba scene file whose BSDF "material" is to be replaced.
+        scene: "ball", "sphere", "teapot", "plane", "wedges", "lid", or a Mitsuba scene file whose BSDF "material" is to
+            be replaced.
         env: "studio", "sky", "furnace", or an .exr or .hdr file.
         spp: samples per pixel.
         progress: called with (samples per pixel done, spp) now and then.

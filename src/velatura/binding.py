@@ -16,9 +16,6 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.stack import (
     Brushing,
-    Diffuse,
-    Interface,
-    Medium,
     Named,
     Stack,
     Texture,
@@ -26,9 +23,9 @@ from velatura.stack import (
     load,
     loads,
     spectrum,
+    within,
 )
 from velatura.stack import rgb as rgb_of
-from velatura.stack.schema import parameters
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
 #: quarter of the mean of the three curves that make sRGB of a spectrum under D65.
@@ -273,9 +270,5 @@ def _plain(value: Any) -> Any:
 
 
 def _range(name: str) -> dict[str, float]:
-    """Range of the value of that flat name, a little inside where its ends are excluded."""
-    key = name.partition("_")[2]
-    declared = {k: p for model in (Interface, Medium, Diffuse) for k, p in parameters(model).items()}
-    parameter: Any = declared["alpha" if key.startswith("alpha") else key]
-    margin = 1e-3 if parameter.strict else 0.0
-    return {"low": parameter.low + margin, "high": parameter.high - margin}
+    low, high = within(name)
+    return {"low": low, "high": high}

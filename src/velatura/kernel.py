@@ -19,6 +19,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -58,6 +59,18 @@ def mitsuba(variant: str | None = None) -> ModuleType:
     if wanted != mi.variant():
         mi.set_variant(wanted)
     return mi
+
+
+def is_picture(path: Path) -> bool:
+    """Whether Mitsuba can read a file as a picture. Sets no variant. Raises MissingTool where it is not installed."""
+    _drjit()
+    import mitsuba as mi
+
+    try:
+        mi.Bitmap(str(path))
+    except RuntimeError:
+        return False
+    return True
 
 
 # LLVM

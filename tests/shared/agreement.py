@@ -10,8 +10,8 @@ import numpy as np
 from chromium import Browser
 
 from velatura.model import bsdf
-from velatura.shader import Recording, Shader, record, shader, variance
-from velatura.stack import Kind, Stack
+from velatura.shader import Recording, Shader, constant, record, shader, variance
+from velatura.stack import Kind, Stack, is_colour
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
 
@@ -176,12 +176,48 @@ def differences(truth: Results, found: Results) -> Differences:
     )
 
 
-def compare(pattern: Pattern, model: str, count: int, seed: int, browser: Browser, **switches: str) -> Differences:
+def compare(pattern: Pattern, model: str, count: int, seed: int, browser: Browser, **switches: Any) -> Differences:
     """Random stacks of a pattern through both."""
     case = random_case(pattern, count, np.random.default_rng(seed))
     recording, made = record(case.stack, model, **switches), shader(case.stack, model, **switches)
     found, _, _ = in_browser(case, recording, made, browser)
     return differences(in_numpy(case, recording), found)
+
+
+def read_back(stack: Stack, made: Shader, wi: np.ndarray, browser: Browser) -> np.ndarray:
+    """What a shader with parameters reads of the lobes that it has drawn: for each name in `shown`, energies and, but
+    for a base, alphas and rotation, shape (lobes, 6, N)."""
+    flat = stack.flat()
+    uniforms = {
+        f"vt_parameters.{place}": np.broadcast_to(constant(name, flat[name]), 3 if is_colour(name) else 1).tolist()
+        for name, place in made.uniforms.items()
+    }
+    uniforms["vt_shown[0]"] = [1.0] * len(made.shown)
+    assert made.baking is not None
+    drawing = "out vec4 result;\nvoid main() { result = vt_bake(ivec2(gl_FragCoord.xy)); }\n"
+    tables = {"vt_tables": made.tables}
+    baked = browser.draw(f"#version 300 es\n{made.baking.text}{drawing}", tables, *made.baking.size, uniforms)
+    answers = []
+    for name in made.shown:
+        alphas = "vec4(0.0)" if name == "base" else f"vec4(l.{name}.alpha_u, l.{name}.alpha_v, l.{name}.rotation, 0.0)"
+        answers += [f"vec4(l.{'base_energy' if name == 'base' else f'{name}.energy'}, 0.0)", alphas]
+    cases = "\n".join(f"        case {j}: result = {answer}; break;" for j, answer in enumerate(answers))
+    main = f"""
+uniform highp sampler2D inputs;
+out vec4 result;
+
+void main() {{
+    vec3 wi = texelFetch(inputs, ivec2(0, int(gl_FragCoord.y)), 0).xyz;
+    VtLobes l = vt_lobes(vt_material(vec2(0.0)), wi);
+    switch (int(gl_FragCoord.x)) {{
+{cases}
+    }}
+}}
+"""
+    textures = {"inputs": np.pad(wi.T, ((0, 0), (0, 1)))[:, None], "vt_baked": baked.pixels}
+    drawn = browser.draw(f"#version 300 es\n{made.text}{main}", textures, len(answers), wi.shape[1], uniforms)
+    pairs = np.moveaxis(drawn.pixels.astype(float), 0, -1).reshape(len(made.shown), 2, 4, -1)
+    return np.concatenate([pairs[:, 0, :3], pairs[:, 1, :3]], axis=1)
 
 
 def _random_layer(kind: str, shape: str, count: int, rng: np.random.Generator) -> dict[str, np.ndarray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -57,6 +57,11 @@ PAGE = """
     texture(unit, width, height, floats(data));
     gl.uniform1i(gl.getUniformLocation(program, name), unit);
   });
+  for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
+    const { name, type } = gl.getActiveUniform(program, i), values = job.uniforms[name];
+    const set = { [gl.FLOAT]: 'uniform1fv', [gl.FLOAT_VEC3]: 'uniform3fv' }[type];
+    if (set) gl[set](gl.getUniformLocation(program, name), values);
+  }
   gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
   const target = texture(job.textures.length, job.width, job.height, null);
   gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
@@ -93,12 +98,20 @@ class Browser:
 
     page: Any
 
-    def draw(self, text: str, textures: Mapping[str, np.ndarray], width: int, height: int) -> Drawn:
+    def draw(
+        self,
+        text: str,
+        textures: Mapping[str, np.ndarray],
+        width: int,
+        height: int,
+        uniforms: Mapping[str, Sequence[float]] | None = None,
+    ) -> Drawn:
         """What a fragment shader writes to a target of floats.
 
         Args:
             text: GLSL ES 3.00 with its version.
             textures: float arrays (height, width, 4) by the name of the sampler.
+            uniforms: numbers and triples, or arrays of numbers under the name of the first (`weights[0]`).
         """
         job = {
             "text": text,
@@ -106,6 +119,7 @@ class Browser:
                 {"name": name, "width": data.shape[1], "height": data.shape[0], "data": _text(data)}
                 for name, data in textures.items()
             ],
+            "uniforms": {name: list(values) for name, values in (uniforms or {}).items()},
             "width": width,
             "height": height,
         }

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from interrupts import hear
 
 import velatura as vt
 
@@ -159,10 +160,9 @@ def test_bad_input_is_one_line_and_status_2(
 
 def test_an_interrupt_leaves_nothing(tmp_path: Path) -> None:
     """Expected: Ctrl-C in the middle of a long picture ends it soon, with status 130 and an empty folder."""
-    # A process that is started in the background may have been told to ignore interrupts: make it listen
-    listen = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.default_int_handler)}
-    process = start("render", "coated-gold", "--spp", "1000000", "--size", "256", cwd=tmp_path, **listen)
+    process = start("render", "coated-gold", "--spp", "1000000", "--size", "256", cwd=tmp_path, preexec_fn=hear)
     while "libLLVM" not in Path(f"/proc/{process.pid}/maps").read_text():
+        assert process.poll() is None, process.stderr and process.stderr.read()
         time.sleep(0.05)
     time.sleep(1)
     process.send_signal(signal.SIGINT)

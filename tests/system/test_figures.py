@@ -217,7 +217,7 @@ def test_the_roughness_maps_come_out_of_two_bounces(tmp_path: Path) -> None:
     add as the sums of GGX slopes do, whose median is 1.671 times theirs.
     """
     found = linear_space.compute(**SMALL["linear-space"])
-    by_top = {name: {fit["top"]: fit for fit in found[name]["fits"]} for name in found}
+    by_top = {name: {fit["top"]: fit for fit in part["fits"]} for name, part in found.items()}
     assert by_top["variance"][0.33]["p"] == pytest.approx(1.1, abs=0.02)
     fit = by_top["median"][0.33]
     assert abs(fit["a"] - 1.28809776) < 3 * fit["a_error"] and abs(fit["b"] - 1.31699416) < 3 * fit["b_error"]
@@ -225,6 +225,11 @@ def test_the_roughness_maps_come_out_of_two_bounces(tmp_path: Path) -> None:
     assert by_top["median"][0.51]["b"] < 0.3
     median = dict(zip(found["median"]["alpha"], found["median"]["equivalent"]))
     assert median[0.001] / 0.001 == pytest.approx(1.671, rel=0.01)
+    # Over both axes any constant may be as published at little cost, and all of them do better than the map per axis
+    fit = by_top["both_axes"][0.36]
+    assert max(found["both_axes"]["profile"].values()) < 1.1
+    assert fit["rms"] < fit["rms_weier-2d"] < min(1.25 * fit["rms"], 0.9 * fit["rms_weier"])
+    assert fit["factor"]["b"] is None and fit["factor"]["inverse c"] is None
     drawn(linear_space, found, tmp_path)
 
 

@@ -217,6 +217,9 @@ def test_doctor_says_the_command_that_mends(run: Run, monkeypatch: pytest.Monkey
     found = "19.1" if ok else "missing"
     finding = SimpleNamespace(what="LLVM", found=found, ok=ok, mend="apt-get install -y libllvm19")
     monkeypatch.setattr("velatura.kernel.doctor", lambda: (finding,))
+    monkeypatch.setattr(
+        "velatura.editor.bundle.finding", lambda: SimpleNamespace(what="Page", found="bundled", ok=True)
+    )
     status, out, _ = run("doctor")
     assert status == (0 if ok else 1)
     assert finding.found in out

@@ -25,7 +25,7 @@ MAY_IMPORT = {
     "model": "stack optics tables ops",
     "binding": "stack",
     "plugins": "stack optics tables model ops kernel binding",
-    "shader": "stack tables model ops",
+    "shader": "stack optics tables model ops",
     "inverse": "stack optics tables model ops",
     "reference": "stack optics ops kernel binding",
     "checks": "kernel",
@@ -37,9 +37,9 @@ MAY_IMPORT = {
 # The ends of the stream -> who may import them.
 IMPORTED_BY = {
     "cli": "__main__",
-    "editor": "cli",
+    "editor": "__init__ cli",
     "comparison": "__init__ figures cli",
-    "figures": "cli",
+    "figures": "cli editor",
 }
 
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
@@ -61,6 +61,7 @@ LOADS_NO = {
     "velatura.plugins": "mitsuba drjit",
     "velatura.comparison": "mitsuba drjit matplotlib",
     "velatura.figures": "mitsuba drjit matplotlib",
+    "velatura.editor.server": "mitsuba drjit scipy matplotlib",
 }
 
 FILES = sorted(SOURCE.rglob("*.py"))

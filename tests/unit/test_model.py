@@ -183,7 +183,6 @@ def test_one_channel_of_separate_is_the_grey_stack_of_that_channel() -> None:
     st.floats(0.01, 0.9), st.floats(0.01, 0.9), st.floats(-180, 180), st.floats(-180, 180), st.floats(0, 6.28),
     st.floats(0.1, 1),
 )  # fmt: skip
-@settings(deadline=None)
 def test_turning_every_interface_turns_the_lobes(u, v, rotation, turn, phi, cos_theta) -> None:
     def turned(by: float) -> Stack:
         return Stack([

@@ -52,7 +52,7 @@ def four_layers(alpha: list[Any], rotation: tuple[float, ...] = (0, 0, 0)) -> St
 
 @pytest.mark.parametrize("model", NAMES)
 @given(st.lists(alphas, min_size=3, max_size=3), angles, st.floats(0.05, 1))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_covariances_with_equal_axes_are_the_scalar_recursion(model, alpha, rotation, cos_theta) -> None:
     """Turning an isotropic interface changes nothing, and the three kinds of variance agree."""
     scalar = lobes(four_layers(alpha), Isotropic, cos_theta, model=model)
@@ -63,7 +63,7 @@ def test_covariances_with_equal_axes_are_the_scalar_recursion(model, alpha, rota
 
 @pytest.mark.parametrize("model", NAMES)
 @given(st.lists(st.tuples(alphas, alphas), min_size=3, max_size=3), st.floats(0.05, 1), st.floats(0, 6.28))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_covariances_without_rotation_are_the_recursion_per_axis(model, alpha, cos_theta, phi) -> None:
     stack = four_layers(alpha)
     expected = lobes(stack, PerAxis, cos_theta, phi, model=model)
@@ -72,7 +72,7 @@ def test_covariances_without_rotation_are_the_recursion_per_axis(model, alpha, c
 
 @pytest.mark.parametrize("model", NAMES)
 @given(st.lists(st.tuples(alphas, alphas, angles), min_size=3, max_size=3), angles, st.floats(0.05, 1), st.floats(0, 6))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_turning_every_interface_turns_the_lobes(model, layers, turn, cos_theta, phi) -> None:
     alpha, rotation = [(u, v) for u, v, _ in layers], [r for _, _, r in layers]
     before = lobes(four_layers(alpha, tuple(rotation)), Covariance, cos_theta, phi, model=model)
@@ -114,7 +114,7 @@ def reflectance(cos_i: float, n: complex) -> tuple[float, complex]:
     st.tuples(alphas, alphas, angles), st.tuples(alphas, alphas, angles), st.floats(1.05, 2.5), st.floats(0, 4),
     st.floats(0.05, 1),
 )  # fmt: skip
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_two_interfaces_by_the_closed_form_with_covariances(top, base, n, k, cos_i) -> None:
     """Yamaguchi et al. 2019, A.2 (Belcour 2018, Eq. 38), and by how much the code that was shipped departs from it.
 

@@ -102,7 +102,7 @@ def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
     np.testing.assert_allclose(value, truth, rtol=1e-6)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0, 180), st.floats(0, 360), st.sampled_from(REFLECTANCES))
 def test_turning_all_interfaces_and_the_light_turns_the_lobes(by: float, azimuth: float, reflectance: str) -> None:
     def turned(angle: float) -> Any:

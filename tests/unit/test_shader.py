@@ -209,6 +209,40 @@ def test_textures_become_samplers(tmp_path: Path) -> None:
         shader(stack, constant=["layer0_alpha_u"])
 
 
+@pytest.mark.parametrize("model", ["belcour2018", "velatura"])
+def test_no_change_of_a_value_changes_the_code(model: str) -> None:
+    """No rotation, no scattering, one number for a colour: all are values. (A pair of equal roughnesses is one.)"""
+
+    def key(eta: object, alpha: object, rotation: float, sigma_s: float, metal: float) -> str:
+        coat = {"interface": {"eta": eta, "alpha": alpha, "rotation": rotation}}
+        medium = {"medium": {"sigma_a": 0.1, "sigma_s": sigma_s}}
+        base = {"interface": {"eta": 0.2, "k": metal, "alpha": 0.3}}
+        return shader(vt.Stack([coat, medium, base]), model, values="uniforms").key
+
+    assert key(1.5, [0.1, 0.2], 30, 0.1, 3) == key([1.4, 1.5, 1.6], [0.3, 0.1], 0, 0, 0)
+    assert key(1.5, [0.1, 0.2], 30, 0.1, 3) != key(1.5, 0.1, 30, 0.1, 3)
+
+
+def test_a_uniform_material_is_shaded_without_its_layers() -> None:
+    """The program that shades reads neither tables nor media; the one that draws the lobes does."""
+    made = shader(vt.preset("varnished-paint"), values="uniforms")
+    assert made.baking is not None
+    assert "vt_tables" not in made.text
+    assert "vt_tables" in made.baking.text
+    assert made.text.count("\n") < made.baking.text.count("\n") / 2
+
+
+@pytest.mark.parametrize(
+    ("model", "lobes"), [("velatura", [[0], [1], [3], [4]]), ("realtime", [[0], [1, 3], [4]])], ids=str
+)
+def test_every_lobe_belongs_to_its_interfaces(model: str, lobes: list[list[int]]) -> None:
+    coat = {"interface": {"eta": 1.5, "alpha": 0.1}}
+    film = {"interface": {"eta": 1.3, "alpha": 0.1}}
+    made = shader(vt.Stack([coat, film, {"medium": {}}, coat, film]), model, values="uniforms")
+    assert made.lobes == lobes
+    assert list(made.shown) == [*(f"reflected[{k}]" for k in range(len(lobes))), "transmitted"]
+
+
 def test_the_texture_holds_the_tables() -> None:
     """Every node of every table, at the place that the readers ask for."""
     recording: Recording = record(vt.preset("coated-gold"), "belcour2018")

@@ -293,7 +293,7 @@ def stacks(draw: st.DrawFn, image: Path) -> Stack:
     )
 
 
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_files_and_flat_names_give_the_same_stack_back(data: st.DataObject, tmp_path_factory: Any) -> None:
     image = tmp_path_factory.getbasetemp() / "image.png"

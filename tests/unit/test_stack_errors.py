@@ -17,6 +17,11 @@ def one_layer(keys: str) -> str:
     return f"layers: [{{interface: {{{keys}}}}}]"
 
 
+def doubled(times: int) -> str:
+    """Lines that each name the one before eight times."""
+    return "".join(f"a{i + 1}: &a{i + 1} [{', '.join([f'*a{i}'] * 8)}]\n" for i in range(times))
+
+
 def over_diffuse(keys: str) -> str:
     return f"layers: [{{medium: {{{keys}}}}}, {{diffuse: {{}}}}]"
 
@@ -140,7 +145,8 @@ VALUES = {
     "name: x\n---\nname: y": "line 2: is not valid YAML: but found another document",
     "name: \x00": "is not valid YAML: special characters are not allowed",
     "? [1]\n: x": "line 1: is not valid YAML: found unhashable key",
-    "name: &a [*a]\n" + COAT: "is nested too deeply",
+    "name: &a [*a]\n" + COAT: "holds more than 100000 values once its aliases are written out",
+    "a0: &a0 [1]\n" + doubled(12) + COAT: "holds more than 100000 values once its aliases are written out",
     "[" * 600: "is nested too deeply",
 }
 

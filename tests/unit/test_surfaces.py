@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from velatura.scenes.objects import OBJECTS
 from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, join, lathe, rounded
@@ -76,6 +80,20 @@ def test_a_body_is_closed_and_stands_on_the_floor(name: str) -> None:
     assert np.sum(area_vectors(surface), axis=0) == pytest.approx(np.zeros(3), abs=1e-9)
     assert volume(surface) > 0.0
     assert surface.positions[:, 1].min() == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_every_part_of_a_body_is_turned_outwards(name: str) -> None:
+    """Parts hang together by points in the same place; each is closed, so that each has a volume of its own."""
+    surface = OBJECTS[name].surface()
+    _, place = np.unique(np.round(surface.positions, 9), axis=0, return_inverse=True)
+    a, b, c = place.reshape(-1)[surface.triangles].T
+    edges = coo_array((np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, c]))), (place.max() + 1,) * 2)
+    part = connected_components(edges, directed=False)[1][a]
+    for number in range(part.max() + 1):
+        piece = replace(surface, triangles=surface.triangles[part == number])
+        assert np.sum(area_vectors(piece), axis=0) == pytest.approx(np.zeros(3), abs=1e-9)
+        assert volume(piece) > 0.0
 
 
 @pytest.mark.parametrize("name", OBJECTS)

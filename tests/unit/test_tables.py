@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import subprocess
 import sys
 from math import log
 from pathlib import Path
@@ -27,6 +28,7 @@ DEFAULT = {
     *("tir_published", "tir_published_outside"),
 }
 OTHER = {"dielectric", "conductor", "inside", "absorbing_inside", "tir_clean", "drawn"}
+OVER_A_DIFFUSE_BASE = {"entering", "returning", "passing", "staying"}
 SHIPPED = tables.load()
 MAKERS = makers()
 COSINES = np.linspace(0.02, 1, 500)
@@ -325,8 +327,9 @@ def test_the_angular_axis_has_its_ends_and_the_critical_angle_where_it_says() ->
 
 def test_what_the_default_model_needs_is_small() -> None:
     sizes = {name: table.data.nbytes for name, table in SHIPPED.items()}
-    assert sizes.keys() == DEFAULT | OTHER
+    assert sizes.keys() == DEFAULT | OTHER | OVER_A_DIFFUSE_BASE
     assert sum(sizes[name] for name in DEFAULT) <= 2 * 2**20
+    assert sum(sizes[name] for name in OVER_A_DIFFUSE_BASE) <= 2**20
     assert all(table.data.dtype == np.float32 for _, table in SHIPPED.items())
 
 
@@ -380,7 +383,7 @@ def test_report(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = {row["table"]: row for row in report(heard.append)}
     assert heard == sorted(heard)
     assert heard[-1] == pytest.approx(1)
-    assert rows.keys() == DEFAULT | OTHER
+    assert rows.keys() == DEFAULT | OTHER | OVER_A_DIFFUSE_BASE
     assert rows["conductor"] == rows["conductor"] | {
         "shape": list(SHIPPED.conductor.data.shape),
         "bytes": SHIPPED.conductor.data.nbytes,
@@ -402,3 +405,13 @@ def test_the_yardstick_is_larger_and_worse() -> None:
     truth = conductor(eta, kappa, cos_theta, alpha)  # ten times better
     error = yardstick.fgd(grid, cos_theta, alpha, eta, kappa) - truth
     assert 1e-3 < np.sqrt(np.mean(error**2)) < 5e-3
+
+
+def test_threads_share_the_tables() -> None:
+    """Whoever asks first, and at the same time as others, gets the same tables as they."""
+    script = (
+        "from concurrent.futures import ThreadPoolExecutor; from velatura import tables\n"
+        "print(len({id(found) for found in ThreadPoolExecutor(8).map(lambda _: tables.load(), range(8))}))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert run.stdout == "1\n"

@@ -11,8 +11,9 @@ def doctor() -> None:
     from rich.table import Table
 
     from velatura import kernel
+    from velatura.editor import bundle
 
-    findings = kernel.doctor()
+    findings = (*kernel.doctor(), bundle.finding())
     table = Table(box=None, show_header=False)
     for finding in findings:
         table.add_row("[green]ok[/]" if finding.ok else "[red]mend[/]", finding.what, finding.found)

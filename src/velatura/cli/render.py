@@ -22,7 +22,7 @@ def render(
         typer.Option("--output", "-o", metavar="F", help="PNG (tone-mapped) or EXR (linear); else M with .png, here."),
     ] = None,
     scene: Annotated[
-        str, typer.Option(metavar="NAME|F", help="ball, sphere, wedges, or a Mitsuba scene (.xml).")
+        str, typer.Option(metavar="NAME|F", help="ball, sphere, teapot, plane, wedges, lid, or a Mitsuba scene (.xml).")
     ] = "ball",
     env: Annotated[
         str | None,

@@ -6,11 +6,7 @@ its appearance; (d) extent and colour of haze. The object, its light, and the ch
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import bati2021_14, bati2021_16, canvas, looks
+from velatura.figures import bati2021_14, bati2021_16, looks
 from velatura.stack import Stack
 
 TARGETS = {"18": "a", "18 b, rough": "a, rough", "19 a": "d", "19 c": "d, more haze"}
@@ -25,23 +21,8 @@ def stacks() -> dict[str, Stack]:
     return dict(sorted(found.items()))
 
 
-def compute(
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """As `looks.compute`."""
-    return looks.compute(stacks(), size, spp, seed, progress, "ball")
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """As `looks.draw`.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    looks.draw(numbers, path)
+FIGURE = looks.Looks(stacks, {"scene": "ball"})
+compute, draw = FIGURE.compute, FIGURE.draw
 
 
 if __name__ == "__main__":

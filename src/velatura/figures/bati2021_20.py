@@ -2,32 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, looks
+from velatura.figures import looks
 
 TARGETS = ("20 left", "20 right")
-
-
-def compute(
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """As `looks.compute`."""
-    return looks.compute(looks.inverted(TARGETS), size, spp, seed, progress)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """As `looks.draw`.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    looks.draw(numbers, path)
+FIGURE = looks.Looks.of(TARGETS)
+compute, draw = FIGURE.compute, FIGURE.draw
 
 
 if __name__ == "__main__":

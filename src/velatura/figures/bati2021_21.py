@@ -5,33 +5,11 @@ With plain Fresnel: by directional albedos there is no stack for the left one, a
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
-from velatura.figures import canvas, looks
+from velatura.figures import looks
 
 TARGETS = ("21 left", "21 right")
-PLAIN = {"reflectance": "fresnel"}
-
-
-def compute(
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """As `looks.compute`."""
-    return looks.compute(looks.inverted(TARGETS, **PLAIN), size, spp, seed, progress, **PLAIN)
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """As `looks.draw`.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    looks.draw(numbers, path)
+FIGURE = looks.Looks.of(TARGETS, reflectance="fresnel")
+compute, draw = FIGURE.compute, FIGURE.draw
 
 
 if __name__ == "__main__":

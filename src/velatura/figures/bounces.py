@@ -60,3 +60,13 @@ def equivalent(width: Any, single: Any, alphas: Any) -> Array:
     """The roughness of the one bounce that is so wide, `single` being the widths for `alphas`; NaN where none is."""
     log_widths = np.log(np.maximum.accumulate(single))
     return np.asarray(np.exp(np.interp(np.log(width), log_widths, np.log(alphas), right=np.nan)))
+
+
+def equivalent_along(once: Array, x: Array, at: Array) -> Array:
+    """The roughness along x of the one bounce with variances `at` (..., 2); NaN where none has them.
+
+    `once` (..., 2) are the variances along both axes of bounces whose roughness along x is `x`.
+    """
+    from scipy.interpolate import LinearNDInterpolator
+
+    return np.asarray(LinearNDInterpolator(once.reshape(-1, 2), x.ravel())(at))

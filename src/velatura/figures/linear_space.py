@@ -8,7 +8,7 @@ roughness* of two bounces is that of the one bounce that is as wide. A roughness
 Belcour (appendix A) iterates f(equivalent(a, a)) = 2 f(a), and reads a^p/(1-a^p) off the curve, with p = 1.1; Weier and
 Belcour (3.3) fit the a and b of their map to the equation itself. Neither says up to which roughness, and the outcome
 depends on that. Their width is the variance on the projected disc; beside it stands the median of the slopes of
-half-vectors, which is what makes one lobe look like another.
+half-vectors, which is what makes one lobe look like another. (`velatura.figures.both_axes` derives the other map.)
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import both_axes, canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, Array, along, bounce, equivalent, uniform
 from velatura.model.maps import ALPHA_MAX, MAPS
 
@@ -35,7 +35,7 @@ def compute(count: int = 2**15, progress: Callable[[int, int], None] | None = No
 
     `equivalent` of two equal bounces over `alpha`; `iterated` f over roughness; `p` read off it; `fits` for growing
     `top`: a and b with standard errors, the error (root mean square) of roughness that they leave, p by the same
-    criterion, and the errors of the published maps.
+    criterion, and the errors of the published maps. `both_axes` is what is fitted over both axes at once.
     """
     u = uniform(count)
     steps = [(name, alpha) for name in WIDTHS for alpha in (*ALPHAS, *PAIRS)]
@@ -47,7 +47,7 @@ def compute(count: int = 2**15, progress: Callable[[int, int], None] | None = No
             found["double"].append(width(bounce(once, alpha, alpha, *u[2:])))
         else:
             found["pairs"].append([width(bounce(once, b, b, *u[2:])) for b in PAIRS if b <= alpha])
-    return {name: _derived(found) for name, found in numbers.items()}
+    return {**{name: _derived(found) for name, found in numbers.items()}, "both_axes": both_axes.compute(count // 4)}
 
 
 # What follows from them
@@ -126,8 +126,8 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     Raises:
         InvalidInput: the file cannot be written.
     """
-    figure = canvas.canvas(10, 4.5)
-    left, right = figure.subplots(1, 2)
+    figure = canvas.canvas(15, 4.5)
+    left, right, axes = figure.subplots(1, 3)
     colours = {"variance": "C3", "median": "black"}
     for name, colour in colours.items():
         found = numbers[name]
@@ -143,8 +143,12 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         right.plot(alpha, f.roughness(2 * s), color=colour, label=name)
     left.set(xscale="log", yscale="log", xlabel="alpha", ylabel="f, scaled to agree at .1", ylim=(1e-4, 1e2))
     right.set(xlim=(0, 0.6), ylim=(0, 1), xlabel="alpha of both surfaces", ylabel="equivalent alpha")
-    left.legend()
-    right.legend()
+    fits = numbers["both_axes"]["fits"]
+    for key, label in (("rms_weier", "weier"), ("rms_weier-2d", "weier-2d"), ("rms", "its constants fitted anew")):
+        axes.plot([fit["top"] for fit in fits], [fit[key] for fit in fits], "o-", label=label)
+    axes.set(xlabel="largest alpha, of either axis", ylabel="error of the equivalent alpha, both axes", ylim=(0, None))
+    for plot in (left, right, axes):
+        plot.legend()
     canvas.save(figure, path)
 
 

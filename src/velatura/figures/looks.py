@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +23,15 @@ GRAZING = COSINES.index(0.2)
 
 @dataclass(frozen=True)
 class Looks:
-    """A figure of looks alone: what finds its stacks by name."""
+    """A figure of looks alone: what finds its stacks by name, and what else `looks.compute` is given."""
 
     stacks: Callable[[], Mapping[str, Stack]]
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, targets: Sequence[str], **switches: Any) -> Looks:
+        """That of stacks which have the lobes of the paper's targets of these names."""
+        return cls(lambda: inverted(targets, **switches), switches)
 
     def compute(
         self,
@@ -35,7 +41,7 @@ class Looks:
         progress: Callable[[int, int], None] | None = None,
     ) -> dict[str, Any]:
         """As `looks.compute`."""
-        return compute(self.stacks(), size, spp, seed, progress)
+        return compute(self.stacks(), size, spp, seed, progress, **self.options)
 
     def draw(self, numbers: Mapping[str, Any], path: str | Path) -> None:
         """As `looks.draw`.

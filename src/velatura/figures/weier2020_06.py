@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import canvas
-from velatura.figures.bounces import NORMAL, Array, along, bounce, uniform, variances
+from velatura.figures.bounces import NORMAL, Array, along, bounce, equivalent_along, uniform, variances
 from velatura.model.maps import MAPS
 
 ALPHAS = (0.02, 0.05, *np.linspace(0.1, 1, 19).round(2).tolist())
@@ -38,7 +38,7 @@ def compute(
             light = bounce(start, a, b, *u[:2])
             once[i, j], twice[i, j] = variances(light), variances(bounce(light, a, b, *u[2:]))
     x, y = np.meshgrid(alphas, alphas, indexing="ij")
-    equivalent = _roughness(once, x, twice)
+    equivalent = equivalent_along(once, x, twice)
     known, low = np.isfinite(equivalent), np.maximum(x, y) <= LOW
     predicted = {name: _predicted(name, x, y) for name in NAMES}
     ticks = np.linspace(0, once.max(), SIDE)
@@ -46,19 +46,12 @@ def compute(
         "alpha": list(alphas),
         "variance": once[..., 0].tolist(),
         "variances": ticks.tolist(),
-        "inverse": _plain(_roughness(once, x, np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1))),
+        "inverse": _plain(equivalent_along(once, x, np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1))),
         "equivalent": _plain(equivalent),
         "predicted": {name: values.tolist() for name, values in predicted.items()},
         "error": {name: _rms((p - equivalent)[known & low]) for name, p in predicted.items()},
         "error_above": {name: _rms((p - equivalent)[known & ~low]) for name, p in predicted.items()},
     }
-
-
-def _roughness(once: Array, x: Array, at: Array) -> Array:
-    """The roughness along x of the one bounce with variances `at`; NaN where none has them."""
-    from scipy.interpolate import LinearNDInterpolator
-
-    return np.asarray(LinearNDInterpolator(once.reshape(-1, 2), x.ravel())(at))
 
 
 def _predicted(name: str, x: Array, y: Array) -> Array:

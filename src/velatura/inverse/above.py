@@ -6,7 +6,7 @@ Colours are arrays of shape (C, N) or (1, N), other quantities (N,); a number is
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -170,15 +170,7 @@ class Above:
 
     def _read(self, path: tuple[Layers, ...]) -> adding.Lobe:
         """The last lobe of whole stacks."""
-        kinds: list[str] = []
-        values: dict[str, Value] = {"exterior": self.exterior}
-        for layers in path:
-            if np.any(layers.tau):
-                values |= _medium(layers.tau, len(kinds))
-                kinds.append("medium")
-            values |= _interface(layers, len(kinds))
-            kinds.append(layers.kind)
-        lobe = lobes(prepare(kinds, values, self.model, self.variance), NORMAL)[0][-1]
+        lobe = lobes(prepare(*flat(path, self.exterior), self.model, self.variance), NORMAL)[0][-1]
         return dataclasses.replace(lobe, variance=self.variance_of(lobe.roughness))
 
     def variance_of(self, roughness: Roughness) -> Variance:
@@ -191,6 +183,19 @@ class Above:
     def take(self, index: Any) -> Above:
         """Some of the N."""
         return take(self, index)
+
+
+def flat(path: Sequence[Layers], exterior: Value) -> tuple[list[str], dict[str, Value]]:
+    """Whole stacks as kinds of layers and values under flat names."""
+    kinds: list[str] = []
+    values: dict[str, Value] = {"exterior": exterior}
+    for layers in path:
+        if np.any(layers.tau):
+            values |= _medium(layers.tau, len(kinds))
+            kinds.append("medium")
+        values |= _interface(layers, len(kinds))
+        kinds.append(layers.kind)
+    return kinds, values
 
 
 def _interface(layers: Layers, n: int) -> dict[str, Value]:

@@ -13,13 +13,12 @@ from velatura.inverse.above import NORMAL, Above, Array, Layers, join
 from velatura.inverse.descent import written
 from velatura.inverse.equivalence import dislike
 from velatura.inverse.explain import REASONS
-from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_index
+from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_tint
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import Model, lobes, named, prepare, variance_kind
 from velatura.model.diffuse import under, with_means
 from velatura.model.statistics import Statistics, number, statistics
 from velatura.model.variance import Roughness
-from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Layer, Medium, Stack
 
 KEEP = 64  # partial stacks that are followed
@@ -87,10 +86,10 @@ def coat(
     before, after = (statistics(one, 1.0, model=chosen) for one in (stack, coated))
     diffuse = None
     if isinstance(stack.layers[-1], Diffuse):
-        wanted = _scattered(stack, chosen)
+        wanted = scattered(stack, chosen)
         if keep_appearance:
-            coated = _with_albedo(coated, wanted, chosen)
-        diffuse = wanted, _scattered(coated, chosen)
+            coated = with_albedo(coated, wanted, chosen)
+        diffuse = wanted, scattered(coated, chosen)
     return Coated(coated, before, after, diffuse)
 
 
@@ -128,27 +127,33 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Laye
     return (*solved, *(layer for layer in stack.layers if isinstance(layer, Diffuse)))
 
 
-def _scattered(stack: Stack, model: Model) -> Array:
+def scattered(stack: Stack, model: Model) -> Array:
     """Energy of a diffuse base at normal incidence, (3,)."""
+    return _scattered(stack, model)[:, 0]
+
+
+def _scattered(stack: Stack, model: Model, *albedos: float) -> Array:
+    """Energy of a diffuse base at normal incidence, its own or of N albedos, (3, N)."""
     flat = stack.flat()
     values = {key: number(key, value) for key, value in flat.items()}
+    if albedos:
+        values[f"layer{len(stack.layers) - 1}_albedo"] = np.tile(albedos, (3, 1))
     prepared = with_means(prepare(stack.kinds, values, model, variance_kind(stack.kinds, flat)))
     base = under(prepared, NORMAL)
     assert base is not None
-    return np.broadcast_to(base.energy, (3, 1))[:, 0]
+    return np.broadcast_to(base.energy, (3, max(len(albedos), 1)))
 
 
-def _with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
+def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
     """The stack with the albedo of its base that gives this energy, or the nearest to it.
 
     Of an albedo a the energy is p a / (1 - q a), with what passes, p, and what comes back to the base, q.
     """
-    name = f"layer{len(stack.layers) - 1}_albedo"
-    half, white = (_scattered(stack.replace(**{name: albedo}), model) for albedo in (0.5, 1.0))
+    half, white = _scattered(stack, model, 0.5, 1.0).T
     q = (white - 2 * half) / (white - half)
     p = white * (1 - q)
     albedo = np.clip(wanted / (p + q * wanted), 0, 1)
-    return stack.replace(**{name: written(albedo)})
+    return stack.replace(**{f"layer{len(stack.layers) - 1}_albedo": written(albedo)})
 
 
 def _choices(stack: Stack, values: dict[str, Array], n: int, eta_max: float) -> Sequence[Choice]:
@@ -159,10 +164,7 @@ def _choices(stack: Stack, values: dict[str, Array], n: int, eta_max: float) -> 
     eta = values[f"layer{n}_eta"]
     eta_1 = _index_above(stack, values, n)
     if kind == "conductor":
-        relative, kappa = eta / eta_1, values[f"layer{n}_k"] / eta_1
-        low, high = (conductor_index(fresnel.normal_incidence(relative, kappa), t) for t in (0.0, 1.0))
-        tint = np.clip((relative - low) / np.maximum(high - low, 1e-12), 0, 1)
-        return [Choice("conductor", tint=tint)]
+        return [Choice("conductor", tint=conductor_tint(eta / eta_1, values[f"layer{n}_k"] / eta_1))]
     sides = (DENSER, RARER) if np.mean(eta) >= np.mean(eta_1) else (RARER, DENSER)
     bounded = max(eta_max, float(np.max(eta)))
     same = Choice(eta=eta, eta_max=bounded)

@@ -202,6 +202,12 @@ class EquivalenceClass:
             report["channels"] = [{"eta_1": self.indices_1(c)} for c in range(len(self.energy))]
         return report
 
+    def _repr_png_(self) -> bytes:
+        """The class in a cell of a notebook."""
+        from velatura.inverse import plots
+
+        return plots.png(self)
+
     # How it is found -------------------------------------------------------------------------------------------------
 
     @property

@@ -320,6 +320,13 @@ def conductor_index(reflectance: Value, tint: Value) -> Value:
     return low + tint * (high - low)
 
 
+def conductor_tint(eta: Array, kappa: Array) -> Array:
+    """Where relative eta stands between the bounds that its reflectance allows, 0..1, as `conductor_index` takes it."""
+    reflectance = np.maximum(fresnel.normal_incidence(eta, kappa), CONDUCTOR_MIN)
+    low, high = (conductor_index(reflectance, t) for t in (0.0, 1.0))
+    return np.asarray(np.clip((eta - low) / np.maximum(high - low, 1e-12), 0, 1))
+
+
 def at_brightest(above: Above, s: Variance, bright: Array) -> Variance:
     """The variance of the channel where `bright` is largest, if every channel has its own."""
     return type(s)(*(at_brightest_value(above, x, bright) for x in vars(s).values()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,21 @@ from velatura.inverse.above import Layers
 from velatura.inverse.equivalence import EquivalenceClass
 
 RESOLUTION = 256
+SIZE, DPI = (4.2, 4.2), 90  # of a picture: inches, and pixels in one
 FILLS = ("#d62728", "#2ca02c", "#1f77b4")  # of red, green and blue
+
+
+def png(members: EquivalenceClass) -> bytes:
+    """A class as a picture, with the member that is preferred."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SIZE if members.free != 1 else (SIZE[0], SIZE[1] / 3), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    draw(figure.add_subplot(), members, members.chosen)
+    picture = io.BytesIO()
+    figure.savefig(picture)
+    return picture.getvalue()
 
 
 def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None = None) -> None:

@@ -8,7 +8,7 @@ takes the value from the lobes of a direction that only changes its sign when wi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -28,14 +28,18 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 
+LEAST = 0.1  # share of samples, in the symmetric form
+GRAZING = 0.05  # cosine
+
 
 @dataclass(frozen=True)
 class Body:
     """A stack prepared from above and, where it transmits, from below (else None).
 
     `eta` is the index below over the index above, one for all colours; 1 where nothing is transmitted. `lobes_above`
-    and `lobes_below` tell the lobes on either side, for a direction turned up. `scaling` keeps the energy of the
-    symmetric form; None where it is as published.
+    and `lobes_below` tell the lobes on either side, for a direction turned up, and `base_above` the diffuse base; None
+    where it is worked out from the layers. `scaling` keeps the energy of the symmetric form; None where it is as
+    published.
     """
 
     above: Prepared
@@ -44,6 +48,11 @@ class Body:
     lobes_above: memo.Lobes
     lobes_below: memo.Lobes
     scaling: Scaling | None = None
+    base_above: Callable[[Direction], Base | None] | None = None
+
+    def base(self, w: Direction) -> Base | None:
+        """The diffuse base for a direction above; None without one."""
+        return self.base_above(w) if self.base_above else under(self.above, w)
 
 
 @dataclass(frozen=True)
@@ -58,14 +67,15 @@ class Scattered:
     transmitted: Lobe | None
     eta: Value
 
-    def share(self, asked: Asked) -> Value:
-        """Of samples that are transmitted."""
+    def share(self, asked: Asked, least: float = 0.0) -> Value:
+        """Of samples that are transmitted; if both are asked for, there are at least so many of each."""
         if self.transmitted is None or not asked.transmission:
             return 0.0
         if not asked.reflection:
             return 1.0
         through = ops.mean(self.transmitted.energy)
-        return ops.divide(through, through + sum(ops.mean(lobe.energy) for lobe in self.reflected))
+        share = ops.divide(through, through + sum(ops.mean(lobe.energy) for lobe in self.reflected))
+        return ops.clip(share, least, 1 - least) if least else share
 
 
 @dataclass(frozen=True)
@@ -113,7 +123,7 @@ def scattered(stack: Body, wi: Direction) -> Scattered:
     turned = _upright(wi, wi)
     reflected, passed = stack.lobes_above(turned)
     if stack.below is None:
-        return Scattered(reflected, under(stack.above, turned), None, 1.0)
+        return Scattered(reflected, stack.base(turned), None, 1.0)
     from_above = wi[2] > 0
     reflected_below, passed_below = stack.lobes_below(turned)
     assert passed is not None and passed_below is not None
@@ -137,7 +147,7 @@ def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) 
         return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
 
     # Transmit, as a reflection in the medium beyond; radiance is squeezed into the cone there
-    i_beyond, o_beyond = _refracted(i, seen.eta), _down(o)
+    i_beyond, o_beyond = _beyond(stack, i, seen.eta), _down(o)
     through, density_through = mixture.eval_pdf([seen.transmitted], None, i_beyond, o_beyond)
     if symmetric:
         # In the medium below whichever way light goes
@@ -149,7 +159,7 @@ def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) 
         through = through / (seen.eta * seen.eta)
 
     # Choose what is asked for
-    share, passes = seen.share(asked), o[2] < 0
+    share, passes = seen.share(asked, _least(stack)), o[2] < 0
     value = ops.select(passes, through if asked.transmission else 0.0, value if asked.reflection else 0.0)
     return value, ops.select(passes, share * density_through, (1 - share) * density)
 
@@ -162,13 +172,13 @@ def sample(
     Where light cannot go the way that is drawn, `eval_pdf` is 0.
     """
     seen, i = scattered(stack, wi), _upright(wi, wi)
-    share = seen.share(asked)
+    share = seen.share(asked, _least(stack))
     if seen.transmitted is None:
         return mixture.sample(seen.reflected, seen.base, i, u, u1, u2), 1.0
     passes = u < share
     u = ops.divide(ops.select(passes, u, u - share), ops.select(passes, share, 1 - share))
     o = mixture.sample(seen.reflected, seen.base, i, u, u1, u2)
-    beyond = _down(mixture.sample([seen.transmitted], None, _refracted(i, seen.eta), u, u1, u2))
+    beyond = _down(mixture.sample([seen.transmitted], None, _beyond(stack, i, seen.eta), u, u1, u2))
     x, y, z = _chosen_direction(passes, beyond, o)
     # A direction that has missed its side belongs to no lobe
     z = ops.select(passes, ops.minimum(z, 0.0), ops.maximum(z, 0.0))
@@ -195,6 +205,21 @@ def sample_smooth(
 
 
 # The symmetric form
+
+
+def _least(stack: Body) -> float:
+    """Share of samples that reflection and transmission get at least: the forward form, by whose lobes the symmetric
+    one is sampled, may have no light where this one has some."""
+    return LEAST if stack.above.model.form == "symmetric" else 0.0
+
+
+def _beyond(stack: Body, i: Direction, eta: Value) -> Direction:
+    """The refracted direction about which light is sampled; the symmetric form passes light beyond the critical angle,
+    too, where it is sampled at grazing."""
+    x, y, z = _refracted(i, eta)
+    if stack.above.model.form == "forward":
+        return x, y, z
+    return ggx.normalize((x, y, ops.maximum(z, GRAZING)))
 
 
 def exchangeable(stack: Body, wi: Direction, wo: Direction) -> tuple[Sequence[Lobe], Lobe | None]:

@@ -1,29 +1,40 @@
-"""A diffuse base under a stack: light that enters, scatters there, and leaves, between bounces below the interfaces."""
+"""A diffuse base under a stack: light that enters, scatters there, and leaves, between bounces below the interfaces.
+
+Light in the stack is followed by its parts in a few directions (`velatura.tables.parts`). What a node is worth, the
+share of its light that reaches the base, follows from what the interfaces make of it, by sweeps up and down the stack.
+That is done once for a material; what a direction is worth is then the sum of its parts.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 
-from velatura import ops
-from velatura.model import adding, momentum, recursion
+from velatura import ops, tables
+from velatura.model import operators
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.ops import Value
+from velatura.optics import phase
 from velatura.optics.ggx import Direction
+from velatura.tables import parts
 
 Settle = Callable[[Value], Value]
+Row = Sequence[Value]  # of values at the nodes of a medium
 
-# Cosines and weights of the mean over directions; what the stack does is smooth in the cosine
-_NODES = [(0.5 + 0.5 * float(x), 0.5 * float(w)) for x, w in zip(*np.polynomial.legendre.leggauss(5))]
+SWEEPS = 6  # down the stack and up; what is missing then follows from how fast they converge
+SLOWEST = 0.95  # ratio of the last two sweeps
+
+# Cosines and weights of the mean over directions above; what the stack does is smooth in the cosine
+_NODES = [(0.5 + 0.5 * float(x), 0.5 * float(w)) for x, w in zip(*np.polynomial.legendre.leggauss(6))]
 
 
 @dataclass(frozen=True)
 class Base:
-    """The diffuse part of a BSDF for one direction wi: f = scale T(wo), T being what the stack transmits.
+    """The diffuse part of a BSDF for one direction wi: f = scale T(wo), T being the share of light that gets through.
 
     `energy` is its albedo, a colour.
     """
@@ -34,75 +45,15 @@ class Base:
 
     def value(self, wo: Direction) -> Value:
         """f(wi, wo), a colour, without the cosine."""
-        return self.scale * _below(self.prepared, wo).t_0i
+        return self.scale * self.through(wo)
+
+    def through(self, w: Direction) -> Value:
+        """T, a colour: what gets through to the base of light from w."""
+        return _through(self.prepared, w)
 
 
 def as_it_is(value: Value) -> Value:
     return value
-
-
-def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
-    """`prepared` with what the stack reflects and transmits of diffuse light from the base.
-
-    The means are over projected solid angle in the medium at the base. Directions that Snell's law lets out are those
-    of light coming in at cosine c above, 2c dc / n^2 of all; what goes down there comes up as well. `settle` is
-    applied to every cosine and energy: a renderer evaluates them, so that one kernel serves all nodes.
-    """
-    if prepared.base is None:
-        return prepared
-    n2 = prepared.base.n * prepared.base.n
-    lowest = ops.sqrt(1 - n2)  # cosine above of grazing light at the base, where the base's index is the lower
-    reflected: Value = 0.0
-    transmitted: Value = 0.0
-    for node, weight in _NODES:
-        cosine = settle(ops.mean(lowest + (1 - lowest) * node))
-        state = _below(prepared, _tilted(cosine))
-        share = cosine * (1 - lowest) * (2 * weight) / n2
-        reflected = reflected + settle(state.r_i0) * share
-        transmitted = transmitted + settle(state.t_0i) * share
-    reflected = reflected + _kept(prepared, n2, settle)
-    base = dataclasses.replace(prepared.base, mean_reflectance=reflected, mean_transmittance=transmitted)
-    return dataclasses.replace(prepared, base=base)
-
-
-def _kept(prepared: Prepared, n2: Value, settle: Settle) -> Value:
-    """Share of the light that comes back to the base because Snell's law does not let it out: all but what media take.
-
-    Rough interfaces are taken as smooth, which lose nothing to facets.
-    """
-    if not any(isinstance(layer, PreparedMedium) for layer in prepared.layers):
-        return ops.maximum(1 - 1 / n2, 0.0)
-    inside = _smooth_from_below(prepared)
-    total: Value = 0.0
-    begin: Value = 0.0
-    index: Value = 1.0
-    lowest: Value = 1.0
-    for layer in inside.layers:
-        if not isinstance(layer, PreparedInterface):
-            continue
-        # Between the angles where this interface and those below it begin to keep light in
-        index = index * layer.n12
-        lowest = ops.minimum(lowest, index)
-        end = ops.sqrt(1 - lowest * lowest)
-        for node, weight in _NODES:
-            cosine = settle(begin + (end - begin) * node)
-            lobes, _ = adding.lobes(inside, _tilted(cosine))
-            energy = sum((lobe.energy for lobe in lobes[1:]), lobes[0].energy)
-            total = total + settle(energy) * (cosine * (end - begin) * (2 * weight))
-        begin = end
-    return total
-
-
-def _smooth_from_below(prepared: Prepared) -> Prepared:
-    """The stack as smooth interfaces, turned over."""
-    model = dataclasses.replace(prepared.model, reflectance="fresnel", tir="off", calibrations=None)
-    layers = [
-        dataclasses.replace(layer, eta=1 / layer.eta, n12=1 / layer.n12, reflectance=None, leaving=None)
-        if isinstance(layer, PreparedInterface) and layer.eta is not None
-        else layer
-        for layer in reversed(prepared.layers)
-    ]
-    return dataclasses.replace(prepared, model=model, layers=tuple(layers), base=None)
 
 
 def under(prepared: Prepared, wi: Direction) -> Base | None:
@@ -110,20 +61,178 @@ def under(prepared: Prepared, wi: Direction) -> Base | None:
     base = prepared.base
     if base is None:
         return None
-    through = _below(prepared, wi).t_0i
+    through = _through(prepared, wi)
     reflected = through * base.albedo / ops.maximum(1 - base.albedo * base.mean_reflectance, ops.TINY)
     scale = reflected / (base.n * base.n * pi)
     return Base(prepared, scale, reflected * base.mean_transmittance)
 
 
-def _below(prepared: Prepared, wi: Direction) -> adding.State | momentum.State:
-    """The state at the base. Its light is followed angle by angle, so that total reflection needs no correction."""
-    layers = (
-        dataclasses.replace(layer, leaving=None) if isinstance(layer, PreparedInterface) else layer
-        for layer in prepared.layers
-    )
-    return recursion.below(dataclasses.replace(prepared, layers=tuple(layers)), wi)
+def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
+    """`prepared` with what the stack does to diffuse light from the base, and what its nodes are worth.
+
+    `settle` is applied to every cosine, row and energy: a renderer evaluates them, so that one kernel serves all nodes.
+    """
+    if prepared.base is None:
+        return prepared
+    inside = _Inside.of(prepared)
+    cosines = [settle(node + 0 * prepared.base.n) for node, _ in _NODES]
+    measures = [2 * weight * cosine for cosine, (_, weight) in zip(cosines, _NODES)]
+    lit = [_halfway(cosine, inside.interfaces) for cosine in cosines]
+    worth: Row = ()
+    reflected: Value = 0.0
+    if inside.interfaces:
+        # Light leaves by the way that it comes in
+        entered = [settle(_entered(prepared, wi)) for wi in lit]
+        leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in range(parts.COUNT)]
+        even = parts.even(inside.indices[0])
+        squared = inside.indices[0] * inside.indices[0]
+        leaves = [ops.divide(x, squared * w) for x, w in zip(leaves, even)]
+        worth, reflected = inside.solved(leaves, settle)
+    base = dataclasses.replace(prepared.base, worth=tuple(worth), mean_reflectance=reflected)
+    prepared = dataclasses.replace(prepared, base=base)
+    through = [settle(_through(prepared, wi)) for wi in lit]
+    transmitted = _sum(measure * t for measure, t in zip(measures, through)) / (base.n * base.n)
+    return dataclasses.replace(prepared, base=dataclasses.replace(base, mean_transmittance=transmitted))
 
 
-def _tilted(cosine: Value) -> Direction:
-    return ops.sqrt(1 - cosine * cosine), 0.0, cosine
+def _through(prepared: Prepared, wi: Direction) -> Value:
+    """Share of light from wi that reaches the base, before it scatters there."""
+    assert prepared.base is not None
+    inside = _Inside.of(prepared)
+    kept = _passed(inside.depth_above, wi[2])
+    if not inside.interfaces:
+        return kept
+    return kept * _sum(a * b for a, b in zip(_entered(prepared, wi), prepared.base.worth))
+
+
+def _entered(prepared: Prepared, wi: Direction) -> Row:
+    """Parts of light from wi that pass the first interface."""
+    layer = next(layer for layer in prepared.layers if isinstance(layer, PreparedInterface))
+    cosine, alpha = operators.fetched(prepared, layer.roughness, wi[2], wi)
+    r = ops.clip(operators.reflectance(prepared, layer, wi[2], layer.roughness, wi), 0.0, 1.0)
+    return [(1 - r) * x for x in parts.entering(tables.load(), cosine, alpha, layer.n12)]
+
+
+@dataclass(frozen=True)
+class _Inside:
+    """A stack as diffuse light sees it: its interfaces, and the media below each by index and optical depth."""
+
+    depth_above: Value
+    interfaces: Sequence[PreparedInterface]
+    indices: Sequence[Value]
+    depths: Sequence[Value]
+
+    @classmethod
+    def of(cls, prepared: Prepared) -> _Inside:
+        interfaces: list[PreparedInterface] = []
+        indices: list[Value] = [1.0]
+        depths: list[Value] = [0.0]
+        for layer in prepared.layers:
+            if isinstance(layer, PreparedMedium):
+                depths[-1] = depths[-1] + layer.tau - layer.tau_s * phase.forwards(layer.g)
+            else:
+                interfaces.append(layer)
+                indices.append(indices[-1] * layer.n12)
+                depths.append(0.0)
+        return cls(depths[0], interfaces, indices[1:], depths[1:])
+
+    def solved(self, leaves: Row, settle: Settle) -> tuple[Row, Value]:
+        """What the nodes below the first interface are worth, and the share of diffuse light that returns to the base.
+
+        `leaves` is what leaves the stack of the light at each of these nodes.
+        """
+        kept = [[_passed(depth, c) for c in parts.node_cosines(n)] for n, depth in zip(self.indices, self.depths)]
+        exchanges = [self._exchange(k, settle) for k in range(1, len(self.interfaces))]
+        back = parts.returning(tables.load(), _roughness(self.interfaces[0]), self.indices[0])
+        back = settle(_balanced(back, leaves))
+
+        def up(going_down: Sequence[Row]) -> list[Row]:
+            """Worth of light that comes to each interface from below; `going_down` that of light from above."""
+            rows = [_seen(back, kept[0], going_down[0])]
+            for k, exchange in enumerate(exchanges, 1):
+                returned = _seen(exchange.staying_below, kept[k], going_down[k])
+                rows.append(settle(_added(returned, _seen(exchange.up, kept[k - 1], rows[-1]))))
+            return rows
+
+        def down(going_up: Sequence[Row]) -> list[Row]:
+            """Worth of light that comes to what is below each medium."""
+            rows: list[Row] = [[1.0] * parts.COUNT]
+            for k, exchange in reversed(list(enumerate(exchanges, 1))):
+                returned = _seen(exchange.staying_above, kept[k - 1], going_up[k - 1])
+                rows.insert(0, settle(_added(returned, _seen(exchange.down, kept[k], rows[0]))))
+            return rows
+
+        none: Row = [0.0] * parts.COUNT
+        going_down = down([none] * len(self.interfaces))
+        if exchanges:
+            # Sweep up and down, and go on as the last two sweeps did
+            gains: list[Value] = []
+            for _ in range(SWEEPS):
+                before, going_down = going_down, down(up(going_down))
+                gains.append(_sum(b - a for p, q in zip(before, going_down) for a, b in zip(p, q)))
+            ratio = ops.clip(ops.divide(gains[-1], gains[-2]), 0.0, SLOWEST)
+            rest = ratio / (1 - ratio)
+            going_down = [[b + (b - a) * rest for a, b in zip(p, q)] for p, q in zip(before, going_down)]
+        worth = [a * b for a, b in zip(kept[0], going_down[0])]
+        even = parts.even(self.indices[-1])
+        return settle(worth), settle(_sum(w * a * b for w, a, b in zip(even, kept[-1], up(going_down)[-1])))
+
+    def _exchange(self, k: int, settle: Settle) -> _Exchange:
+        """What the interface between two media does."""
+        alpha, above, below = _roughness(self.interfaces[k]), self.indices[k - 1], self.indices[k]
+        found, ratio = tables.load(), self.interfaces[k].n12
+        down = settle(parts.between(found.passing, alpha, above, ratio))
+        up = settle(parts.between(found.passing, alpha, below, 1 / ratio))
+        staying_above = parts.between(found.staying, alpha, above, ratio)
+        staying_below = parts.between(found.staying, alpha, below, 1 / ratio)
+        staying_above = settle(_balanced(staying_above, [_sum(row) for row in down]))
+        staying_below = settle(_balanced(staying_below, [_sum(row) for row in up]))
+        return _Exchange(down, up, staying_above, staying_below)
+
+
+@dataclass(frozen=True)
+class _Exchange:
+    """Parts of the light from each node that pass an interface, and that stay on the side where they come from."""
+
+    down: Sequence[Row]
+    up: Sequence[Row]
+    staying_above: Sequence[Row]
+    staying_below: Sequence[Row]
+
+
+def _balanced(staying: Sequence[Row], leaving: Row) -> Sequence[Row]:
+    """Rows that hold all that does not leave; what errors of interpolation miss goes back where it came from."""
+    missing = [1 - gone - _sum(row) for row, gone in zip(staying, leaving)]
+    return [[x + missing[k] if k == i else x for i, x in enumerate(row)] for k, row in enumerate(staying)]
+
+
+def _seen(rows: Sequence[Row], kept: Row, worth: Row) -> Row:
+    """What the nodes are worth before an interface and a medium that keeps so much, from what they are after them."""
+    after = [a * b for a, b in zip(kept, worth)]
+    return [_sum(part * x for part, x in zip(row, after)) for row in rows]
+
+
+def _added(a: Row, b: Row) -> Row:
+    return [x + y for x, y in zip(a, b)]
+
+
+def _sum(values: Iterable[Value]) -> Value:
+    first, *others = values
+    return sum(others, first)
+
+
+def _passed(depth: Value, cosine: Value) -> Value:
+    return ops.exp(-1 * depth / ops.maximum(cosine, operators.COS_MIN))
+
+
+def _roughness(layer: PreparedInterface) -> Value:
+    """Isotropic roughness, the mean over azimuths."""
+    u, v, _ = layer.roughness
+    return ops.minimum(ops.sqrt(0.5 * (u * u + v * v)), 1.0)
+
+
+def _halfway(cosine: Value, interfaces: Sequence[PreparedInterface]) -> Direction:
+    """A direction halfway between the axes of the first interface, where it has the mean of its roughnesses."""
+    rotation = interfaces[0].roughness.rotation if interfaces else 0.0
+    sine, azimuth = ops.sqrt(1 - cosine * cosine), rotation + pi / 4
+    return sine * ops.cos(azimuth), sine * ops.sin(azimuth), cosine

@@ -6,7 +6,7 @@ maps but one treat each by itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from velatura import ops
@@ -68,16 +68,23 @@ def _weier() -> RoughnessMap:
     return _each(forward, backward)
 
 
-def _weier_2d() -> RoughnessMap:
-    """A fit for either way, which are no exact inverses: .3 goes to .316 (Weier & Belcour 2020, Appendix B)."""
+#: Of the map over both axes: a to d of the way there, a to e of the way back (Weier & Belcour 2020, Appendix B).
+WEIER_2D = (
+    (0.0134517769, 0.0123629536, 0.493769777, 0.225934414),
+    (1.38609881, 0.609910674, 100.608653, 64.1513931, 1e-5),
+)
+
+
+def weier_2d(there: Sequence[float], back: Sequence[float]) -> RoughnessMap:
+    """A fit for either way, which are no exact inverses: .3 goes to .316 as published (Weier & Belcour 2020, B)."""
 
     def forward(along: Value, across: Value) -> Value:
-        a, b, c, d = 0.0134517769, 0.0123629536, 0.493769777, 0.225934414
+        a, b, c, d = there
         x, apart = ops.power(along, a), along - across
         return along * ops.log(1 + b * x / (1 - x)) * ops.exp(apart * (c * apart + d))
 
     def backward(along: Value, across: Value) -> Value:
-        a, b, c, d, e = 1.38609881, 0.609910674, 100.608653, 64.1513931, 1e-5
+        a, b, c, d, e = back
         apart = ops.clip(along - across, -EXPONENT_MAX, EXPONENT_MAX)
         own, other = ops.power(_log_sigmoid(along, b), 1 / a), ops.power(_log_sigmoid(across, c), 1 / d)
         return ops.minimum(own * other * ops.exp(e * apart), 1.0)
@@ -95,5 +102,5 @@ MAPS: dict[str, RoughnessMap] = {
     "belcour-release": _each(lambda a: a / (1 - a), lambda s: s / (1 + s)),  # as in its released plugin
     "power": _each(lambda a: ops.power(a, 1.5), lambda s: ops.power(s, 2 / 3)),  # of `velatura.model.momentum`
     "weier": _weier(),  # Weier & Belcour 2020, Listing 2
-    "weier-2d": _weier_2d(),
+    "weier-2d": weier_2d(*WEIER_2D),
 }

@@ -6,8 +6,9 @@ half a turn.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from velatura import ops
 from velatura.model import mixture
@@ -28,15 +29,26 @@ NORMALS = 256  # over which the albedo of a lobe is averaged
 _AS_IT_IS = RoughnessMap(lambda along, across: along, lambda along, across: along)
 
 
+class Sampled(Protocol):
+    """Columns of numbers that were sampled over direction."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    def __call__(self, w: Direction) -> Iterable[Value]: ...
+
+
 @dataclass(frozen=True)
 class Memo:
-    """Energies of type `colour` and roughnesses of all lobes, the transmitted one last if there is one.
+    """Energies and roughnesses of all lobes, the transmitted one last if there is one; `colour` makes an energy of
+    `width` channels.
 
     Lobes that have axes of their own have a gain too; `facets` are those of lobes that are drawn with them.
     """
 
-    curves: curve.Curves
-    colour: type
+    curves: Sampled
+    colour: Callable[..., Value]
+    width: int
     prepared: Prepared
     facets: Sequence[PreparedInterface | None]
     transmits: bool
@@ -58,7 +70,7 @@ class Memo:
         return Lobe(energy, kind.of(roughness, self.prepared.f), roughness, gain)
 
     def _colour(self, channels: Iterator[Value]) -> Value:
-        return self.colour(*(next(channels) for _ in range(len(self.colour()))))
+        return self.colour(*(next(channels) for _ in range(self.width)))
 
 
 def sample(lobes: Lobes, prepared: Prepared, number: type, colour: type, transmits: bool) -> Memo:
@@ -68,14 +80,14 @@ def sample(lobes: Lobes, prepared: Prepared, number: type, colour: type, transmi
     seen = [*reflected, passed] if transmits and passed is not None else reflected
     facets = [lobe.facets for lobe in seen]
 
-    def held(seen: Sequence[Lobe]) -> Memo:
-        columns = [column for lobe in seen for column in _columns(lobe, prepared, colour)]
-        return Memo(curve.curves(columns, shape, number), colour, prepared, facets, transmits)
+    def kept(seen: Sequence[Lobe]) -> Memo:
+        held = [column for lobe in seen for column in columns(lobe, prepared, colour)]
+        return Memo(curve.curves(held, shape, number), colour, len(colour()), prepared, facets, transmits)
 
-    memo = held(seen)
+    memo = kept(seen)
     if prepared.variance is Isotropic or prepared.model.calibrations is None:
         return memo
-    return held([replace(lobe, gain=gain) for lobe, gain in zip(seen, _gains(memo, seen, number))])
+    return kept([replace(lobe, gain=gain) for lobe, gain in zip(seen, _gains(memo, seen, number))])
 
 
 def _kind(prepared: Prepared) -> type[Variance]:
@@ -85,11 +97,12 @@ def _kind(prepared: Prepared) -> type[Variance]:
     return PerAxis if prepared.variance is Isotropic else Covariance
 
 
-def _columns(lobe: Lobe, prepared: Prepared, colour: type) -> list[Value]:
+def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Value]]) -> list[Value]:
+    """The numbers of a lobe that a `Memo` is made of, in order; `apart` gives the channels of a colour."""
     if lobe.facets is not None:
-        return [*colour(lobe.energy), *colour(lobe.gain)]
+        return [*apart(lobe.energy), *apart(lobe.gain)]
     roughness = vars(_kind(prepared).of(lobe.roughness, _AS_IT_IS)).values()
-    return [*colour(lobe.energy), *roughness, *([lobe.gain] if prepared.model.calibrations else [])]
+    return [*apart(lobe.energy), *roughness, *([lobe.gain] if prepared.model.calibrations else [])]
 
 
 def _gains(memo: Memo, seen: Sequence[Lobe], number: type) -> list[Value]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from velatura import ops
 from velatura.model.adding import Lobe
+from velatura.model.models import Model
 from velatura.model.prepare import Prepared
 
 _COUNT = {"three": 3, "two": 2}
@@ -17,11 +18,17 @@ def merged(prepared: Prepared, lobes: Sequence[Lobe]) -> list[Lobe]:
     The first lobe is kept: it is a reflection by one interface alone, and is often sharp. Of three, the last is kept as
     well, the base's. Those between are merged.
     """
-    count = _COUNT.get(prepared.model.lobes, len(lobes))
-    if len(lobes) <= count:
-        return list(lobes)
-    kept = len(lobes) - (count - 2)
-    return [lobes[0], _mixed(prepared, lobes[1:kept]), *lobes[kept:]]
+    groups = [lobes[group.start : group.stop] for group in merging(prepared.model, len(lobes))]
+    return [_mixed(prepared, group) if len(group) > 1 else group[0] for group in groups]
+
+
+def merging(model: Model, interfaces: int) -> list[range]:
+    """The interfaces of each lobe that the model evaluates."""
+    count = _COUNT.get(model.lobes, interfaces)
+    if interfaces <= count:
+        return [range(k, k + 1) for k in range(interfaces)]
+    kept = interfaces - (count - 2)
+    return [range(1), range(1, kept), *(range(k, k + 1) for k in range(kept, interfaces))]
 
 
 def _mixed(prepared: Prepared, lobes: Sequence[Lobe]) -> Lobe:

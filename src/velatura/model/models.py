@@ -25,10 +25,12 @@ SWITCHES: dict[str, tuple[str, ...]] = {
 }
 
 #: By form, the laws that its BSDFs do not keep: light that a lobe sends below the surface is lost, the forward form is
-#: not reciprocal, and the symmetric one gains at grazing angles.
+#: not reciprocal, and the symmetric one gains at grazing angles, but for opaque stacks where it is balanced
+#: (`velatura.model.scaling`).
 EXCEPTIONS: dict[str, frozenset[str]] = {
     "forward": frozenset({"lossless", "reciprocity"}),
     "symmetric": frozenset({"lossless", "energy", "white furnace"}),
+    "balanced": frozenset({"lossless"}),
 }
 
 
@@ -93,16 +95,18 @@ class Model:
                 raise InvalidInput(unknown("switch", key, SWITCHES))
             if value not in SWITCHES[key]:
                 raise InvalidInput(f"{key}: must be one of {', '.join(SWITCHES[key])}, got {value!r}")
-            if value not in self._allowed(key):
+            if value not in self.allowed(key):
                 raise InvalidInput(
-                    f"{key}={value}: {self.name} has {' and '.join(self._allowed(key))} only; "
+                    f"{key}={value}: {self.name} has {' and '.join(self.allowed(key))} only; "
                     "the models of the papers have all"
                 )
         changes: dict[str, Any] = {**switches}
         return dataclasses.replace(self, **changes)
 
-    def _allowed(self, key: str) -> tuple[str, ...]:
-        """Values of a switch: all, where the model is of the papers; else the form, and what it is calibrated for."""
+    def allowed(self, key: str) -> tuple[str, ...]:
+        """Values that a switch may have: all, where the model is of the papers; else those that it is calibrated for,
+        and every form.
+        """
         if self.calibrations is None or key == "form":
             return SWITCHES[key]
         return tuple(self.calibrations) if key == "reflectance" else (getattr(self, key),)

@@ -24,7 +24,7 @@ from velatura.model.operators import COS_MIN, G_MIN
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
-from velatura.optics import fresnel
+from velatura.optics import fresnel, phase
 from velatura.optics.ggx import Direction
 
 FAINT = 1e-4  # albedo that the tables' errors come close to
@@ -165,9 +165,8 @@ def _through(above: State, medium: PreparedMedium) -> State:
 
     Light that it scatters backwards is lost.
     """
-    # Sort out what goes on (share of Henyey and Greenstein's phase function in front)
-    g = ops.select(ops.absolute(medium.g) < G_MIN, G_MIN, medium.g)
-    forwards = (1 + g) / (2 * g) * (1 - (1 - g) / ops.sqrt(1 + g * g))
+    # Sort out what goes on
+    forwards = phase.forwards(medium.g)
     depth = medium.tau - medium.tau_s * forwards
     path = 1 / ops.maximum(above.cos_theta, COS_MIN)
     t = ops.exp(-depth * path)

@@ -46,10 +46,10 @@ def interface(
     lit = (s_t0i + layer.s_r).roughness(prepared.f)  # as rough as interface and light together
 
     # Reflect, within the bounds that fits and rounding leave by their errors
-    r = ops.clip(_reflectance(prepared, layer, cos_theta, lit, wi), 0.0, 1.0)
+    r = ops.clip(reflectance(prepared, layer, cos_theta, lit, wi), 0.0, 1.0)
     leaving = None
     if layer.leaving is not None:
-        leaving = ops.clip(layer.leaving(*_fetched(prepared, lit, cos_theta, wi)), 0.0, 1.0)
+        leaving = ops.clip(layer.leaving(*fetched(prepared, lit, cos_theta, wi)), 0.0, 1.0)
     if layer.opaque:
         return Operator(r, 0.0, 0.0, 0.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
 
@@ -65,14 +65,12 @@ def interface(
     return Operator(r, t, ops.select(passes, r, 0.0), t, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
 
 
-def _reflectance(
-    prepared: Prepared, layer: PreparedInterface, cos_theta: Value, lit: Roughness, wi: Direction
-) -> Value:
+def reflectance(prepared: Prepared, layer: PreparedInterface, cos_theta: Value, lit: Roughness, wi: Direction) -> Value:
     """Energy that an interface reflects of light at cos_theta; `lit` is its roughness with that of the light."""
     if layer.reflectance is not None:
         # The split sum looks at the interface alone (Weier & Belcour 2020, Listing 3)
         roughness = layer.roughness if prepared.model.reflectance == "split-sum" else lit
-        return layer.reflectance(*_fetched(prepared, roughness, cos_theta, wi, layer.opaque))
+        return layer.reflectance(*fetched(prepared, roughness, cos_theta, wi, layer.opaque))
     r = layer.reflect(cos_theta)
     if prepared.model.reflectance == "fg":
         # Masking is the same for a direction and its mirror image
@@ -106,7 +104,7 @@ def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) ->
     return Operator(0.0, t, 0.0, t, none, s_t, s_t, 1.0, 1.0, cos_theta, None)
 
 
-def _fetched(
+def fetched(
     prepared: Prepared, roughness: Roughness, cos_theta: Value, wi: Direction, opaque: bool = False
 ) -> tuple[Value, Value]:
     """Cosine and isotropic roughness at which an average over an anisotropic interface is looked up."""

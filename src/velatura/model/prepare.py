@@ -62,15 +62,22 @@ class PreparedMedium:
 
 @dataclass(frozen=True)
 class PreparedBase:
-    """A diffuse base: albedo, relative index n = eta_n/eta_0 of the medium at it, and what the stack does to its light.
+    """A diffuse base: albedo (a colour), index n of the medium at it over that outside, what the stack does to light.
 
-    All are colours. The means are those for diffuse light from below, and are known once the layers are.
+    The means (colours) are those for diffuse light from below. `worth` is the share of light below the first interface
+    that reaches the base, at each node of `tables.parts`. All are known once the layers are.
     """
 
     albedo: Value
     n: Value
     mean_reflectance: Value = 0.0
     mean_transmittance: Value = 1.0
+    worth: tuple[Value, ...] = ()
+
+    @property
+    def means(self) -> tuple[Value, ...]:
+        """All that the stack does to its light."""
+        return self.mean_reflectance, self.mean_transmittance, *self.worth
 
 
 @dataclass(frozen=True)
@@ -130,7 +137,7 @@ def prepare(
         if kind == "medium":
             layers.append(_medium(layer))
         elif kind == "diffuse":
-            base = PreparedBase(layer["albedo"], eta_1 / values["exterior"])
+            base = PreparedBase(layer["albedo"], n)
         else:
             layers.append(_interface(kind, layer, eta_1, n_leaving, averages, variance))
             if kind == "dielectric":

@@ -11,11 +11,19 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
+G_MIN = 1e-3  # where it scatters evenly, and a division by g would be one by 0
+
 
 def henyey_greenstein(cos_theta: Value, g: Value) -> Value:
     """Density per solid angle, in 1/sr, for asymmetry g in (-1, 1)."""
     d = (1 - g) * (1 - g) + 2 * g * (1 - cos_theta)
     return (1 - g * g) / (4 * pi * d * ops.sqrt(d))
+
+
+def forwards(g: Value) -> Value:
+    """Share that is scattered into the half in front."""
+    g = ops.select(ops.absolute(g) < G_MIN, G_MIN, g)
+    return (1 + g) / (2 * g) * (1 - (1 - g) / ops.sqrt(1 + g * g))
 
 
 def sample_henyey_greenstein(g: Value, u: Value) -> Value:

@@ -9,6 +9,7 @@ from velatura import kernel, tables
 from velatura.binding import Binding
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
+from velatura.model.models import EXCEPTIONS
 from velatura.plugins import spectral
 
 
@@ -26,7 +27,7 @@ def make(mi: Any) -> type:
                 stack, or change that of `material`. `layer0_eta`, `layer0_k`, `layer0_alpha_u`, `layer0_alpha_v`,
                 `layer0_rotation`, `layer1_depth`, `layer1_sigma_a`, `layer1_sigma_s`, `layer1_g`, ...
             exterior (number, default 1): absolute index above.
-            model (string, default belcour2018): one of `velatura.MODELS`.
+            model (string, default velatura): one of `velatura.MODELS`.
             reflectance, tir, map, scale, medium, form, fetch, lobes (strings): switches of the model.
 
         One reflected lobe per interface, over a diffuse base if there is one. A stack that ends in a dielectric
@@ -40,7 +41,6 @@ def make(mi: Any) -> type:
             switches = {name: str(properties[name]) for name in SWITCHES if name in properties}
             chosen = str(properties["model"]) if "model" in properties else DEFAULT
             self.model = named(chosen, **switches)
-            self.exceptions = self.model.exceptions
             if self.model.channels == "separate":
                 raise InvalidInput(
                     "channels=separate: only for lobes and inverse, since a BSDF has one lobe for all colours"
@@ -49,6 +49,12 @@ def make(mi: Any) -> type:
                 tables.load().upload(sys.modules[mi.Float.__module__])
             self.binding = Binding(mi, properties, {"model", *SWITCHES})
             self._update()
+
+        @property
+        def exceptions(self) -> frozenset[str]:
+            """Laws of `velatura.checks` that it does not keep, and is known not to."""
+            balanced = self.body is not None and self.body.scaling is not None and not self.transmits
+            return EXCEPTIONS["balanced"] if balanced else self.model.exceptions
 
         # The material, and what follows from it
 

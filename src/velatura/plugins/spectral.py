@@ -71,9 +71,10 @@ class Spectra:
         base = self.fixed.above.base
         if base is None or prepared.base is None or self.means is None:
             return prepared
-        fixed = base.mean_reflectance, base.mean_transmittance
-        r, t = (self.mi.ArrayXf([*a, *b]) for a, b in zip(fixed, ops.interpolate(self.means, place)))
-        return replace(prepared, base=replace(prepared.base, mean_reflectance=r, mean_transmittance=t))
+        fixed = (self.mi.UnpolarizedSpectrum(x) for x in base.means)
+        r, t, *worth = (self.mi.ArrayXf([*a, *b]) for a, b in zip(fixed, ops.interpolate(self.means, place)))
+        means = replace(prepared.base, mean_reflectance=r, mean_transmittance=t, worth=tuple(worth))
+        return replace(prepared, base=means)
 
 
 def sample(mi: Any, fixed: bsdf.Body, body_at: Callable[[Any], bsdf.Body]) -> Spectra:
@@ -82,7 +83,7 @@ def sample(mi: Any, fixed: bsdf.Body, body_at: Callable[[Any], bsdf.Body]) -> Sp
     below = _side(mi, fixed.lobes_below, lambda nm: body_at(nm).lobes_below) if fixed.below else None
     base, means = body_at(_all_wavelengths(mi)).above.base, None
     if base is not None:
-        columns = [_over_wavelengths(mi, x, 1) for x in (base.mean_reflectance, base.mean_transmittance)]
+        columns = [_over_wavelengths(mi, x, 1) for x in base.means]
         means = curve.curves(columns, (NODES,), mi.Float)
     return Spectra(mi, fixed, above, below, means)
 

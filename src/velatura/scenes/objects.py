@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
+from velatura.scenes import teapot as newell
 from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, flattened, join, lathe, rounded
 
 
@@ -62,10 +64,41 @@ def lid() -> Surface:
     return join(flattened(top), below).moved((0.0, edge - rim[1], 0.0))
 
 
+@functools.cache
+def plane() -> Surface:
+    """A square slab that lies flat, an image upright on its top for somebody who stands in front of it."""
+    half, height = 1.15, 0.06
+    corners = np.array([[half, height], [-half, height], [-half, 0.0], [half, 0.0], [half, height]])
+    faces = [extrude(np.linspace(start, stop, 3), 2.0 * half) for start, stop in itertools.pairwise(corners)]
+    return join(*faces, cap(corners, -half), cap(corners, half))
+
+
+@functools.cache
+def teapot() -> Surface:
+    """Newell's teapot, its spout to the right and a little towards the camera."""
+    turn = np.radians(20.0)
+    about_y = np.array([[np.cos(turn), 0.0, -np.sin(turn)], [0.0, 1.0, 0.0], [np.sin(turn), 0.0, np.cos(turn)]])
+    return newell.teapot().moved((-0.1, 0.0, 0.0), about_y)
+
+
+@functools.cache
+def plinth() -> Surface:
+    """What an object stands on: a low round table, its top at y = 0."""
+    return lathe(np.concatenate([arc((1.65, -0.06), 0.06, -90.0, 90.0, step=15.0), [[0.0, 0.0]]]))
+
+
+@functools.cache
+def ground() -> Surface:
+    """A floor without an end in sight, which the plinth stands on."""
+    return extrude(np.array([[1e3, -0.12], [0.0, -0.12], [-1e3, -0.12]]), width=2e3)
+
+
 #: What `scene` may name, besides the file of a Mitsuba scene.
 OBJECTS = {
     "ball": Object(ball, View((0.0, 2.6, 7.2), (0.0, 1.0, 0.0), 19.5)),
     "sphere": Object(sphere, View((0.0, 2.2, 7.2), (0.0, 0.95, 0.0), 19.5)),
+    "teapot": Object(teapot, View((0.0, 2.6, 7.2), (0.0, 0.6, 0.0), 19.5)),
+    "plane": Object(plane, View((0.0, 4.2, 5.8), (0.0, 0.0, 0.0), 24.0)),
     "wedges": Object(wedges, View((2.6, 2.6, 6.6), (0.0, 0.4, 0.0), 23.0)),
     "lid": Object(lid, View((0.0, 6.0, 4.0), (0.0, 0.1, 0.0), 21.0)),
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,8 @@ import numpy as np
 from velatura import kernel
 from velatura.errors import InvalidInput
 from velatura.scenes.environments import emitter
-from velatura.scenes.objects import OBJECTS, View
-from velatura.scenes.surfaces import Surface, arc, extrude, lathe
+from velatura.scenes.objects import OBJECTS, View, ground, plinth
+from velatura.scenes.surfaces import Surface
 
 Name = str | os.PathLike[str]
 
@@ -37,8 +36,8 @@ def scene_dict(
     """A scene for `mi.load_dict`, to be rendered as it is or changed first.
 
     Args:
-        scene: "ball", "sphere", "wedges", "lid", or a Mitsuba scene file (.xml), in which every shape whose bsdf has
-            the id "material" gets the material, and which keeps its own cameras, integrator and lights.
+        scene: a name of `OBJECTS` ("ball", "sphere", ...), or a Mitsuba scene file (.xml), in which every shape whose
+            bsdf has the id "material" gets the material, and which keeps its own cameras, integrator and lights.
         env: "studio", "sky", "furnace", or an .exr or .hdr file; None means a scene file's own lights, or else the
             studio. In the furnace the object floats alone, so that a material that loses no light vanishes.
         bsdf: a `mi.BSDF`, or the dictionary of one.
@@ -81,23 +80,13 @@ def mesh(mi: Any, surface: Surface, bsdf: Any) -> Any:
     return shape
 
 
-@functools.cache
-def _plinth() -> Surface:
-    """A low round table, its top at y = 0."""
-    return lathe(np.concatenate([arc((1.65, -0.06), 0.06, -90.0, 90.0, step=15.0), [[0.0, 0.0]]]))
-
-
-@functools.cache
-def _ground() -> Surface:
-    return extrude(np.array([[1e3, -0.12], [0.0, -0.12], [-1e3, -0.12]]), width=2e3)
-
-
 def _surroundings(mi: Any, env: Name) -> dict[str, Any]:
     if env == "furnace":
         return {}
-    plinth = {"plinth": mesh(mi, _plinth(), mi.load_dict(_GREY))}
-    below = {"ground": mesh(mi, _ground(), mi.load_dict(_GREY))} if env == "sky" else {}  # the sky ends at the horizon
-    return plinth | below
+    bodies = {"plinth": plinth()}
+    if env == "sky":
+        bodies["ground"] = ground()  # the sky ends at the horizon
+    return {name: mesh(mi, surface, mi.load_dict(_GREY)) for name, surface in bodies.items()}
 
 
 def _camera(mi: Any, view: View, size: tuple[int, int], zoom: float) -> dict[str, Any]:

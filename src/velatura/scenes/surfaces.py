@@ -104,9 +104,18 @@ def _sweep(profile: Array, outwards: Array, offsets: Array) -> Surface:
     # Carry both around
     positions = profile[:, None, :1] * outwards + profile[:, None, 1:] * _Y + offsets
     normals = normal[:, None, :1] * outwards + normal[:, None, 1:] * _Y
-    u, v = np.meshgrid(np.linspace(0.0, 1.0, len(outwards)), 1.0 - length / length[-1])
+    return grid(positions, normals, 1.0 - length / length[-1])
 
-    # Split the grid's cells into triangles
+
+def grid(positions: Array, normals: Array, v: Array | None = None) -> Surface:
+    """Rows of points (rows, columns, 3): seen from outside, columns run anticlockwise around the way that rows go.
+
+    u runs from 0 to 1 with the columns, and v back along the rows, evenly where it is not given.
+    """
+    rows, columns, _ = positions.shape
+    u, v = np.meshgrid(np.linspace(0.0, 1.0, columns), np.linspace(1.0, 0.0, rows) if v is None else v)
+
+    # Split the cells into triangles
     index = np.arange(u.size, dtype=np.uint32).reshape(u.shape)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     triangles = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])

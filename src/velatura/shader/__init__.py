@@ -2,6 +2,6 @@
 
 from velatura.shader.material import constant
 from velatura.shader.program import Shader, shader
-from velatura.shader.recording import Recording, record, variance
+from velatura.shader.recording import Recording, record, structure, variance
 
-__all__ = ["Recording", "Shader", "constant", "record", "shader", "variance"]
+__all__ = ["Recording", "Shader", "constant", "record", "shader", "structure", "variance"]

@@ -11,14 +11,15 @@ from velatura.tables import Table
 
 WIDTH = 1024  # texels
 
+# Loops over corners, where code without them is longer: compilers of shaders take their time for every call again
 HELPERS = f"""\
 vec4 vt_texel(int i) {{
-    return texelFetch(vt_tables, ivec2(i % {WIDTH}, i / {WIDTH}), 0);
+    return texelFetch(vt_tables, ivec2(i & {WIDTH - 1}, i >> {WIDTH.bit_length() - 1}), 0);
 }}
 
 float vt_float(int i) {{
-    vec4 texel = vt_texel(i / 4);
-    return texel[i % 4];
+    vec4 texel = vt_texel(i >> 2);
+    return texel[i & 3];
 }}
 
 // One texel of the nodes of a plane, interpolated in single precision, which filters of textures do not have
@@ -26,20 +27,28 @@ vec4 vt_plane(int start, ivec2 nodes, int texels, int texel, vec2 at) {{
     vec2 position = clamp(at, 0.0, 1.0) * vec2(nodes - 1);
     ivec2 cell = min(ivec2(position), nodes - 2);
     vec2 upper = position - vec2(cell);
-    int down = nodes.y * texels;
-    int i = start + cell.x * down + cell.y * texels + texel;
-    vec4 a = mix(vt_texel(i), vt_texel(i + texels), upper.y);
-    vec4 b = mix(vt_texel(i + down), vt_texel(i + down + texels), upper.y);
-    return mix(a, b, upper.x);
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < 4; k++) {{
+        ivec2 corner = ivec2(k >> 1, k & 1), node = cell + corner;
+        vec2 weight = mix(1.0 - upper, upper, vec2(corner));
+        sum += weight.x * weight.y * vt_texel(start + (node.x * nodes.y + node.y) * texels + texel);
+    }}
+    return sum;
 }}
 
 // The same in space
 vec4 vt_space(int start, ivec3 nodes, int texels, int texel, vec3 at) {{
-    float position = clamp(at.x, 0.0, 1.0) * float(nodes.x - 1);
-    int cell = min(int(position), nodes.x - 2);
-    int deep = nodes.y * nodes.z * texels, i = start + cell * deep;
-    vec4 a = vt_plane(i, nodes.yz, texels, texel, at.yz), b = vt_plane(i + deep, nodes.yz, texels, texel, at.yz);
-    return mix(a, b, position - float(cell));
+    vec3 position = clamp(at, 0.0, 1.0) * vec3(nodes - 1);
+    ivec3 cell = min(ivec3(position), nodes - 2);
+    vec3 upper = position - vec3(cell);
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < 8; k++) {{
+        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1), node = cell + corner;
+        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
+        int i = ((node.x * nodes.y + node.y) * nodes.z + node.z) * texels + texel;
+        sum += weight.x * weight.y * weight.z * vt_texel(start + i);
+    }}
+    return sum;
 }}
 
 // The same for one number a node, four of them in a texel
@@ -47,12 +56,14 @@ float vt_volume(int start, ivec3 nodes, vec3 at) {{
     vec3 position = clamp(at, 0.0, 1.0) * vec3(nodes - 1);
     ivec3 cell = min(ivec3(position), nodes - 2);
     vec3 upper = position - vec3(cell);
-    int i = 4 * start + (cell.x * nodes.y + cell.y) * nodes.z + cell.z, z = nodes.z, yz = nodes.y * nodes.z;
-    vec2 a = mix(vec2(vt_float(i), vt_float(i + 1)), vec2(vt_float(i + z), vt_float(i + z + 1)), upper.y);
-    i += yz;
-    vec2 b = mix(vec2(vt_float(i), vt_float(i + 1)), vec2(vt_float(i + z), vt_float(i + z + 1)), upper.y);
-    vec2 along = mix(a, b, upper.x);
-    return mix(along.x, along.y, upper.z);
+    float sum = 0.0;
+    for (int k = 0; k < 8; k++) {{
+        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1), node = cell + corner;
+        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
+        int i = (node.x * nodes.y + node.y) * nodes.z + node.z;
+        sum += weight.x * weight.y * weight.z * vt_float(4 * start + i);
+    }}
+    return sum;
 }}
 """
 
@@ -92,7 +103,17 @@ def _reader(name: str, table: Table, start: int) -> str:
     size, at = f"ivec{len(nodes)}({', '.join(map(str, nodes))})", f"vec{len(nodes)}({', '.join(axes)})"
     arguments = ", ".join(f"float {axis}" for axis in axes)
     if channels == 1:
-        lines = [f"float vt_{name}({arguments}) {{", f"    return vt_volume({start}, {size}, {at});"]
+        colours = arguments.replace("float", "vec3")
+        each = ", ".join(f"{axis}[c]" for axis in axes)
+        lines = [
+            f"float vt_{name}({arguments}) {{",
+            f"    return vt_volume({start}, {size}, {at});",
+            "}",
+            f"vec3 vt_{name}({colours}) {{",
+            "    vec3 colour;",
+            f"    for (int c = 0; c < 3; c++) colour[c] = vt_{name}({each});",
+            "    return colour;",
+        ]
     else:
         read = f"vt_{'plane' if len(nodes) == 2 else 'space'}({start}, {size}, {count}, i, {at})"
         lines = [

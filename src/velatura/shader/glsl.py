@@ -68,9 +68,9 @@ _WORDS = """
     default degrees discard distance do dot else enum exp extern external false far filter fixed flat float floor for
     fract goto greaterThan greaterThanEqual half highp if in inline inout input int interface invariant l layout length
     lessThan lessThanEqual log long lowp m main max mediump min mix mod namespace near noinline noise normalize not out
-    output partition patch pow precision public radians reflect refract resource return sample sampler short sign sin
-    sizeof smooth sqrt static step struct superp switch tan template texture this true typedef u uniform union unsigned
-    using varying void volatile wi while wo
+    output partition patch place pow precision public radians reflect refract resource return row sample sampler short
+    sign sin sizeof smooth sqrt static step struct superp switch tan template texel texels texture this true typedef u
+    uniform union unsigned using varying void volatile wi while wo
 """
 
 
@@ -82,7 +82,7 @@ def statements(outputs: Sequence[tuple[Operand, Kind]]) -> tuple[list[str], list
 
 def _type(symbol: Symbol) -> str:
     if symbol.kind == "texels":
-        return f"vec4[{atlas.texels(symbol.detail)}]"
+        return f"vec4[{symbol.detail.texels if symbol.op == 'baked' else atlas.texels(symbol.detail)}]"
     return TYPES[symbol.kind]
 
 
@@ -95,6 +95,11 @@ def literal(x: Operand) -> str:
     assert not isinstance(x, Symbol)
     text = str(np.float32(x))
     return text if "." in text or "e" in text else f"{text}.0"
+
+
+def block(head: str, lines: Sequence[str]) -> str:
+    """A function or struct with its lines."""
+    return "\n".join([f"{head} {{", *(f"    {line}".rstrip() for line in lines), "}", ""])
 
 
 class _Statements:
@@ -137,8 +142,8 @@ class _Statements:
 
     def _name(self, symbol: Symbol) -> str:
         name = symbol.hint or symbol.place.function.strip("_<>")
-        if symbol.op == "texels":
-            name = symbol.detail
+        if symbol.kind == "texels":
+            name = symbol.detail.name if symbol.op == "baked" else symbol.detail
         name = "value" if name in ("", "lambda", "genexpr", "listcomp") else name.replace("__", "_")
         free = (x for x in chain([name], (f"{name}_{n}" for n in count(2))) if x not in self.taken)
         self.taken.add(chosen := next(free))
@@ -150,7 +155,9 @@ class _Statements:
         if op == "input":
             return symbol.detail, _ATOM
         if op in ("texels", "value"):
-            return f"vt_{symbol.detail}({', '.join(map(self.of, args))})", _ATOM
+            return f"vt_{symbol.detail}({', '.join(self.of(x, wide=wide) for x in args)})", _ATOM
+        if op == "baked":
+            return f"vt_baked_{symbol.detail.name}(vec3({', '.join(map(self.of, args))}))", _ATOM
         if op == "component":
             texel, channel = divmod(symbol.detail, 4)
             of_texels = isinstance(args[0], Symbol) and args[0].kind == "texels"

@@ -20,7 +20,7 @@ class Graph:
 
     given: Mapping[Symbol, Symbol] = field(default_factory=dict)
     _known: dict[Hashable, Symbol] = field(default_factory=dict)
-    _chosen: dict[Symbol, Symbol] = field(default_factory=dict)
+    _chosen: dict[Symbol, Operand] = field(default_factory=dict)
 
     def unique(self, outputs: Sequence[Value]) -> list[Operand]:
         """The outputs, made of symbols of this graph."""
@@ -32,8 +32,10 @@ class Graph:
     def _of(self, x: Operand) -> Operand:
         return self._chosen[x] if isinstance(x, Symbol) else x
 
-    def _one(self, symbol: Symbol) -> Symbol:
+    def _one(self, symbol: Symbol) -> Operand:
         args = tuple(self._of(x) for x in symbol.args)
+        if symbol.op == "select" and args[1] is args[2]:
+            return args[1]
         names = [(type(x).__name__, id(x) if isinstance(x, Symbol) else x) for x in args]
         key = (symbol.op, symbol.detail, *(sorted(names, key=repr) if symbol.op in _COMMUTE else names))
         found = self._known.setdefault(key, symbol)

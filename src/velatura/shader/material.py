@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from velatura.model.statistics import number as plain
-from velatura.shader.glsl import literal
+from velatura.shader.glsl import block, literal
 from velatura.shader.symbol import operand
-from velatura.stack import Brushing, Stack, Texture, Varying, is_colour
-from velatura.stack.schema import parameters
+from velatura.stack import Brushing, Stack, Texture, Varying, is_colour, within
+
+PARAMETERS = "vt_parameters"  # in the code: the values that change
 
 
 def place(name: str) -> str:
@@ -39,30 +40,37 @@ def structs(stack: Stack, read: Sequence[str]) -> str:
     return text + struct("VtMaterial", members, "indices are absolute, rotations in degrees")
 
 
-def filled(stack: Stack, read: Sequence[str]) -> str:
-    """`vt_material`: the values of the stack at texture coordinates, and the samplers that it needs."""
-    flat = stack.flat()
+def maps(stack: Stack, read: Sequence[str]) -> dict[Texture, str]:
+    """The samplers of the textures, named after the first value that reads each."""
     images: dict[Texture, str] = {}
-    lines = [f"    m.exterior = {literal(stack.exterior)};"]
-    for name in read:
-        value = flat[name]
-        if isinstance(value, Texture):
+    for name, value in stack.flat().items():
+        if name in read and isinstance(value, Texture):
             images.setdefault(value, f"vt_map_{name}")
-        if name != "exterior":
-            lines.append(f"    m.{place(name)} = {_value(stack, name, value, images)};")
+    return images
+
+
+def filled(stack: Stack, read: Sequence[str], parameters: bool) -> str:
+    """`vt_material`: the values of the stack at texture coordinates, and the samplers that it needs.
+
+    With `parameters`, plain values are those of a uniform.
+    """
+    flat, images = stack.flat(), maps(stack, read)
+    written = [name for name in read if name != "exterior" and (isinstance(flat[name], Varying) or not parameters)]
+    lines = [f"m.{place(name)} = {_value(name, flat[name], images)};" for name in written]
+    begin = ["VtMaterial m;", f"m.exterior = {literal(stack.exterior)};"]
     samplers = [
         f"uniform sampler2D {name}; // {image.texture}{', to be decoded from sRGB' * (image.encoding == 'srgb')}\n"
         for image, name in images.items()
     ]
-    body = "\n".join(["    VtMaterial m;", *lines, "    return m;"])
-    return f"{''.join(samplers)}VtMaterial vt_material(vec2 uv) {{\n{body}\n}}\n"
+    lines = [*([f"VtMaterial m = {PARAMETERS};"] if parameters else begin), *lines, "return m;"]
+    return f"{''.join(samplers)}{block('VtMaterial vt_material(vec2 uv)', lines)}"
 
 
 def struct(name: str, members: Sequence[str], comment: str) -> str:
     return "\n".join([f"struct {name} {{ // {comment}", *(f"    {member}" for member in members), "};", ""])
 
 
-def _value(stack: Stack, name: str, value: Any, images: Mapping[Texture, str]) -> str:
+def _value(name: str, value: Any, images: Mapping[Texture, str]) -> str:
     if isinstance(value, Brushing):
         across = 90.0 if value.brushing == "concentric" else 0.0
         centre = f"uv.y - {literal(value.v)}, uv.x - {literal(value.u)}"
@@ -74,14 +82,7 @@ def _value(stack: Stack, name: str, value: Any, images: Mapping[Texture, str]) -
     colour = is_colour(name)
     channel = "rgb" if colour and value.channel in (None, "rgb") else (value.channel or "r")
     texel = f"texture({images[value]}, uv).{channel} * {literal(value.scale)} + {literal(value.offset)}"
-    low, high = _range(stack, name)
+    low, high = within(name)
+    low = max(low, -1e6)
     texel = f"max({texel}, {literal(low)})" if high == inf else f"clamp({texel}, {literal(low)}, {literal(high)})"
     return f"vec3({texel})" if colour and channel != "rgb" else texel
-
-
-def _range(stack: Stack, name: str) -> tuple[float, float]:
-    """What a texel is kept within, a little inside where the ends are excluded."""
-    layer, _, key = name.removeprefix("layer").partition("_")
-    declared: Any = parameters(type(stack.layers[int(layer)]))["alpha" if key.startswith("alpha") else key]
-    margin = 1e-3 if declared.strict else 0.0
-    return max(declared.low + margin, -1e6), declared.high - margin

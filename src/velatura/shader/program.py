@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from velatura.model import DEFAULT, SWITCHES, Model, named
+from velatura.model.merge import merging
 from velatura.shader import atlas, glsl, material
-from velatura.shader.recording import Recording, part, record
-from velatura.shader.symbol import Kind, Operand
-from velatura.stack import Stack
+from velatura.shader.recording import SHOWN, Recording, part, record
+from velatura.shader.symbol import Kind, Operand, Symbol
+from velatura.stack import Stack, Texture
 
 
 @dataclass(frozen=True)
@@ -19,34 +22,67 @@ class Shader:
     """GLSL ES 3.00, the texture of tables that it reads (float32, shape (height, width, 4)), and its uniforms.
 
     `uniforms` are the values that the struct of the material holds: flat names (`layer0_eta`) and where they lie in
-    the struct (`layer0.eta`).
+    the struct (`layer0.eta`). `maps` are the textures of the material by sampler.
+
+    Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baking` is the program
+    that draws the lobes, None where a texture makes them differ from point to point. The tables are that program's.
+    `lobes` are the layers whose light each reflected lobe is, seen from above.
     """
 
     text: str
     tables: np.ndarray
     uniforms: Mapping[str, str]
+    maps: Mapping[str, Texture]
+    lobes: Sequence[Sequence[int]]
+    shown: Sequence[str]
+    baking: Baking | None
+
+    @property
+    def key(self) -> str:
+        """Equal for equal code."""
+        text = self.text + (self.baking.text if self.baking else "")
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def shader(stack: Stack, model: str | Model = DEFAULT, constant: Collection[str] = (), **switches: str) -> Shader:
+@dataclass(frozen=True)
+class Baking:
+    """The program that draws the lobes: `vt_bake(ivec2 texel)`, for a texture of floats of a size (width, height)."""
+
+    text: str
+    size: tuple[int, int]
+
+
+def shader(
+    stack: Stack,
+    model: str | Model = DEFAULT,
+    constant: Collection[str] = (),
+    values: Literal["literals", "uniforms"] = "literals",
+    **switches: str,
+) -> Shader:
     """A stack as GLSL ES 3.00: the structs `VtMaterial` and `VtLobes`, and functions on them.
 
     Args:
         stack: its kinds of layers make the code; its values go into `vt_material`, which gives them.
         constant: flat names of values that never change, which are worked out now and are not in the struct.
+        values: plain values as `literals`, or as `uniforms` that somebody changes; then the code is the same for all
+            of them, be roughnesses equal or not, and lobes are drawn once for a change, and read.
 
     Raises:
         InvalidInput: as `record`.
     """
-    recording = record(stack, model, constant, **switches)
-    read = recording.read
-    looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
-    texture, readers = atlas.pack(looked_up)
+    recording = record(stack, model, constant, values == "uniforms", **switches)
+    baked, read = recording.baked, recording.read
+    texture, tables = _tables(baked.symbols if baked else recording.symbols)
+    name = "A material" if recording.shown else " ".join(stack.name.split()) or "A material"
+    structs = material.structs(stack, list(read))
+    parameters = f"uniform VtMaterial {material.PARAMETERS};\n"
     parts = [
-        _HEADER.format(name=" ".join(stack.name.split()) or "A material", model=_described(recording.model)),
-        material.structs(stack, list(read)),
-        material.filled(stack, list(read)),
+        _HEADER.format(name=name, model=_described(recording.model)) + _PRECISION,
+        structs,
+        *([parameters, f"uniform float {SHOWN}[{len(recording.shown)}];\n"] if recording.shown else []),
+        material.filled(stack, list(read), bool(recording.shown)),
         _lobes_struct(recording),
-        *([_TABLES.format(*texture.shape[1::-1]), atlas.HELPERS + readers] if looked_up else []),
+        *([baked.reading()] if baked else tables),
         glsl.HELPERS,
         _lobes(recording),
         _function(
@@ -61,7 +97,29 @@ def shader(stack: Stack, model: str | Model = DEFAULT, constant: Collection[str]
             "vec3({}, {}, {})",
         ),
     ]
-    return Shader("\n".join(parts), texture, read)
+    drawing = [_PRECISION, structs, parameters, *tables, glsl.HELPERS, baked.drawing()] if baked else []
+    return Shader(
+        text="\n".join(parts),
+        tables=texture,
+        uniforms=read,
+        maps={sampler: image for image, sampler in material.maps(stack, list(read)).items()},
+        lobes=_interfaces(recording),
+        shown=recording.shown,
+        baking=Baking("\n".join(drawing), baked.size) if baked else None,
+    )
+
+
+def _tables(symbols: Sequence[Symbol]) -> tuple[np.ndarray, list[str]]:
+    """The texture of tables, and what declares and reads it."""
+    looked_up = {symbol.detail for symbol in symbols if symbol.op in ("texels", "value")}
+    texture, readers = atlas.pack(looked_up)
+    return texture, [_TABLES.format(*texture.shape[1::-1]), atlas.HELPERS + readers] if looked_up else []
+
+
+def _interfaces(recording: Recording) -> list[list[int]]:
+    """By reflected lobe, seen from above: the layers whose light it is."""
+    places = [i for i, kind in enumerate(recording.stack.kinds) if kind not in ("medium", "diffuse")]
+    return [[places[k] for k in group] for group in merging(recording.model, len(places))]
 
 
 _WRAPPERS = """\
@@ -83,6 +141,11 @@ _TABLES = """\
 uniform highp sampler2D vt_tables;
 """
 
+_PRECISION = """\
+precision highp float;
+precision highp int;
+"""
+
 _HEADER = """\
 // {name} as the model {model} has it; GLSL ES 3.00, written by Velatura.
 //
@@ -93,8 +156,6 @@ _HEADER = """\
 //
 // Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
 
-precision highp float;
-precision highp int;
 """
 
 
@@ -121,13 +182,9 @@ def _lobes_struct(recording: Recording) -> str:
 def _lobes(recording: Recording) -> str:
     lines, texts = glsl.statements([(value, recording.kinds[name]) for name, value in recording.lobes.items()])
     assigned = [f"l.{name} = {text};" for name, text in zip(recording.lobes, texts)]
-    return _block("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [*lines, "", "VtLobes l;", *assigned, "return l;"])
+    return glsl.block("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [*lines, "", "VtLobes l;", *assigned, "return l;"])
 
 
 def _function(head: str, outputs: Sequence[tuple[Operand, Kind]], result: str) -> str:
     lines, texts = glsl.statements(outputs)
-    return _block(head, [*lines, f"return {result.format(*texts)};"])
-
-
-def _block(head: str, lines: Sequence[str]) -> str:
-    return "\n".join([f"{head} {{", *(f"    {line}".rstrip() for line in lines), "}", ""])
+    return glsl.block(head, [*lines, f"return {result.format(*texts)};"])

@@ -3,30 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeGuard
 
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT, Model, bsdf, named, variance_kind
-from velatura.model.variance import Variance
+from velatura.model import DEFAULT, Model, bsdf, memo, named, variance_kind
+from velatura.model.adding import Lobe
+from velatura.model.diffuse import Base
+from velatura.model.merge import merging
+from velatura.model.prepare import PreparedInterface
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
+from velatura.optics.ggx import Direction
 from velatura.shader import material, source, symbol
+from velatura.shader.bake import Bake, bake
 from velatura.shader.graph import Graph
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Stack, is_colour
+from velatura.stack import Stack, Varying, is_colour
 from velatura.stack.schema import unknown
+
+SHOWN = "vt_shown"  # in the code: the weights of lobes
 
 
 @dataclass(frozen=True)
 class Recording:
     """What the model does for a stack: `lobes` from material and wi, the rest from these, wo, and random numbers u.
 
-    Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ...
+    Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ... `baked` is what the lobes
+    are read from, where they are not added up; `shown` names the weights of lobes, where they have any.
     """
 
     stack: Stack
     model: Model
+    baked: Bake | None
+    shown: Sequence[str]
     kinds: Mapping[str, Kind]
     lobes: Mapping[str, Operand]
     value: Operand
@@ -41,13 +52,23 @@ class Recording:
     @cached_property
     def read(self) -> dict[str, str]:
         """The values of the material that anything reads, by flat name, and their place in the struct."""
-        details = {s.detail for s in self.symbols if s.op == "input"}
+        symbols = [*self.symbols, *(self.baked.symbols if self.baked else [])]
+        details = {s.detail for s in symbols if s.op == "input"}
         places = {name: material.place(name) for name in self.stack.flat()}
         return {name: place for name, place in places.items() if f"m.{place}" in details}
 
 
-def record(stack: Stack, model: str | Model = DEFAULT, constant: Collection[str] = (), **switches: str) -> Recording:
+def record(
+    stack: Stack,
+    model: str | Model = DEFAULT,
+    constant: Collection[str] = (),
+    parameters: bool = False,
+    **switches: str,
+) -> Recording:
     """The model's functions for a stack; the values named `constant` as they are, all others as inputs.
+
+    With `parameters`, for a program whose user changes values and looks at single lobes: as general as the `structure`
+    of the stack, with a weight for every lobe, and, without textures, with lobes that are read.
 
     Raises:
         InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture;
@@ -67,8 +88,16 @@ def record(stack: Stack, model: str | Model = DEFAULT, constant: Collection[str]
 
     # Run the model
     with source.naming(Symbol):
-        body = bsdf.body(stack.kinds, values, stack.thin, chosen, variance(stack), constant=False)
-        fields, kinds = _fields(bsdf.scattered(body, wi))
+        kind = structure(stack) if parameters else variance(stack)
+        body = bsdf.body(stack.kinds, values, stack.thin, chosen, kind, constant=False)
+        baked: Bake | None = None
+        shown: list[str] = []
+        if parameters:
+            uniform = not any(isinstance(value, Varying) for value in flat.values())
+            baked = bake(stack, values, body) if uniform else None
+            body, shown = _weighed(baked.body if baked else body)
+        base = body.above.base if baked is None else None  # what is read of a base holds all of it
+        fields, kinds = _fields(bsdf.scattered(body, wi), base.worth if base else ())
         value, density = bsdf.eval_pdf(body, wi, wo)
         drawn, _ = bsdf.sample(body, wi, *u)
 
@@ -78,7 +107,7 @@ def record(stack: Stack, model: str | Model = DEFAULT, constant: Collection[str]
     held = {x: _held(name, kinds[name], x) for name, x in reversed(lobes.items()) if _worth(x)}
     rest = Graph(held)
     evaluated, sampled = rest.unique(graph.unique([value, density])), rest.unique(graph.unique(drawn))
-    return Recording(stack, chosen, kinds, lobes, evaluated[0], evaluated[1], sampled)
+    return Recording(stack, chosen, baked, shown, kinds, lobes, evaluated[0], evaluated[1], sampled)
 
 
 def _worth(x: Operand) -> TypeGuard[Symbol]:
@@ -105,8 +134,47 @@ def variance(stack: Stack) -> type[Variance]:
     return variance_kind(stack.kinds, stack.flat())
 
 
-def _fields(seen: bsdf.Scattered) -> tuple[dict[str, Value], dict[str, Kind]]:
-    """All that is known once wi is, by its place in the struct."""
+def structure(stack: Stack) -> type[Variance]:
+    """The kind of variance that holds a stack whatever its plain values are: as general as its interfaces are written,
+    with a pair of roughnesses or one, with a rotation or without. (Two that are equal are read as one.)
+    """
+    pairs = [layer for layer in stack.interfaces if isinstance(layer.alpha, tuple)]
+    if not pairs:
+        return Isotropic
+    return Covariance if any("rotation" in layer.model_fields_set for layer in pairs) else PerAxis
+
+
+def _weighed(body: bsdf.Body) -> tuple[bsdf.Body, list[str]]:
+    """A body with a weight for each reflected lobe, its base and its transmitted lobe; and their names."""
+    count = len(merging(body.above.model, sum(isinstance(layer, PreparedInterface) for layer in body.above.layers)))
+    names = [f"reflected[{k}]" for k in range(count)]
+    last = symbol.number(f"{SHOWN}[{count}]")
+
+    def lobe(seen: Lobe, weight: Value) -> Lobe:
+        gain = seen.gain * weight if seen.facets else seen.gain
+        return replace(seen, energy=seen.energy * weight, gain=gain)
+
+    def weighed(lobes: memo.Lobes) -> memo.Lobes:
+        def shown(w: Direction) -> tuple[list[Lobe], Lobe | None]:
+            reflected, passed = lobes(w)
+            weights = [symbol.number(f"{SHOWN}[{k}]") for k in range(count)]
+            return [lobe(*pair) for pair in zip(reflected, weights)], lobe(passed, last) if passed else None
+
+        return shown
+
+    def base(w: Direction) -> Base:
+        found = body.base(w)
+        assert found is not None
+        return replace(found, scale=found.scale * last, energy=found.energy * last)
+
+    shown = replace(body, lobes_above=weighed(body.lobes_above), lobes_below=weighed(body.lobes_below))
+    if body.below is not None:
+        return shown, [*names, "transmitted"]
+    return (replace(shown, base_above=base), [*names, "base"]) if body.above.base else (shown, names)
+
+
+def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> tuple[dict[str, Value], dict[str, Kind]]:
+    """All that is known once wi is, by its place in the struct; `worth` is that of the light over a diffuse base."""
     lobes = {f"reflected[{k}]": lobe for k, lobe in enumerate(seen.reflected)}
     if seen.transmitted is not None:
         lobes["transmitted"] = seen.transmitted
@@ -116,8 +184,10 @@ def _fields(seen: bsdf.Scattered) -> tuple[dict[str, Value], dict[str, Kind]]:
     fields = {f"{place}.{part}": value for place, all_parts in parts.items() for part, value in all_parts.items()}
     if seen.base:
         fields |= {"base_scale": seen.base.scale, "base_energy": seen.base.energy}
+    worths = {f"base_worth{k}": value for k, value in enumerate(worth)}
+    fields |= worths
     # A part is a colour in all lobes, where it is in one
-    wide = {"energy", "base_scale", "base_energy"}
+    wide = {"energy", "base_scale", "base_energy", *worths}
     wide |= {part(name) for name, value in fields.items() if symbol.is_colour(operand(value))}
     return fields, {name: "colour" if part(name) in wide else "number" for name in fields}
 

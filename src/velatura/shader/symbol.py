@@ -194,13 +194,14 @@ class Recorder:
 
     def interpolate(self, table: tables.Table, coordinates: Sequence[Value]) -> list[Value]:
         args = tuple(operand(x) for x in coordinates)
-        if any(is_colour(x) for x in args):
-            each = (self.interpolate(table, [component(x, c) for x in args]) for c in range(3))
-            return [Symbol("colour", channels, "colour") for channels in zip(*each)]
+        wide = any(is_colour(x) for x in args)
         name = next(name for name, known in tables.load().items() if known is table)
         channels = table.data.shape[-1]
         if channels == 1:
-            return [Symbol("value", args, "number", name)]
+            return [Symbol("value", args, "colour" if wide else "number", name)]
+        if wide:
+            each = (self.interpolate(table, [component(x, c) for x in args]) for c in range(3))
+            return [Symbol("colour", channels, "colour") for channels in zip(*each)]
         texels = Symbol("texels", args, "texels", name)
         return [Symbol("component", (texels,), "number", c) for c in range(channels)]
 

@@ -2,7 +2,7 @@
 
 from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.io import dumps, load, loads, preset, presets, save
-from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, is_colour
+from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, is_colour, within
 from velatura.stack.spectra import Named, names, rgb, spectrum
 from velatura.stack.stack import Stack
 from velatura.stack.values import RGB, Brushing, Texture, Varying
@@ -32,4 +32,5 @@ __all__ = [
     "rgb",
     "save",
     "spectrum",
+    "within",
 ]

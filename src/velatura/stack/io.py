@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
 import os
 import re
 from collections.abc import Callable, Iterable
@@ -18,6 +20,7 @@ from velatura.stack.stack import Stack
 
 _PRESETS = Path(__file__).with_name("presets")
 _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
+_LARGEST = 100_000  # values in a file
 
 
 # In ------------------------------------------------------------------------------------------------------------------
@@ -175,7 +178,13 @@ def _unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML that refuses duplicate keys and reads 1e-3 as a number, as YAML 1.2 does."""
+    """YAML that refuses duplicate keys and endless aliases, and reads 1e-3 as a number, as YAML 1.2 does."""
+
+    def get_single_node(self) -> yaml.Node | None:
+        node = super().get_single_node()
+        if node is not None and _size(node, {}) > _LARGEST:
+            raise InvalidInput(f"holds more than {_LARGEST} values once its aliases are written out")
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
@@ -185,6 +194,16 @@ class _Loader(yaml.SafeLoader):
                     raise InvalidInput(f"line {key.start_mark.line + 1}: key {key.value!r} appears twice")
                 seen.add(key.value)
         return super().construct_mapping(node, deep)
+
+
+def _size(node: yaml.Node, known: dict[int, float]) -> float:
+    """How many values a node holds, aliases written out; one that holds itself has no end."""
+    if id(node) not in known:
+        known[id(node)] = math.inf
+        parts = node.value if isinstance(node, yaml.CollectionNode) else ()
+        flat = itertools.chain.from_iterable(parts) if isinstance(node, yaml.MappingNode) else parts
+        known[id(node)] = 1 + sum(_size(part, known) for part in flat)
+    return known[id(node)]
 
 
 class _Dumper(yaml.SafeDumper):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import model_validator
 
@@ -127,6 +127,15 @@ _COLOURS = {k for model in LAYERS.values() for k, declared in parameters(model).
 def is_colour(name: str) -> bool:
     """Whether the value of that flat name (`layer0_eta`) may differ between colours."""
     return name.partition("_")[2] in _COLOURS
+
+
+def within(name: str) -> tuple[float, float]:
+    """Range of the value of that flat name, a little inside where its ends are excluded."""
+    key = name.partition("_")[2]
+    declared = {k: p for model in LAYERS.values() for k, p in parameters(model).items()}
+    parameter: Any = declared["alpha" if key.startswith("alpha") else key]
+    margin = 1e-3 if parameter.strict else 0.0
+    return parameter.low + margin, parameter.high - margin
 
 
 def entry_name(layer: Layer) -> str:

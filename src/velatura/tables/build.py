@@ -20,6 +20,11 @@ Of light that may bounce between the facets (`many`), as U at angles where Fresn
     conductor_multi         18 channels, for the same metals as `conductor`
     absorbing_inside_multi  12 channels, for kappa < eta < 1
     inside_multi            the energy itself, of dielectrics of relative index below 1
+
+Of diffuse light, by parts in a few directions (`parts`, `exchange`):
+
+    entering, returning     what the first interface lets in, and sends back from below
+    passing, staying        what others let through, and send back
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-from velatura.tables import many, once, stretched
+from velatura.tables import exchange, many, once, stretched
 from velatura.tables.quadrature import Progress, ignore
 from velatura.tables.store import Table, Tables
 
@@ -60,4 +65,4 @@ def build(progress: Progress = ignore) -> Built:
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
     """What makes each table."""
-    return {**once.makers(), **stretched.makers(), **many.makers()}
+    return {**once.makers(), **stretched.makers(), **many.makers(), **exchange.makers()}

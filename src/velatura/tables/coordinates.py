@@ -13,6 +13,7 @@ import numpy as np
 from velatura import ops
 from velatura.ops import Value
 
+INDEX_MAX, RATIO_MAX = 3.0, 2.5  # of the tables for diffuse light, where the lowest are 1 and 1 / 2.5
 ETA_MIN = 0.05  # lowest relative index of the tables for light inside a denser medium
 _CRITICAL_MIN = asin(ETA_MIN)
 
@@ -40,6 +41,24 @@ def from_critical_angle(theta_c: Value) -> Value:
 
 def to_critical_angle(x: np.ndarray) -> np.ndarray:
     return _CRITICAL_MIN + 1.5 * x / (1 + 0.5 * x) * (pi / 2 - _CRITICAL_MIN)
+
+
+def from_index(n: Value) -> Value:
+    return (1 - 1 / n) / (1 - 1 / INDEX_MAX)
+
+
+def to_index(x: np.ndarray) -> np.ndarray:
+    return 1 / (1 - x * (1 - 1 / INDEX_MAX))
+
+
+def from_ratio(ratio: Value) -> Value:
+    """Coordinate of a ratio of indices: 1/2 where they are equal."""
+    return 0.5 + (ratio / (1 + ratio) - 0.5) * ((RATIO_MAX + 1) / (RATIO_MAX - 1))
+
+
+def to_ratio(x: np.ndarray) -> np.ndarray:
+    share = 0.5 + (x - 0.5) * ((RATIO_MAX - 1) / (RATIO_MAX + 1))
+    return share / (1 - share)
 
 
 def from_angle(cos_theta: Value, theta_c: Value) -> Value:

@@ -16,6 +16,7 @@ from velatura.optics.ggx import Direction
 from velatura.tables import coordinates
 
 LINE = (512,)  # nodes, where functions depend on the cosine alone
+SINE_MIN = 1e-6  # so that there is an azimuth at the normal
 PLANE = (64, 33)  # nodes over the cosine and the azimuth; the latter one more than a multiple of four
 
 
@@ -31,17 +32,26 @@ class Curves:
 
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
         """For a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
-        azimuth = [_from_azimuth(w[0], w[1])] * (len(self.shape) - 1 - len(others))
-        return ops.interpolate(self, coordinates.from_cosine(w[2]), *azimuth, *others)
+        return ops.interpolate(self, *places(w, len(self.shape) - len(others)), *others)
 
 
 def directions(shape: tuple[int, ...], number: type | None) -> Direction:
     """Those at the nodes, for Dr.Jit's type of numbers (None for NumPy). Shape: (cosines,) or (cosines, azimuths)."""
     index, real = _index(prod(shape), number)
     turns = prod(shape[1:])
-    cosine = coordinates.to_cosine(real(index // turns) / (shape[0] - 1))
-    sine, phi = ops.sqrt(1 - cosine * cosine), _to_azimuth(real(index % turns) / max(turns - 1, 1))
+    return direction(real(index // turns) / (shape[0] - 1), real(index % turns) / max(turns - 1, 1))
+
+
+def direction(x: Value, t: Value) -> Direction:
+    """The direction at coordinates from 0 to 1, of its cosine and of its azimuth, which tells even at the normal."""
+    cosine, phi = coordinates.to_cosine(x), _to_azimuth(t)
+    sine = ops.maximum(ops.sqrt(1 - cosine * cosine), SINE_MIN)
     return sine * ops.cos(phi), sine * ops.sin(phi), cosine
+
+
+def places(w: Direction, axes: int) -> list[Value]:
+    """The coordinates of a direction, on one axis or two."""
+    return [coordinates.from_cosine(w[2]), *([_from_azimuth(w[0], w[1])] if axes > 1 else [])]
 
 
 def curves(columns: Sequence[Value], shape: tuple[int, ...], number: type | None) -> Curves:
@@ -81,7 +91,7 @@ def _index(count: int, number: type | None) -> tuple[Value, Callable[[Value], Va
 
 
 def _from_azimuth(x: Value, y: Value) -> Value:
-    c, s = x * x - y * y, 2 * x * y
+    c, s = x * x - y * y + ops.TINY, 2 * x * y  # 0 at the normal
     p = ops.divide(c, ops.absolute(c) + ops.absolute(s))
     return 0.25 * ops.select(s < 0, 3 + p, 1 - p)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from velatura.optics import fresnel
-from velatura.tables import stretched, walks, yardstick
+from velatura.tables import exchange, parts, stretched, walks, yardstick
 from velatura.tables.build import build
 from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, tir
 from velatura.tables.many import bin_cosines
@@ -82,6 +82,38 @@ def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
         "tir_published_outside": lambda: leaving("published", mean_transmittance_out, above),
         "tir_clean": lambda: leaving("clean", share_in_cone, below),
         "drawn": drawn,
+        **_measures_of_parts(tables),
+    }
+
+
+def _measures_of_parts(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
+    """For the tables of diffuse light: errors of what an optical depth of .5 leaves of it, of light that comes from one
+    direction, or evenly from all. Indices are those from 1.3 to 2.2."""
+    cos_theta, alpha, *random = (x[:WALKED] for x in _points())
+    n, other = (1.3 + 0.9 * x for x in random)
+
+    def left(found: np.ndarray, n: np.ndarray) -> np.ndarray:
+        """Of parts, shape (nodes, points)."""
+        return np.asarray((found * np.exp(-0.5 / np.array(parts.node_cosines(n)))).sum(axis=0))
+
+    def entering() -> np.ndarray:
+        true = [
+            exchange.scattered(cos_theta[i : i + 1], alpha[i], (1.0, n[i]), PATHS, np.random.default_rng(2))[1][0]
+            for i in range(WALKED)
+        ]
+        return left(np.array([x / x.sum() for x in true]).T - parts.entering(tables, cos_theta, alpha, n), n)
+
+    def evenly(which: int, rows: Sequence[Sequence[np.ndarray]], beyond: np.ndarray) -> np.ndarray:
+        even = np.array(parts.even(n))
+        true = [exchange.exchanged(alpha[i], (n[i], beyond[i]), PATHS // 16, [4])[which] for i in range(WALKED)]
+        error = np.moveaxis(np.array(true), 0, -1) - np.array(rows)
+        return left(np.einsum("ji,jki->ki", even, error), beyond if which else n)
+
+    return {
+        "entering": entering,
+        "returning": lambda: evenly(0, parts.returning(tables, alpha, n), np.ones_like(n)),
+        "passing": lambda: evenly(1, parts.between(tables.passing, alpha, n, other / n), other),
+        "staying": lambda: evenly(0, parts.between(tables.staying, alpha, n, other / n), other),
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from functools import cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """All that `fgd` and `tir` look up; `build` says what each one holds."""
+    """All that is looked up; `build` says what each one holds."""
 
     dielectric: Table
     conductor: Table
@@ -64,6 +65,10 @@ class Tables:
     tir_published_outside: Table
     tir_clean: Table
     drawn: Table
+    entering: Table
+    returning: Table
+    passing: Table
+    staying: Table
 
     def upload(self, dialect: Any) -> None:
         """Make all textures of a Dr.Jit module now, as they cannot be made while a kernel is being recorded."""
@@ -85,9 +90,17 @@ def save(tables: Tables, path: Path = FILE) -> None:
         np.savez_compressed(file, **arrays)
 
 
-@cache
 def load() -> Tables:
-    """The tables shipped with the package."""
+    """The tables shipped with the package: the same ones for all threads, since they are told apart by identity."""
+    with _loading:
+        return _loaded()
+
+
+_loading = Lock()
+
+
+@cache
+def _loaded() -> Tables:
     with np.load(FILE) as arrays:
         return Tables(**{f.name: _read(arrays, f.name) for f in fields(Tables)})
 

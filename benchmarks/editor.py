@@ -1,0 +1,192 @@
+"""The editor's viewport: its stills against Mitsuba's, and what it costs (SwiftShader, so run it on a quiet machine).
+
+Stills: root mean square of the difference in linear radiance relative to white, beside the noise of either picture.
+Times: to a first picture, to a picture after a new shader, of frames while a value is dragged, and of a sample; and
+of a frame with a new roughness beside one of three.js with MeshPhysicalMaterial and clearcoat, by turns.
+
+    python benchmarks/editor.py [--size 96] [--samples 1024] [--spp 2048] [--only stills|times]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
+
+import viewport
+
+import velatura as vt
+from velatura.editor import bodies
+
+STILLS = (
+    ("coated-gold", "ball"),
+    ("turned-brushing", "ball"),
+    ("glossy-plastic", "ball"),
+    ("frosted-metal", "sphere"),
+    ("frosted-glass", "sphere"),
+)
+
+THREE = "export * as three from 'three';"
+FIRST = """
+async (material) => {
+  const start = performance.now();
+  await viewport.setObject('ball');
+  await viewport.setEnvironment('studio');
+  const shader = await answer('shader', { material });
+  await viewport.setMaterial('a', shader);
+  while (!viewport.frames.length) await new Promise((resolve) => setTimeout(resolve, 5));
+  return performance.now() - start;
+}
+"""
+ANOTHER = """
+async (material) => {
+  const frames = viewport.frames.length, start = performance.now();
+  const shader = await answer('shader', { material });
+  const asked = performance.now();
+  await viewport.setMaterial('a', shader);
+  while (viewport.frames.length === frames) await new Promise((resolve) => setTimeout(resolve, 5));
+  return [asked - start, performance.now() - asked];
+}
+"""
+DRAG = """
+async (key) => {
+  const { values } = viewport.slots.a;
+  viewport.moving(true);
+  viewport.frames = [];
+  for (let k = 0, end = performance.now() + 3000; performance.now() < end; k++) {
+    viewport.setValues('a', { ...values, [key]: 0.05 + 0.3 * ((k % 50) / 50) });
+    await new Promise((resolve) => requestAnimationFrame(resolve));
+  }
+  viewport.moving(false);
+  return viewport.framesPerSecond;
+}
+"""
+SAMPLE = """
+async () => {
+  viewport.setBudget({ samples: 4 });
+  while (viewport.samples < 1) await new Promise((resolve) => setTimeout(resolve, 5));
+  const start = performance.now();
+  while (viewport.samples < 4) await new Promise((resolve) => setTimeout(resolve, 5));
+  return (performance.now() - start) / 3;
+}
+"""
+
+BESIDE = """
+async (material) => {
+  const { three } = page, { sources, device, canvas, camera } = viewport, { gl } = device;
+  viewport.setBudget({ samples: 0 });
+  await viewport.setMaterial('a', await answer('shader', { material }));
+  while (!viewport.previewed) await new Promise((resolve) => setTimeout(resolve, 20));
+  await device.done();
+
+  // The same object in the same light
+  const other = Object.assign(document.createElement('canvas'), { width: canvas.width, height: canvas.height });
+  const renderer = new three.WebGLRenderer({ canvas: other, antialias: false });
+  const stage = new three.Scene();
+  const { width, height, blurred } = sources.environment;
+  const light = new three.DataTexture(blurred, width, height, three.RGBAFormat, three.FloatType);
+  light.mapping = three.EquirectangularReflectionMapping;
+  light.needsUpdate = true;
+  stage.environment = stage.background = new three.PMREMGenerator(renderer).fromEquirectangular(light).texture;
+  const coated = { color: 0xffb040, metalness: 1, clearcoat: 1, clearcoatRoughness: 0.05 };
+  const surface = new three.MeshPhysicalMaterial(coated);
+  for (const { role, positions, normals, uv, triangles } of sources.parts) {
+    if (role === 'ground') continue;
+    const geometry = new three.BufferGeometry();
+    geometry.setAttribute('position', new three.BufferAttribute(positions, 3));
+    geometry.setAttribute('normal', new three.BufferAttribute(normals, 3));
+    geometry.setAttribute('uv', new three.BufferAttribute(uv, 2));
+    geometry.setIndex(new three.BufferAttribute(triangles, 1));
+    stage.add(new three.Mesh(geometry, role === 'object' ? surface : new three.MeshStandardMaterial()));
+  }
+  const eye = new three.PerspectiveCamera(camera.fov, width / height, 0.1, 100);
+  eye.aspect = canvas.width / canvas.height;
+  eye.updateProjectionMatrix();
+  eye.position.set(...camera.origin);
+  eye.lookAt(...camera.target);
+
+  // Frames by turns
+  const pixel = new Uint8Array(4);
+  const timed = (gl, draw) => {
+    const start = performance.now();
+    draw();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    return performance.now() - start;
+  };
+  const slot = viewport.slots.a, { values } = slot, uniforms = viewport.uniforms();
+  const ours = (quick, alpha) => () => {
+    slot.setValues({ ...values, layer0_alpha_u: alpha, layer0_alpha_v: alpha });
+    slot.drawPreview(viewport.preview, uniforms, quick);
+    viewport.paint();
+  };
+  const theirs = (roughness) => () => {
+    surface.roughness = roughness;
+    renderer.render(stage, eye);
+  };
+  const found = { fine: [], quick: [], theirs: [] };
+  for (let k = 0; k < 24; k++) {
+    const roughness = 0.1 + 0.01 * k;
+    found.fine.push(timed(gl, ours(false, roughness)));
+    found.quick.push(timed(gl, ours(true, roughness)));
+    found.theirs.push(timed(renderer.getContext(), theirs(roughness)));
+  }
+  const ratio = (name) => found[name].map((time, k) => time / found.theirs[k]).slice(4).sort((a, b) => a - b)[10];
+  const middle = (name) => found[name].slice(4).sort((a, b) => a - b)[10];
+  renderer.dispose();
+  return { fine: ratio('fine'), quick: ratio('quick'), times: ['fine', 'quick', 'theirs'].map(middle) };
+}
+"""
+
+
+def stills(size: int, samples: int, spp: int) -> None:
+    with tempfile.TemporaryDirectory() as folder, viewport.stage(Path(folder), size, size) as opened:
+        for preset, scene in STILLS:
+            found = viewport.compare(opened, vt.preset(preset), scene, "studio", samples, spp)
+            print(
+                f"{preset:26} {scene:8} difference {found.difference:.4f}  noise {found.noise:.4f}, "
+                f"of Mitsuba {found.noise_of_truth:.4f}",
+                flush=True,
+            )
+
+
+def times() -> None:
+    with tempfile.TemporaryDirectory() as folder, viewport.stage(Path(folder), 640, 360, THREE) as opened:
+        page = opened.page
+        page.evaluate("viewport.setBudget({ samples: 0 })")
+        two, three = (bodies.document(vt.preset(name)) for name in ("coated-gold", "three-dielectrics-over-metal"))
+        print(f"first picture {page.evaluate(FIRST, two) / 1e3:.2f} s")
+        asked, drawn = page.evaluate(ANOTHER, three)
+        print(f"other layers: {asked / 1e3:.2f} s for the shader, {drawn / 1e3:.2f} s to compile and draw")
+        page.evaluate(ANOTHER, two)
+        print(f"dragging a roughness at 640 x 360: {page.evaluate(DRAG, 'layer0_alpha_u'):.1f} frames/s")
+        print(f"a sample at 640 x 360: {page.evaluate(SAMPLE) / 1e3:.2f} s")
+        found = page.evaluate(BESIDE, two)
+        fine, quick, theirs = found["times"]
+        print(
+            f"a frame with another roughness: {fine:.0f} ms, {quick:.0f} ms in fewer pixels, as while dragging, and "
+            f"{theirs:.0f} ms of MeshPhysicalMaterial: {found['fine']:.2f} and {found['quick']:.2f} times that"
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--size", type=int, default=96)
+    parser.add_argument("--samples", type=int, default=1024)
+    parser.add_argument("--spp", type=int, default=2048)
+    parser.add_argument("--only", choices=("stills", "times"))
+    arguments = parser.parse_args()
+    if why := viewport.missing():
+        print(f"skipped: {why}")
+        return
+    if arguments.only != "stills":
+        times()
+    if arguments.only != "times":
+        stills(arguments.size, arguments.samples, arguments.spp)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,20 @@
+"""`velatura edit`: the editor in the browser."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def edit(
+    material: Annotated[
+        str | None, typer.Argument(metavar="M", help="A material file (YAML or JSON), or the name of a preset.")
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Of the server; 0 for any free one.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+) -> None:
+    """Edit materials in the browser; files are read from and written to the working directory."""
+    from velatura.editor import server
+
+    server.serve(material, port, browser)

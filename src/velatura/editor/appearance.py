@@ -1,0 +1,352 @@
+"""What the Appearance panel asks: a material as lobes, and the material that has other ones.
+
+Every verb is a function of a mapping to a mapping, both of JSON's types; `service.VERBS` takes them over. What was
+answered is remembered with all that is known of it, so that the next drag starts from there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from collections.abc import Iterator
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from velatura.editor.bodies import Answer, Body, Verb, document, material_of, model_of
+from velatura.errors import InvalidInput, NoSolution
+from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
+from velatura.inverse.coats import with_albedo
+from velatura.inverse.explain import REASONS
+from velatura.inverse.nearby import Bound, Nearby, closed, plain
+from velatura.inverse.target import BLUR
+from velatura.inverse.targets import FIGURES
+from velatura.model import Model, named
+from velatura.model.maps import MAPS
+from velatura.model.statistics import statistics
+from velatura.stack import Diffuse, Interface, Stack, Varying
+
+ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
+REMEMBERED = 32  # answers
+EFFORT = stacks.EFFORTS[:1]  # to find a stack that is not near
+HALVES = 7  # of the way to a wish that cannot be met
+STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
+SAVED = tuple(str(n) for n in range(15, 23))  # figures of Bati et al. 2021
+SAVED_MODEL = "bati2021"
+
+
+# Bodies and answers --------------------------------------------------------------------------------------------------
+
+
+def reader_of(body: Body, target: Target) -> Model:
+    """The model that reads the stacks; its channels are the target's, where that says so."""
+    chosen = model_of(body)
+    return chosen.with_switches(channels=target.channels) if target.channels else chosen
+
+
+def lobe_of(body: Body, target: Target) -> int:
+    """The index of a lobe of the target."""
+    lobe = body.get("lobe")
+    if not isinstance(lobe, int) or not 0 <= lobe < len(target.lobes):
+        raise InvalidInput(f"lobe: must be a number from 0 to {len(target.lobes) - 1}, got {lobe!r}")
+    return lobe
+
+
+def described(target: Target) -> Answer:
+    """A target as a body holds it, all of its lobes' keys written out."""
+    rows = []
+    for lobe in target.lobes:
+        row = {"energy": list(lobe.colour), "alpha": lobe.roughness, "interfaces": lobe.interfaces, "base": lobe.base}
+        rows.append({**row, "tint": lobe.tint, "fixed": lobe.fixed.to_dict()})
+    return {**target.to_dict(), "lobes": rows}
+
+
+# What is remembered --------------------------------------------------------------------------------------------------
+
+_answers: dict[str, Nearby] = {}
+_lock = Lock()
+
+
+def _key(material: Answer, target: Target, model: Model) -> str:
+    """What tells answers apart: the material, the model, and of a target all but its energies and blurs."""
+    form: list[Any] = [target.exterior, target.eta_max]
+    form += [[lobe.interfaces, lobe.base, round(lobe.tint, 6), lobe.fixed.to_dict()] for lobe in target.lobes]
+    return json.dumps([material, form, repr(model)], sort_keys=True)
+
+
+def remember(found: Nearby, material: Answer) -> None:
+    with _lock:
+        _answers[_key(material, found.target, found.model)] = found
+        while len(_answers) > REMEMBERED:
+            del _answers[next(iter(_answers))]
+
+
+def held(material: Answer, target: Target, model: Model) -> Nearby | None:
+    """A material as what can be moved, None where it does not have the form of the target."""
+    with _lock:
+        known = _answers.get(_key(material, target, model))
+    if known is not None:
+        return known
+    try:
+        return Nearby.of(Stack.from_dict(material), target, model)
+    except InvalidInput:
+        return None
+
+
+# A material as lobes -------------------------------------------------------------------------------------------------
+
+
+def appearance(body: Body) -> Answer:
+    """A material as a target; where it can be none, `says` why, and the target is there to be looked at."""
+    stack, model = material_of(body), model_of(body)
+    try:
+        parts = plain(stack)
+    except InvalidInput as error:
+        return _shown(stack, model, str(error))
+
+    # Share the interfaces out among lobes
+    each = Nearby.of(stack, _target(stack, parts, [1] * len(parts)), model)
+    assert each is not None
+    reading = each.known.reading
+    energies, variances = reading[: 3 * len(parts)].reshape(-1, 3), reading[3 * len(parts) :]
+    counts: list[int] = body.get("interfaces") or _counts(variances)
+    if sum(counts) != len(parts) or not set(counts) <= {1, 2}:
+        raise InvalidInput(f"interfaces: must be 1 or 2 for each lobe, {len(parts)} in all, got {counts}")
+    firsts = np.cumsum([0, *counts[:-1]])
+    target = _target(stack, parts, counts)
+    for k, (n, count) in enumerate(zip(firsts, counts)):
+        alpha = float(MAPS[model.map].roughness(variances[n]))
+        target = target.with_lobe(k, energy=tuple(energies[n : n + count].sum(axis=0).tolist()), alpha=alpha)
+    return {
+        "target": described(target),
+        "variances": variances[firsts].tolist(),
+        "haze": haze(target, model),
+        "layers": _layers(stack, counts),
+        "says": None,
+    }
+
+
+def haze(target: Target, model: Model) -> list[Answer]:
+    """Of every lobe and the next one below the ratio of their energies, by channel, and of their widths."""
+    found = []
+    for lobe, below in zip(target.lobes, target.lobes[1:]):
+        s, s_below = (float(MAPS[model.map].variance(one.roughness)) for one in (lobe, below))
+        energy = [b / a if a > 0 else None for a, b in zip(lobe.colour, below.colour)]
+        found.append({"energy": energy, "width": (s_below / s) ** 0.5 if s > 0 else None})
+    return found
+
+
+def _counts(variances: np.ndarray) -> list[int]:
+    """Interfaces of every lobe: two neighbours that blur alike are one."""
+    counts: list[int] = []
+    previous = None
+    for s in variances:
+        if previous is not None and abs(s - previous) <= ALIKE and counts[-1] == 1:
+            counts[-1] = 2
+        else:
+            counts.append(1)
+        previous = s
+    return counts
+
+
+def _target(stack: Stack, parts: list[Any], counts: list[int]) -> Target:
+    """A target of the form of a material, its energies and blurs not yet read."""
+    lobes, n, eta = [], 0, stack.exterior
+    for count in counts:
+        own = parts[n : n + count]
+        tau = np.broadcast_to(own[0].tau, (3, 1))[:, 0]
+        pinned = bool(np.any(tau)) and (count == 2 or n == 0)
+        fixed = {"tau": [tuple(tau.tolist()), *[None] * (count - 1)]} if pinned else {}
+        tint = 0.5
+        if own[-1].kind == "conductor":
+            above = own[0].eta if count == 2 else eta
+            tint = _tint(own[-1], above)
+        lobes.append({"energy": 0.0, "interfaces": count, "base": own[-1].kind, "tint": tint, "fixed": fixed})
+        n, eta = n + count, own[-1].eta
+    most = max([4.0, *(float(np.max(part.eta)) for part in parts if part.kind == "dielectric")])
+    return Target(lobes, name=stack.name, exterior=stack.exterior, eta_max=most)
+
+
+def _tint(part: Any, eta_1: Any) -> float:
+    from velatura.inverse.interface import conductor_tint
+
+    return float(np.mean(conductor_tint(part.eta / eta_1, part.kappa / eta_1)))
+
+
+def _layers(stack: Stack, counts: list[int]) -> list[list[int]]:
+    """Indices of the layers of every lobe: its interfaces, and the media above them."""
+    found: list[list[int]] = [[] for _ in counts]
+    lobes = iter([k for k, count in enumerate(counts) for _ in range(count)])
+    waiting: list[int] = []
+    for n, layer in enumerate(stack.layers):
+        waiting.append(n)
+        if isinstance(layer, Interface):
+            found[next(lobes)] += waiting
+            waiting = []
+    return found
+
+
+def _shown(stack: Stack, model: Model, says: str) -> Answer:
+    """The lobes of a material that is no target, one for each interface, as far as they are those of one point."""
+    try:
+        read = statistics(stack, 1.0, model=model)
+    except InvalidInput:
+        return {"target": None, "variances": [], "haze": [], "layers": [], "says": says}
+    energies = [np.clip(energy[:, 0], 0, None).tolist() for energy in read.energy]
+    alphas = [float(np.sqrt(np.prod(np.reshape(alpha, (-1, 2)).mean(axis=0)))) for alpha in read.alpha]
+    lobes = [{"energy": e, "alpha": min(a, 1.0), "interfaces": 1} for e, a in zip(energies, alphas)]
+    target = Target(lobes) if lobes else None
+    return {
+        "target": described(target) if target else None,
+        "variances": [float(MAPS[model.map].variance(a)) for a in alphas],
+        "haze": haze(target, model) if target else [],
+        "layers": _layers(stack, [1] * len(lobes)),
+        "says": says,
+    }
+
+
+# Lobes as a material -------------------------------------------------------------------------------------------------
+
+
+def invert(body: Body) -> Answer:
+    """The stack with the lobes of a target, or of the nearest on the way there; near `material` if that is given."""
+    wish = Target.from_dict(body.get("target"))
+    model, material = reader_of(body, wish), body.get("material")
+    near = held(material, wish, model) if material else None
+    if near is None:
+        return _fresh(wish, model)
+    possible = near.achromatic(wish)
+    found, bound = near.towards(possible)
+    if bound is not None:
+        other = _elsewhere(possible, near)
+        if other is not None:
+            found, bound = other, None
+        elif near.far(possible):
+            found, bound = _approached(possible, near)
+    says = bound.why(wish) if bound else None
+    if says is None and possible is not wish:
+        says = f"lobe 1: {REASONS['colour']}"
+    return answered(found, says)
+
+
+def answered(found: Nearby, snapped: str | None) -> Answer:
+    """A stack as an answer, what was asked for or, `snapped` for that reason, the nearest to it."""
+    stack = _under(found)
+    material = document(stack)
+    remember(found, material)
+    return {
+        "feasible": True,
+        "material": material,
+        "target": described(found.target),
+        "haze": haze(found.target, found.model),
+        "snapped": snapped,
+    }
+
+
+def _under(found: Nearby) -> Stack:
+    """The material; where it has a diffuse base, that keeps its energy."""
+    base = found.tail[-1] if found.tail else None
+    if not isinstance(base, Diffuse) or isinstance(base.albedo, Varying) or found.diffuse is None:
+        return found.stack
+    return with_albedo(found.stack, np.array(found.diffuse), found.model)
+
+
+def _elsewhere(wish: Target, near: Nearby) -> Nearby | None:
+    """The stack that has the lobes, found without regard to what there is."""
+    found = stacks.search(wish, closed(near.model), EFFORT)
+    fresh = Nearby.of(found.stack, wish, near.model) if found else None
+    if fresh is None:
+        return None
+    fresh = dataclasses.replace(fresh, tail=near.tail, name=near.name, diffuse=near.diffuse)
+    moved, bound = fresh.towards(wish)
+    return moved if bound is None else None
+
+
+def _approached(wish: Target, near: Nearby) -> tuple[Nearby, Bound | None]:
+    """As near to a wish that is far and cannot be met as halves of the way lead, and then what is kept allows."""
+    t, found = 0.0, near
+    for n in range(1, HALVES + 1):
+        other = _elsewhere(near.between(wish, t + 0.5**n), near)
+        if other is not None:
+            t, found = t + 0.5**n, other
+    return found.towards(wish)
+
+
+def _fresh(wish: Target, model: Model) -> Answer:
+    """A stack for a target by itself."""
+    for start in _starts(wish):
+        found = stacks.search(start, closed(model), EFFORT)
+        fresh = Nearby.of(found.stack, start, model) if found else None
+        if fresh is not None:
+            moved, bound = fresh.towards(fresh.achromatic(wish))
+            if bound is None or start is not wish:
+                return answered(moved, bound.why(wish) if bound else None)
+    return _pinned(wish, model)
+
+
+def _starts(wish: Target) -> Iterator[Target]:
+    """Targets from which a wish is approached: itself, then such as have more blur below, then darker ones."""
+    yield wish
+    for scale in STARTS:
+        start, s = wish, 0.0
+        for k, lobe in enumerate(wish.lobes):
+            s = max(float(BLUR.variance(lobe.roughness)), WIDER * s)
+            grey = k == 0 and lobe.interfaces == 1 and lobe.base == "dielectric"
+            energy = (float(np.mean(lobe.colour)),) * 3 if grey else lobe.colour
+            start = start.with_lobe(k, energy=tuple(scale * e for e in energy), alpha=None, variance=s)
+        yield start
+
+
+def _pinned(wish: Target, model: Model) -> Answer:
+    """A stack for a target that fixes more than a drag keeps, by the whole search."""
+    try:
+        found, says = invert_stack(wish, model), None
+    except Infeasible as error:
+        if error.nearest is None:
+            return {"feasible": False, "why": error.why}
+        found, says = invert_stack(error.nearest, model), error.why
+    return {"feasible": True, "material": document(found.stack), "target": described(found.target), "snapped": says}
+
+
+# Coats, and the figures ----------------------------------------------------------------------------------------------
+
+
+def coated(body: Body) -> Answer:
+    """A material under a coat, with its appearance kept or not, and its lobes before and after."""
+    values = {key: body.get(key, default) for key, default in (("eta", 1.5), ("alpha", 0.0))}
+    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values.values()):
+        raise InvalidInput(f"eta, alpha: must be numbers, got {values['eta']!r}, {values['alpha']!r}")
+    try:
+        found = coat(material_of(body), **values, keep_appearance=bool(body.get("keep")), model=model_of(body))
+    except NoSolution as error:
+        return {"error": str(error)}
+    return {"material": document(found.stack), "lobes": found.change()}
+
+
+def targets(body: Body) -> Answer:
+    """The targets of Bati et al. 2021, figures 15 to 22, with the stacks that have them."""
+    return {"targets": _saved()}
+
+
+@functools.cache
+def _saved() -> list[Answer]:
+    found = []
+    for figure, lobes in FIGURES.items():
+        if figure.split()[0] not in SAVED:
+            continue
+        title = f"Bati 2021, figure {figure}"
+        answer = _fresh(Target(lobes, name=title), named(SAVED_MODEL))
+        name = f"bati2021-{figure.replace(',', '').replace(' ', '-')}"
+        found.append({"name": name, "title": title, "model": SAVED_MODEL, **answer})
+    return found
+
+
+#: What `service.VERBS` takes over.
+VERBS: dict[str, Verb] = {
+    "appearance": appearance,
+    "invert": invert,
+    "coat": coated,
+    "targets": targets,
+}

@@ -1,0 +1,187 @@
+"""The class of one lobe as a map: all indices with which it looks the same head-on, and the member that is taken."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.editor.appearance import answered, held, lobe_of, reader_of
+from velatura.editor.bodies import Answer, Body, Verb, array
+from velatura.errors import InvalidInput
+from velatura.inverse import EquivalenceClass, Target, interface, stacks
+from velatura.inverse.interface import conductor_index
+from velatura.inverse.nearby import Nearby
+
+Array = NDArray[np.float64]
+
+SIZES = (8, 256)
+TINTS = 33  # points of a conductor's curve
+CHANNELS = ("r", "g", "b")
+
+
+def class_(body: Body) -> Answer:
+    """The map of a lobe's class below the layers that the material has above it.
+
+    Arrays have rows over the second axis (y) and columns over the first (x). `feasible` and `absorption` (the mean
+    optical depth) are null where all members lie on curves: those of `outlines`, by channel, `all` for the indices
+    that do for all of them. Where the model has no closed form, that of the papers stands in, with the lobes that it
+    reads of the material, so that the map is exact at the member. `conductor` is the map of a metal's eta against k
+    over its tint, `members` by channel.
+    """
+    target, near, lobe = _held(body)
+    size = body.get("size", 48)
+    if not isinstance(size, int) or not SIZES[0] <= size <= SIZES[1]:
+        raise InvalidInput(f"size: must be a number from {SIZES[0]} to {SIZES[1]}, got {size!r}")
+    place = next(n for n, place in enumerate(near.places) if place.lobe == lobe)
+    seen = near.in_closed_form()
+    wanted = seen.target.lobes[lobe]
+    members = stacks.class_of(seen.above(place), wanted, seen.target, first=lobe == 0)
+    if wanted.interfaces == 2:
+        members = dataclasses.replace(members, tau=near.places[place].kept)
+    axis = np.geomspace(1.0, target.eta_max, size)
+    answer: Answer = {"member": near.point_of(lobe)}
+    if wanted.interfaces == 2 and wanted.base == "dielectric":
+        return answer | {"kind": "dielectric pair"} | _pair(members, axis)
+    conductor = _conductor(near, place + wanted.interfaces - 1) if wanted.base == "conductor" else None
+    if wanted.interfaces == 1 and conductor:
+        return answer | conductor
+    kind = "pair over a conductor" if conductor else "dielectric"
+    return answer | {"kind": kind, "conductor": conductor} | _line(members, axis, bool(conductor))
+
+
+def member(body: Body) -> Answer:
+    """The stack with the member of a lobe's class at a point of its map, or the nearest; all lobes stay as they are.
+
+    point: as `class` gives `member`; with `map: conductor` a point [eta, k], to which the nearest tint is taken.
+    """
+    target, near, lobe = _held(body)
+    point = body.get("point")
+    numbers = isinstance(point, list) and all(isinstance(x, int | float) for x in point)
+    wanted = near.target.lobes[lobe]
+    if not numbers or not point:
+        raise InvalidInput(f"point: must be a list of numbers, got {point!r}")
+    if wanted.base == "conductor" and (wanted.interfaces == 1 or body.get("map") == "conductor") and len(point) == 2:
+        last = max(n for n, place in enumerate(near.places) if place.lobe == lobe)
+        point = [*near.point_of(lobe)[:-1], _nearest_tint(near, last, point)]
+    here = near.point_of(lobe)
+    if len(point) != len(here):
+        raise InvalidInput(f"point: must hold {len(here)} numbers, got {len(point)}")
+    tints = 1 if wanted.base == "conductor" else 0
+    high = [target.eta_max] * (len(here) - tints) + [1.0] * tints
+    low = [1.0] * (len(here) - tints) + [0.0] * tints
+    found, bound = near.member(lobe, np.clip(point, low, high).tolist())
+    if tints:
+        tint = found.point_of(lobe)[-1]
+        found = found.renamed(found.target.with_lobe(lobe, tint=min(max(tint, 0.0), 1.0)))
+    return answered(found, bound.why(target) if bound else None)
+
+
+def _held(body: Body) -> tuple[Target, Nearby, int]:
+    """The target, the material that has it, and the lobe that is meant."""
+    target = Target.from_dict(body.get("target"))
+    near = held(body.get("material") or {}, target, reader_of(body, target))
+    if near is None:
+        raise InvalidInput("material: does not have the interfaces of the target")
+    return target, near.renamed(target), lobe_of(body, target)
+
+
+# Maps ----------------------------------------------------------------------------------------------------------------
+
+
+def _pair(members: EquivalenceClass, axis: Array) -> Answer:
+    """Index against index."""
+    depths = members.grid(axis, axis)
+    feasible = np.all(depths >= -interface.NEGLIGIBLE, axis=0)
+    channels = [*zip(CHANNELS, depths), ("all", np.min(depths, axis=0))]
+    return {
+        "axes": [_axis("eta 1", axis), _axis("eta 2", axis)],
+        "feasible": array(feasible.T, "uint8"),
+        "absorption": array(np.where(feasible, np.mean(depths, axis=0), np.nan).T),
+        "outlines": [{"channel": name, "points": line} for name, depth in channels for line in _zeros(axis, depth)],
+    }
+
+
+def _zeros(axis: Array, depth: Array) -> list[list[list[float]]]:
+    """Curves of depth 0 over the indices (eta_1, eta_2): below the index above, where it falls, and where it rises."""
+    curves = []
+    reflected = np.exp(2 * depth) - 1  # straighter than the depth itself
+    for sign in (-1, 1):
+        found = []
+        for x, column in zip(axis, reflected):
+            a, b = sign * column[:-1], sign * column[1:]
+            for n in np.flatnonzero((a < 0) & (b >= 0)):
+                y = axis[n] + (axis[n + 1] - axis[n]) * a[n] / (a[n] - b[n])
+                found.append([float(x), float(y)])
+        curves.append(found)
+    return [curve for curve in curves if len(curve) > 1]
+
+
+def _line(members: EquivalenceClass, axis: Array, tinted: bool) -> Answer:
+    """The one free index; against the tint, where a conductor lies below, which hardly matters."""
+    parts = members.member(axis)
+    feasible = np.broadcast_to(np.logical_and.reduce([part.feasible for part in parts]), axis.shape)
+    depth = np.broadcast_to(np.mean(np.atleast_2d(parts[-1].tau), axis=0), axis.shape)
+    absorption = np.where(feasible, depth, np.nan)
+    rows = np.ones((len(axis) if tinted else 1, 1))
+    axes = [_axis("eta 1", axis), *([{"label": "tint", "low": 0.0, "high": 1.0}] if tinted else [])]
+    return {
+        "axes": axes,
+        "feasible": array(rows * feasible > 0, "uint8"),
+        "absorption": array(rows * absorption),
+        "outlines": [],
+    }
+
+
+def _conductor(near: Nearby, n: int) -> Answer:
+    """eta against k of a metal, over its tint."""
+    eta, kappa = _curves(near, n, np.linspace(0, 1, TINTS))
+    here = [x[:, 0] for x in _metal(near, n)]
+    limits = [(float(x.min()), float(x.max())) for x in (eta, kappa)]
+    return {
+        "kind": "conductor",
+        "axes": [{"label": label, "low": low, "high": high} for label, (low, high) in zip(("eta", "k"), limits)],
+        "feasible": None,
+        "absorption": None,
+        "outlines": [
+            {"channel": name, "points": np.stack(curve, axis=1).tolist()} for name, *curve in zip(CHANNELS, eta, kappa)
+        ],
+        "member": [float(np.mean(x)) for x in here],
+        "members": np.stack(here, axis=1).tolist(),
+        "tint": near.point_of(near.places[n].lobe)[-1],
+    }
+
+
+def _metal(near: Nearby, n: int) -> tuple[Array, Array]:
+    """Absolute eta and k of a metal, (3, 1) each."""
+    eta, kappa = near.indices(n)
+    assert kappa is not None
+    return np.broadcast_to(eta, (3, 1)), np.broadcast_to(kappa, (3, 1))
+
+
+def _curves(near: Nearby, n: int, tint: Array) -> tuple[Array, Array]:
+    """eta and k, (3, N), of metals that reflect as much when smooth."""
+    eta, kappa = _metal(near, n)
+    eta_1 = near.index_above(n)
+    a, b = eta / eta_1, kappa / eta_1
+    u = ((a - 1) ** 2 + b * b) / ((a + 1) ** 2 + b * b)
+    along = conductor_index(u, tint)
+    return along * eta_1, np.sqrt(np.maximum(u * (along + 1) ** 2 - (along - 1) ** 2, 0) / (1 - u)) * eta_1
+
+
+def _nearest_tint(near: Nearby, n: int, point: list[float]) -> float:
+    """The mean tint with which some channel comes nearest to a point (eta, k)."""
+    tints = np.linspace(0, 1, 8 * TINTS)
+    eta, kappa = _curves(near, n, tints)
+    apart = np.hypot(eta - point[0], kappa - point[1])
+    channel, best = np.unravel_index(int(np.argmin(apart)), apart.shape)
+    return near.tint_by(n, int(channel), float(tints[best]))
+
+
+def _axis(label: str, values: Array) -> Answer:
+    return {"label": label, "low": float(values[0]), "high": float(values[-1]), "values": values.tolist()}
+
+
+#: What `service.VERBS` takes over.
+VERBS: dict[str, Verb] = {"class": class_, "member": member}

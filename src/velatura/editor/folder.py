@@ -1,0 +1,166 @@
+"""The files of the folder that the editor was started in: materials and textures, by plain names, and nothing else."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import hashlib
+import itertools
+import os
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from velatura.editor.bodies import Answer, Body, Verb, document, field, material_of
+from velatura.errors import InvalidInput
+from velatura.files import whole
+from velatura.stack import dumps, load
+
+#: Bytes of the largest file that is read, and of the largest request.
+LARGEST = 32 * 2**20
+
+MATERIALS = (".yaml", ".yml", ".json")
+PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
+
+
+class Conflict(InvalidInput):
+    """A file is not as it was when it was opened: somebody else has written it meanwhile."""
+
+
+class Folder:
+    """The working directory, and the verbs that read and write files directly in it."""
+
+    def __init__(self) -> None:
+        self.path = Path.cwd().resolve()
+        self.writing = threading.Lock()
+
+    @property
+    def verbs(self) -> dict[str, Verb]:
+        """Every verb by the name that the page calls it by."""
+        return {"list": self.listed, "open": self.opened, "save": self.saved, "texture": self.texture}
+
+    def first(self, material: str) -> Answer:
+        """A material that is named on the command line: a file, to be saved back if it is in the folder, or a preset.
+
+        Raises:
+            InvalidInput: no such material.
+        """
+        stack, path = load(material), Path(material).resolve()
+        if path.is_file() and path.parent == self.path and path.suffix.lower() in MATERIALS:
+            return {**self.opened({"file": path.name}), "file": path.name}
+        return {"material": document(stack), "file": None, "version": None}
+
+    # Verbs -----------------------------------------------------------------------------------------------------------
+
+    def listed(self, body: Body) -> Answer:
+        """What there is to open."""
+        names = sorted(os.listdir(self.path))
+        kinds = {"files": MATERIALS, "textures": PICTURES}
+        return {kind: [name for name in names if self._readable(name, endings)] for kind, endings in kinds.items()}
+
+    def opened(self, body: Body) -> Answer:
+        """The material of a file, and the version that the file has now."""
+        path = self.existing(field(body, "file", str), MATERIALS)
+        version = _version(path)
+        return {"material": document(load(os.path.relpath(path))), "version": version}
+
+    def saved(self, body: Body) -> Answer:
+        """Write a material; Conflict unless the file has the version given, None for a file that is not there."""
+        name = field(body, "file", str)
+        path = self.place(name, MATERIALS)
+        text = dumps(material_of(body), "json" if path.suffix.lower() == ".json" else "yaml", self.path)
+        with self.writing:
+            self._check_version(path, body.get("version"))
+            _write(path, text.encode())
+            return {"file": name, "version": _version(path)}
+
+    def texture(self, body: Body) -> Answer:
+        """Put a picture into the folder, under a name that is free, or is this very picture's already."""
+        name = field(body, "file", str)
+        path = self.place(name, PICTURES)
+        try:
+            data = base64.b64decode(field(body, "data", str), validate=True)
+        except (binascii.Error, ValueError):
+            raise InvalidInput("data: must be in base64") from None
+        with self.writing:
+            free = _free(path, data)
+            if not free.exists():
+                _write(free, data, check=_check_picture)
+        return {"file": free.name}
+
+    # Names -----------------------------------------------------------------------------------------------------------
+
+    def place(self, name: str, endings: Sequence[str]) -> Path:
+        """The path of a file of that name, which may not be there yet.
+
+        Raises:
+            InvalidInput: anything but the plain name of a file of this folder with one of the endings.
+        """
+        if not name.isprintable() or {"/", "\\"} & set(name) or name.startswith(".") or not name.strip():
+            raise InvalidInput(f"{name!r}: must be the plain name of a file in {self.path}")
+        path = self.path / name
+        if path.suffix.lower() not in endings:
+            raise InvalidInput(f"{name}: must end in {', '.join(endings)}")
+        try:
+            inside = path.resolve().parent == self.path and (path.is_file() or not path.exists())
+        except (OSError, RuntimeError, ValueError):
+            inside = False
+        if not inside:
+            raise InvalidInput(f"{name}: must be a file in {self.path}, and no link out of it")
+        return path
+
+    def existing(self, name: str, endings: Sequence[str]) -> Path:
+        """The path of a file that is there. Raises InvalidInput as `place`, and where it is missing or too large."""
+        path = self.place(name, endings)
+        if not path.is_file():
+            raise InvalidInput(f"{name}: there is no such file in {self.path}")
+        if path.stat().st_size > LARGEST:
+            raise InvalidInput(f"{name}: is larger than {LARGEST >> 20} MiB")
+        return path
+
+    def _check_version(self, path: Path, expected: object) -> None:
+        if _version(path) == expected:
+            return
+        if expected is None:
+            raise Conflict(f"{path.name}: exists already")
+        raise Conflict(f"{path.name}: has {'changed' if path.exists() else 'been removed'} since it was opened")
+
+    def _readable(self, name: str, endings: Sequence[str]) -> bool:
+        try:
+            return self.existing(name, endings).is_file()
+        except InvalidInput:
+            return False
+
+
+def _version(path: Path) -> str | None:
+    """What the content of a file is known by; None where there is none."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise InvalidInput(f"{path.name}: cannot be read ({error.strerror})") from None
+
+
+def _write(path: Path, data: bytes, check: Callable[[Path], None] = lambda path: None) -> None:
+    """Write a file that passes a check, whole or not at all."""
+    try:
+        with whole(path) as unfinished:
+            unfinished.write_bytes(data)
+            check(unfinished)
+    except OSError as error:
+        raise InvalidInput(f"{path.name}: cannot be written ({error.strerror})") from None
+
+
+def _check_picture(path: Path) -> None:
+    """Raise InvalidInput unless the renderer can read a file as a picture."""
+    from velatura import kernel
+
+    if not kernel.is_picture(path):
+        raise InvalidInput("this is no picture that can be read")
+
+
+def _free(path: Path, data: bytes) -> Path:
+    """The path, or with a number where another file has the name."""
+    numbered = (path.with_stem(f"{path.stem}-{i}") for i in itertools.count(2))
+    return next(p for p in itertools.chain([path], numbered) if not p.exists() or p.read_bytes() == data)

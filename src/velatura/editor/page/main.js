@@ -1,0 +1,32 @@
+// The page's entry: connects to the server, mounts the editor, restores what was open.
+
+import { mount } from './app.js';
+import { call, liveConnection } from './connection.js';
+import './editor.css';
+import { browserStorage } from './state/persist.js';
+import { isShared } from './state/share.js';
+
+try {
+  const session = await call('session');
+  const live = liveConnection(`ws://${location.host}/api/live`);
+  window.velatura = mount(document.body, {
+    ...{ call, live, session, storage: browserStorage(window) },
+    address: location.origin + location.pathname,
+  });
+  openAddress();
+  window.addEventListener('hashchange', openAddress);
+} catch (error) {
+  const words = Object.assign(document.createElement('p'), {
+    textContent: `The editor cannot start: ${error.message}`,
+  });
+  words.setAttribute('role', 'alert');
+  document.body.replaceChildren(words);
+}
+
+/** Opens what the address holds; then it is taken out of it, so that a later reload keeps what has changed. */
+function openAddress() {
+  const { hash, pathname } = location;
+  if (!isShared(hash)) return;
+  history.replaceState(null, '', pathname);
+  window.velatura.openShared(hash);
+}

@@ -1,0 +1,161 @@
+// The picture without paths: every lobe by a few directions, each looking into a blurred environment.
+
+import { camera } from './camera.glsl.js';
+import { blurredEnvironment } from './environment.glsl.js';
+
+/** Pixels of the picture, along both axes, that are one while something is dragged. */
+export const COARSE = 2;
+
+const SAMPLES = 3; // of a lobe
+
+/** What lights the object of a material, as call("shader") has it. */
+export const preview = (shader) => `#version 300 es
+${shader.text}
+${camera}
+${blurredEnvironment}
+${parts(shader)}
+${OBJECT}`;
+
+/** The lobes, and the base, in the order in which vt_sample divides its first number among them. */
+function parts({ lobes, transmitted, base }) {
+  const energies = [
+    ...(transmitted ? ['transmitted.energy'] : []),
+    ...lobes.map(({ place }) => `${place}.energy`),
+    ...(base ? ['base_energy'] : []),
+  ];
+  const assigned = energies.map((energy, k) => `shares[${k}] = dot(l.${energy}, vec3(1.0)) + 3e-9;`);
+  return `
+const int PARTS = ${energies.length};
+float[PARTS] part_shares(VtLobes l) {
+  float shares[PARTS];
+  ${assigned.join('\n  ')}
+  return shares;
+}
+`;
+}
+
+const OBJECT = /* glsl */ `
+uniform highp sampler2D seen_normal;
+uniform highp sampler2D seen_tangent;
+uniform highp sampler2D seen_uv;
+uniform int seen_every; // how many pixels of the picture, along both axes, are one that is seen
+uniform highp sampler2D shade; // what paths of the same view have told of shadows
+out vec4 radiance;
+
+void main() {
+  // Find the frame
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec3 ray = camera_ray(float(seen_every) * gl_FragCoord.xy);
+  vec4 normal = texelFetch(seen_normal, pixel, 0);
+  if (normal.w != 1.0) discard;
+  vec3 n = normal.xyz, tangent = texelFetch(seen_tangent, pixel, 0).xyz;
+  vec3 s = normalize(tangent - n * dot(n, tangent)), t = cross(n, s);
+  vec3 wi = -vec3(dot(ray, s), dot(ray, t), dot(ray, n));
+  wi = normalize(vec3(wi.xy, max(wi.z, 1e-3)));
+
+  // Divide all numbers among the lobes
+  VtMaterial m = vt_material(texelFetch(seen_uv, pixel, 0).xy);
+  VtLobes l = vt_lobes(m, wi);
+  float shares[PARTS] = part_shares(l);
+  float total = 0.0, before = 0.0;
+  for (int k = 0; k < PARTS; k++) total += shares[k];
+
+  // Look where each of them goes; steps between blurred pictures come at other places for each direction
+  vec3 light = vec3(0.0);
+  for (int k = 0; k < PARTS; k++) {
+    float share = shares[k] / total;
+    for (int j = 0; j < ${SAMPLES}; j++) {
+      float u = (float(j) + 0.5) / ${SAMPLES}.0;
+      vec3 wo = vt_sample(m, l, wi, vec3(before + 0.5 * share, fract(0.5 + float(j) * 0.61803399), u));
+      vec4 f = vt_eval_pdf(m, l, wi, wo);
+      if (f.a > 0.0) {
+        vec3 direction = s * wo.x + t * wo.y + n * wo.z;
+        light += f.rgb * (share / f.a) * environment_cone(direction, share / (${SAMPLES}.0 * f.a), u - 0.5);
+      }
+    }
+    before += share;
+  }
+  radiance = vec4(light / ${SAMPLES}.0 * texelFetch(shade, seen_every * pixel, 0).rgb, 1.0);
+}
+`;
+
+/** All around the object: the environment itself, and the grey plinth in it. */
+export const surroundings = /* glsl */ `#version 300 es
+precision highp float;
+${camera}
+${blurredEnvironment}
+uniform highp sampler2D seen_normal;
+uniform highp sampler2D shade;
+uniform vec3 irradiance[9];
+out vec4 radiance;
+
+vec3 diffuse_light(vec3 d) {
+  vec3 w = to_environment(d);
+  vec3 sum = irradiance[0] + irradiance[1] * w.y + irradiance[2] * w.z + irradiance[3] * w.x;
+  sum += irradiance[4] * w.x * w.y + irradiance[5] * w.y * w.z + irradiance[6] * (3.0 * w.z * w.z - 1.0);
+  return sum + irradiance[7] * w.x * w.z + irradiance[8] * (w.x * w.x - w.y * w.y);
+}
+
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 normal = texelFetch(seen_normal, pixel, 0);
+  if (normal.w == 1.0) discard;
+  vec3 light;
+  if (normal.w < 0.5) light = environment_cone(camera_ray(gl_FragCoord.xy), 0.0, 0.0);
+  else light = 0.18 * diffuse_light(normal.xyz);
+  radiance = vec4(light * texelFetch(shade, pixel, 0).rgb, 1.0);
+}
+`;
+
+/** What is seen of the object, in fewer pixels: of each block the first that shows it. */
+export const coarsening = /* glsl */ `#version 300 es
+precision highp float;
+uniform highp sampler2D seen_normal;
+uniform highp sampler2D seen_tangent;
+uniform highp sampler2D seen_uv;
+layout(location = 0) out vec4 coarse_normal;
+layout(location = 1) out vec4 coarse_tangent;
+layout(location = 2) out vec2 coarse_uv;
+
+void main() {
+  ivec2 first = ${COARSE} * ivec2(gl_FragCoord.xy), last = textureSize(seen_normal, 0) - 1, found = first;
+  for (int k = ${COARSE * COARSE} - 1; k >= 0; k--) {
+    ivec2 pixel = min(first + ivec2(k % ${COARSE}, k / ${COARSE}), last);
+    if (texelFetch(seen_normal, pixel, 0).w == 1.0) found = pixel;
+  }
+  coarse_normal = texelFetch(seen_normal, found, 0);
+  coarse_tangent = texelFetch(seen_tangent, found, 0);
+  coarse_uv = texelFetch(seen_uv, found, 0).xy;
+}
+`;
+
+/** Light of fewer pixels, spread over all: between the four around, by how close they lie and are turned. */
+export const spreading = /* glsl */ `#version 300 es
+precision highp float;
+uniform highp sampler2D coarse_light;
+uniform highp sampler2D coarse_normal;
+uniform highp sampler2D seen_normal;
+out vec4 radiance;
+
+void main() {
+  vec4 normal = texelFetch(seen_normal, ivec2(gl_FragCoord.xy), 0);
+  if (normal.w != 1.0) discard;
+  vec2 place = gl_FragCoord.xy / ${COARSE}.0 - 0.5;
+  ivec2 node = ivec2(floor(place)), last = textureSize(coarse_light, 0) - 1;
+  vec2 upper = place - vec2(node);
+  vec4 sum = vec4(0.0);
+  for (int k = 0; k < 4; k++) {
+    ivec2 corner = ivec2(k & 1, k >> 1), at = clamp(node + corner, ivec2(0), last);
+    vec4 other = texelFetch(coarse_normal, at, 0);
+    vec2 weights = mix(1.0 - upper, upper, vec2(corner));
+    float alike = max(dot(normal.xyz, other.xyz), 0.0);
+    alike *= alike;
+    alike *= alike;
+    alike *= alike;
+    alike *= alike;
+    float weight = other.w == 1.0 ? weights.x * weights.y * (alike + 1e-4) : 0.0;
+    if (weight > 0.0) sum += weight * vec4(texelFetch(coarse_light, at, 0).rgb, 1.0);
+  }
+  radiance = vec4(sum.rgb / sum.a, 1.0);
+}
+`;

@@ -1,0 +1,35 @@
+// What is where in the picture, for the preview: material, normal, tangent, texture coordinates.
+
+export const rasterVertex = /* glsl */ `#version 300 es
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 tangent; // and material
+layout(location = 3) in vec2 uv;
+uniform mat4 camera_projection;
+out vec3 to_normal;
+out vec4 to_tangent;
+out vec2 to_uv;
+
+void main() {
+  to_normal = normal;
+  to_tangent = tangent;
+  to_uv = uv;
+  gl_Position = camera_projection * vec4(position, 1.0);
+}
+`;
+
+export const raster = /* glsl */ `#version 300 es
+precision highp float;
+in vec3 to_normal;
+in vec4 to_tangent;
+in vec2 to_uv;
+layout(location = 0) out vec4 seen_normal; // and material from 1 on; 0 is the background
+layout(location = 1) out vec4 seen_tangent; // and v
+layout(location = 2) out vec2 seen_uv;
+
+void main() {
+  seen_normal = vec4(normalize(to_normal), to_tangent.w + 1.0);
+  seen_tangent = vec4(normalize(to_tangent.xyz), 1.0);
+  seen_uv = to_uv;
+}
+`;

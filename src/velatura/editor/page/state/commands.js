@@ -1,0 +1,203 @@
+// What can be done: pure functions from a state to the next, each with the title that undo shows.
+
+import { documentOf, enabled, indices, isOpaque, layersOf, variantOf } from './material.js';
+
+const titled = (title, command) => Object.assign(command, { title });
+
+/** The keys of the state that undo leaves alone. */
+export const OUTSIDE = ['camera', 'disk'];
+
+const VIEW = {
+  object: 'ball',
+  environment: 'studio',
+  rotation: 0,
+  exposure: 0,
+  mode: 'single',
+  other: null,
+  split: 0.5,
+  lobe: null,
+};
+
+/** The state that a material opens in. */
+export function initial(material, session, place = {}) {
+  const blank = {
+    model: session.default_model,
+    switches: {},
+    view: VIEW,
+    camera: null,
+    document: 0,
+    disk: {},
+  };
+  return openMaterial(blank, material, place);
+}
+
+// Files ----------------------------------------------------------------------------------------------
+
+export const openMaterial = titled(
+  'open a material',
+  (state, material, { file = null, version = null, model = null, switches = {}, view = {} } = {}) => {
+    const document = Math.max(0, ...Object.keys(state.disk).map(Number)) + 1;
+    const taken = setMaterial(state, material);
+    const opened = { ...taken, ...(model && { model, switches }), view: { ...taken.view, ...view }, document };
+    return { ...opened, disk: { ...state.disk, [document]: { file, version, text: textOf(opened) } } };
+  },
+);
+
+/** The disk now holds this material under that name. */
+export const saved = titled('save', (state, material, file, version) => ({
+  ...state,
+  disk: { ...state.disk, [state.document]: { file, version, text: JSON.stringify(material) } },
+}));
+
+/** Where the material lies on the disk: `{file, version}`, of nulls where it does not. */
+export const placeOf = (state) => state.disk[state.document] ?? { file: null, version: null, text: null };
+
+/** Whether the material differs from what was opened or saved. */
+export const isChanged = (state) => placeOf(state).text !== textOf(state);
+
+const textOf = (state) => JSON.stringify(documentOf(state));
+
+// The material ---------------------------------------------------------------------------------------
+
+/** Puts another material in the place of the one that is there. */
+export const setMaterial = titled('change the material', (state, material) => ({
+  ...state,
+  name: material.name ?? '',
+  source: material.source ?? '',
+  exterior: material.exterior ?? 1,
+  thin: material.thin ?? false,
+  layers: layersOf(material),
+  view: { ...state.view, lobe: null },
+}));
+
+export const rename = titled('rename', (state, name) => ({ ...state, name }));
+export const setExterior = titled('change the exterior', (state, exterior) => ({ ...state, exterior }));
+export const setThin = titled('change the thickness of the pane', (state, thin) => ({ ...state, thin }));
+
+// Layers ---------------------------------------------------------------------------------------------
+
+const FRESH = {
+  interface: { eta: 1.5, alpha: 0.1 },
+  medium: { depth: 1, sigma_a: [0.1, 0.2, 0.4] },
+  diffuse: { albedo: [0.5, 0.5, 0.5] },
+};
+
+const changed = (state, id, change) => ({
+  ...state,
+  layers: state.layers.map((layer) => (layer.id === id ? { ...layer, ...change(layer) } : layer)),
+});
+
+const freshId = (state) => Math.max(0, ...state.layers.map(({ id }) => id)) + 1;
+
+function inserted(state, layer, index) {
+  return { ...state, layers: [...state.layers.slice(0, index), layer, ...state.layers.slice(index)] };
+}
+
+/** Adds a layer where it makes sense: a coat on top, a medium between interfaces, a base below everything. */
+export const addLayer = titled('add a layer', (state, kind) => {
+  const layer = { id: freshId(state), kind, enabled: true, keys: FRESH[kind] };
+  if (kind === 'interface') return inserted(state, layer, 0);
+  if (kind === 'diffuse') {
+    const covered = state.layers.map((other) => (isOpaque(other) ? { ...other, enabled: false } : other));
+    return inserted({ ...state, layers: covered }, layer, state.layers.length);
+  }
+  return inserted(state, layer, gap(state));
+});
+
+/** The lowest place between two layers that can take a medium, or else the top. */
+function gap({ layers }) {
+  for (let index = layers.length - 1; index > 0; index--) {
+    if (layers[index].kind !== 'medium' && layers[index - 1].kind === 'interface') return index;
+  }
+  return 0;
+}
+
+export const removeLayer = titled('remove a layer', (state, id) => ({
+  ...state,
+  layers: state.layers.filter((layer) => layer.id !== id),
+}));
+
+/** Moves a layer to the place `index` among all. */
+export const moveLayer = titled('move a layer', (state, id, index) => {
+  const from = state.layers.findIndex((layer) => layer.id === id);
+  const place = Math.max(0, Math.min(state.layers.length - 1, index));
+  if (from === place) return state;
+  const rest = state.layers.filter((layer) => layer.id !== id);
+  return inserted({ ...state, layers: rest }, state.layers[from], place);
+});
+
+export const duplicateLayer = titled('duplicate a layer', (state, id) => {
+  const index = state.layers.findIndex((layer) => layer.id === id);
+  return inserted(state, { ...state.layers[index], id: freshId(state) }, index);
+});
+
+export const enableLayer = titled('turn a layer on or off', (state, id, on) =>
+  changed(state, id, () => ({ enabled: on })),
+);
+
+export const setValue = titled('change a value', (state, id, key, value) =>
+  changed(state, id, ({ keys }) => ({ keys: { ...keys, [key]: value } })),
+);
+
+/** Makes an interface a `dielectric`, `metal`, `custom` or `mirror`; indices that it has are kept. */
+export const setVariant = titled('change the kind of an interface', (state, id, variant, names) =>
+  changed(state, id, ({ keys }) => {
+    if (variantOf(keys) === variant) return {};
+    const { eta, k, conductor, ...surface } = keys;
+    const metal = conductor === undefined || conductor === 'mirror' ? 'Al' : conductor;
+    const index = {
+      dielectric: () => ({ eta: typeof eta === 'string' && names.conductors[eta] ? 1.5 : (eta ?? 1.5) }),
+      metal: () => ({ conductor: metal }),
+      custom: () => ({
+        eta: eta ?? rounded(indices(metal, 'eta', names)),
+        k: k ?? rounded(indices(metal, 'k', names)),
+      }),
+      mirror: () => ({ conductor: 'mirror' }),
+    };
+    return { keys: { ...index[variant](), ...surface } };
+  }),
+);
+
+const rounded = (colour) => colour.map((channel) => Number(channel.toPrecision(4)));
+
+// By appearance -------------------------------------------------------------------------------------
+
+/** Takes the layers of another material; what is turned off stays, below where its place is gone. */
+function withLayers(state, material) {
+  const next = layersOf(material);
+  const on = enabled(state);
+  const alike = on.length === next.length && on.every(({ kind }, index) => kind === next[index].kind);
+  if (alike) {
+    const keys = new Map(on.map(({ id }, index) => [id, next[index].keys]));
+    return { ...state, layers: state.layers.map((layer) => ({ ...layer, keys: keys.get(layer.id) ?? layer.keys })) };
+  }
+  const first = freshId(state);
+  const fresh = next.map((layer, index) => ({ ...layer, id: first + index }));
+  return { ...state, layers: [...fresh, ...state.layers.filter((layer) => !layer.enabled)] };
+}
+
+export const setAppearance = titled('change the appearance', withLayers);
+export const setMember = titled('choose a member of the class', (...given) => withLayers(...given));
+export const addCoat = titled('coat the material', (...given) => withLayers(...given));
+
+// How it is shown ------------------------------------------------------------------------------------
+
+export const setModel = titled('change the model', (state, model, switches) =>
+  state.model === model && !switches ? state : { ...state, model, switches: switches ?? {} },
+);
+
+/** Sets a switch of the model, or takes it back to its default where the value is null. */
+export const setSwitch = titled('change a switch of the model', (state, key, value) => {
+  const { [key]: _, ...rest } = state.switches;
+  return { ...state, switches: value === null ? rest : { ...rest, [key]: value } };
+});
+
+export const setView = titled('change the view', (state, changes) => ({
+  ...state,
+  view: { ...state.view, ...changes },
+}));
+
+export const setCamera = titled('move the camera', (state, camera) => ({ ...state, camera }));
+
+/** The position of a layer among those that count, as messages of Python number them. */
+export const numberOf = (state, id) => enabled(state).findIndex((layer) => layer.id === id);

@@ -1,0 +1,93 @@
+// A material: layers of the state from and to the document of a file, their flat values, and their shape.
+
+/** Layers with identities, from the document of a file. */
+export function layersOf(material) {
+  return material.layers.map((entry, index) => {
+    const [[kind, keys]] = Object.entries(entry);
+    return { id: index + 1, kind, enabled: true, keys: keys ?? {} };
+  });
+}
+
+/** The layers that count. */
+export const enabled = (state) => state.layers.filter((layer) => layer.enabled);
+
+/** The document that a file would hold; layers that are off are not in it. */
+export function documentOf(state) {
+  const { name, source, exterior, thin } = state;
+  return {
+    ...(name && { name }),
+    ...(source && { source }),
+    ...(exterior !== 1 && { exterior }),
+    ...(thin && { thin }),
+    layers: enabled(state).map(({ kind, keys }) => ({ [kind]: keys })),
+  };
+}
+
+/** What an interface is: `dielectric`, `metal` (by name), `custom` (eta and k) or `mirror`. */
+export function variantOf(keys) {
+  if (keys.conductor !== undefined) return keys.conductor === 'mirror' ? 'mirror' : 'metal';
+  return keys.k === undefined ? 'dielectric' : 'custom';
+}
+
+export const isOpaque = ({ kind, keys }) =>
+  kind === 'diffuse' || (kind === 'interface' && variantOf(keys) !== 'dielectric');
+
+/** How a message or a button calls a layer. */
+export function layerName({ kind, keys }) {
+  if (kind !== 'interface') return kind === 'medium' ? 'medium' : 'diffuse base';
+  if (keys.conductor !== undefined) return keys.conductor;
+  return typeof keys.eta === 'string' ? keys.eta : variantOf(keys) === 'custom' ? 'metal' : 'dielectric';
+}
+
+/** A number or three, where a name may stand: indices of `names` ({dielectrics, conductors}). */
+export function indices(value, part, names) {
+  if (typeof value !== 'string') return value;
+  return names.conductors[value]?.[part] ?? (part === 'eta' ? names.dielectrics[value] : 0);
+}
+
+/** Values by flat name, as Stack.flat() has them; what varies over the surface is left out. */
+export function flat(state, { names, schema }) {
+  const values = { exterior: state.exterior };
+  enabled(state).forEach(({ kind, keys }, index) => {
+    const found =
+      kind === 'interface' ? surface(keys, names, schema) : { ...defaults(schema[kind]), ...keys };
+    for (const [key, value] of Object.entries(found)) {
+      if (typeof value === 'number' || Array.isArray(value)) values[`layer${index}_${key}`] = value;
+    }
+  });
+  return values;
+}
+
+function surface(keys, names, schema) {
+  const variant = variantOf(keys);
+  const opaque = variant === 'metal' || variant === 'custom';
+  const [u, v] = axes(keys.alpha ?? schema.interface.alpha.default);
+  return {
+    ...(variant !== 'mirror' && { eta: indices(keys.conductor ?? keys.eta, 'eta', names) }),
+    ...(opaque && { k: indices(keys.conductor ?? keys.k, 'k', names) }),
+    alpha_u: u,
+    alpha_v: v,
+    rotation: keys.rotation ?? schema.interface.rotation.default,
+  };
+}
+
+const defaults = (parameters) =>
+  Object.fromEntries(Object.entries(parameters).map(([key, { default: value }]) => [key, value]));
+
+/** The two of a pair; a locked one has the same twice. */
+export const axes = (pair) => (Array.isArray(pair) ? pair : [pair, pair]);
+
+/** What decides about the code of a shader, as text; two states of one pattern differ in numbers alone. */
+export function pattern(state) {
+  const shape = (value) => {
+    if (Array.isArray(value)) return value.length === 2 ? value.map(shape) : 0;
+    return value !== null && typeof value === 'object' ? value : 0;
+  };
+  const layers = enabled(state).map(({ kind, keys }) => [
+    kind === 'interface' ? (isOpaque({ kind, keys }) ? keys.conductor === 'mirror' : 'dielectric') : kind,
+    Object.entries(keys)
+      .filter(([, value]) => typeof shape(value) === 'object')
+      .map(([key, value]) => [key, shape(value)]),
+  ]);
+  return JSON.stringify([state.thin, layers]);
+}

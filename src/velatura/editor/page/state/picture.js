@@ -1,0 +1,159 @@
+// Keeps the pictures in step with the state: values go straight to the viewport, shapes over Python.
+
+import { Offline } from '../connection.js';
+import { documentOf, flat, layersOf, pattern } from './material.js';
+
+const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
+
+/** One material in the viewport: the state's own (`a`), or that of the other model (`b`). */
+class Slot {
+  constructor(name, { viewport, call, session, onShader, onProblem, onBaked }) {
+    Object.assign(this, { name, viewport, call, session, onShader, onProblem, onBaked });
+    this.shader = null; // what the viewport draws now
+    this.drawn = null; // and the pattern it was asked for
+    this.wanted = null; // what Python is to be asked next
+    this.asked = null; // what it was asked last
+    this.busy = false;
+    this.timer = null;
+  }
+
+  /** Brings the picture to a state, with the model and switches given. */
+  follow(state, { model, switches }) {
+    const shape = JSON.stringify([pattern(state), model, switches]);
+    const material = documentOf(state);
+    const text = JSON.stringify([material, model, switches]);
+    if (this.asked === text && !this.failed) return;
+    const known = shape === this.drawn;
+    this.asked = text;
+    this.failed = false;
+    this.state = state;
+    this.shape = shape;
+    if (known) this.setValues();
+    this.wanted = { material, model, switches, shape };
+    clearTimeout(this.timer);
+    if (known) this.timer = setTimeout(() => this.ask(), PAUSE);
+    else this.ask();
+  }
+
+  setValues() {
+    this.viewport.setValues(this.name, this.values());
+    this.onBaked(this.name);
+  }
+
+  values() {
+    return valuesOf(this.shader, this.state, this.session);
+  }
+
+  /** Asks for the shader of what is wanted, one question at a time and the latest only. */
+  async ask() {
+    if (this.busy) return;
+    this.busy = true;
+    while (this.wanted) {
+      const { shape, ...question } = this.wanted;
+      this.wanted = null;
+      try {
+        const shader = await this.call('shader', question);
+        if (!this.wanted) await this.accept(shader, shape);
+      } catch (error) {
+        this.failed = true;
+        if (!this.wanted) this.onProblem(this.name, error);
+        if (error instanceof Offline) break;
+      }
+    }
+    this.busy = false;
+  }
+
+  async accept(shader, shape) {
+    if (shader.key !== this.shader?.key) {
+      const old = this.shader;
+      this.shader = shader;
+      try {
+        await this.viewport.setMaterial(this.name, shader, this.values());
+      } catch (error) {
+        this.shader = old;
+        throw error;
+      }
+    }
+    this.drawn = shape;
+    if (shape === this.shape) this.setValues();
+    this.onProblem(this.name, null);
+    this.onShader(this.name, shader);
+  }
+}
+
+/** A state's values in the form that a shader takes them: three for what may be a colour. */
+export function valuesOf(shader, state, session) {
+  const values = flat(state, session);
+  const shaped = ([key, old]) => {
+    const value = values[key] ?? old;
+    return [key, Array.isArray(old) && !Array.isArray(value) ? old.map(() => value) : value];
+  };
+  return Object.fromEntries(Object.entries(shader.values).map(shaped));
+}
+
+const isSame = (a, b) => ['origin', 'target', 'fov'].every((key) => String(a[key]) === String(b[key]));
+
+/** What the second picture is of, and by which model: a material that was pinned, or this one by another model. */
+function otherOf(state, session) {
+  const { model = session.default_model, switches = {}, material = null } = state.view.other ?? {};
+  if (!material) return [state, { model, switches }];
+  const { exterior = 1, thin = false } = material;
+  return [{ ...state, name: '', source: '', exterior, thin, layers: layersOf(material) }, { model, switches }];
+}
+
+/** Follows a store: `{shader(slot), drawn(slot), quiet, again(), stop()}`; `again` asks anew what could not be asked. */
+export function follow({ store, viewport, call, session, files, onProblem, onBaked, onShader }) {
+  const part = { viewport, call, session, onShader, onProblem, onBaked };
+  const slots = { a: new Slot('a', part), b: new Slot('b', part) };
+  const shown = {};
+  let home = null; // the camera that the object's own view asks for
+
+  /** Does something for a key of the view, once for every value of it; it is tried again where it failed. */
+  async function once(key, value, act) {
+    if (shown[key] === value) return;
+    shown[key] = value;
+    try {
+      await act(value);
+      onProblem(key, null);
+    } catch (error) {
+      if (shown[key] === value) shown[key] = undefined;
+      onProblem(key, error);
+    }
+  }
+
+  function update(state) {
+    const { object, environment, rotation, exposure, mode, split, lobe, other } = state.view;
+    slots.a.follow(state, state);
+    if (mode !== 'single' && !other?.truth) slots.b.follow(...otherOf(state, session));
+    viewport.setView({
+      rotation,
+      exposure,
+      mode,
+      split,
+      lobe: lobe < slots.a.shader?.shown.length ? lobe : null,
+    });
+    once('object', object, async (name) => {
+      await viewport.setObject(await files.object(name));
+      home = viewport.camera;
+      viewport.setCamera(store.get().camera ?? home);
+    });
+    once('environment', environment, async (name) => viewport.setEnvironment(await files.environment(name)));
+    const camera = state.camera ?? home;
+    if (camera && !isSame(camera, viewport.camera)) viewport.setCamera(camera);
+  }
+
+  const unsubscribe = store.subscribe(update);
+  update(store.get());
+  return {
+    shader: (slot) => slots[slot].shader,
+    drawn: (slot) => slots[slot].drawn,
+    get quiet() {
+      return Object.values(slots).every((slot) => !slot.wanted && !slot.busy);
+    },
+    again: () => update(store.get()),
+    stop() {
+      unsubscribe();
+      for (const slot of Object.values(slots)) clearTimeout(slot.timer);
+    },
+  };
+}

@@ -1,0 +1,53 @@
+// A material in an address: after #m= its JSON, deflated, in base64url.
+
+const MARK = '#m=';
+const VIEW = { object: 'objects', environment: 'environments', rotation: null, exposure: null }; // what is shared of it
+
+/** What follows the address of the page to open it with what is shown now; files that were dropped are left out. */
+export async function fragmentOf(state, material) {
+  const { model, switches, view, camera } = state;
+  const shown = Object.fromEntries(
+    Object.keys(VIEW).flatMap((key) => (String(view[key]).startsWith('file:') ? [] : [[key, view[key]]])),
+  );
+  const text = JSON.stringify({ material, model, switches, view: shown, camera });
+  const bytes = await through(new CompressionStream('deflate-raw'), new TextEncoder().encode(text));
+  const letters = btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(''));
+  return MARK + letters.replace(/\+/g, '-').replace(/\//g, '_').replace(/=+$/, '');
+}
+
+export const isShared = (fragment) => fragment.startsWith(MARK);
+
+/**
+ * {material, model, switches, view, camera} of a fragment; the material is not checked yet. Raises Error in words.
+ */
+export async function readFragment(fragment, session) {
+  let found;
+  try {
+    const letters = atob(fragment.slice(MARK.length).replace(/-/g, '+').replace(/_/g, '/'));
+    const bytes = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
+    found = JSON.parse(new TextDecoder().decode(await through(new DecompressionStream('deflate-raw'), bytes)));
+  } catch {
+    throw new Error('The address holds no material that can be read: it has been cut off, or changed.');
+  }
+  const { material, model, switches = {}, view = {}, camera = null } = found ?? {};
+  if (!session.models.some(({ name }) => name === model)) {
+    throw new Error(`The address names a model that is not known here: ${model}.`);
+  }
+  return { material, model, switches, view: known(view, session), camera: isCamera(camera) ? camera : null };
+}
+
+/** Of a view that which is possible here. */
+function known(view, session) {
+  const possible = ([key, list]) => {
+    if (!list) return Number.isFinite(view[key]);
+    return session[list].some((entry) => (entry.name ?? entry) === view[key]);
+  };
+  return Object.fromEntries(Object.entries(VIEW).filter(possible).map(([key]) => [key, view[key]]));
+}
+
+const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
+const isCamera = (camera) => isPoint(camera?.origin) && isPoint(camera.target) && Number.isFinite(camera.fov);
+
+async function through(stream, bytes) {
+  return new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
+}

@@ -1,0 +1,377 @@
+// The material by what is seen of it: lobes under the hand, and the stack that has them.
+
+import { html, nothing, render } from 'lit-html';
+import { addCoat, setAppearance, setView } from '../state/commands.js';
+import { documentOf } from '../state/material.js';
+import './appearance.css';
+import { createClass } from './appearance/class.js';
+import { handles } from './appearance/handles.js';
+import { about, changed, hue, withMean } from './appearance/looks.js';
+import { asker, oneAtATime } from './appearance/questions.js';
+import { colourRow, hex, menu, number } from './controls.js';
+import { mean, shown } from './plots/scale.js';
+import { line } from './settings.js';
+
+const KEPT = 60; // materials whose targets are known
+const ENERGIES = [-4, 0]; // decades of a slider
+const SHARE = { low: 0, high: 1, strict: false };
+const COAT = { eta: 1.5, alpha: 0, keep: true };
+const BASES = [
+  ['dielectric', 'Dielectric'],
+  ['conductor', 'Conductor'],
+];
+
+/**
+ * Shows the panel in an element; it follows the store.
+ *
+ * @param {HTMLElement} element
+ * @param {object} app
+ * @returns {{know: function, destroy: function}}
+ */
+export function mountAppearance(element, app) {
+  const { store } = app;
+  const ask = asker(app);
+  const known = new Map(); // by material: what was said of it
+  let read = { target: null, haze: [], says: 'The lobes are being read.' };
+  let text = ''; // of the material that was read, or is asked about
+  let asked = null; // target that was wished for, where it could not be had, or not yet
+  let refused = null; // why it could not: {lobe, text}
+  let held = false;
+  let chosen = 0;
+  let coat = COAT;
+  let coatSays = '';
+  let frame = 0;
+  let reading = 0; // questions about a material that are not answered yet
+
+  // What is known of a material
+
+  const textOf = ({ layers, exterior = 1, thin = false }, { model, switches }) =>
+    JSON.stringify([layers, exterior, thin, model, switches]);
+  const now = () => textOf(documentOf(store.get()), store.get());
+  const question = () => {
+    const { model, switches } = store.get();
+    return { material: documentOf(store.get()), model, switches };
+  };
+
+  function remember(key, answer) {
+    known.delete(key);
+    known.set(key, answer);
+    if (known.size > KEPT) known.delete(known.keys().next().value);
+  }
+
+  /** Reads the material anew where it is another one. */
+  async function follow() {
+    if (!element.getClientRects().length || now() === text) return paint();
+    text = now();
+    [asked, coatSays] = [null, ''];
+    const key = text;
+    reading++;
+    try {
+      const answer = known.get(key) ?? (await ask('appearance', question()));
+      if (!answer || key !== text) return;
+      remember(key, answer);
+      show(answer);
+    } catch (error) {
+      if (key !== text) return;
+      text = '';
+      show({ target: null, haze: [], says: error.message });
+    } finally {
+      reading--;
+    }
+  }
+
+  function show(answer) {
+    read = answer;
+    refused = answer.snapped ? about(answer.snapped) : null;
+    chosen = Math.min(chosen, (read.target?.lobes.length ?? 1) - 1);
+    classes.follow();
+    paint();
+  }
+
+  // Wishes: one is asked for at a time, and it starts from the material that is there then
+
+  const wishes = oneAtATime(async ({ verb, body, command }) => {
+    const before = now();
+    try {
+      const answer = await ask(verb, { ...body, ...question() });
+      if (!answer || before !== now()) return;
+      accept(answer, command);
+      app.forgive('appearance');
+    } catch (error) {
+      app.complain('appearance', error.message);
+    }
+  }, () => held || settle());
+
+  function accept({ material, target, haze, snapped, why }, command) {
+    refused = snapped || why ? about(snapped ?? why) : null;
+    if (!material) return paint();
+    read = { target, haze, snapped, says: null };
+    text = textOf(material, store.get());
+    remember(text, read);
+    app.drag('appearance', command, material);
+    paint();
+  }
+
+  function want(wish) {
+    held = true;
+    wishes.want(wish);
+  }
+
+  /** Ends a step once the last wish is answered. */
+  function letGo() {
+    held = false;
+    if (!wishes.busy) settle();
+  }
+
+  function settle() {
+    if (!refused) asked = null;
+    app.settle();
+    classes.follow();
+    paint();
+  }
+
+  /** Wishes for a lobe that differs; what was asked before in the same drag stays asked. */
+  function wish(index, changes) {
+    chosen = index;
+    asked = changed(underHand(), index, changes);
+    want({ verb: 'invert', body: { target: asked }, command: setAppearance });
+    paint();
+  }
+
+  const once = (index, changes) => {
+    wish(index, changes);
+    letGo();
+  };
+
+  const classes = createClass(app, {
+    ask,
+    question,
+    want,
+    letGo,
+    paint,
+    target: () => (read.says ? null : read.target),
+    chosen: () => chosen,
+    held: () => held || wishes.busy,
+  });
+
+  function choose(index) {
+    if (index === chosen) return;
+    chosen = index;
+    classes.follow();
+    paint();
+  }
+
+  // The panel
+
+  function paint() {
+    frame ||= requestAnimationFrame(() => {
+      frame = 0;
+      render(panel(), element);
+    });
+  }
+
+  const panel = () => html`<section class="appearance" aria-label="Appearance">
+    ${read.says ? html`<p class="says">${saying()}</p>` : nothing} ${read.target ? lobes() : nothing}
+    ${read.target && !read.says ? [theClass(), theCoat()] : nothing}
+    <div class="actions">
+      <button type="button" @click=${pin} title="Keep this one on the right of the picture, to compare others with it">
+        Pin as B
+      </button>
+      ${store.get().view.mode === 'single' ? nothing : html`<button type="button" @click=${unpin}>One picture</button>`}
+    </div>
+  </section>`;
+
+  const saying = () => (read.target ? `Its lobes can be seen, but not dragged. ${capital(read.says)}.` : read.says);
+
+  /** The target under the hand: as it is asked for while it is held, else as it is. */
+  const underHand = () => ((held || wishes.busy) && asked ? asked : read.target);
+
+  const lobes = () => html`
+    ${handles({
+      lobes: read.target.lobes,
+      asked: asked?.lobes ?? null,
+      hand: underHand().lobes,
+      chosen,
+      fixed: Boolean(read.says),
+      onChoose: choose,
+      onMove(index, { blur, energy }) {
+        const { energy: old } = underHand().lobes[index];
+        wish(index, {
+          ...(blur !== undefined && { alpha: rounded(blur) }),
+          ...(energy !== undefined && { energy: withMean(old, energy).map(rounded) }),
+        });
+      },
+      onLetGo: letGo,
+    })}
+    <ol class="lobes" aria-label="Lobes">
+      ${read.target.lobes.map((lobe, index) => [row(lobe, index), refusal(index), between(index)])}
+    </ol>
+    ${refused && refused.lobe === null ? html`<p class="problem">${capital(refused.text)}.</p>` : nothing}
+    <fieldset ?disabled=${Boolean(read.says)}>
+      <legend>Lobe ${chosen + 1}</legend>
+      ${controls(underHand().lobes[chosen], chosen)}
+    </fieldset>
+  `;
+
+  const row = (lobe, index) => html`<li>
+    <button type="button" class="lobe" aria-pressed=${index === chosen} @click=${() => choose(index)}>
+      <span class="swatch" style="background:${hex(hue(lobe))}"></span>
+      <b>${index + 1}</b>
+      <span>energy ${shown(mean(lobe.energy))}</span>
+      <span>blur ${shown(lobe.alpha)}</span>
+      <span class="faint">${lobe.interfaces > 1 ? `${lobe.interfaces} × ` : ''}${lobe.base}</span>
+    </button>
+  </li>`;
+
+  const refusal = (index) =>
+    refused?.lobe === index
+      ? html`<li class="refused">
+          ${asked ? html`Asked: ${difference(asked.lobes[index], read.target.lobes[index])}.` : nothing}
+          ${capital(refused.text)}.
+        </li>`
+      : nothing;
+
+  function between(index) {
+    const haze = read.haze?.[index];
+    if (!haze) return nothing;
+    const ratios = haze.energy.filter((ratio) => ratio !== null);
+    return html`<li class="haze" title="The lobe below against the one above: ratios of their energies and widths">
+      haze ${haze.width === null ? 'around a mirror' : html`${brief(haze.width)} × as wide`}${
+        ratios.length ? html`, ${brief(mean(ratios))} × the energy` : nothing
+      }
+    </li>`;
+  }
+
+  function controls(lobe, index) {
+    const edit = (key, valueOf = (value) => value) => ({
+      move: (value) => wish(index, { [key]: valueOf(value) }),
+      set: (value) => once(index, { [key]: valueOf(value) }),
+      settle: letGo,
+      refuse: (words) => app.complain('appearance', words, { passing: true }),
+    });
+    const energy = edit('energy', (value) => withMean(lobe.energy, Math.max(value, 1e-6)).map(rounded));
+    return html`
+      ${line('Colour', colourRow({ label: 'Energy', value: lobe.energy, spec: SHARE, edit: edit('energy') }))}
+      ${line('Energy', number({ ...share('Energy', mean(lobe.energy)), edit: energy, span: null, decades: ENERGIES }))}
+      ${line('Blur', number({ ...share('Blur', lobe.alpha), edit: edit('alpha') }))}
+      ${line(
+        'Made by',
+        html`<div class="made">
+          ${menu({
+            label: 'Number of interfaces',
+            value: String(lobe.interfaces),
+            options: [
+              ['1', '1 interface'],
+              ['2', '2 interfaces'],
+            ],
+            choose: (count) => once(index, { interfaces: Number(count) }),
+          })}
+          ${menu({ label: 'Kind of base', value: lobe.base, options: BASES, choose: (base) => once(index, { base }) })}
+        </div>`,
+      )}
+      ${
+        lobe.base === 'conductor'
+          ? line('Tint', number({ ...share('Tint', lobe.tint), edit: edit('tint') }))
+          : nothing
+      }
+    `;
+  }
+
+  const theClass = () => html`<details class="part" open>
+    <summary>Class of lobe ${chosen + 1}</summary>
+    ${classes.view()}
+  </details>`;
+
+  // Coats
+
+  function theCoat() {
+    const edit = (key) => ({
+      move: (value) => setCoat({ [key]: value }),
+      set: (value) => setCoat({ [key]: value }),
+      settle() {},
+      refuse: (words) => app.complain('appearance', words, { passing: true }),
+    });
+    const one = (name, key) => ({ label: `${name} of the coat`, value: coat[key], edit: edit(key) });
+    const { eta, alpha } = app.session.schema.interface;
+    return html`<details class="part">
+      <summary>Coat</summary>
+      ${line('Index', number({ ...one('Index', 'eta'), spec: eta, span: [1, 3] }))}
+      ${line('Roughness', number({ ...one('Roughness', 'alpha'), spec: alpha }))}
+      <div class="actions">
+        <label class="flag">
+          <input type="checkbox" .checked=${coat.keep} @change=${({ target }) => setCoat({ keep: target.checked })} />
+          keep the appearance below
+        </label>
+        <button type="button" @click=${putCoat}>Coat it</button>
+      </div>
+      ${coatSays ? html`<p class="refused" role="alert">${coatSays}</p>` : nothing}
+    </details>`;
+  }
+
+  function setCoat(changes) {
+    coat = { ...coat, ...changes };
+    paint();
+  }
+
+  async function putCoat() {
+    await app.attempt('appearance', async () => {
+      const before = now();
+      const answer = await app.call('coat', { ...question(), ...coat });
+      if (before !== now()) return;
+      if (answer.material) store.run(addCoat, answer.material);
+      coatSays = answer.error ? `${capital(answer.error)}.` : '';
+      paint();
+    });
+  }
+
+  // Side by side
+
+  function pin() {
+    const { name, model, switches } = store.get();
+    const other = { material: documentOf(store.get()), title: `B: ${name || 'pinned'}`, model, switches };
+    store.run(setView, { mode: 'split', other });
+  }
+
+  const unpin = () => store.run(setView, { mode: 'single' });
+
+  const stop = store.subscribe(follow);
+  const stopListening = app.live?.onChange((online) => online && follow());
+  follow();
+  return {
+    follow,
+    /** Whether nothing is asked for, and nothing under the hand. */
+    get quiet() {
+      return !held && !wishes.busy && !reading;
+    },
+    /** Says beforehand which target a material has, by a model. */
+    know: (material, model, answer) => remember(textOf(material, { model, switches: {} }), { says: null, ...answer }),
+    destroy() {
+      stop();
+      stopListening?.();
+      classes.stop();
+      cancelAnimationFrame(frame);
+      render(nothing, element);
+    },
+  };
+}
+
+const rounded = (value) => Number(value.toPrecision(4));
+const brief = (value) => Number(value.toPrecision(2));
+
+/** A number from 0 to 1 as a control shows it. */
+const share = (label, value) => ({
+  label,
+  value: Number(Number(value.toPrecision(3)).toFixed(5)),
+  spec: SHARE,
+});
+const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
+
+/** What was asked of a lobe that it has not got. */
+function difference(wish, got) {
+  const parts = [
+    ['blur', wish.alpha, got.alpha],
+    ['energy', mean(wish.energy), mean(got.energy)],
+  ].filter(([, a, b]) => shown(a) !== shown(b));
+  if (!parts.length) return 'another colour';
+  return parts.map(([name, a, b]) => `${name} ${shown(a)}, got ${shown(b)}`).join('; ');
+}

@@ -1,0 +1,280 @@
+// Controls of single values. Each takes its value and `edit`: what to do with a new one.
+
+import { html, nothing } from 'lit-html';
+import { live } from 'lit-html/directives/live.js';
+import { styleMap } from 'lit-html/directives/style-map.js';
+import { icons } from './icons.js';
+
+const TICKS = 200; // of a slider
+const DECADES = [-3, 2]; // of a slider for what has no upper bound; its left end is 0
+
+/** A value as a field shows it. */
+export const shown = (value) => String(Number(value.toPrecision(6)));
+
+// Numbers --------------------------------------------------------------------------------------------
+
+/** How the ticks of a slider stand for values: `span` [low, high] evenly, or decades where there is none. */
+function scaleOf(span, [first, last] = DECADES) {
+  if (span) {
+    const [low, high] = span;
+    return {
+      tick: (value) => Math.round((TICKS * (value - low)) / (high - low)),
+      value: (tick) => Number((low + (tick / TICKS) * (high - low)).toPrecision(4)),
+    };
+  }
+  return {
+    tick: (value) =>
+      value > 0 ? Math.round(1 + ((TICKS - 1) * (Math.log10(value) - first)) / (last - first)) : 0,
+    value: (tick) =>
+      tick < 1 ? 0 : Number((10 ** (first + ((tick - 1) / (TICKS - 1)) * (last - first))).toPrecision(3)),
+  };
+}
+
+/** The ends of a slider: those of the range, within it where they are excluded; null: as decades. */
+export function spanOf({ low, high, strict }) {
+  if (low === null || high === null) return null;
+  const margin = strict ? (high - low) / TICKS : 0;
+  return [low + margin, high - margin];
+}
+
+/** What is wrong with a number, in words; empty where nothing is. */
+function objection(value, { low = null, high = null, strict = false }) {
+  if (!Number.isFinite(value)) return 'must be a number';
+  const outside = (low !== null && value < low) || (high !== null && value > high);
+  if (!outside && !(strict && (value === low || value === high))) return '';
+  const ends = strict ? ', both excluded' : '';
+  return high !== null
+    ? `must lie in ${low} to ${high}${ends}`
+    : `must be ${strict ? 'above' : 'at least'} ${low}`;
+}
+
+/** A field that takes a number within the range of `spec`, with steps by the arrow keys. */
+export function numberField({ label, value, spec = {}, edit, step = 0.01 }) {
+  const take = (field, use) => {
+    const number = field.value.trim() === '' ? NaN : Number(field.value.replace(',', '.'));
+    const wrong = objection(number, spec);
+    field.setCustomValidity(wrong);
+    field.toggleAttribute('aria-invalid', Boolean(wrong));
+    if (wrong) edit.refuse(`${label}: ${wrong}, got ${field.value.trim() || 'nothing'}`);
+    else use(number);
+  };
+  const onKey = (event) => {
+    const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (!sign) return;
+    event.preventDefault();
+    const moved = value + sign * step * (event.shiftKey ? 10 : 1);
+    if (objection(moved, spec)) return;
+    edit.move(Number(moved.toPrecision(6)));
+    edit.settle();
+  };
+  return html`<input
+    class="number"
+    type="text"
+    inputmode="decimal"
+    autocomplete="off"
+    spellcheck="false"
+    aria-label=${label}
+    .value=${live(shown(value))}
+    @keydown=${onKey}
+    @change=${({ target }) => take(target, edit.set)}
+  />`;
+}
+
+/** A slider with its field. */
+export function number({ label, value, spec, edit, span = spanOf(spec), decades }) {
+  const scale = scaleOf(span, decades);
+  return html`<div class="number-row">
+    <input
+      type="range"
+      min="0"
+      max=${TICKS}
+      aria-label=${`${label}, slider`}
+      aria-valuetext=${shown(value)}
+      .value=${live(String(Math.max(0, Math.min(TICKS, scale.tick(value)))))}
+      @input=${({ target }) => edit.move(scale.value(Number(target.value)))}
+      @change=${edit.settle}
+    />
+    ${numberField({ label, value, spec, edit })}
+  </div>`;
+}
+
+// Colours --------------------------------------------------------------------------------------------
+
+const CHANNELS = ['red', 'green', 'blue'];
+const encoded = (c) => (c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055);
+const decoded = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+/** A colour, linear from 0 to 1, as the page writes it. */
+export const hex = (rgb) =>
+  `#${rgb
+    .map((c) =>
+      Math.round(255 * encoded(Math.max(0, Math.min(1, c))))
+        .toString(16)
+        .padStart(2, '0'),
+    )
+    .join('')}`;
+
+export const channelsOf = (value) => (Array.isArray(value) ? value : [value, value, value]);
+
+/** A colour to be picked; its largest channel stays `whole`. */
+function swatch({ label, rgb, whole, edit }) {
+  const picked = ({ target }) => {
+    const bytes = [1, 3, 5].map((at) => parseInt(target.value.slice(at, at + 2), 16) / 255);
+    edit.move(bytes.map((c) => Number((whole * decoded(c)).toPrecision(4))));
+  };
+  return html`<input
+    type="color"
+    aria-label=${`${label}, swatch`}
+    title=${whole === 1 ? 'Pick a colour' : `Pick a colour; the largest channel stays ${shown(whole)}`}
+    .value=${live(hex(rgb.map((c) => c / whole)))}
+    @input=${picked}
+    @change=${edit.settle}
+  />`;
+}
+
+/** One number, or one for each channel with a swatch; what may exceed 1 is shown relative to its largest. */
+export function colour({ label, value, spec, edit, span = spanOf(spec) }) {
+  const rgb = channelsOf(value);
+  if (!Array.isArray(value)) return number({ label, value, spec, edit, span });
+  const whole = spec.high === 1 ? 1 : Math.max(...rgb) || 1;
+  const channel = (index) => {
+    const replaced = (number) => rgb.map((old, other) => (other === index ? number : old));
+    const one = {
+      ...edit,
+      move: (number) => edit.move(replaced(number)),
+      set: (number) => edit.set(replaced(number)),
+    };
+    return html`<div class="channel ${CHANNELS[index]}">
+      ${number({ label: `${label}, ${CHANNELS[index]}`, value: rgb[index], spec, edit: one, span })}
+    </div>`;
+  };
+  return html`<div class="colour">
+    ${swatch({ label, rgb, whole, edit })}
+    <div class="channels">${CHANNELS.map((_, index) => channel(index))}</div>
+  </div>`;
+}
+
+/** A swatch and a field for each channel, in one row; a colour that is picked keeps the largest channel. */
+export function colourRow({ label, value, spec, edit }) {
+  const whole = Math.max(...value) || 1;
+  const channel = (index) => {
+    const replaced = (number) => value.map((old, other) => (other === index ? number : old));
+    const one = {
+      ...edit,
+      move: (number) => edit.move(replaced(number)),
+      set: (number) => edit.set(replaced(number)),
+    };
+    const now = Number(value[index].toPrecision(3));
+    return numberField({ label: `${label}, ${CHANNELS[index]}`, value: now, spec, edit: one });
+  };
+  return html`<div class="rgb">
+    ${swatch({ label, rgb: value, whole, edit })}
+    ${CHANNELS.map((_, index) => channel(index))}
+  </div>`;
+}
+
+// Choices --------------------------------------------------------------------------------------------
+
+/** A menu of `options`: values, or [value, title], or {group, options}. */
+export function menu({ label, value, options, choose }) {
+  const option = (entry) => {
+    if (entry.group) return html`<optgroup label=${entry.group}>${entry.options.map(option)}</optgroup>`;
+    const [key, title] = Array.isArray(entry) ? entry : [entry, entry];
+    return html`<option value=${key} .selected=${live(key === value)}>${title}</option>`;
+  };
+  return html`<select aria-label=${label} @change=${({ target }) => choose(target.value)}>
+    ${options.map(option)}
+  </select>`;
+}
+
+export function flag({ label, value, choose, title = '' }) {
+  return html`<label class="flag" title=${title}>
+    <input type="checkbox" .checked=${live(value)} @change=${({ target }) => choose(target.checked)} />
+    ${label}
+  </label>`;
+}
+
+/** A button that is a drawing; `pressed` makes it a switch. */
+export function iconButton({ label, icon, act, pressed = null, disabled = false, name = '' }) {
+  return html`<button
+    type="button"
+    class="small ${name}"
+    title=${label}
+    aria-label=${label}
+    aria-pressed=${pressed ?? nothing}
+    ?disabled=${disabled}
+    @click=${act}
+  >
+    ${icons[icon]}
+  </button>`;
+}
+
+// Angles ---------------------------------------------------------------------------------------------
+
+/** A dial, anticlockwise from the right, with its field; degrees. */
+export function dial({ label, value, spec, edit, low = -180 }) {
+  const turn = (event) => {
+    const box = event.currentTarget.getBoundingClientRect();
+    const [x, y] = [event.clientX - box.left - box.width / 2, box.top + box.height / 2 - event.clientY];
+    const degrees = Math.round((Math.atan2(y, x) * 180) / Math.PI);
+    edit.move(degrees < low ? degrees + 360 : degrees);
+  };
+  const onKey = (event) => {
+    const steps = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: 15, PageDown: -15 };
+    if (!(event.key in steps)) return;
+    event.preventDefault();
+    edit.move(value + steps[event.key]);
+    edit.settle();
+  };
+  return html`<div class="knob-row">
+    <div
+      class="knob"
+      role="slider"
+      tabindex="0"
+      aria-label=${`${label}, dial`}
+      aria-valuemin=${low}
+      aria-valuemax=${low + 360}
+      aria-valuenow=${shown(value)}
+      aria-valuetext=${`${shown(value)} degrees`}
+      style=${styleMap({ '--turn': `${-value}deg` })}
+      @pointerdown=${(event) => {
+        event.currentTarget.setPointerCapture(event.pointerId);
+        turn(event);
+      }}
+      @pointermove=${(event) => event.buttons && turn(event)}
+      @pointerup=${edit.settle}
+      @keydown=${onKey}
+    ></div>
+    ${numberField({ label, value, spec, edit, step: 1 })}<span class="unit">°</span>
+  </div>`;
+}
+
+// Textures -------------------------------------------------------------------------------------------
+
+/** The place, scale and reading of a texture. */
+export function texture({ label, value, spec, records, edit }) {
+  const {
+    scale = 1,
+    offset = 0,
+    encoding = 'linear',
+    channel = spec.kind === 'colour' || spec.kind === 'index' ? 'rgb' : 'r',
+  } = value;
+  const part = (key) => ({
+    ...edit,
+    move: (entry) => edit.move({ ...value, [key]: entry }),
+    set: (entry) => edit.set({ ...value, [key]: entry }),
+  });
+  const channels = records.channel.options.filter(
+    (name) => name !== 'rgb' || channel === 'rgb' || spec.kind !== 'number',
+  );
+  const choice = (key, options, chosen) =>
+    menu({ label: `${label}, ${key}`, value: chosen, options, choose: part(key).set });
+  return html`<div class="texture">
+    <span class="file" title=${value.texture}>${value.texture}</span>
+    <div class="pairs">
+      <label>scale ${numberField({ label: `${label}, scale`, value: scale, edit: part('scale') })}</label>
+      <label>offset ${numberField({ label: `${label}, offset`, value: offset, edit: part('offset') })}</label>
+      <label>channel ${choice('channel', channels, channel)}</label>
+      <label>encoding ${choice('encoding', records.encoding.options, encoding)}</label>
+    </div>
+  </div>`;
+}

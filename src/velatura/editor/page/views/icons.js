@@ -1,0 +1,19 @@
+// Small line drawings, 16 units square, in the colour of the text.
+
+import { html, svg } from 'lit-html';
+
+const draw = (shape) =>
+  html`<svg class="icon" viewBox="0 0 16 16" aria-hidden="true" focusable="false">${shape}</svg>`;
+const path = (d) => draw(svg`<path d=${d} />`);
+
+export const icons = {
+  undo: path('M6 3 2.5 6.5 6 10M3 6.5h6.5a4 4 0 0 1 0 8H7'),
+  redo: path('M10 3l3.5 3.5L10 10M13 6.5H6.5a4 4 0 0 0 0 8H9'),
+  grip: path('M3 5h10M3 8h10M3 11h10'),
+  duplicate: path('M5.5 5.5h8v8h-8zM10.5 5.5v-3h-8v8h3'),
+  remove: path('M4 4l8 8M12 4l-8 8'),
+  locked: path('M4 7.5h8v6H4zM5.5 7.5v-2a2.5 2.5 0 0 1 5 0v2'),
+  unlocked: path('M4 7.5h8v6H4zM5.5 7.5v-3a2.5 2.5 0 0 1 4.7-1.2'),
+  channels: path('M3 4.5h10M3 8h10M3 11.5h10M6 3v3M10 6.5v3M7 10v3'),
+  texture: path('M2.5 3h11v10h-11zM2.5 11l3.5-4 3 3 1.5-1.5 3 3M10.5 6h.01'),
+};

@@ -1,0 +1,391 @@
+// Look inside: the lobes of the material as plots, and the papers' validations.
+
+import { html, nothing, render } from 'lit-html';
+import { Slices, radians } from '../render/slices.js';
+import { setView } from '../state/commands.js';
+import { enabled, layerName } from '../state/material.js';
+import './inspector.css';
+import { chart, valueAt } from './plots/chart.js';
+import { SIZE, colourAt, disc, outline } from './plots/disc.js';
+import { polar } from './plots/polar.js';
+import { isGrey, lookOf, nearest, shown, shownColour } from './plots/scale.js';
+import { createValidations } from './validations/validations.js';
+
+const TABS = [
+  { name: 'polar', title: 'Polar' },
+  { name: 'disc', title: 'Disc' },
+  { name: 'energy', title: 'Energy' },
+  { name: 'blur', title: 'Blur' },
+  { name: 'validations', title: 'Validations' },
+];
+const CHANNELS = ['red', 'green', 'blue'];
+
+/**
+ * Shows the inspector in an element; it follows the store and what the viewport draws.
+ *
+ * @param {HTMLElement} element
+ * @param {{store, viewport, session, call, onLobes}} app
+ * @returns {{destroy: function}}
+ */
+export function mountInspector(element, { store, viewport, session, call, onLobes }) {
+  let local = { tab: 'polar', angle: 45, azimuth: 0, below: false, logarithmic: true, cursors: {} };
+  const slices = {}; // by slot
+  const latest = {}; // slices that may not be ready
+  const changed = { a: true, b: true };
+  let problem = '';
+  let stale = true;
+  let frame = requestAnimationFrame(follow);
+  const validations = createValidations(call, paint);
+  const stops = [store.subscribe(paint), onLobes((name) => (changed[name] = true))];
+
+  const set = (changes) => {
+    const aimed = ['angle', 'azimuth', 'below'].some((key) => key in changes);
+    if (aimed) Object.assign(changed, { a: true, b: true });
+    local = { ...local, ...(aimed && { cursors: {} }), ...changes };
+    paint();
+  };
+  const setCursor = (place) => set({ cursors: { ...local.cursors, [local.tab]: place } });
+  const overAngle = (what, quantity, lines, cursor) =>
+    chart({
+      label: `${what}, over the angle of incidence`,
+      x: { label: 'angle of incidence (°)', low: 0, high: 90 },
+      y: { label: quantity, low: 0, high: null },
+      lines,
+      cursor,
+      onCursor: setCursor,
+    });
+  const isCompared = () => store.get().view.mode !== 'single' && !store.get().view.other?.truth;
+  const showAlone = (k) => store.run(setView, { lobe: store.get().view.lobe === k ? null : k });
+
+  /** Every frame in which it can be seen: what has changed since the last one. */
+  function follow() {
+    frame = requestAnimationFrame(follow);
+    if (!element.getClientRects().length) return;
+    if (local.tab !== 'validations') slice();
+    if (stale) render(page(), element);
+    stale = false;
+  }
+
+  /** New slices of what is drawn, where that, or where the light comes from, has changed. */
+  function slice() {
+    for (const name of Object.keys(changed)) {
+      const slot = viewport.slots[name];
+      if (name === 'b' && !isCompared()) {
+        replace(name, undefined);
+        changed[name] = true;
+      } else if (changed[name] && slot.shader) {
+        changed[name] = false;
+        make(name, slot);
+      }
+    }
+  }
+
+  async function make(name, slot) {
+    const asked = (latest[name] = new Slices(slot, local));
+    try {
+      await asked.ready();
+      if (latest[name] === asked) replace(name, asked);
+    } catch (error) {
+      problem = error.message;
+      paint();
+    }
+  }
+
+  function replace(name, made) {
+    if (slices[name] === made) return;
+    slices[name]?.dispose();
+    slices[name] = made;
+    problem = '';
+    paint();
+  }
+
+  function paint() {
+    stale = true;
+  }
+
+  const page = () => html`<section class="inspector" aria-label="Look inside">
+    <div class="tabs" role="tablist" @keydown=${step}>
+      ${TABS.map(
+        ({ name, title }) => html`<button
+          role="tab"
+          id="inspect-${name}"
+          aria-selected=${name === local.tab}
+          aria-controls="inspected"
+          tabindex=${name === local.tab ? 0 : -1}
+          @click=${() => set({ tab: name })}
+        >
+          ${title}
+        </button>`,
+      )}
+    </div>
+    <div id="inspected" role="tabpanel" aria-labelledby="inspect-${local.tab}">
+      ${local.tab === 'validations' ? validations.view() : plots()}
+    </div>
+  </section>`;
+
+  /** Arrow keys go from tab to tab. */
+  function step(event) {
+    const moves = { ArrowLeft: -1, ArrowRight: 1 };
+    if (!(event.key in moves)) return;
+    const now = TABS.findIndex(({ name }) => name === local.tab);
+    const { name } = TABS[(now + moves[event.key] + TABS.length) % TABS.length];
+    set({ tab: name });
+    element.querySelector(`#inspect-${name}`).focus();
+  }
+
+  function plots() {
+    if (problem) return html`<p class="problem" role="alert">${problem}</p>`;
+    if (!slices.a) return html`<p class="waiting">The lobes come with the first picture.</p>`;
+    const { plot, read } = PLOTS[local.tab]();
+    return html`${directions()}
+      <div class="plot">${plot}</div>
+      <div class="told">${legend(read)}</div>`;
+  }
+
+  const directions = () => html`<div class="chosen">
+    ${slider('Incidence', 'angle', 0, 89)} ${slider('Azimuth', 'azimuth', -180, 180)}
+    ${slices.a.shader.transmitted
+      ? html`<label><input type="checkbox" .checked=${local.below} @change=${(event) => set({ below: event.target.checked })} />
+          from below</label>`
+      : nothing}
+    ${local.tab === 'polar'
+      ? html`<label
+          ><input
+            type="checkbox"
+            .checked=${local.logarithmic}
+            @change=${(event) => set({ logarithmic: event.target.checked })}
+          />
+          logarithmic</label
+        >`
+      : nothing}
+  </div>`;
+
+  const slider = (title, key, low, high) => html`<label class="slide">
+    <span>${title}</span>
+    <input
+      type="range"
+      min=${low}
+      max=${high}
+      step="1"
+      name=${key}
+      .value=${String(local[key])}
+      @input=${(event) => set({ [key]: Number(event.target.value) })}
+    />
+    <output>${local[key]}°</output>
+  </label>`;
+
+  // The four plots: each a picture, and what is read where its cursor is
+
+  const lobe = () => store.get().view.lobe;
+  const seen = (k) => lobe() === null || lobe() === k;
+
+  const PLOTS = {
+    polar() {
+      const { a, b } = slices;
+      const slice = a.polar();
+      const beyond = a.parts[lobe()]?.kind === 'transmitted' && a.refracted !== null;
+      const cursor = local.cursors.polar ?? (beyond ? 180 - a.refracted : a.angle);
+      const whole = a.shader.transmitted;
+      const other = b?.polar();
+      const place = nearest(slice.angles, cursor);
+      const side = Math.abs(cursor) > 90 ? 'transmitted, ' : '';
+      const angle = Math.abs(cursor) > 90 ? 180 - Math.abs(cursor) : Math.abs(cursor);
+      return {
+        plot: polar({
+          slice,
+          other,
+          incidence: a,
+          whole,
+          logarithmic: local.logarithmic,
+          seen,
+          sum: lobe() === null,
+          cursor,
+          onCursor: setCursor,
+        }),
+        read: {
+          title: `f cos at ${shown(angle)}°${cursor < 0 && side === '' ? ', towards the light' : ''}${side && ' beyond'}`,
+          parts: slice.parts.map((values) => values[place]),
+          all: slice.all[place],
+          other: other && { parts: other.parts.map((values) => values[place]), all: other.all[place] },
+        },
+      };
+    },
+
+    disc() {
+      const { a, b } = slices;
+      const cursor = local.cursors.disc ?? null;
+      const sides = a.shader.transmitted ? [true, false] : [true];
+      const pictures = sides.map((reflected) => a.disc(SIZE, reflected, lobe()));
+      const which = cursor?.reflected === false && pictures.length > 1 ? 1 : 0;
+      const parts = cursor && a.parts.map((_, k) => colourAt(a.disc(SIZE, sides[which], k), cursor.point));
+      return {
+        plot: html`<div class="discs">
+          ${sides.map(
+            (reflected, i) => html`<figure>
+              ${disc({
+                label: reflected ? 'Reflected light on the projected disc' : 'Transmitted light on the projected disc',
+                pixels: pictures[i],
+                outlines: [...outlines(a, reflected, false), ...(b ? outlines(b, reflected, true) : [])],
+                mark: markOf(a, reflected),
+                cursor: cursor?.reflected === reflected ? cursor.point : null,
+                onCursor: (point) => setCursor({ reflected, point }),
+              })}
+              <figcaption>${reflected ? 'reflected; + mirror direction' : 'transmitted; + refracted direction'}</figcaption>
+            </figure>`,
+          )}
+        </div>`,
+        read: {
+          title: cursor ? `f cos at ${cursor.point.map(shown).join(', ')}` : 'f cos: point at a disc',
+          parts: parts ?? [],
+          all: cursor ? colourAt(a.disc(SIZE, sides[which]), cursor.point) : null,
+        },
+      };
+    },
+
+    energy() {
+      const [a, b] = ['a', 'b'].map((name) => slices[name]?.curves());
+      const lines = [...energyLines(a, ''), ...(b ? energyLines(b, 'dashed') : [])];
+      const cursor = local.cursors.energy ?? local.angle;
+      const at = ({ angles, parts }) => {
+        const each = parts.map(({ energy }) => colourOf(angles, energy, cursor));
+        return { parts: each, all: [0, 1, 2].map((channel) => each.reduce((sum, colour) => sum + colour[channel], 0)) };
+      };
+      return {
+        plot: overAngle('Energy of each lobe and of all', 'energy', lines, cursor),
+        read: { title: `Energy at ${shown(cursor)}°`, ...at(a), other: b && at(b), swatches: false },
+      };
+    },
+
+    blur() {
+      const [a, b] = ['a', 'b'].map((name) => slices[name]?.curves());
+      const lines = [...blurLines(a, ''), ...(b ? blurLines(b, 'dashed') : [])];
+      const cursor = local.cursors.blur ?? local.angle;
+      const at = ({ angles, parts }) =>
+        parts.map(({ alpha }) => alpha?.map((axis) => valueAt({ x: angles, y: axis }, cursor)) ?? null);
+      return {
+        plot: overAngle('Equivalent roughness of each lobe along both axes', 'equivalent alpha', lines, cursor),
+        read: { title: `Alpha along u, v at ${shown(cursor)}°`, parts: at(a), all: null, other: b && { parts: at(b), all: null } },
+      };
+    },
+  };
+
+  /** A line for each channel where a lobe is coloured, else one; the sum of all is thicker. */
+  function energyLines({ angles, parts }, look) {
+    const all = angles.map((_, i) => [0, 1, 2].map((c) => parts.reduce((sum, { energy }) => sum + energy[i][c], 0)));
+    const named = parts.map(({ energy }, k) => ({ colours: energy, tag: tagOf(k), look: lookOf(k), k }));
+    const sum = lobe() === null && parts.length > 1 ? [{ colours: all, tag: 'Σ', look: 'sum', k: null }] : [];
+    return [...sum, ...named.filter(({ k }) => seen(k))].flatMap(({ colours, tag, look: own }) => {
+      const end = look ? {} : { tag };
+      if (colours.every(isGrey)) return [{ x: angles, y: colours.map(([value]) => value), look: `${own} grey ${look}`, ...end }];
+      return CHANNELS.map((channel, c) => ({
+        x: angles,
+        y: colours.map((colour) => colour[c]),
+        look: `${own} ${channel} ${look}`,
+        ...(c === 1 && end),
+      }));
+    });
+  }
+
+  function blurLines({ angles, parts }, look) {
+    return parts.flatMap(({ alpha }, k) => {
+      if (!alpha || !seen(k)) return [];
+      const [u, v] = alpha.map((y) => ({ x: angles, y, look: `${lookOf(k)} ${look}` }));
+      const tag = look ? {} : { tag: tagOf(k) };
+      if (u.y.every((value, i) => Math.abs(value - v.y[i]) < 1e-4)) return [{ ...u, ...tag }];
+      return [
+        { ...u, ...(!look && { tag: `${tagOf(k)}u` }) },
+        { ...v, look: `${v.look} second`, ...(!look && { tag: `${tagOf(k)}v` }) },
+      ];
+    });
+  }
+
+  function outlines(made, reflected, dashed) {
+    const azimuth = radians(made.azimuth);
+    const angle = reflected ? made.angle : made.refracted;
+    if (angle === null) return [];
+    return made
+      .chosen()
+      .map((part, k) => ({ ...part, k, kind: made.parts[k].kind }))
+      .filter(({ k, kind, alpha }) => alpha && seen(k) && (kind === 'reflected') === reflected)
+      .map((part) => ({ k: part.k, dashed, points: outline(part, Math.sin(radians(angle)), azimuth) }));
+  }
+
+  function markOf(made, reflected) {
+    const angle = reflected ? made.angle : made.refracted;
+    if (angle === null) return null;
+    const sine = -Math.sin(radians(angle));
+    return [sine * Math.cos(radians(made.azimuth)), sine * Math.sin(radians(made.azimuth))];
+  }
+
+  // The legend, which is also the read-out
+
+  const tagOf = (k) => {
+    const { kind, layers } = slices.a.parts[k];
+    if (kind !== 'reflected') return kind === 'base' ? 'base' : 'T';
+    return seenLayers(layers).map((layer) => layer + 1).join('+');
+  };
+
+  /** Numbers of the layers that a lobe is of; seen from below, interfaces come the other way round. */
+  function seenLayers(layers) {
+    if (!slices.a.below) return layers;
+    const all = slices.a.parts.flatMap((part) => part.layers);
+    return layers.map((layer) => all[all.length - 1 - all.indexOf(layer)]);
+  }
+
+  function nameOf(k) {
+    const { kind, layers } = slices.a.parts[k];
+    if (kind === 'base') return 'diffuse base';
+    if (kind === 'transmitted') return 'T transmitted';
+    const all = enabled(store.get());
+    return seenLayers(layers).map((layer) => `${layer + 1} ${all[layer] ? described(all[layer]) : ''}`).join(', ');
+  }
+
+  function legend({ title, parts, all, other, swatches = true }) {
+    const swatch = (look) => (swatches ? html`<span class="swatch ${look}"></span>` : nothing);
+    const row = (k, name, look, value, second) => html`<tr class=${k !== null && k === lobe() ? 'alone' : ''}>
+      <th scope="row">
+        ${k === null
+          ? html`${swatch(look)}${name}`
+          : html`<button aria-pressed=${k === lobe()} title="Show this lobe alone" @click=${() => showAlone(k)}>
+              ${swatch(look)}${name}
+            </button>`}
+      </th>
+      <td>${told(value)}</td>
+      ${other ? html`<td class="second">${told(second)}</td>` : nothing}
+    </tr>`;
+    return html`<table class="legend">
+      <thead>
+        <tr>
+          <th scope="col">${title}</th>
+          <th scope="col">${other ? store.get().model : nothing}</th>
+          ${other ? html`<th scope="col">- - ${store.get().view.other?.model ?? session.default_model}</th>` : nothing}
+        </tr>
+      </thead>
+      <tbody>
+        ${slices.a.parts.map((_, k) => row(k, nameOf(k), lookOf(k), parts[k], other?.parts[k]))}
+        ${all ? row(null, 'Σ all together', 'sum', all, other?.all) : nothing}
+      </tbody>
+    </table>`;
+  }
+
+  return {
+    destroy() {
+      cancelAnimationFrame(frame);
+      stops.forEach((stop) => stop());
+      Object.values(slices).forEach((made) => made?.dispose());
+      render(nothing, element);
+    },
+  };
+}
+
+const told = (value) => (value ? shownColour(value) : '');
+
+const colourOf = (angles, colours, place) =>
+  [0, 1, 2].map((channel) => valueAt({ x: angles, y: colours.map((colour) => colour[channel]) }, place));
+
+/** What an interface is, in few words. */
+function described(layer) {
+  const name = layerName(layer);
+  const { eta } = layer.keys;
+  return typeof eta === 'number' ? `${name}, eta ${shown(eta)}` : name;
+}

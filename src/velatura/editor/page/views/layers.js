@@ -1,0 +1,186 @@
+// The layers: from the top down, each with its parameters; dragged or moved by keys.
+
+import { html, nothing } from 'lit-html';
+import { repeat } from 'lit-html/directives/repeat.js';
+import { live } from 'lit-html/directives/live.js';
+import {
+  addLayer,
+  duplicateLayer,
+  enableLayer,
+  moveLayer,
+  removeLayer,
+  rename,
+  setExterior,
+  setThin,
+  setVariant,
+} from '../state/commands.js';
+import { layerName, variantOf } from '../state/material.js';
+import { flag, iconButton, menu, numberField } from './controls.js';
+import { icons } from './icons.js';
+import { parameter, parametersOf } from './parameter.js';
+
+const VARIANTS = [
+  ['dielectric', 'Dielectric'],
+  ['metal', 'Metal by name'],
+  ['custom', 'Metal by eta and k'],
+  ['mirror', 'Mirror'],
+];
+
+export function layers(app) {
+  const state = app.store.get();
+  return html`
+    ${top(app, state)}
+    <ol class="layers">
+      ${repeat(
+        state.layers,
+        ({ id }) => id,
+        (layer, index) => card(app, layer, index),
+      )}
+    </ol>
+    <div class="add" role="group" aria-label="Add a layer">
+      <span>Add</span>
+      ${[
+        ['interface', 'Interface'],
+        ['medium', 'Medium'],
+        ['diffuse', 'Diffuse base'],
+      ].map(
+        ([kind, title]) =>
+          html`<button type="button" data-add=${kind} @click=${() => app.store.run(addLayer, kind)}>
+            ${title}
+          </button>`,
+      )}
+    </div>
+  `;
+}
+
+function top(app, { name, exterior, thin }) {
+  const { store, session } = app;
+  const edit = {
+    move: (next) => app.drag('exterior', setExterior, next),
+    set: (next) => store.run(setExterior, next),
+    settle: app.settle,
+    refuse: (text) => app.complain('material', text, { passing: true }),
+  };
+  const { material } = session.schema;
+  return html`<div class="top">
+    <label class="wide">
+      Name
+      <input
+        type="text"
+        .value=${live(name)}
+        spellcheck="false"
+        @change=${({ target }) => store.run(rename, target.value)}
+      />
+    </label>
+    <label title=${material.exterior.doc}>
+      Exterior ${numberField({ label: 'Exterior index', value: exterior, spec: material.exterior, edit })}
+    </label>
+    ${flag({ label: 'Thin', value: thin, title: material.thin.doc, choose: (on) => store.run(setThin, on) })}
+  </div>`;
+}
+
+// One layer ------------------------------------------------------------------------------------------
+
+function card(app, layer, index) {
+  const { store, session } = app;
+  const name = layerName(layer);
+  const problem = app.problemOf(layer.id);
+  return html`<li
+    class="layer ${layer.kind} ${layer.enabled ? '' : 'off'} ${app.dropAt === index ? 'drop' : ''}"
+    data-layer=${layer.id}
+    aria-label=${`Layer ${index}: ${name}`}
+  >
+    <div class="head">
+      <button
+        type="button"
+        class="small grip"
+        title="Drag to move; arrow keys move too"
+        aria-label=${`Move ${name}: arrow keys`}
+        @keydown=${(event) => moveByKey(app, event, layer, index)}
+        @pointerdown=${(event) => moveByHand(app, event, layer)}
+      >
+        ${icons.grip}
+      </button>
+      ${kindOf(app, layer)}
+      <span class="buttons">
+        <input
+          type="checkbox"
+          title="On or off"
+          aria-label=${`${name} is on`}
+          .checked=${live(layer.enabled)}
+          @change=${({ target }) => store.run(enableLayer, layer.id, target.checked)}
+        />
+        ${
+          layer.kind === 'diffuse'
+            ? nothing
+            : iconButton({
+                label: `Duplicate ${name}`,
+                icon: 'duplicate',
+                act: () => store.run(duplicateLayer, layer.id),
+              })
+        }
+        ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: () => remove(app, layer, index) })}
+      </span>
+    </div>
+    ${problem ? html`<p class="problem">${problem}</p>` : nothing}
+    <div class="parameters" ?hidden=${!layer.enabled}>
+      ${repeat(
+        parametersOf(layer, session.schema),
+        (key) => key,
+        (key) => parameter(app, layer, key),
+      )}
+    </div>
+  </li>`;
+}
+
+function kindOf({ store, session }, layer) {
+  if (layer.kind !== 'interface')
+    return html`<span class="kind">${layer.kind === 'medium' ? 'Medium' : 'Diffuse base'}</span>`;
+  const choose = (variant) => store.run(setVariant, layer.id, variant, session.names);
+  return menu({ label: 'Kind of interface', value: variantOf(layer.keys), options: VARIANTS, choose });
+}
+
+function remove(app, layer, index) {
+  app.store.run(removeLayer, layer.id);
+  const next = app.store.get().layers[Math.min(index, app.store.get().layers.length - 1)];
+  app.focus(next ? `[data-layer="${next.id}"] .grip` : '[data-add]');
+}
+
+// Moving ---------------------------------------------------------------------------------------------
+
+function moveByKey(app, event, layer, index) {
+  const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+  if (!step) return;
+  event.preventDefault();
+  app.store.run(moveLayer, layer.id, index + step);
+  app.focus(`[data-layer="${layer.id}"] .grip`);
+}
+
+/** Follows a pointer over the list and shows where the layer would go; it moves when the pointer is let go. */
+function moveByHand(app, event, layer) {
+  if (event.button !== 0) return;
+  const grip = event.currentTarget;
+  const cards = [...grip.closest('.layers').children];
+  const over = ({ clientY }) => {
+    const index = cards.findIndex((card) => clientY < card.getBoundingClientRect().bottom);
+    return index < 0 ? cards.length - 1 : index;
+  };
+  const done = new AbortController();
+  const on = (name, act) => grip.addEventListener(name, act, { signal: done.signal });
+  const end = () => {
+    done.abort();
+    app.dropAt = null;
+    app.update();
+  };
+  grip.setPointerCapture(event.pointerId);
+  on('pointermove', (moved) => {
+    app.dropAt = over(moved);
+    app.update();
+  });
+  on('pointerup', (moved) => {
+    end();
+    app.store.run(moveLayer, layer.id, over(moved));
+    app.focus(`[data-layer="${layer.id}"] .grip`);
+  });
+  on('pointercancel', end);
+}

@@ -1,0 +1,223 @@
+// A parameter of a layer: its name, the control that its kind asks for, and what else it may be.
+
+import { html, nothing } from 'lit-html';
+import { axes, indices, variantOf } from '../state/material.js';
+import { setValue } from '../state/commands.js';
+import { channelsOf, colour, dial, iconButton, menu, number, numberField, texture } from './controls.js';
+
+const NAMES = {
+  eta: 'Index',
+  k: 'Extinction',
+  conductor: 'Metal',
+  alpha: 'Roughness',
+  rotation: 'Rotation',
+  depth: 'Depth',
+  sigma_a: 'Absorption',
+  sigma_s: 'Scattering',
+  g: 'Mean cosine',
+  albedo: 'Albedo',
+};
+const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fields take any
+const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
+
+const isTexture = (value) => value?.texture !== undefined;
+const isBrushing = (value) => value?.brushing !== undefined;
+
+/** Which parameters a layer shows: an interface has those of its kind only. */
+export function parametersOf({ kind, keys }, schema) {
+  if (kind !== 'interface') return Object.keys(schema[kind]);
+  const index = { dielectric: ['eta'], metal: ['conductor'], custom: ['eta', 'k'], mirror: [] }[
+    variantOf(keys)
+  ];
+  return [...index, 'alpha', 'rotation'];
+}
+
+export function parameter(app, layer, key) {
+  const { store, session } = app;
+  const spec = session.schema[layer.kind][key];
+  const value = layer.keys[key] ?? spec.default;
+  const label = NAMES[key] ?? key;
+  const edit = {
+    move: (next) => app.drag(`${layer.id}.${key}`, setValue, layer.id, key, next),
+    set: (next) => store.run(setValue, layer.id, key, next),
+    settle: app.settle,
+    refuse: (text) => app.complain(`layer.${layer.id}`, text, { layer: layer.id, passing: true }),
+  };
+  const context = { app, layer, key, label, spec, value, edit, records: session.schema };
+  const { control, extras } = FORMS[spec.kind](context);
+  const takes = spec.texturable ? textureTarget(context) : {};
+  return html`<div
+    class="parameter"
+    title=${explained(key, spec)}
+    @dragover=${takes.over}
+    @drop=${takes.drop}
+  >
+    <span class="name">${label} <span class="unit">${spec.kind === 'angle' ? '' : spec.unit}</span></span>
+    <span class="extras">${extras}</span>
+    <div class="control">${control}</div>
+  </div>`;
+}
+
+function explained(key, { doc, low = null, high = null, unit }) {
+  const range = high !== null ? `, ${low} to ${high}` : low !== null ? `, from ${low}` : '';
+  return `${key}: ${doc}${range}${unit ? ` (${unit})` : ''}`;
+}
+
+// By kind --------------------------------------------------------------------------------------------
+
+const FORMS = {
+  number: (context) => simple(context, number),
+  colour: (context) => simple(context, colour),
+  index,
+  pair,
+  angle,
+  choice: ({ label, value, spec, edit }) => {
+    const options = [...new Set([value, ...spec.options])].filter((name) => name !== 'mirror').sort();
+    return { control: menu({ label, value, options, choose: edit.set }), extras: nothing };
+  },
+};
+
+/** A control that may give way to a texture. */
+function simple(context, control, span = SPANS[context.key]) {
+  const { value, spec } = context;
+  if (isTexture(value)) return textured(context);
+  return {
+    control: control({ ...context, ...(span && { span }) }),
+    extras: html`${control === colour ? channelsSwitch(context) : nothing}${textureButton(context)}`,
+  };
+}
+
+function channelsSwitch({ label, value, edit }) {
+  const several = Array.isArray(value);
+  const act = () =>
+    edit.set(several ? Number((value.reduce((a, b) => a + b) / 3).toPrecision(4)) : channelsOf(value));
+  return iconButton({ label: `${label} by channel`, icon: 'channels', pressed: several, act });
+}
+
+/** An index: a name of a measured material, or numbers. */
+function index(context) {
+  const { app, layer, key, label, value, edit } = context;
+  if (isTexture(value)) return textured(context);
+  const { dielectrics, conductors } = app.session.names;
+  const opaque = variantOf(layer.keys) === 'custom';
+  const group = (title, names) => {
+    const known = Object.keys(names);
+    return { group: title, options: known };
+  };
+  const named = typeof value === 'string';
+  const known = named && (value in dielectrics || value in conductors);
+  const options = [
+    ['', 'custom'],
+    ...(named && !known ? [value] : []),
+    ...(key === 'eta' ? [group('Dielectrics', dielectrics)] : []),
+    ...(opaque ? [group('Metals', conductors)] : []),
+  ];
+  const choose = (name) => edit.set(name || plainIndex(indices(value, key, app.session.names)));
+  const menuOf = menu({ label: `${label}, by name`, value: named ? value : '', options, choose });
+  const numbers = named ? { control: nothing, extras: textureButton(context) } : simple(context, colour);
+  return { control: html`${menuOf}${numbers.control}`, extras: numbers.extras };
+}
+
+/** The numbers of a name as one number where the channels are nearly the same. */
+function plainIndex(found) {
+  const rgb = channelsOf(found ?? 1.5).map((channel) => Number(channel.toPrecision(4)));
+  return Math.max(...rgb) === Math.min(...rgb) ? rgb[0] : rgb;
+}
+
+/** Roughness: one number while locked, else one for each axis; each may be a texture. */
+function pair(context) {
+  const { label, value, edit } = context;
+  const locked = !Array.isArray(value);
+  const lock = iconButton({
+    label: locked ? `${label}: one for each axis` : `${label}: the same for both axes`,
+    icon: locked ? 'locked' : 'unlocked',
+    pressed: locked,
+    name: 'lock',
+    act: () => edit.set(locked ? axes(value) : value[0]),
+  });
+  if (locked) {
+    const { control, extras } = simple(context, number);
+    return { control, extras: html`${lock}${extras}` };
+  }
+  const axis = (name, place) => {
+    const replaced = (next) => value.map((old, other) => (other === place ? next : old));
+    const one = {
+      ...edit,
+      move: (next) => edit.move(replaced(next)),
+      set: (next) => edit.set(replaced(next)),
+    };
+    const part = simple({ ...context, label: `${label} ${name}`, value: value[place], edit: one }, number);
+    return html`<div class="axis"><span class="tag">${name}</span>${part.control}${part.extras}</div>`;
+  };
+  return { control: html`${axis('u', 0)}${axis('v', 1)}`, extras: lock };
+}
+
+/** Rotation: an angle, a texture, or a field of directions. */
+function angle(context) {
+  const { label, value, spec, edit, records } = context;
+  if (isTexture(value)) return textured(context);
+  const straight = !isBrushing(value);
+  const kinds = ['straight', ...records.brushing.brushing.options];
+  const choose = (kind) => edit.set(kind === 'straight' ? 0 : { ...(straight ? {} : value), brushing: kind });
+  const brushing = menu({
+    label: `${label}, brushing`,
+    value: straight ? 'straight' : value.brushing,
+    options: kinds,
+    choose,
+  });
+  const part = (key) => {
+    const one = {
+      ...edit,
+      set: (next) => edit.set({ ...value, [key]: next }),
+      move: (next) => edit.move({ ...value, [key]: next }),
+    };
+    const number = value[key] ?? records.brushing[key].default;
+    return html`<label
+      >${key} ${numberField({ label: `${label}, ${key}`, value: number, edit: one })}</label
+    >`;
+  };
+  return {
+    control: straight
+      ? html`<div class="angle">${dial({ label, value, spec, edit })}${brushing}</div>`
+      : html`${brushing}
+          <div class="pairs">${['u', 'v', 'offset'].map(part)}</div>`,
+    extras: textureButton(context),
+  };
+}
+
+// Textures -------------------------------------------------------------------------------------------
+
+function textured(context) {
+  const { label, spec, edit, records } = context;
+  const act = () => edit.set(PLAIN[spec.kind]);
+  return {
+    control: texture({ ...context, records: records.texture }),
+    extras: iconButton({ label: `${label}: remove the texture`, icon: 'remove', act }),
+  };
+}
+
+function textureButton({ app, label, edit, spec }) {
+  if (!spec.texturable) return nothing;
+  const act = async () => {
+    const file = await app.chooseFile('image/*,.exr,.hdr');
+    if (file) putTexture(app, file, edit);
+  };
+  return iconButton({ label: `${label}: take a texture`, icon: 'texture', act });
+}
+
+function textureTarget({ app, edit }) {
+  return {
+    over: (event) => event.preventDefault(),
+    drop(event) {
+      const [file] = event.dataTransfer?.files ?? [];
+      if (!file) return;
+      event.preventDefault();
+      event.stopPropagation();
+      putTexture(app, file, edit);
+    },
+  };
+}
+
+async function putTexture(app, file, edit) {
+  await app.attempt(`Texture ${file.name}`, async () => edit.set({ texture: await app.upload(file) }));
+}

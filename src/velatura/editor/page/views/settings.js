@@ -1,0 +1,120 @@
+// What the picture shows, and by which model.
+
+import { html, nothing } from 'lit-html';
+import { partsOf } from '../render/slices.js';
+import { setCamera, setModel, setSwitch, setView } from '../state/commands.js';
+import { enabled, layerName } from '../state/material.js';
+import { dial, menu, number } from './controls.js';
+
+const MODES = [
+  ['single', 'One model'],
+  ['split', 'Split screen'],
+  ['difference', 'Difference'],
+];
+/** What is beside the models to compare with: slow, so that it comes a few samples at a time. */
+const TRUTH = { name: 'truth', title: 'Truth (random walk)' };
+const capital = (name) => name[0].toUpperCase() + name.slice(1);
+
+export function line(label, control) {
+  return html`<div class="parameter">
+    <span class="name">${label}</span>
+    <div class="control">${control}</div>
+  </div>`;
+}
+
+const choice = (label, value, options, choose) => line(label, menu({ label, value, options, choose }));
+
+// View -----------------------------------------------------------------------------------------------
+
+export function view(app) {
+  const { store, session } = app;
+  const { view } = store.get();
+  const change = (key) => ({
+    move: (value) => app.drag(`view.${key}`, setView, { [key]: value }),
+    set: (value) => store.run(setView, { [key]: value }),
+    settle: app.settle,
+    refuse: (text) => app.complain('view', text, { passing: true }),
+  });
+  const known = session.environments.map(({ name, title }) => [name, title]);
+  /** What was dropped, among what is known. */
+  const withOwn = (options, name) =>
+    options.some(([known]) => known === name) ? options : [...options, [name, name.replace('file:', '')]];
+  const chooseObject = (object) => {
+    store.run(setView, { object });
+    store.aside(setCamera, null);
+  };
+  const exposure = { label: 'Exposure, in stops', spec: { low: -20, high: 20 }, span: [-4, 4] };
+  const objects = session.objects.map((name) => [name, capital(name)]);
+  return html`
+    ${choice('Object', view.object, withOwn(objects, view.object), chooseObject)}
+    ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
+    ${line('Turned by', dial({ label: 'Rotation of the light', value: view.rotation, edit: change('rotation') }))}
+    ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
+    ${line('Lobes', lobes(app))}
+    <div class="actions">
+      <button type="button" @click=${() => store.aside(setCamera, null)}>Reset the camera</button>
+      <button type="button" @click=${() => chooseEnvironment(app)}>Light from a file</button>
+    </div>
+  `;
+}
+
+async function chooseEnvironment(app) {
+  const file = await app.chooseFile('.hdr,.exr');
+  if (file) app.takeEnvironment(file);
+}
+
+/** One button for all lobes, and one for each alone. */
+function lobes(app) {
+  const { store } = app;
+  const { lobe } = store.get().view;
+  const shader = app.shader();
+  if (!shader) return nothing;
+  const all = enabled(store.get());
+  const title = ({ kind, layers }) => {
+    if (kind !== 'reflected') return capital(kind);
+    return layers.map((number) => `${number + 1} ${all[number] ? layerName(all[number]) : ''}`).join(', ');
+  };
+  const button = (value, text) =>
+    html`<button
+      type="button"
+      aria-pressed=${value === lobe}
+      @click=${() => store.run(setView, { lobe: value })}
+    >
+      ${text}
+    </button>`;
+  return html`<div class="choices" role="group" aria-label="Lobes shown">
+    ${button(null, 'All')}${partsOf(shader).map((part, index) => button(index, title(part)))}
+  </div>`;
+}
+
+// Model ----------------------------------------------------------------------------------------------
+
+export function model(app) {
+  const { store, session } = app;
+  const { model, switches, view } = store.get();
+  const { switches: choices, defaults } = session.models.find(({ name }) => name === model);
+  const models = session.models.map(({ name, title }) => [name, title]);
+  const other = view.other?.model ?? session.models.find(({ name }) => name !== model).name;
+  const chooseMode = (mode) =>
+    store.run(setView, { mode, ...(mode !== 'single' && { other: view.other ?? { model: other } }) });
+  const pinned = view.other?.material ? [['', view.other.title]] : [];
+  const chooseOther = (name) =>
+    name && store.run(setView, { other: name === TRUTH.name ? { truth: true, title: TRUTH.title } : { model: name } });
+  const compared = view.other?.truth ? TRUTH.name : pinned.length ? '' : other;
+  const others = [...pinned, ...models, [TRUTH.name, TRUTH.title]];
+  const offered = Object.entries(choices).filter(([, options]) => options.length > 1);
+  const selector = ([key, options]) => {
+    const titles = options.map((option) => [option, option + (option === defaults[key] ? ' (default)' : '')]);
+    const choose = (value) => store.run(setSwitch, key, value === defaults[key] ? null : value);
+    return choice(capital(key), switches[key] ?? defaults[key], titles, choose);
+  };
+  return html`
+    ${choice('Model', model, models, (name) => store.run(setModel, name))}
+    ${choice('Compare', view.mode, MODES, chooseMode)}
+    ${view.mode === 'single' ? nothing : choice('With', compared, others, chooseOther)}
+    <details class="switches">
+      <summary>Switches</summary>
+      ${offered.map(selector)}
+    </details>
+  `;
+}

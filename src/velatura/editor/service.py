@@ -1,0 +1,194 @@
+"""What the page asks: which parameters and presets there are, a material's shader, an object, a text.
+
+Every verb is a function of a mapping to a mapping, both of JSON's types. Textures in a material are relative to the
+working directory. All errors that a user can make are InvalidInput.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic.fields import FieldInfo
+
+from velatura import __version__
+from velatura.editor import appearance, bundle, classes, truth, validations
+from velatura.editor.bodies import Answer, Body, Verb, array, document, field, material_of, model_of
+from velatura.editor.shading import shading
+from velatura.editor.shading import tables as kept_tables
+from velatura.errors import InvalidInput
+from velatura.model import DEFAULT, MODELS, SWITCHES, Model
+from velatura.scenes.environments import studio
+from velatura.scenes.objects import OBJECTS, ground, plinth
+from velatura.scenes.surfaces import Surface
+from velatura.stack import Named, Stack, Texture, dumps, loads, names, preset, presets, rgb
+from velatura.stack.layers import LAYERS
+from velatura.stack.schema import Parameter, Record, parameters, unknown
+from velatura.stack.spectra import MIRROR
+from velatura.stack.values import Angle, Brushing, Choice, Colour, Conductor, Flag, Index, Pair, Scalar, Text
+
+#: What the page shows a parameter as.
+KINDS: dict[type[Parameter], str] = {
+    Scalar: "number",
+    Colour: "colour",
+    Index: "index",
+    Pair: "pair",
+    Angle: "angle",
+    Choice: "choice",
+    Conductor: "choice",
+    Flag: "flag",
+    Text: "text",
+}
+
+#: Pictures of light that need no file.
+ENVIRONMENTS: dict[str, Callable[[], ArrayLike]] = {
+    "studio": studio,
+    "furnace": lambda: np.ones((2, 4, 3), np.float32),
+}
+
+
+# Verbs ---------------------------------------------------------------------------------------------------------------
+
+
+def session(body: Body) -> Answer:
+    """All that the page knows from the start; nothing is `opened` yet."""
+    return {**_constants(), "opened": None}
+
+
+@functools.cache
+def _constants() -> Answer:
+    environments = [(name, None) for name in ENVIRONMENTS] + list(bundle.environments().items())
+    return {
+        "version": __version__,
+        "schema": {where: _keys(model) for where, model in _RECORDS.items()},
+        "presets": [_preset(name) for name in presets()],
+        "models": [_model(model) for model in MODELS],
+        "default_model": DEFAULT,
+        "names": _names(),
+        "objects": list(OBJECTS),
+        "environments": [{"name": name, "title": _titled(name), "url": url} for name, url in environments],
+    }
+
+
+_RECORDS: dict[str, type[Record]] = {"material": Stack, **LAYERS, "texture": Texture, "brushing": Brushing}
+
+
+def _keys(model: type[Record]) -> Answer:
+    """The declared parameters of a layer, or of the whole material."""
+    return {
+        key: _parameter(declared, model.model_fields[key])
+        for key, declared in parameters(model).items()
+        if type(declared) in KINDS
+    }
+
+
+def _parameter(declared: Parameter, place: FieldInfo) -> Answer:
+    """One parameter as its control needs it; None stands for infinity, and for no default."""
+    known: Answer = {"kind": KINDS[type(declared)], "unit": declared.unit, "doc": declared.doc}
+    known |= {"default": None if place.is_required() else place.default, "texturable": declared.texturable}
+    if isinstance(declared, Scalar):
+        low, high = (limit if math.isfinite(limit) else None for limit in (declared.low, declared.high))
+        known |= {"low": low, "high": high, "strict": declared.strict}
+    if isinstance(declared, Choice):
+        known["options"] = declared.options
+    if isinstance(declared, Conductor):
+        known["options"] = (MIRROR, *names()[0])
+    return known
+
+
+def _titled(name: str) -> str:
+    """A name as a heading: `belcour2018` as Belcour 2018."""
+    words = re.sub(r"(?<=\D)(?=\d)|[-_]", " ", name)
+    return words[:1].upper() + words[1:]
+
+
+def _preset(name: str) -> Answer:
+    stack = preset(name)
+    return {"name": name, "title": stack.name or _titled(name), "material": document(stack)}
+
+
+def _model(model: Model) -> Answer:
+    return {
+        "name": model.name,
+        "title": _titled(model.name),
+        "switches": {switch: model.allowed(switch) for switch in SWITCHES},
+        "defaults": {switch: getattr(model, switch) for switch in SWITCHES},
+    }
+
+
+def _names() -> Answer:
+    """Named indices as RGB."""
+    conductors, dielectrics = names()
+    return {
+        "dielectrics": {name: rgb(Named(name, "eta")) for name in dielectrics},
+        "conductors": {name: {"eta": rgb(Named(name, "eta")), "k": rgb(Named(name, "k"))} for name in conductors},
+    }
+
+
+def shader(body: Body) -> Answer:
+    """How to draw a material, as `shading.shading` says it, with the model and its switches."""
+    stack = material_of(body)
+    written = (entry.get("interface") or {} for entry in body["material"]["layers"])
+    return shading(stack, model_of(body), stretched=any(isinstance(keys.get("alpha"), list) for keys in written))
+
+
+def tables(body: Body) -> Answer:
+    """The averages that a shader looks up, as texels."""
+    return {"texture": array(kept_tables(field(body, "key", str)))}
+
+
+def read(body: Body) -> Answer:
+    """The material in a text, YAML or JSON."""
+    return {"material": document(loads(field(body, "text", str), "the text"))}
+
+
+def write(body: Body) -> Answer:
+    """A material as YAML, its textures relative to the working directory."""
+    return {"text": dumps(material_of(body), "yaml", ".")}
+
+
+def object_(body: Body) -> Answer:
+    """An object with what it stands on, as triangles, and the camera that sees it."""
+    name = field(body, "name", str)
+    if name not in OBJECTS:
+        raise InvalidInput(unknown("object", name, OBJECTS))
+    surfaces = {"object": OBJECTS[name].surface(), "plinth": plinth(), "ground": ground()}
+    return {"parts": [_part(role, surface) for role, surface in surfaces.items()], "view": OBJECTS[name].view._asdict()}
+
+
+def _part(role: str, surface: Surface) -> Answer:
+    return {
+        "role": role,
+        "positions": array(surface.positions),
+        "normals": array(surface.normals),
+        "uv": array(surface.uv),
+        "triangles": array(surface.triangles, "uint32"),
+    }
+
+
+def environment(body: Body) -> Answer:
+    """A picture of the light from all around, linear RGB, equirectangular."""
+    name = field(body, "name", str)
+    if name not in ENVIRONMENTS:
+        raise InvalidInput(unknown("environment", name, ENVIRONMENTS))
+    return {"picture": array(ENVIRONMENTS[name]())}
+
+
+#: Every verb by the name that the page calls it by.
+VERBS: dict[str, Verb] = {
+    "session": session,
+    "shader": shader,
+    "tables": tables,
+    "read": read,
+    "write": write,
+    "object": object_,
+    "environment": environment,
+    **validations.VERBS,
+    **appearance.VERBS,
+    **classes.VERBS,
+    **truth.VERBS,
+}

@@ -1,0 +1,175 @@
+"""The editor in a cell of a notebook: the same page, with this process in the place of the server."""
+
+from __future__ import annotations
+
+import contextvars
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from velatura.editor import bundle
+from velatura.editor.bodies import Answer, document, field
+from velatura.editor.folder import PICTURES, Conflict, Folder
+from velatura.editor.service import VERBS
+from velatura.errors import InvalidInput, MissingTool, VelaturaError
+from velatura.model import DEFAULT, SWITCHES, Model, named
+from velatura.stack import Stack, load
+from velatura.stack.schema import show, unknown
+
+try:
+    import anywidget
+    import traitlets
+except ImportError:
+    raise MissingTool('the editor in a notebook needs anywidget: pip install "velatura[notebook]"') from None
+
+BUG = "the editor has failed, which is a mistake in it; the kernel's log says more"
+LOWEST = 200  # pixels
+THREADS = 4  # that answer one widget
+
+
+class Read(traitlets.TraitType):
+    """A trait that a function reads, which raises InvalidInput where there is no meaning to a value."""
+
+    def __init__(self, read: Callable[[Any], Any]) -> None:
+        super().__init__()
+        self.read = read
+
+    def validate(self, _: Any, value: Any) -> Any:
+        return self.read(value)
+
+
+# Values --------------------------------------------------------------------------------------------------------------
+
+
+def _stack(value: Any) -> Stack:
+    if isinstance(value, Stack):
+        return value
+    if isinstance(value, Mapping):
+        return Stack.from_dict(value)
+    if isinstance(value, str | Path):
+        return load(value)
+    raise InvalidInput(f"stack: must be a Stack, its fields, a file or the name of a preset, got {show(value)}")
+
+
+def _model(value: Any) -> Model:
+    if isinstance(value, str | Model):
+        return named(value)
+    raise InvalidInput(f"model: must be a Model or its name, got {show(value)}")
+
+
+def _height(value: Any) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and value >= LOWEST:
+        return value
+    raise InvalidInput(f"height: must be a whole number of pixels from {LOWEST}, got {show(value)}")
+
+
+# Values as the page has them -----------------------------------------------------------------------------------------
+
+
+def _written(stack: Stack, editor: Editor) -> Answer:
+    """A stack for the page: in its own words where it is the page's, which hears of no change then."""
+    described, fields = editor._described
+    return fields if stack == described else document(stack)
+
+
+def _described(fields: Answer, editor: Editor) -> Stack:
+    """The page's stack; while that is not valid, which the page says itself, the last one that was."""
+    try:
+        stack = Stack.from_dict(fields)
+    except InvalidInput:
+        return editor.stack
+    editor._described = stack, fields
+    return stack
+
+
+def _chosen(model: Model, _: Editor) -> Answer:
+    usual = named(model.name)
+    changed = {switch: getattr(model, switch) for switch in SWITCHES}
+    return {
+        "name": model.name,
+        "switches": {key: choice for key, choice in changed.items() if choice != getattr(usual, key)},
+    }
+
+
+def _named(fields: Answer, editor: Editor) -> Model:
+    try:
+        return named(fields["name"], **fields["switches"])
+    except InvalidInput:
+        return editor.model
+
+
+# The widget ----------------------------------------------------------------------------------------------------------
+
+
+class Editor(anywidget.AnyWidget):
+    """The editor, shown in the cell whose last line it is.
+
+    `stack` and `model` are synchronised both ways: set them, and the page changes, in one step that it can undo; change
+    the page, and they are changed, which `editor.observe(f, "stack")` tells. What is opened and saved in the page are
+    files of the working directory.
+
+    Args:
+        stack: a Stack, its fields as a mapping, a file or the name of a preset.
+        model: a named model, or a Model with other switches.
+        height: of the cell, in pixels.
+
+    Raises:
+        InvalidInput: no valid material, model or height, here or where they are set.
+        MissingTool: on import, where anywidget or the page is missing.
+    """
+
+    _esm = bundle.require() / "widget.js"
+    _css = bundle.require() / "widget.css"
+
+    stack = Read(_stack).tag(sync=True, to_json=_written, from_json=_described)
+    model = Read(_model).tag(sync=True, to_json=_chosen, from_json=_named)
+    height = Read(_height).tag(sync=True)
+
+    def __init__(
+        self,
+        stack: Stack | Mapping[str, Any] | str | Path | None = None,
+        model: str | Model = DEFAULT,
+        height: int = 640,
+    ) -> None:
+        self._described: tuple[Stack | None, Answer] = None, {}
+        self._folder = Folder()
+        self._verbs = {**VERBS, **self._folder.verbs}
+        self._threads = ThreadPoolExecutor(THREADS)
+        super().__init__(stack="coated-gold" if stack is None else stack, model=model, height=height)
+        self.on_msg(self._asked)
+
+    def __repr__(self) -> str:
+        return f"Editor(stack={self.stack.name!r}, model={self.model.name!r}, height={self.height})"
+
+    def close(self) -> None:
+        """Take the editor off the notebook."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        super().close()
+
+    def _asked(self, _: Any, message: Answer, buffers: Any) -> None:
+        """Answer a message of the page without holding up the notebook."""
+        self._threads.submit(contextvars.copy_context().run, self._answer, message)
+
+    def _answer(self, message: Answer) -> None:
+        about = {"id": message.get("id")}
+        try:
+            verb, body = field(message, "verb", str), field(message, "body", dict, {})
+            if verb == "file":
+                self.send({**about, "answer": {}}, [self._file(field(body, "address", str))])
+            elif verb in self._verbs:
+                self.send({**about, "answer": self._verbs[verb](body)})
+            else:
+                raise InvalidInput(unknown("verb", verb, self._verbs))
+        except VelaturaError as error:
+            self.send({**about, "error": str(error), "status": 409 if isinstance(error, Conflict) else 422})
+        except Exception:
+            self.log.exception("The editor has failed")
+            self.send({**about, "error": BUG, "status": 500})
+
+    def _file(self, address: str) -> bytes:
+        """What the server has at an address: an environment, or a texture of the folder."""
+        if address in bundle.environments().values():
+            return (bundle.STATIC / address.lstrip("/")).read_bytes()
+        return self._folder.existing(unquote(address.removeprefix("/files/")), PICTURES).read_bytes()

@@ -1,0 +1,249 @@
+"""The lobes of a uniform material, drawn once over direction into a texture, and read back from it.
+
+What is drawn, and how lobes are made of it again, are those of `velatura.model.memo`: energies, gains, and roughness as
+a matrix, over the cosine, and over the azimuth where an interface is anisotropic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import prod
+from typing import NamedTuple
+
+from velatura import ops
+from velatura.model import bsdf, memo
+from velatura.model.diffuse import Base
+from velatura.model.prepare import Prepared, PreparedInterface
+from velatura.model.sides import turned_over, with_index_below
+from velatura.model.variance import Isotropic
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+from velatura.shader import glsl
+from velatura.shader.graph import Graph
+from velatura.shader.symbol import Operand, Symbol, component, in_order, number, operand
+from velatura.stack import Stack
+from velatura.tables import curve
+
+_OF_BASE = 6  # columns: its scale and its energy
+PLANE = (95, 49)  # nodes over the cosine, twice as dense as those of most tables, and the azimuth
+PLACE = "place"  # in the code: coordinates of cosine and azimuth, from 0 to 1, and the side, 0 above and 1 below
+
+
+class Group(NamedTuple):
+    """Texels that are read together: how many, from which on."""
+
+    name: str
+    begin: int
+    texels: int
+
+
+@dataclass(frozen=True)
+class Bake:
+    """What is drawn for a direction, as columns of numbers, four to a texel: first what the layers above a diffuse base
+    transmit, if there is one, then the lobes.
+
+    `body` reads its lobes from the texture. A line of texels holds one of them for all cosines; lines go over azimuths,
+    sides and texels.
+    """
+
+    columns: Sequence[Operand]
+    body: bsdf.Body
+    nodes: tuple[int, ...]
+    groups: Sequence[Group]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Texels along x and y."""
+        return self.nodes[0], self._sides * prod(self.nodes[1:]) * self._texels
+
+    @property
+    def _sides(self) -> int:
+        return 1 if self.body.below is None else 2
+
+    @property
+    def _texels(self) -> int:
+        return len(self.columns) // 4
+
+    @cached_property
+    def symbols(self) -> list[Symbol]:
+        """All that is worked out, and all inputs."""
+        return in_order(self.columns)
+
+    def drawing(self) -> str:
+        """`vt_bake_node`, all texels of a node, and `vt_bake`, a texel of the texture."""
+        lines, texts = glsl.statements([(column, "number") for column in self.columns])
+        texels = [f"texels[{k}] = vec4({', '.join(texts[4 * k : 4 * k + 4])});" for k in range(self._texels)]
+        turns = prod(self.nodes[1:])
+        place = (
+            f"vec3(float(node.x) / {float(self.nodes[0] - 1)}, float(node.y % {turns}) / {float(max(turns - 1, 1))}, "
+            f"float(node.y / {turns}))"
+        )
+        begin = [f"vec3 {PLACE} = {place};", "VtMaterial m = vt_parameters;"]
+        end = ["", f"vec4 texels[{self._texels}];", *texels, "return texels;"]
+        width, height = self.size
+        constants = (
+            "// Of the texture, and how many texels a node has: blocks of lines, one above the other\n"
+            f"const ivec2 VT_BAKED = ivec2({width}, {height});\nconst int VT_TEXELS = {self._texels};\n"
+        )
+        node = glsl.block("vec4[VT_TEXELS] vt_bake_node(ivec2 node)", [*begin, *lines, *end])
+        return "\n".join([constants, node, _TEXEL])
+
+    def reading(self) -> str:
+        """The sampler, and functions that read each group."""
+        return "".join([_READING[len(self.nodes)].format(*self.nodes, sides=self._sides), *map(_reader, self.groups)])
+
+
+_TEXEL = """\
+vec4 vt_bake(ivec2 texel) {
+    int lines = VT_BAKED.y / VT_TEXELS;
+    return vt_bake_node(ivec2(texel.x, texel.y % lines))[texel.y / lines];
+}
+"""
+
+_READING = {
+    1: """\
+// The lobes over direction: RGBA32F, never filtered
+uniform highp sampler2D vt_baked;
+
+vec4 vt_baked_texel(int texel, vec3 place) {{
+    float position = clamp(place.x, 0.0, 1.0) * float({0} - 1);
+    int node = min(int(position), {0} - 2), line = {sides} * texel + int(place.z);
+    vec4 a = texelFetch(vt_baked, ivec2(node, line), 0), b = texelFetch(vt_baked, ivec2(node + 1, line), 0);
+    return mix(a, b, position - float(node));
+}}
+""",
+    2: """\
+// The lobes over direction: RGBA32F, never filtered
+uniform highp sampler2D vt_baked;
+
+vec4 vt_baked_texel(int texel, vec3 place) {{
+    vec2 position = clamp(place.xy, 0.0, 1.0) * vec2({0} - 1, {1} - 1);
+    ivec2 node = min(ivec2(position), ivec2({0}, {1}) - 2);
+    vec2 upper = position - vec2(node);
+    int line = ({sides} * texel + int(place.z)) * {1} + node.y;
+    vec4 a = texelFetch(vt_baked, ivec2(node.x, line), 0), b = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
+    line++;
+    vec4 c = texelFetch(vt_baked, ivec2(node.x, line), 0), d = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
+    return mix(mix(a, b, upper.x), mix(c, d, upper.x), upper.y);
+}}
+""",
+}
+
+
+def _reader(group: Group) -> str:
+    lines = [
+        f"vec4 texels[{group.texels}];",
+        f"for (int i = 0; i < {group.texels}; i++) texels[i] = vt_baked_texel({group.begin} + i, place);",
+        "return texels;",
+    ]
+    return "\n" + glsl.block(f"vec4[{group.texels}] vt_baked_{group.name}(vec3 place)", lines)
+
+
+def bake(stack: Stack, values: Mapping[str, Value], body: bsdf.Body) -> Bake:
+    """The lobes of a body, recorded from values by flat name, over direction."""
+    nodes = curve.LINE if body.above.variance is Isotropic else PLANE
+    w = curve.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
+
+    # Draw what is seen of a direction
+    columns, facets = _seen(stack, values, body, w)
+    base, groups = body.base(w), []
+    if base:
+        groups, through = [Group("through", 0, 1)], _apart(base.through(w))
+        columns = [*through, 0.0, *_apart(base.scale), *_apart(base.energy), *columns]
+    columns += [0.0] * (-len(columns) % 4)
+    groups.append(Group("lobes", len(groups), len(columns) // 4 - len(groups)))
+
+    # And read it
+    return Bake(Graph().unique(columns), _read(body, nodes, groups, facets), nodes, groups)
+
+
+def _seen(stack: Stack, values: Mapping[str, Value], body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
+    """The columns of all lobes at an upright direction, and whether each is drawn with facets."""
+    above = number(f"{PLACE}.z") < 0.5
+    if body.below is not None and stack.kinds == stack.kinds[::-1]:
+        # Layers that are of the same kinds from both sides are added up once, for either
+        values = with_index_below(stack.kinds, values, stack.thin)
+        _, turned = turned_over(stack.kinds, values)
+        chosen = {name: ops.select(above, value, turned[name]) for name, value in values.items()}
+        model, variance = body.above.model, body.above.variance
+        body = bsdf.body(stack.kinds, chosen, False, model, variance, constant=False)
+        return _columns(body.lobes_above, body, w)
+    columns, facets = _columns(body.lobes_above, body, w)
+    if body.below is None:
+        return columns, facets
+    return [ops.select(above, a, b) for a, b in zip(columns, _columns(body.lobes_below, body, w)[0])], facets
+
+
+def _columns(lobes: memo.Lobes, body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
+    reflected, passed = lobes(w)
+    seen = [*reflected, *([passed] if body.below is not None and passed is not None else [])]
+    columns = [column for lobe in seen for column in memo.columns(lobe, body.above, _apart)]
+    return columns, [lobe.facets is not None for lobe in seen]
+
+
+def _apart(colour: Value) -> list[Operand]:
+    return [component(operand(colour), channel) for channel in range(3)]
+
+
+def _together(r: Value, g: Value, b: Value) -> Value:
+    return Symbol("colour", (r, g, b), "colour")
+
+
+# Lobes that are read
+
+
+@dataclass(frozen=True)
+class _Texture:
+    """The columns of a group, over direction, on one side."""
+
+    shape: tuple[int, ...]
+    group: Group
+    side: Value
+    begin: int = 0
+
+    def __call__(self, w: Direction) -> Iterable[Value]:
+        at = [operand(x) for x in (*curve.places(w, len(self.shape)), 0.0, self.side)]
+        texels = Symbol("baked", (at[0], at[1], at[-1]), "texels", self.group)
+        channels = range(self.begin, 4 * self.group.texels)
+        return [Symbol("component", (texels,), "number", channel) for channel in channels]
+
+
+@dataclass(frozen=True)
+class _Base(Base):
+    """A base whose light is read."""
+
+    texture: _Texture
+
+    def through(self, w: Direction) -> Value:
+        r, g, b, _ = self.texture(w)
+        return _together(r, g, b)
+
+
+def _read(body: bsdf.Body, nodes: tuple[int, ...], groups: Sequence[Group], facets: Sequence[bool]) -> bsdf.Body:
+    """A body whose lobes are read from the texture."""
+    transmits, held = body.below is not None, groups[-1]
+    # Light is on the side that wi is on, but for the symmetric form, which looks at others
+    side = 0.0 if not transmits else ops.select(number("wi.z") > 0, 0.0, 1.0)
+    sides = (0.0, 1.0) if body.above.model.form == "symmetric" else (side, side)
+
+    def lobes(prepared: Prepared, side: Value) -> memo.Lobes:
+        first = prepared.layers[0]
+        own = [first if each and isinstance(first, PreparedInterface) else None for each in facets]
+        columns = _Texture(nodes, held, side, _OF_BASE if prepared.base else 0)
+        return memo.Memo(columns, _together, 3, prepared, own, transmits)
+
+    if body.below is not None:
+        return replace(body, lobes_above=lobes(body.above, sides[0]), lobes_below=lobes(body.below, sides[1]))
+    above = lobes(body.above, 0.0)
+    read = replace(body, lobes_above=above, lobes_below=above)
+    if body.above.base is None:
+        return read
+    columns, through = _Texture(nodes, held, 0.0), _Texture(nodes, groups[0], 0.0)
+
+    def base(w: Direction) -> Base:
+        channels = list(columns(w))[:_OF_BASE]
+        return _Base(body.above, _together(*channels[:3]), _together(*channels[3:]), through)
+
+    return replace(read, base_above=base)

@@ -1,0 +1,456 @@
+"""The Appearance panel as a user meets it, in headless Chromium with a server of its own.
+
+Rationale: what is dragged there goes to Python and comes back as layers, and only a browser shows that both faces of a
+material stay one. At the centre of a sphere that is looked at straight the light comes in along the normal: there the
+members of a class must look the same. The tolerance is the picture's own noise: the differences of the two pictures
+over a patch of pixels there have a standard error, and their mean must lie within 4 of it (false alarms: 1 in 15 000).
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import chromium
+import numpy as np
+import pytest
+from editor import Server, Visit
+
+import velatura as vt
+from velatura.editor import appearance
+from velatura.scenes.objects import OBJECTS
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+
+Open = Callable[..., Visit]
+SAME = 0.5  # of 255: mean difference of previews of one material
+OTHER = 1.0  # of 255: what a change of the material makes at least
+NOISE = 4.0  # standard errors
+SIZE = (128, 96)  # pixels of the pictures that are traced
+SAMPLES = 128
+
+
+@pytest.fixture
+def visit(opened: Any, served: Server) -> Iterator[Open]:
+    """Opens pages in a browser without a past, and sees that no console complains."""
+    context = opened.new_context(viewport={"width": 900, "height": 500})
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    visits: list[Visit] = []
+    expected: list[str] = []
+
+    def begin(*expecting: str, address: str = "") -> Visit:
+        expected.extend(expecting)
+        found = Visit(context.new_page(), address or served.address)
+        found.page.locator(".look > summary").click()
+        visits.append(found)
+        return found
+
+    yield begin
+    context.close()
+    complaints = [text for found in visits for text in found.complaints]
+    assert [text for text in complaints if not any(known in text for known in expected)] == []
+
+
+def open_material(visit: Visit, title: str) -> None:
+    visit.page.get_by_role("button", name="Open", exact=True).click()
+    visit.page.get_by_role("button", name=title, exact=True).click()
+    visit.settled()
+
+
+def panel(visit: Visit) -> Any:
+    """The panel, with the lobes of the material in it."""
+    visit.page.get_by_role("tab", name="Appearance").click()
+    found = visit.page.locator("section.appearance")
+    found.locator(".lobe").first.wait_for()
+    return found
+
+
+def answered(visit: Visit) -> None:
+    """Wait until what was dragged has been answered, drawn, and made one step."""
+    visit.settled()
+    visit.page.wait_for_function("() => !velatura.store.dragging")
+
+
+def chosen(visit: Visit, lobe: int) -> None:
+    visit.page.locator(".lobe").nth(lobe - 1).click()
+    visit.page.get_by_text(f"Class of lobe {lobe}").wait_for()
+
+
+def steps(visit: Visit) -> int:
+    return int(visit.page.evaluate("velatura.store.history().past.length"))
+
+
+def lobes(visit: Visit) -> Any:
+    """The lobes of the material in the page, by Python and the page's model."""
+    material = {"layers": [{layer["kind"]: layer["keys"]} for layer in visit.state("layers")]}
+    return vt.lobes(vt.Stack.from_dict(material), 1.0, model=visit.state("model"))
+
+
+def check_physical(visit: Visit) -> None:
+    for layer in visit.state("layers"):
+        for key, value in layer["keys"].items():
+            assert np.min(value) >= (1 if key == "eta" and "k" not in layer["keys"] else 0), (key, value)
+
+
+def drag_member(visit: Visit, x: float, y: float) -> None:
+    """Drags the point in the map to a share of its width and height, from the lower left."""
+    plot = visit.page.locator(".plane").first
+    plot.scroll_into_view_if_needed()
+    plot.locator(".member").wait_for()
+    box = plot.locator(".frame").bounding_box()
+    point = plot.locator(".member").bounding_box()
+    mouse = visit.page.mouse
+    mouse.move(point["x"] + point["width"] / 2, point["y"] + point["height"] / 2)
+    mouse.down()
+    mouse.move(box["x"] + x * box["width"], box["y"] + (1 - y) * box["height"], steps=4)
+    mouse.up()
+
+
+def traced(visit: Visit) -> np.ndarray:
+    """The sphere looked at straight, (height, width, 3), linear, traced; then the preview alone is drawn again."""
+    positions = OBJECTS["sphere"].surface().positions
+    centre = (0.5 * (positions.min(axis=0) + positions.max(axis=0))).tolist()
+    visit.settled()
+    pixels = visit.page.evaluate(
+        """async ([[x, y, z], size, samples]) => {
+          const { viewport } = velatura;
+          viewport.moving(false);
+          viewport.setSize(...size);
+          viewport.setCamera({ origin: [x, y, z + 7], target: [x, y, z], fov: 19.5 });
+          viewport.setBudget({ samples });
+          while (viewport.samples < samples) await new Promise((resolve) => setTimeout(resolve, 20));
+          const { data } = viewport.radiance();
+          viewport.setBudget({ samples: 0 });
+          return [...data];
+        }""",
+        [centre, SIZE, SAMPLES],
+    )
+    return np.reshape(pixels, (SIZE[1], SIZE[0], 4))[..., :3]
+
+
+def around(low: float, high: float) -> np.ndarray:
+    """The pixels of `traced` between two shares of the sphere's radius."""
+    positions = OBJECTS["sphere"].surface().positions
+    radius = 0.5 * float(np.ptp(positions[:, 0]))
+    edge = radius / np.sqrt(7**2 - radius**2) / np.tan(np.radians(19.5 / 2)) * SIZE[1] / 2
+    y, x = np.indices((SIZE[1], SIZE[0]))
+    away = np.hypot(x + 0.5 - SIZE[0] / 2, y + 0.5 - SIZE[1] / 2) / edge
+    return (away >= low) & (away < high)
+
+
+def apart(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> float:
+    """By how many standard errors two pictures differ on average over some pixels, in the worst channel."""
+    differences = (a - b)[where]
+    error = differences.std(axis=0) / np.sqrt(len(differences))
+    return float(np.max(np.abs(differences.mean(axis=0)) / np.maximum(error, 1e-6)))
+
+
+# A visit -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_visit_from_blur_to_class_to_coat(visit: Open, served: Server) -> None:
+    page = visit()
+    page.page.evaluate(
+        "void (velatura.viewport.thumbnail = () => new Promise(() => {}))"
+    )  # no paths but those asked for here
+    page.page.get_by_label("Object", exact=True).select_option("sphere")
+    open_material(page, "Coated rough metal")
+    look = panel(page)
+    first = page.picture()
+
+    # Blur
+    chosen(page, 2)
+    before = steps(page)
+    blur = look.get_by_label("Blur, slider")
+    for tick in (88, 80, 70):
+        blur.fill(str(tick))
+    answered(page)
+    assert lobes(page).alpha[-1][0, 0] == pytest.approx(0.35, abs=1e-4)
+    assert float(np.mean(np.abs(page.picture() - first))) > SAME
+    assert steps(page) == before + 1
+    check_physical(page)
+
+    # Two interfaces, and the class that they have
+    chosen(page, 1)
+    look.get_by_label("Number of interfaces").select_option("2")
+    answered(page)
+    assert sum(layer["kind"] == "interface" for layer in page.state("layers")) == 3
+    whole, energies = traced(page), lobes(page).energy
+    indices = page.state("layers.0.keys.eta"), page.state("layers.1.keys.eta")
+    before = steps(page)
+    drag_member(page, 0.13, 0.62)  # indices 1.2 and 2.36
+    answered(page)
+    assert steps(page) == before + 1
+    assert page.state("layers.0.keys.eta") == pytest.approx(1.2, abs=0.05)
+    check_physical(page)
+    after = lobes(page).energy
+    assert float(np.max(np.abs(after[0] + after[1] - energies[0] - energies[1]))) < 1e-6
+    other = traced(page)
+    assert apart(whole, other, around(0, 0.09)) < NOISE
+    assert apart(whole, other, around(0.9, 0.97)) > 2 * NOISE
+
+    # Back
+    page.page.get_by_role("button", name="Undo: choose a member of the class").click()
+    page.settled()
+    assert (page.state("layers.0.keys.eta"), page.state("layers.1.keys.eta")) == indices
+
+    # Coat
+    look.get_by_text("Coat", exact=True).click()
+    look.get_by_label("Index of the coat", exact=True).fill("1.33")
+    look.get_by_label("Index of the coat", exact=True).press("Enter")
+    interfaces = len(lobes(page).energy)
+    look.get_by_role("button", name="Coat it").click()
+    page.page.get_by_role("button", name="Undo: coat the material").wait_for()
+    page.settled()
+    assert page.state("layers.0.keys.eta") == pytest.approx(1.33)
+    covered = lobes(page)
+    assert len(covered.energy) == interfaces + 1
+    assert covered.alpha[-1][0, 0] == pytest.approx(0.35, abs=1e-4)
+    kept = page.picture()
+
+    # Save and reopen
+    page.page.get_by_role("button", name="Save as").click()
+    page.page.get_by_label("File name").fill("looks.yaml")
+    page.page.locator("dialog.save").get_by_role("button", name="Save").click()
+    page.page.get_by_text("Saved looks.yaml").wait_for()
+    assert (served.folder / "looks.yaml").is_file()
+    open_material(page, "Gold")
+    open_material(page, "looks.yaml")
+    page.page.wait_for_function("() => velatura.store.get().layers.length > 2")
+    assert float(np.mean(np.abs(page.picture() - kept))) < SAME
+
+
+def test_a_burst_of_drags_is_a_few_calls_and_the_last_one_wins(visit: Open) -> None:
+    page = visit()
+    open_material(page, "Coated rough metal")
+    look = panel(page)
+    chosen(page, 2)
+    before = steps(page)
+    page.page.evaluate(
+        """() => {
+          window.asked = [];
+          const { ask } = velatura.live;
+          velatura.live.ask = (verb, body) => (window.asked.push(verb), ask(verb, body));
+        }"""
+    )
+    look.get_by_label("Blur, slider").evaluate(
+        """(slider) => {
+          for (let tick = 0; tick < 50; tick++) {
+            slider.value = 91 - tick;
+            slider.dispatchEvent(new Event('input', { bubbles: true }));
+          }
+          slider.dispatchEvent(new Event('change', { bubbles: true }));
+        }"""
+    )
+    answered(page)
+    assert page.page.evaluate("asked.filter((verb) => verb === 'invert').length") <= 3
+    assert lobes(page).alpha[-1][0, 0] == pytest.approx(0.21, abs=1e-4)
+    assert look.get_by_label("Blur", exact=True).input_value() == "0.21"
+    assert steps(page) == before + 1
+
+
+def test_handles_move_by_pointer_and_by_keys(visit: Open) -> None:
+    page = visit()
+    open_material(page, "Coated rough metal")
+    look = panel(page)
+    handle = look.locator(".handle").nth(1)
+    handle.focus()
+    handle.press("ArrowRight")
+    answered(page)
+    start = lobes(page)
+    assert start.alpha[-1][0, 0] == pytest.approx(0.4627 + 0.01, abs=1e-3)
+
+    box = handle.locator("circle").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x - 30, y, steps=3)
+    page.page.mouse.up()
+    answered(page)
+    moved = lobes(page)
+    assert moved.alpha[-1][0, 0] < start.alpha[-1][0, 0] - 0.05
+    assert float(moved.energy[-1][0, 0]) == pytest.approx(float(start.energy[-1][0, 0]), rel=0.1)
+
+
+def test_small_pictures_lead_to_members(visit: Open) -> None:
+    page = visit()
+    page.page.evaluate(
+        """() => {
+          const { viewport } = velatura;
+          const { thumbnail } = viewport;
+          viewport.thumbnail = (shader, values, size) => thumbnail.call(viewport, shader, values, size, 4);
+          viewport.setSize(96, 72);
+          viewport.setBudget({ samples: 1 });
+        }"""
+    )
+    open_material(page, "Bati 2021, figure 15 a")
+    look = panel(page)
+    drawn = page.page.wait_for_function(
+        """() => {
+          const pictures = [...document.querySelectorAll('.members canvas')].map((canvas) =>
+            [...canvas.getContext('2d').getImageData(0, 0, 96, 96).data].reduce((sum, value) => sum + value, 0));
+          return pictures.length === 5 && pictures.every(Boolean) && pictures;
+        }""",
+        timeout=60_000,
+    ).json_value()
+    assert len(set(drawn)) == 5
+    before = lobes(page).energy
+    look.get_by_role("button", name="Take member 2 of the path").click()
+    answered(page)
+    after = lobes(page).energy
+    assert page.state("layers.0.keys.eta") != pytest.approx(2.13, abs=0.02)
+    assert float(np.max(np.abs(np.sum(before, axis=0) - np.sum(after, axis=0)))) < 1e-6
+
+
+# What cannot be ------------------------------------------------------------------------------------------------------
+
+
+def test_what_cannot_be_had_is_said_beside_the_lobe(visit: Open) -> None:
+    page = visit()
+    open_material(page, "Bati 2021, figure 21 right")
+    look = panel(page)
+    chosen(page, 2)
+    look.get_by_label("Blur, slider").fill("0")
+    answered(page)
+    look.locator(".refused", has_text="Asked: blur 0").wait_for()
+    assert look.locator("circle.ghost").count() == 1
+    check_physical(page)
+    page.page.get_by_role("button", name="Undo").click()
+    look.locator(".refused").wait_for(state="detached")
+
+
+def test_a_material_that_is_no_target_says_why(visit: Open) -> None:
+    page = visit()
+    open_material(page, "Coated brushed aluminium")
+    look = panel(page)
+    assert "is brushed" in look.locator(".says").inner_text()
+    assert look.locator(".lobe").count() == 2
+    assert look.get_by_label("Blur, slider").is_disabled()
+
+
+# Saved states, addresses, objects ------------------------------------------------------------------------------------
+
+
+def test_all_figures_of_the_paper_open(visit: Open) -> None:
+    page = visit()
+    states = appearance.targets({})["targets"]
+    assert {state["title"].split()[3] for state in states} == {str(figure) for figure in range(15, 23)}
+    page.page.get_by_role("button", name="Open", exact=True).click()
+    for state in states:
+        page.page.get_by_role("button", name=state["title"], exact=True).click()
+        page.page.wait_for_function("(name) => velatura.store.get().name === name", arg=state["title"])
+        page.page.wait_for_function(
+            "(count) => document.querySelectorAll('.appearance .lobe').length === count",
+            arg=len(state["target"]["lobes"]),
+        )
+        assert page.state("model") == state["model"]
+        assert len(page.state("layers")) == len(state["material"]["layers"])
+        said = page.page.locator("section.appearance .refused").all_inner_texts()
+        assert bool(said) == bool(state["snapped"]), state["title"]
+        page.page.get_by_role("button", name="Open", exact=True).click()
+    page.page.get_by_role("button", name="Cancel").first.click()
+    page.settled()
+
+
+def test_an_address_holds_the_material(visit: Open, served: Server) -> None:
+    page = visit()
+    open_material(page, "Wet copper")
+    page.page.get_by_label("Exposure, in stops", exact=True).fill("1")
+    page.page.get_by_label("Exposure, in stops", exact=True).press("Enter")
+    page.page.get_by_role("button", name="Share").click()
+    page.page.get_by_text("The address is on the clipboard").wait_for()
+    address = page.page.evaluate("navigator.clipboard.readText()")
+    assert address.startswith(f"{served.address}#m=")
+    before = page.picture()
+
+    other = visit(address=address)
+    other.page.wait_for_function("() => velatura.store.get().name === 'Wet copper'")
+    assert other.state("view.exposure") == 1
+    assert other.page.url == served.address
+    assert float(np.mean(np.abs(other.picture() - before))) < SAME
+
+    broken = visit(address=address[:-20])
+    broken.page.locator(".messages").get_by_text("The address holds no material that can be read").wait_for()
+
+
+def test_a_dropped_object_is_seen(visit: Open) -> None:
+    page = visit()
+    before = page.picture()
+    text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv .5 .5 1\nf 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
+    for name, data in (("pyramid.obj", text.encode()), ("triangle.glb", _glb())):
+        page.page.evaluate(
+            """([name, bytes]) => {
+              const dataTransfer = new DataTransfer();
+              dataTransfer.items.add(new File([new Uint8Array(bytes)], name));
+              document.querySelector('canvas').dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true }));
+            }""",
+            [name, list(data)],
+        )
+        page.page.wait_for_function("(name) => velatura.store.get().view.object === `file:${name}`", arg=name)
+        page.page.wait_for_timeout(300)
+        seen = page.picture()
+        assert float(np.mean(np.abs(seen - before))) > OTHER, name
+        before = seen
+    page.page.reload()
+    page.ready()
+    page.page.locator(".look > summary").click()
+    assert float(np.mean(np.abs(page.picture() - before))) < SAME
+
+
+def _glb() -> bytes:
+    """One triangle that faces the camera."""
+    positions = np.array([[-1, 0, 0], [1, 0, 0], [0, 2, 0]], "<f4").tobytes()
+    fields = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, 0, 0], "max": [1, 2, 0]}
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": len(positions)}],
+        "buffers": [{"byteLength": len(positions)}],
+    }
+    text = json.dumps(fields).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(positions), b"BIN\0") + positions
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+# Side by side --------------------------------------------------------------------------------------------------------
+
+
+def test_two_members_side_by_side(visit: Open) -> None:
+    page = visit()
+    open_material(page, "Bati 2021, figure 15 c")
+    look = panel(page)
+    look.get_by_role("button", name="Pin as B").click()
+    page.settled()
+    alike = page.picture()
+    look.get_by_label("Energy, slider").fill("198")
+    answered(page)
+    changed = np.abs(page.picture() - alike).mean(axis=(0, 2))
+    assert changed[:30].mean() > OTHER
+    assert changed[34:].mean() < SAME
+    assert page.page.locator(".side.right").inner_text() == "B: Bati 2021, figure 15 c"
+    look.get_by_role("button", name="One picture").click()
+    assert page.state("view.mode") == "single"
+
+
+def test_the_truth_beside_the_model(visit: Open) -> None:
+    page = visit()
+    page.page.evaluate("velatura.viewport.setSize(96, 72)")
+    open_material(page, "Glossy plastic")
+    page.page.get_by_label("Compare").select_option("split")
+    alike = page.picture()
+    page.page.get_by_label("With").select_option("truth")
+    page.page.wait_for_function("() => velatura.viewport.truth?.samples >= 32", timeout=60_000)
+    truth = page.picture()
+    assert float(np.mean(np.abs(truth - alike)[:, :30])) < SAME
+    # It is the same view, where the model is good: noise and the preview's lack of shadows are what is left
+    assert 0 < float(np.mean(np.abs(truth - alike)[:, 34:])) < 20
+    page.page.get_by_label("Compare").select_option("single")
+    assert page.page.evaluate("velatura.viewport.truth") is None

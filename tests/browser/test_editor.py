@@ -1,0 +1,396 @@
+"""The editor as a user meets it, in headless Chromium with a server of its own.
+
+Rationale: what people do in it runs through page, Python and files at once, and only a browser shows whether it holds.
+Pictures are compared as previews, which are the same every time. Every visit fails where the console has complained;
+the browser itself notes there that a server is away, or has refused, which the visits that bring it about expect.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import chromium
+import numpy as np
+import pytest
+from editor import Server, Visit
+
+import velatura as vt
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+
+Open = Callable[..., Visit]
+SAME = 0.5  # of 255: mean difference of pictures of one material
+OTHER = 1.0  # of 255: what a change of the material makes at least
+REFUSED = "the server responded with a status of 4"
+AWAY = "ERR_CONNECTION_REFUSED"
+
+
+@pytest.fixture
+def visit(opened: Any, served: Server) -> Iterator[Open]:
+    """Opens pages in a browser without a past, and sees that no console complains."""
+    context = opened.new_context(viewport={"width": 900, "height": 600}, accept_downloads=True)
+    visits: list[Visit] = []
+    expected: list[str] = []
+
+    def begin(*expecting: str, **options: Any) -> Visit:
+        nonlocal context
+        expected.extend(expecting)
+        if options:
+            context.close()
+            context = opened.new_context(**options)
+        visits.append(Visit(context.new_page(), served.address))
+        return visits[-1]
+
+    yield begin
+    context.close()
+    complaints = [text for found in visits for text in found.complaints]
+    assert [text for text in complaints if not any(known in text for known in expected)] == []
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.mean(np.abs(a - b)))
+
+
+def open_preset(visit: Visit, title: str) -> None:
+    visit.page.get_by_role("button", name="Open", exact=True).click()
+    visit.page.get_by_role("button", name=title, exact=True).click()
+    visit.settled()
+
+
+def save_as(visit: Visit, name: str) -> None:
+    visit.page.get_by_role("button", name="Save as").click()
+    visit.page.get_by_label("File name").fill(name)
+    visit.page.locator("dialog.save").get_by_role("button", name="Save").click()
+
+
+def slider(visit: Visit, layer: int, label: str) -> Any:
+    return visit.page.locator(".layer").nth(layer).get_by_label(f"{label}, slider", exact=True)
+
+
+def drag(control: Any, ticks: Iterable[int]) -> None:
+    """What the browser tells the page while a slider is held and moved, and when it is let go."""
+    control.evaluate(
+        """async (element, ticks) => {
+          for (const tick of ticks) {
+            element.value = tick;
+            element.dispatchEvent(new Event('input', { bubbles: true }));
+            await new Promise(requestAnimationFrame);
+          }
+          element.dispatchEvent(new Event('change', { bubbles: true }));
+        }""",
+        list(ticks),
+    )
+
+
+def said(visit: Visit) -> Any:
+    return visit.page.locator(".messages")
+
+
+# A visit -------------------------------------------------------------------------------------------------------------
+
+
+def test_open_change_undo_reorder_save_and_reopen(visit: Open, served: Server) -> None:
+    page = visit()
+    open_preset(page, "Three dielectric layers over metal")
+    first = page.picture()
+
+    slider(page, 0, "Roughness").fill("80")
+    assert page.state("layers.0.keys.alpha") == 0.4
+    assert difference(page.picture(), first) > OTHER
+
+    page.page.get_by_role("button", name="Undo: change a value").click()
+    assert page.state("layers.0.keys.alpha") == 0.02
+    assert difference(page.picture(), first) < SAME
+
+    page.page.get_by_label("Move dielectric: arrow keys").first.press("ArrowDown")
+    assert [layer["keys"]["eta"] for layer in page.state("layers")[:2]] == [1.6, 1.35]
+    moved = page.picture()
+
+    save_as(page, "coats.yaml")
+    said(page).get_by_text("Saved coats.yaml").wait_for()
+    assert vt.load(served.folder / "coats.yaml").flat()["layer0_eta"] == 1.6
+    open_preset(page, "Gold")
+    page.page.get_by_role("button", name="Open", exact=True).click()
+    page.page.get_by_role("button", name="coats.yaml").click()
+    page.page.wait_for_function("() => velatura.store.get().layers.length === 4")
+    assert difference(page.picture(), moved) < SAME
+
+
+def test_layers_are_dragged_added_duplicated_turned_off_and_removed(visit: Open) -> None:
+    page = visit()
+    open_preset(page, "Coated brushed aluminium")
+    page.page.get_by_role("button", name="Interface", exact=True).click()
+    page.page.get_by_role("button", name="Medium", exact=True).click()
+    assert [layer["kind"] for layer in page.state("layers")] == ["interface", "interface", "medium", "interface"]
+
+    grips = page.page.locator(".grip")
+    start, end = grips.nth(2).bounding_box(), grips.nth(1).bounding_box()
+    page.page.mouse.move(start["x"] + 5, start["y"] + 5)
+    page.page.mouse.down()
+    page.page.mouse.move(end["x"] + 5, end["y"] + 5, steps=3)
+    page.page.mouse.up()
+    assert [layer["kind"] for layer in page.state("layers")] == ["interface", "medium", "interface", "interface"]
+
+    page.page.get_by_role("button", name="Duplicate dielectric").click()
+    page.page.get_by_role("checkbox", name="dielectric is on").first.uncheck()
+    page.page.get_by_role("button", name="Remove clear-coat").click()
+    kinds = [(layer["kind"], layer["enabled"]) for layer in page.state("layers")]
+    assert kinds == [("interface", False), ("interface", True), ("medium", True), ("interface", True)]
+    page.settled()
+    while page.page.evaluate("velatura.store.canUndo"):
+        page.page.keyboard.press("Control+z")
+    page.page.keyboard.press("Control+y")
+    assert page.state("name") == "Coated brushed aluminium"
+    page.settled()
+
+
+def test_reloading_loses_nothing(visit: Open) -> None:
+    page = visit()
+    open_preset(page, "Wet copper")
+    slider(page, 1, "Roughness").fill("100")
+    page.page.locator("canvas").first.press("ArrowLeft")
+    page.settled()
+    state, picture = page.state(), page.picture()
+    page.page.reload()
+    page.ready()
+    assert page.state() == state
+    assert difference(page.picture(), picture) < SAME
+    page.page.keyboard.press("Control+z")
+    assert page.state("layers.1.keys.alpha") == 0.25
+
+
+def test_a_server_that_goes_away_and_comes_back(visit: Open, served: Server) -> None:
+    page = visit(AWAY)
+    open_preset(page, "Wet copper")
+    served.kill()
+    page.page.get_by_text("Offline, trying again").wait_for()
+
+    # Values go on
+    before = page.picture()
+    slider(page, 1, "Roughness").fill("10")
+    page.settled()
+    assert difference(page.picture(), before) > OTHER
+
+    # What needs the server is said, and done when it is back
+    page.page.get_by_role("button", name="Interface", exact=True).click()
+    said(page).get_by_text("The server is away").wait_for()
+    served.start()
+    page.page.get_by_text("Offline, trying again").wait_for(state="detached", timeout=20_000)
+    page.settled()
+    assert page.page.evaluate("velatura.problems.map(({ about, text }) => `${about}: ${text}`)") == []
+    assert len(page.page.evaluate("velatura.shader().lobes")) == 3
+
+
+def test_dragging_never_compiles(visit: Open) -> None:
+    page = visit()
+    open_preset(page, "Coated brushed gold")
+    page.page.evaluate(
+        """() => {
+          const { viewport } = window.velatura;
+          window.compiled = 0;
+          const { setMaterial } = viewport;
+          viewport.setMaterial = (...given) => (window.compiled++, setMaterial.apply(viewport, given));
+          const { gl } = viewport.device;
+          const { linkProgram } = gl;
+          gl.linkProgram = (program) => (window.compiled++, linkProgram.call(gl, program));
+        }"""
+    )
+    for layer, label in [(0, "Roughness"), (0, "Index"), (1, "Depth"), (1, "Absorption, red"), (2, "Roughness u")]:
+        drag(slider(page, layer, label), range(10, 200, 60))
+    page.settled()
+    page.settled()
+    assert page.page.evaluate("window.compiled") == 0
+    assert page.page.evaluate("velatura.store.history().past.length") == 6  # the preset and five drags
+
+    page.page.get_by_role("button", name="Interface", exact=True).click()
+    page.settled()
+    assert page.page.evaluate("window.compiled") > 0
+
+
+def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
+    """Expected: once the picture can wait, the code for an interface and for a medium on top is there."""
+    page = visit()
+    open_preset(page, "Wet copper")
+    bakes = "[...velatura.viewport.device.programs.keys()].filter((text) => text.includes('vt_bake_node')).length"
+    known = page.page.evaluate(bakes)
+    page.page.evaluate("velatura.viewport.setSize(64, 48); velatura.viewport.setBudget({ samples: 16 })")
+    for _ in range(600):
+        if page.page.evaluate(bakes) == known + 2:
+            break
+        page.page.wait_for_timeout(100)
+    page.page.get_by_role("button", name="Interface", exact=True).click()
+    page.settled()
+    assert len(page.page.evaluate("velatura.shader().lobes")) == 3
+    assert page.page.evaluate(bakes) == known + 2
+
+
+# Errors --------------------------------------------------------------------------------------------------------------
+
+
+def test_a_stack_that_cannot_be_is_refused_in_words_and_undone(visit: Open) -> None:
+    page = visit(REFUSED)
+    open_preset(page, "Coated brushed gold")
+    before = page.picture()
+    page.page.get_by_label("Move Au: arrow keys").press("ArrowUp")
+    problem = "nothing may lie below layer 1 (conductor), which is opaque"
+    page.page.locator(".layer .problem").get_by_text(problem).wait_for()
+    assert problem in said(page).inner_text()
+    assert difference(page.picture(), before) < SAME
+    page.page.keyboard.press("Control+z")
+    page.settled()
+    assert page.page.locator(".problem").count() == 0
+    assert difference(page.picture(), before) < SAME
+
+
+def test_a_number_out_of_range_is_refused_in_words(visit: Open) -> None:
+    page = visit()
+    open_preset(page, "Gold")
+    field = page.page.locator(".layer").first.get_by_label("Roughness", exact=True)
+    for text, why in [("1.5", "must lie in 0 to 1, got 1.5"), ("rough", "must be a number, got rough")]:
+        field.fill(text)
+        field.press("Enter")
+        said(page).get_by_text(f"Roughness: {why}").wait_for()
+    assert page.state("layers.0.keys.alpha") == 0.15
+    field.fill("0.3")
+    field.press("Enter")
+    assert page.state("layers.0.keys.alpha") == 0.3
+    assert said(page).inner_text() == ""
+
+
+def drop(page: Visit, selector: str, name: str, text: str) -> None:
+    page.page.evaluate(
+        """([selector, name, text]) => {
+          const dataTransfer = new DataTransfer();
+          dataTransfer.items.add(new File([text], name));
+          const event = new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true });
+          document.querySelector(selector).dispatchEvent(event);
+        }""",
+        [selector, name, text],
+    )
+
+
+def test_broken_files_are_refused_in_words(visit: Open, served: Server) -> None:
+    page = visit(REFUSED)
+    before = page.state("layers")
+    drop(page, "canvas", "broken.yaml", "layers: [")
+    said(page).get_by_text("is not valid YAML").wait_for()
+    drop(page, "canvas", "light.hdr", "no picture")
+    said(page).get_by_text("light.hdr: not a readable picture").wait_for()
+    drop(page, "canvas", "letter.txt", "Dear")
+    said(page).get_by_text("letter.txt: drop a material").wait_for()
+    drop(page, ".parameter .control", "scratches.png", "no picture")
+    said(page).get_by_text("this is no picture that can be read").wait_for()
+    assert page.state("layers") == before
+    assert not list(served.folder.glob("*.png"))
+
+
+def test_files_out_of_the_folder_are_refused_in_words(visit: Open, served: Server) -> None:
+    page = visit(REFUSED)
+    save_as(page, "../stolen.yaml")
+    said(page).get_by_text("must be the plain name of a file").wait_for()
+    assert not (served.folder.parent / "stolen.yaml").exists()
+
+
+def test_two_tabs_have_a_state_each_and_do_not_overwrite_one_another(visit: Open, served: Server) -> None:
+    one = visit(REFUSED)
+    open_preset(one, "Gold")
+    save_as(one, "gold.yaml")
+    said(one).get_by_text("Saved gold.yaml").wait_for()
+    two = visit()
+    assert two.state("name") == "Gold"  # the last one
+    slider(two, 0, "Roughness").fill("60")
+    assert one.state("layers.0.keys.alpha") == 0.15
+    two.page.keyboard.press("Control+s")
+    said(two).get_by_text("Saved gold.yaml").wait_for()
+
+    slider(one, 0, "Roughness").fill("20")
+    one.page.keyboard.press("Control+s")
+    said(one).get_by_text("has changed since it was opened").wait_for()
+    assert vt.load(served.folder / "gold.yaml").flat()["layer0_alpha_u"] == 0.3
+    one.page.get_by_role("button", name="Overwrite it").click()
+    said(one).get_by_text("Saved gold.yaml").wait_for()
+    assert vt.load(served.folder / "gold.yaml").flat()["layer0_alpha_u"] == 0.1
+
+
+# Looks ---------------------------------------------------------------------------------------------------------------
+
+
+def test_everything_is_reached_by_keys_and_has_a_name(visit: Open) -> None:
+    page = visit()
+    reached = []
+    for _ in range(120):
+        page.page.keyboard.press("Tab")
+        found = page.page.evaluate(
+            """() => {
+              const element = document.activeElement;
+              const label = element.labels?.[0]?.innerText ?? '';
+              return [element.tagName, element.getAttribute('aria-label') || label || element.innerText.trim(),
+                      getComputedStyle(element).outlineStyle];
+            }"""
+        )
+        if found[0] == "BODY":
+            break
+        assert found[1], f"a {found[0]} has no name"
+        assert found[2] != "none", f"the focus on {found} is not seen"
+        reached.append(found[1])
+    for name in ["Open", "Save", "Roughness", "Roughness, slider", "Rotation, dial", "Move Au: arrow keys", "Model"]:
+        assert name in reached
+
+    # Change a value and add a layer without a mouse
+    slider(page, 0, "Roughness").focus()
+    page.page.keyboard.press("ArrowRight")
+    assert page.state("layers.0.keys.alpha") == 0.055
+    page.page.get_by_role("button", name="Interface", exact=True).focus()
+    page.page.keyboard.press("Enter")
+    assert len(page.state("layers")) == 4
+    page.settled()
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_nothing_sticks_out_of_the_window(visit: Open, width: int) -> None:
+    page = visit(viewport={"width": width, "height": 720})
+    assert page.page.evaluate("document.documentElement.scrollWidth") <= width
+    picture = page.page.locator("canvas").first.bounding_box()
+    panel = page.page.locator(".panel").bounding_box()
+    assert panel["width"] >= min(width, 300)
+    if width == 360:
+        assert panel["y"] >= picture["y"] + picture["height"]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_is_readable_in_light_and_dark(visit: Open, scheme: str) -> None:
+    page = visit(color_scheme=scheme)
+    pairs = page.page.evaluate(
+        """() => ['.toolbar button', '.parameter .name', '.parameter .unit', '.kind', 'summary'].map((selector) => {
+          const element = document.querySelector(selector);
+          let behind = element;
+          while (getComputedStyle(behind).backgroundColor === 'rgba(0, 0, 0, 0)') behind = behind.parentElement;
+          return [getComputedStyle(element).color, getComputedStyle(behind).backgroundColor];
+        })"""
+    )
+    for text, ground in pairs:
+        high, low = sorted([luminance(text), luminance(ground)], reverse=True)
+        assert (high + 0.05) / (low + 0.05) >= 4.5  # WCAG 2.2, 1.4.3
+    assert (luminance(pairs[0][1]) < 0.2) == (scheme == "dark")
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of a colour as a browser tells it (WCAG 2.2)."""
+    channels = np.array([float(number) for number in re.findall(r"[\d.]+", colour)[:3]]) / 255
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def test_the_picture_and_the_material_can_be_taken_away(visit: Open, tmp_path: Path) -> None:
+    page = visit()
+    open_preset(page, "Gold")
+    for button, name in [("Download", "gold.yaml"), ("Save picture", "gold.png")]:
+        with page.page.expect_download() as download:
+            page.page.get_by_role("button", name=button, exact=True).click()
+        assert download.value.suggested_filename == name
+        download.value.save_as(tmp_path / name)
+    assert vt.load(tmp_path / "gold.yaml") == vt.preset("bare-gold")
+    assert (tmp_path / "gold.png").read_bytes()[:4] == b"\x89PNG"

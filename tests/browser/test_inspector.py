@@ -1,0 +1,249 @@
+"""Look inside, in the editor: plots tell the model's numbers, follow what is done, and are read without a pointer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import chromium
+import pytest
+
+import velatura as vt
+
+if chromium.missing():
+    pytest.skip(chromium.missing(), allow_module_level=True)
+
+import editor
+
+PRESET = "coated-gold"
+
+
+class Look(editor.Visit):
+    """A visit that does not wait for the picture, but for the plots; they need not share the machine with paths."""
+
+    def ready(self) -> None:
+        self.page.wait_for_selector(".inspector .legend", timeout=60_000)
+        self.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")
+
+
+@pytest.fixture(scope="module")
+def look(served: editor.Server, opened: Any) -> Iterator[Look]:
+    context = opened.new_context(viewport={"width": 1000, "height": 600})
+    yield Look(context.new_page(), served.address)
+    context.close()
+
+
+@pytest.fixture
+def visit(look: Look) -> Iterator[Look]:
+    """The first preset, lit from 45 degrees; afterwards all is undone, and nothing was complained about."""
+    tab(look, "Polar")
+    aim(look, "angle", 45)
+    yield look
+    look.page.evaluate("() => { while (velatura.store.canUndo) velatura.store.undo(); }")
+    assert look.complaints == []
+
+
+def tab(visit: Look, name: str) -> None:
+    visit.page.get_by_role("tab", name=name).click()
+    visit.page.wait_for_selector(f"[aria-labelledby=inspect-{name.lower()}]")
+    painted(visit)
+
+
+def painted(visit: Look) -> None:
+    """Wait for two frames: what is done in one is seen in the next."""
+    visit.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def until(visit: Look, holds: Callable[[], bool]) -> None:
+    """Wait until a condition holds, which is looked at between frames."""
+    for _ in range(200):
+        if holds():
+            return
+        visit.page.wait_for_timeout(100)
+    assert holds()
+
+
+def told(visit: Look) -> dict[str, list[float]]:
+    """The read-out: numbers by what they are of."""
+    rows = visit.page.locator(".inspector .legend tbody tr").all()
+    pairs = [(row.locator("th").inner_text().strip(), row.locator("td").first.inner_text().split()) for row in rows]
+    return {name: [float(number) for number in numbers] for name, numbers in pairs}
+
+
+def aim(visit: Look, key: str, degrees: int) -> None:
+    visit.page.locator(f".inspector input[name={key}]").fill(str(degrees))
+    painted(visit)
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018"])
+def test_the_energy_plot_tells_the_energies_of_the_model(visit: Look, model: str) -> None:
+    """Three digits are shown, of energies below 1: within 5e-4 of what the page has, and that within 5e-4."""
+    visit.page.evaluate(
+        "(model) => velatura.store.run((state) => ({ ...state, model, switches: {} }))",
+        model,
+    )
+    tab(visit, "Energy")
+    for degrees in (0, 45, 80):
+        lobes = vt.lobes(vt.preset(PRESET), math.cos(math.radians(degrees)), model=model)
+        expected = [energy[:, 0].tolist() for energy in (*lobes.energy, sum(lobes.energy))]
+
+        def agrees(expected: list[list[float]] = expected) -> bool:
+            found = [energy if len(energy) == 3 else 3 * energy for energy in told(visit).values()]
+            return len(found) == 3 and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
+
+        aim(visit, "angle", degrees)
+        until(visit, agrees)
+
+
+def test_the_blur_plot_tells_the_roughnesses_of_the_model(visit: Look) -> None:
+    tab(visit, "Blur")
+    aim(visit, "angle", 60)
+    found = list(told(visit).values())[1]
+    expected = vt.lobes(vt.preset(PRESET), 0.5).alpha[1][:, 0]
+    assert sorted(found) == pytest.approx(sorted(expected.tolist()), abs=1e-3)
+
+
+def test_the_polar_plot_follows_the_angle_and_the_material(visit: Look) -> None:
+    """The highest value lies near the mirror direction, and drops where the coat is rougher."""
+    outline = visit.page.locator("svg.polar .line").first
+    before, peak = outline.get_attribute("d"), told(visit)
+    aim(visit, "angle", 20)
+    assert outline.get_attribute("d") != before
+    assert "20°" in visit.page.locator(".legend thead").inner_text()
+
+    aim(visit, "angle", 45)
+    assert told(visit) == peak
+    coat = visit.state("layers.0.id")
+    visit.page.evaluate(
+        """(id) => velatura.store.run((state) => ({ ...state, layers: state.layers.map((layer) =>
+             layer.id === id ? { ...layer, keys: { ...layer.keys, alpha: 0.3 } } : layer) }))""",
+        coat,
+    )
+    first = next(iter(peak))
+    until(visit, lambda: told(visit)[first][0] < 0.2 * peak[first][0])
+
+
+def test_a_lobe_is_shown_alone_in_plots_and_picture(visit: Look) -> None:
+    whole = visit.picture()
+    lines = visit.page.locator("svg.polar .line")
+    assert lines.count() == 3
+    lobe = visit.page.locator(".legend button").first
+    lobe.click()
+    visit.page.wait_for_function("() => velatura.store.get().view.lobe === 0")
+    painted(visit)
+    assert lines.count() == 1
+    assert lobe.get_attribute("aria-pressed") == "true"
+    until(visit, lambda: (whole - visit.picture()).mean() > 5)
+
+    lobe.click()
+    painted(visit)
+    assert visit.state("view.lobe") is None
+    assert lines.count() == 3
+
+
+def test_the_disc_tells_f_cos_where_the_pointer_is(visit: Look) -> None:
+    """In the mirror direction it tells what the polar plot tells there, but for the size of a pixel."""
+    peak = list(told(visit).values())
+    tab(visit, "Disc")
+    disc = visit.page.locator(".disc svg")
+    disc.scroll_into_view_if_needed()
+    box = disc.bounding_box()
+    assert box
+    x = box["x"] + box["width"] * (1.05 - math.sin(math.radians(45))) / 2.1
+    visit.page.mouse.move(x, box["y"] + box["height"] / 2)
+    painted(visit)
+    found = list(told(visit).values())
+    assert found[1] == pytest.approx(peak[1], rel=0.03)
+    assert found[-1] == pytest.approx(peak[-1], rel=0.1)
+
+
+def test_two_models_are_drawn_and_told_side_by_side(visit: Look) -> None:
+    visit.page.evaluate(
+        """() => velatura.store.run((state) =>
+             ({ ...state, view: { ...state.view, mode: 'split', other: { model: 'belcour2018' } } }))"""
+    )
+    visit.page.wait_for_selector("svg.polar .dashed", state="attached", timeout=30_000)
+    assert "belcour2018" in visit.page.locator(".legend thead").inner_text()
+    tab(visit, "Energy")
+    assert visit.page.locator("svg.chart .dashed").count() > 0
+    visit.page.evaluate("() => velatura.store.undo()")
+    visit.page.wait_for_selector("svg.chart .dashed", state="detached")
+
+
+def test_everything_is_reached_by_keys(visit: Look) -> None:
+    page = visit.page
+    page.get_by_role("tab", name="Polar").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    painted(visit)
+    assert page.evaluate("() => document.activeElement.id") == "inspect-energy"
+    page.keyboard.press("Tab")
+    page.keyboard.press("ArrowRight")
+    painted(visit)
+    assert "46°" in page.locator(".legend thead").inner_text()
+    page.locator("svg.chart").focus()
+    page.keyboard.press("PageUp")
+    painted(visit)
+    assert "56°" in page.locator(".legend thead").inner_text()
+    page.locator(".legend button").nth(1).focus()
+    page.keyboard.press("Enter")
+    painted(visit)
+    assert visit.state("view.lobe") == 1
+
+
+def test_validations_answer_their_sliders(visit: Look) -> None:
+    tab(visit, "Validations")
+    page = visit.page
+    said = page.locator(".inspector .says")
+    said.wait_for()
+    for name in ("Transmission scale", "Absorption", "Scattering", "Total internal reflection", "Reflection"):
+        page.locator(".inspector .choice select").select_option(label=name)
+        page.wait_for_selector(".inspector .truth")
+        until(visit, lambda: page.locator(".inspector .line").count() >= 3)
+    page.locator(".inspector input[name=alpha_1]").fill("0")
+    until(visit, lambda: "belcour 0.300" in said.inner_text())
+    assert "two bounces 0.300" in said.inner_text()
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 380), ("dark", 1280)])
+def test_it_is_usable_in_a_narrow_window_and_in_the_dark(
+    served: editor.Server, opened: Any, tmp_path: Path, scheme: str, width: int
+) -> None:
+    """Nothing sticks out of the panel, and words have a contrast of at least 4.5 to what is behind them."""
+    context = opened.new_context(viewport={"width": width, "height": 720}, color_scheme=scheme)
+    visit = Look(context.new_page(), served.address)
+    for name in ("Polar", "Disc", "Energy", "Blur"):
+        tab(visit, name)
+        visit.page.locator(".inspector").screenshot(path=tmp_path / f"{name}.png")
+        slot = visit.page.locator(".inspector-slot")
+        assert slot.evaluate("(e) => e.scrollWidth <= e.clientWidth + 1")
+        assert slot.evaluate(CONTRAST) >= 4.5
+    context.close()
+    assert visit.complaints == []
+
+
+#: The lowest contrast of text to its ground among cells of the legend, by the definition of WCAG 2.
+CONTRAST = """(slot) => {
+  const context = new OffscreenCanvas(1, 1).getContext('2d', { willReadFrequently: true });
+  const rgb = (colour) => {
+    context.clearRect(0, 0, 1, 1);
+    context.fillStyle = colour;
+    context.fillRect(0, 0, 1, 1);
+    return [...context.getImageData(0, 0, 1, 1).data];
+  };
+  const light = (colour) => {
+    const [r, g, b] = rgb(colour).map((x) => (x / 255 <= 0.04045 ? x / 3294.6 : ((x / 255 + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const ground = (element) => {
+    const colour = getComputedStyle(element).backgroundColor;
+    return rgb(colour)[3] === 255 || !element.parentElement ? colour : ground(element.parentElement);
+  };
+  const texts = [...slot.querySelectorAll('.legend th, .legend td, [role=tab]')];
+  return Math.min(...texts.map((element) => {
+    const [a, b] = [light(getComputedStyle(element).color), light(ground(element))].sort();
+    return (b + 0.05) / (a + 0.05);
+  }));
+}"""

@@ -1,0 +1,64 @@
+"""The editor's converged still against the Mitsuba render of the same.
+
+Rationale: the page has a path tracer of its own, and only the picture tells whether camera, objects, shading frames,
+light and sampling are those of `velatura render`. Linear radiance relative to white, all pixels, nothing clipped; both
+pictures are rendered until their own noise is below a third of the bound. `benchmarks/editor.py` does five presets in
+larger pictures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import viewport
+
+import velatura as vt
+
+pytestmark = pytest.mark.skipif(bool(viewport.missing()), reason=viewport.missing())
+
+BOUND = 0.01
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[viewport.Stage]:
+    with viewport.stage(tmp_path_factory.mktemp("page"), 32, 32) as opened:
+        yield opened
+
+
+@pytest.mark.parametrize(
+    ("preset", "scene", "size", "samples", "spp"),
+    [("turned-brushing", "ball", 32, 512, 1024), ("frosted-glass", "sphere", 8, 12288, 20480)],
+)
+def test_a_still_converges_to_mitsuba(
+    preset: str, scene: str, size: int, samples: int, spp: int, stage: viewport.Stage
+) -> None:
+    """Expected: within .01 of white, anisotropic on a curved body with a cavity, and through a solid body."""
+    stage.resize(size, size)
+    found = viewport.compare(stage, vt.preset(preset), scene, "studio", samples, spp)
+    assert found.noise < BOUND / 3
+    assert found.noise_of_truth < BOUND / 3
+    assert found.difference < BOUND
+    assert not stage.errors
+
+
+def test_another_roughness_is_seen(stage: viewport.Stage) -> None:
+    """The comparison can fail: pictures of a coat twice as rough differ by more than the bound."""
+    stage.resize(12, 12)
+    stack = vt.preset("glossy-plastic")
+    stage.show(stack, "ball", "studio")
+    before = stage.trace(64)
+    stage.show(stack.replace(layer0_alpha=2.0 * stack.flat()["layer0_alpha_u"] + 0.1))
+    assert np.sqrt(np.mean((stage.trace(64) - before) ** 2)) > BOUND
+
+
+def test_without_a_material_that_loses_light_the_furnace_is_white(stage: viewport.Stage) -> None:
+    """Expected: a mirror in light of 1 from everywhere cannot be told from it, but at the rim, where normals are those
+    of a rounder body than its triangles, and light reflected at a few of them
+    meets the body again. Mitsuba shows .978 there, and a mean of .9997."""
+    stage.resize(12, 12)
+    stage.show(vt.preset("furnace"), "sphere", "furnace")
+    still = stage.trace(16)
+    assert abs(still.mean() - 1.0) < 2e-3
+    assert np.abs(still - 1.0).max() < 0.05

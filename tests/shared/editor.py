@@ -1,0 +1,134 @@
+"""The editor as its users have it: a server of its own in a folder of its own, and pages in headless Chromium."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import chromium
+import numpy as np
+
+from velatura.editor import bundle
+
+_ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/")
+
+
+class Server:
+    """`velatura edit` in a folder; it can be killed, and started again at the same address."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.folder = folder
+        self.arguments = arguments
+        self.address = ""
+        self.start()
+
+    def start(self) -> None:
+        port = self.address.rstrip("/").rpartition(":")[2] or "0"
+        command = [sys.executable, "-m", "velatura", "edit", *self.arguments, "--no-browser", "--port", port]
+        self.process = subprocess.Popen(
+            command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=_environment()
+        )
+        assert self.process.stdout
+        line = self.process.stdout.readline()
+        found = _ADDRESS.search(line)
+        assert found, f"the editor's server says: {line}{self.process.stdout.read()}"
+        self.address = found[0]
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+
+@contextmanager
+def server(folder: Path, *arguments: str) -> Iterator[Server]:
+    """A server for as long as the block runs; `arguments` of `velatura edit`."""
+    require_fresh_page()
+    running = Server(folder, *arguments)
+    try:
+        yield running
+    finally:
+        running.kill()
+
+
+def require_fresh_page() -> None:
+    """Fail, with the command that helps, where the page has changed since it was built."""
+    built = bundle.STATIC / "editor.js"
+    sources = [path for path in _sources() if not built.is_file() or path.stat().st_mtime > built.stat().st_mtime]
+    assert not sources, f"{sources[0].name} is newer than the built page: cd {bundle.SOURCES} && npm run build"
+
+
+def _sources() -> Iterator[Path]:
+    for path in bundle.SOURCES.rglob("*"):
+        if "node_modules" not in path.parts and path.suffix in (".js", ".css", ".html"):
+            yield path
+
+
+def _environment() -> dict[str, str]:
+    source = str(Path(bundle.__file__).parents[2])
+    return {**os.environ, "PYTHONPATH": source, "PYTHONUNBUFFERED": "1"}
+
+
+class Visit:
+    """A page of the editor, with what its console has complained about."""
+
+    def __init__(self, page: Any, address: str) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        page.on("console", self._listen)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.goto(address)
+        self.ready()
+
+    def _listen(self, message: Any) -> None:
+        if message.type == "error":
+            self.complaints.append(message.text)
+
+    def ready(self) -> None:
+        """Wait until there is a picture; from then on the preview alone is drawn, which is the same every time."""
+        self.page.wait_for_function("() => window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
+        self.page.evaluate("window.velatura.viewport.setBudget({ samples: 0 })")
+
+    def state(self, path: str = "") -> Any:
+        """A part of the state: `state("layers.0.keys.alpha")`."""
+        return self.page.evaluate(
+            "(path) => path.split('.').filter(Boolean).reduce((o, key) => o[key], window.velatura.store.get())", path
+        )
+
+    def settled(self) -> None:
+        """Wait until Python has been asked, has answered, and what it said is drawn."""
+        self.page.wait_for_timeout(300)
+        drawn = "({ quiet, viewport }) => quiet && !viewport.held && viewport.previewed"
+        self.page.wait_for_function(f"() => ({drawn})(window.velatura)")
+
+    def picture(self) -> np.ndarray:
+        """The canvas as it is now, (48, 64, 3), in 0..255."""
+        self.settled()
+        pixels = self.page.evaluate(
+            """() => {
+              const copy = Object.assign(document.createElement('canvas'), { width: 64, height: 48 });
+              const context = copy.getContext('2d');
+              window.velatura.viewport.paint();
+              context.drawImage(window.velatura.canvas, 0, 0, 64, 48);
+              return [...context.getImageData(0, 0, 64, 48).data];
+            }"""
+        )
+        return np.reshape(pixels, (48, 64, 4))[..., :3].astype(float)
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Chromium for as long as the block runs."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=chromium.path(), args=chromium.FLAGS.split())
+        try:
+            yield opened
+        finally:
+            opened.close()

@@ -1,0 +1,336 @@
+"""The editor's server as a browser meets it, and as somebody who should not meet it does.
+
+Rationale: it reads and writes files of its user, so that nobody but the page that it serves itself may call it; and it
+is a process of its own, which must start fast and stop when it is told to. Requests are made by hand, so that they can
+be wrong.
+"""
+
+from __future__ import annotations
+
+import base64
+import http.client
+import json
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import uvicorn
+from interrupts import hear
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from velatura.editor import bundle, server, service
+from velatura.editor.folder import LARGEST
+
+Run = Callable[..., tuple[int, str, str]]
+
+COAT: dict[str, Any] = {
+    "name": "Coat",
+    "layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"conductor": "Au"}}],
+}
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory, and beside it a page of one line."""
+    static = tmp_path / "static"
+    static.mkdir()
+    (static / "index.html").write_text("<!doctype html><title>Velatura</title>")
+    for name in ("editor.js", "widget.js"):
+        (static / name).write_text("export {};")
+    monkeypatch.setattr(bundle, "STATIC", static)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@contextmanager
+def served() -> Iterator[int]:
+    """The port of a server that runs in this process."""
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+        running = uvicorn.Server(server.settings(server.application()))
+        thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
+        thread.start()
+        try:
+            yield listening.getsockname()[1]
+        finally:
+            running.should_exit = True
+            thread.join()
+
+
+@pytest.fixture
+def port(here: Path) -> Iterator[int]:
+    with served() as port:
+        yield port
+
+
+def ask(port: int, method: str, path: str, body: Any = None, **headers: str) -> tuple[int, bytes, dict[str, str]]:
+    """Status, body and headers of an answer."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+    try:
+        connection.request(method, path, body, headers)
+        answer = connection.getresponse()
+        return answer.status, answer.read(), {key.lower(): value for key, value in answer.getheaders()}
+    finally:
+        connection.close()
+
+
+def call(port: int, verb: str, body: Any, **headers: str) -> tuple[int, dict[str, Any]]:
+    text = body if isinstance(body, bytes) else json.dumps(body)
+    status, answer, _ = ask(port, "POST", f"/api/{verb}", text, **headers)
+    return status, json.loads(answer)
+
+
+# What the page gets
+
+
+def test_the_page_and_its_calls(port: int) -> None:
+    """Expected: the page, under a policy that lets it load nothing from elsewhere, and never a stale one."""
+    status, body, headers = ask(port, "GET", "/")
+    assert status == 200 and b"Velatura" in body
+    assert (
+        "default-src 'self'" in headers["content-security-policy"] and "http" not in headers["content-security-policy"]
+    )
+    assert headers["cache-control"] == "no-cache"
+    status, session = call(port, "session", {})
+    assert status == 200 and session["opened"] is None
+    assert call(port, "read", {"text": "layers: [{interface: {eta: 1.5}}]"})[0] == 200
+
+
+def test_a_material_named_at_the_start_is_opened(here: Path) -> None:
+    (here / "coat.json").write_text(json.dumps(COAT))
+    with running("coat.json") as (_, port):
+        opened = call(port, "session", {})[1]["opened"]
+        assert (opened["material"], opened["file"]) == (COAT, "coat.json")
+        body = {"file": "coat.json", "material": {**COAT, "name": "New"}, "version": opened["version"]}
+        version = call(port, "save", body)[1]["version"]
+        assert call(port, "session", {})[1]["opened"] == {
+            "material": body["material"],
+            "file": "coat.json",
+            "version": version,
+        }
+    assert json.loads((here / "coat.json").read_text())["name"] == "New"
+
+
+def test_textures_are_sent_and_nothing_else(here: Path, port: int) -> None:
+    (here / "wood grain.png").write_bytes(b"a picture")
+    (here / "secret.txt").write_text("secret")
+    assert ask(port, "GET", "/files/wood%20grain.png")[:2] == (200, b"a picture")
+    for path in (
+        "secret.txt",
+        "../static/editor.js",
+        "..%2fstatic%2feditor.js",
+        "%2e%2e/static/index.html",
+        "none.png",
+    ):
+        assert ask(port, "GET", f"/files/{path}")[0] == 404
+
+
+# What goes wrong
+
+
+def test_mistakes_are_answered_in_words(port: int) -> None:
+    """Expected: one line for what a user can do wrong, and for what nobody should send."""
+    assert call(port, "read", {"text": "layers: [\n  oops"})[0] == 422
+    for body in (b"", b"{", b"[]", b"\xff", b'{"a":' * 100_000, b"null"):
+        status, answer = call(port, "read", body)
+        assert status == 422 and answer["error"].startswith("the body")
+    assert call(port, "nonsense", {})[0] == 404
+
+
+def test_of_two_tabs_that_save_the_second_is_told(here: Path, port: int) -> None:
+    body = {"file": "coat.yaml", "material": COAT, "version": None}
+    assert call(port, "save", body)[0] == 200
+    status, answer = call(port, "save", body)
+    assert (status, answer["error"]) == (409, "coat.yaml: exists already")
+
+
+@pytest.mark.parametrize(
+    "name", ["../coat.yaml", "/tmp/coat.yaml", "..\\coat.yaml", "..%2fcoat.yaml", "%2e%2e%2fcoat.yaml"]
+)
+def test_nothing_is_saved_outside_the_folder(here: Path, port: int, name: str) -> None:
+    """Expected: refused, but for the last, since nothing is decoded twice, and this is the plain name of a file."""
+    status, _ = call(port, "save", {"file": name, "material": COAT, "version": None})
+    assert status == (200 if name.startswith("%") else 422)
+    assert {path.parent for path in here.parent.rglob("*coat.yaml")} <= {here}
+
+
+def test_what_is_no_picture_is_no_texture(here: Path, port: int) -> None:
+    data = base64.b64encode(b"#!/bin/sh").decode()
+    status, answer = call(port, "texture", {"file": "script.png", "data": data})
+    assert status == 422 and "no picture" in answer["error"]
+    assert not list(here.iterdir())
+
+
+def test_a_failure_of_the_editor_is_told_too(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("velatura.editor.service.loads", lambda *_: 1 / 0)
+    status, answer = call(port, "read", {"text": ""})
+    assert status == 500 and "mistake in it" in answer["error"]
+
+
+# Too much
+
+
+def test_a_large_body_is_refused_before_it_is_sent(port: int) -> None:
+    """Expected: an answer to the head of a request of 300 MB, of which no byte of the body follows."""
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        head = f"POST /api/texture HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 300000000\r\n\r\n"
+        client.sendall(head.encode())
+        assert client.recv(4096).startswith(b"HTTP/1.1 413 ")
+
+
+def test_a_large_body_without_a_length_is_not_kept(port: int) -> None:
+    """Expected: an answer as soon as more than the limit has come, while the body has no end."""
+    chunk = b"100000\r\n" + bytes(2**20) + b"\r\n"
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        head = f"POST /api/texture HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nTransfer-Encoding: chunked\r\n\r\n"
+        client.sendall(head.encode())
+        for _ in range(LARGEST // 2**20 + 1):
+            client.sendall(chunk)
+        assert client.recv(4096).startswith(b"HTTP/1.1 413 ")
+
+
+# Strangers
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:{port}", "127.0.0.1.evil.example:{port}", "", "[::1]:{port}"]
+)
+def test_another_host_is_refused(port: int, host: str) -> None:
+    """Expected: 403 under any name that is not this machine's, which a name that is rebound to it would be."""
+    assert ask(port, "GET", "/", Host=host.format(port=port))[0] == 403
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost:1", "https://127.0.0.1:{port}"])
+def test_another_origin_is_refused(port: int, origin: str) -> None:
+    """Expected: 403 for a page of another site, another port, or no site, on both ways in."""
+    origin = origin.format(port=port)
+    assert call(port, "list", {}, Origin=origin)[0] == 403
+    with pytest.raises(InvalidStatus) as refused, live(port, origin):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def test_the_own_page_is_welcome(port: int) -> None:
+    for name in ("127.0.0.1", "localhost"):
+        assert call(port, "list", {}, Host=f"{name}:{port}", Origin=f"http://{name}:{port}")[0] == 200
+
+
+# Live
+
+
+@contextmanager
+def live(port: int, origin: str | None = None) -> Iterator[ClientConnection]:
+    with connect(f"ws://127.0.0.1:{port}/api/live", origin=origin, open_timeout=10) as socket:
+        yield socket
+
+
+def test_live_calls_are_answered(port: int) -> None:
+    with live(port, f"http://127.0.0.1:{port}") as socket:
+        for body, field in [({"text": "layers: [{interface: {eta: 1.5}}]"}, "answer"), ({"text": "["}, "error")]:
+            socket.send(json.dumps({"id": 7, "verb": "read", "body": body}))
+            answer = json.loads(socket.recv(10))
+            assert answer["id"] == 7 and field in answer
+        for wrong in ("{", "[]", "{}", '{"verb": "nonsense"}', '{"verb": "read", "body": []}'):
+            socket.send(wrong)
+            assert "error" in json.loads(socket.recv(10))
+
+
+def test_of_a_burst_the_first_and_the_last_are_answered(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: while the first call is at work the later ones overtake each other, and never are two at work."""
+    started, release, bodies = threading.Event(), threading.Event(), []
+
+    def slow(body: Any) -> dict[str, Any]:
+        bodies.append(body["n"])
+        started.set()
+        assert release.wait(10)
+        return {"n": body["n"]}
+
+    monkeypatch.setitem(service.VERBS, "slow", slow)
+    with served() as port, live(port) as socket:
+        socket.send(json.dumps({"id": 0, "verb": "slow", "body": {"n": 0}}))
+        assert started.wait(10)
+        for n in range(1, 6):
+            socket.send(json.dumps({"id": n, "verb": "slow", "body": {"n": n}}))
+        overtaken = [json.loads(socket.recv(10)) for _ in range(4)]
+        release.set()
+        answers = [json.loads(socket.recv(10)) for _ in range(2)]
+    assert [message["id"] for message in overtaken] == [1, 2, 3, 4]
+    assert all("overtaken" in message["error"] for message in overtaken)
+    assert [message["answer"]["n"] for message in answers] == [0, 5] == bodies
+
+
+# Start and stop
+
+
+@contextmanager
+def running(*arguments: str, browse: bool = False) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """The command in a process of its own, and the port that it prints."""
+    command = [sys.executable, "-m", "velatura", "edit", *arguments, "--browser" if browse else "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hear)
+    try:
+        assert process.stdout
+        address = process.stdout.readline().split()[4]
+        yield process, int(address.strip("/").rpartition(":")[2])
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_it_stops_when_it_is_told_to(here: Path) -> None:
+    """Expected: within a second (two, where others are at work), though a page is connected, and without complaint."""
+    for number, status in [(signal.SIGINT, 130), (signal.SIGTERM, -signal.SIGTERM)]:
+        with running("coated-gold") as (process, port):
+            assert call(port, "session", {})[1]["opened"]["material"]["name"] == "Coated brushed gold"
+            with live(port):
+                told = time.perf_counter()
+                process.send_signal(number)
+                assert process.wait(10) == status
+                assert time.perf_counter() - told < 2
+            _, err = process.communicate()
+            assert err == ("velatura: interrupted\n" if number == signal.SIGINT else "")
+
+
+def test_the_page_is_opened_in_the_browser(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the user's browser is told the address that is printed."""
+    browser = here / "browser.py"
+    browser.write_text("import pathlib, sys; pathlib.Path('address').write_text(sys.argv[1])")
+    monkeypatch.setenv("BROWSER", f"{sys.executable} {browser} %s")
+    with running(browse=True) as (_, port):
+        for _ in range(100):
+            if (here / "address").is_file() and (here / "address").read_text():
+                break
+            time.sleep(0.05)
+        assert (here / "address").read_text() == f"http://127.0.0.1:{port}/"
+
+
+def test_a_bad_material_starts_no_server(run: Run, here: Path) -> None:
+    (here / "broken.yaml").write_text("layers: [")
+    for material in ("broken.yaml", "none.yaml", "coated-gld"):
+        status, out, err = run("edit", material, "--no-browser")
+        assert (status, out, err.count("\n")) == (2, "", 1)
+
+
+def test_a_port_that_is_taken_is_named(run: Run, here: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        status, out, err = run("edit", "--no-browser", "--port", str(taken.getsockname()[1]))
+    assert (status, out) == (2, "") and "--port" in err
+
+
+def test_a_missing_page_is_told(run: Run, here: Path) -> None:
+    (bundle.STATIC / "editor.js").unlink()
+    status, _, err = run("edit", "--no-browser")
+    assert status == 1 and "pip install" in err

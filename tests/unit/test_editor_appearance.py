@@ -1,0 +1,286 @@
+"""The Appearance panel's verbs: materials as lobes, drags, maps of classes, and what must hold of every answer."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura.editor import appearance, classes
+from velatura.errors import InvalidInput
+from velatura.inverse import Target, stacks
+from velatura.inverse.coats import scattered
+from velatura.model import named
+from velatura.model.maps import MAPS
+from velatura.stack import Interface, Medium, Stack, presets
+
+EXACT = 1e-6  # of energies and variances, at normal incidence
+MODELS = ("bati2021", "belcour2018", "velatura")
+COATED = {
+    "layers": [
+        {"interface": {"eta": 1.5, "alpha": 0.05}},
+        {"medium": {"sigma_a": [0.1, 0.2, 0.3]}},
+        {"interface": {"conductor": "Cu", "alpha": 0.2}},
+    ]
+}
+
+
+def saved(name: str) -> dict[str, Any]:
+    return next(state for state in appearance.targets({})["targets"] if state["name"] == name)
+
+
+def deviation(material: dict[str, Any], target: dict[str, Any], model: str) -> float:
+    """The largest difference of energies and variances between what is read of a material and a target."""
+    read, f = vt.lobes(Stack.from_dict(material), 1.0, model=model), MAPS[named(model).map]
+    worst, first = 0.0, 0
+    for lobe in target["lobes"]:
+        own = slice(first, first := first + lobe["interfaces"])
+        worst = max(worst, float(np.abs(np.sum(read.energy[own], axis=0)[:, 0] - lobe["energy"]).max()))
+        for alpha in read.alpha[own]:
+            worst = max(worst, abs(float(f.variance(alpha[0, 0]) - f.variance(lobe["alpha"]))))
+    return worst
+
+
+def check_physical(material: dict[str, Any], eta_max: float = 4.0) -> None:
+    for layer in Stack.from_dict(material).layers:
+        if isinstance(layer, Medium):
+            assert np.min(layer.sigma_a) >= 0
+        elif isinstance(layer, Interface):
+            eta, k = np.array(layer.eta), layer.k
+            assert 0 <= layer.alpha <= 1
+            assert (np.all((eta >= 1) & (eta <= eta_max * (1 + 1e-7)))) if k is None else np.all(np.array(k) >= eta)
+
+
+def dragged(target: dict[str, Any], rng: np.random.Generator, size: float = 0.08) -> dict[str, Any]:
+    """A target with one lobe brighter or darker, of another colour, or more or less blurred."""
+    wish = copy.deepcopy(target)
+    lobe, what, factor = wish["lobes"][rng.integers(len(wish["lobes"]))], rng.integers(3), np.exp(size * rng.normal())
+    if what == 0:
+        lobe["energy"] = [e * factor for e in lobe["energy"]]
+    elif what == 1:
+        lobe["energy"][rng.integers(3)] *= factor
+    else:
+        lobe["alpha"] = min(lobe["alpha"] * factor + (0.002 if rng.random() < 0.2 else 0), 1.0)
+    return wish
+
+
+# A material as lobes -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_material_is_read_and_found_again(model: str) -> None:
+    answer = appearance.appearance({"material": COATED, "model": model})
+    target = answer["target"]
+    assert answer["says"] is None
+    assert answer["layers"] == [[0], [1, 2]]
+    assert [(lobe["interfaces"], lobe["base"]) for lobe in target["lobes"]] == [(1, "dielectric"), (1, "conductor")]
+    assert deviation(COATED, target, model) < 1e-9
+    f = MAPS[named(model).map]
+    variances = [float(f.variance(lobe["alpha"])) for lobe in target["lobes"]]
+    assert answer["variances"] == pytest.approx(variances)
+    (haze,) = answer["haze"]
+    assert haze["width"] == pytest.approx(np.sqrt(variances[1] / variances[0]))
+    ratio = np.array(target["lobes"][1]["energy"]) / target["lobes"][0]["energy"]
+    assert haze["energy"] == pytest.approx(ratio)
+    same = appearance.invert({"material": COATED, "target": target, "model": model})
+    given, found = Stack.from_dict(COATED).flat(), Stack.from_dict(same["material"]).flat()
+    for key in ("layer0_eta", "layer0_alpha_u", "layer2_alpha_u"):
+        assert found[key] == pytest.approx(given[key], abs=1e-6)
+    assert found["layer2_eta"] == pytest.approx(vt.stack.rgb(given["layer2_eta"]), abs=1e-5)
+
+
+@pytest.mark.parametrize("name", presets())
+def test_every_preset_is_read_or_says_why_not(name: str) -> None:
+    material = appearance.document(vt.preset(name))
+    answer = appearance.appearance({"material": material, "model": "bati2021"})
+    json.dumps(answer, allow_nan=False)
+    if answer["says"] is None:
+        again = appearance.invert({"material": material, "target": answer["target"], "model": "bati2021"})
+        assert again["snapped"] is None
+        assert deviation(again["material"], answer["target"], "bati2021") < EXACT
+    else:
+        assert "\n" not in answer["says"]
+        assert answer["says"].startswith(("layer ", "thin"))
+
+
+def test_a_pair_of_one_blur_is_one_lobe() -> None:
+    state = saved("bati2021-17-red-over-blue")
+    answer = appearance.appearance({"material": state["material"], "model": "bati2021"})
+    assert [lobe["interfaces"] for lobe in answer["target"]["lobes"]] == [2, 2]
+    for read, asked in zip(answer["target"]["lobes"], state["target"]["lobes"]):
+        assert read["energy"] == pytest.approx(asked["energy"], abs=EXACT)
+
+
+# Dragging ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("name", ["15-c", "16", "19-b", "22-top"])
+def test_drags_stay_physical_and_exact(name: str, model: str) -> None:
+    rng = np.random.default_rng(0)
+    state = appearance.invert({"target": saved(f"bati2021-{name}")["target"], "model": model})
+    for _ in range(12):
+        wish = dragged(state["target"], rng)
+        state = appearance.invert({"target": wish, "material": state["material"], "model": model})
+        check_physical(state["material"])
+        assert deviation(state["material"], state["target"], model) < EXACT
+        if state["snapped"] is None:
+            assert deviation(state["material"], wish, model) < EXACT
+
+
+def test_what_is_kept_stays_under_small_drags() -> None:
+    """The index between a pair does not move, and the rest moves by little."""
+    state = appearance.invert({"target": saved("bati2021-15-c")["target"], "model": "bati2021"})
+    index = Stack.from_dict(state["material"]).interfaces[0].eta
+    wish = copy.deepcopy(state["target"])
+    for _ in range(20):
+        wish["lobes"][0]["alpha"] *= 1.005
+        before = Stack.from_dict(state["material"]).interfaces[1]
+        state = appearance.invert({"target": wish, "material": state["material"], "model": "bati2021"})
+        after = Stack.from_dict(state["material"]).interfaces
+        assert after[0].eta == pytest.approx(index, rel=1e-12)
+        assert abs(after[1].eta - before.eta) < 0.01
+    assert state["snapped"] is None
+
+
+def test_an_infeasible_wish_snaps_to_the_edge() -> None:
+    """A wish that is far too bright ends at the brightest pair, to a hundredth of the way."""
+    state = appearance.invert({"target": saved("bati2021-15-a")["target"], "model": "bati2021"})
+    wish = copy.deepcopy(state["target"])
+    wish["lobes"][0]["energy"] = [0.7] * 3
+    answer = appearance.invert({"target": wish, "material": state["material"], "model": "bati2021"})
+    energy = answer["target"]["lobes"][0]["energy"]
+    assert answer["snapped"] == "lobe 1: no index up to 4 reflects as much"
+    check_physical(answer["material"])
+    assert deviation(answer["material"], answer["target"], "bati2021") < EXACT
+    assert energy[0] == pytest.approx(9 / 17, abs=0.01)  # 1 - 2 / C_max of a smooth pair up to 4
+    more = Target([{"energy": energy[0] + 0.02, "alpha": 0.0, "interfaces": 2}])
+    assert stacks.search(more, named("bati2021")) is None
+
+
+def test_a_coloured_wish_for_one_interface_snaps_to_grey() -> None:
+    state = appearance.invert({"target": saved("bati2021-19-a")["target"], "model": "bati2021"})
+    wish = copy.deepcopy(state["target"])
+    wish["lobes"][0]["energy"] = [0.12, 0.1, 0.1]
+    answer = appearance.invert({"target": wish, "material": state["material"], "model": "bati2021"})
+    assert answer["target"]["lobes"][0]["energy"] == pytest.approx([0.32 / 3] * 3)
+    assert answer["snapped"].startswith("lobe 1: what lies above it absorbs nothing")
+
+
+def test_other_interfaces_or_base_give_a_fresh_stack() -> None:
+    state = appearance.invert({"target": saved("bati2021-19-b")["target"], "model": "bati2021"})
+    wish = copy.deepcopy(state["target"])
+    wish["lobes"][0]["interfaces"] = 2
+    answer = appearance.invert({"target": wish, "material": state["material"], "model": "bati2021"})
+    assert len(Stack.from_dict(answer["material"]).interfaces) == 3
+    assert deviation(answer["material"], wish, "bati2021") < EXACT
+
+
+def test_a_diffuse_base_keeps_its_energy() -> None:
+    paint = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"diffuse": {"albedo": [0.5, 0.3, 0.1]}}]}
+    target = appearance.appearance({"material": paint, "model": "bati2021"})["target"]
+    target["lobes"][0]["energy"] = [0.06] * 3
+    answer = appearance.invert({"material": paint, "target": target, "model": "bati2021"})
+    energies = [scattered(Stack.from_dict(m), named("bati2021")) for m in (paint, answer["material"])]
+    assert energies[1] == pytest.approx(energies[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("body", "says"),
+    [
+        ({"target": {"lobes": [{"energy": -1}]}}, "lobe 1: energy"),
+        ({"target": {"lobes": [{"energy": 0.1}]}, "model": "none"}, "model"),
+        ({"target": {"lobes": [{"energy": 0.1}]}, "switches": 3}, "switches"),
+    ],
+)
+def test_a_wrong_body_is_one_line(body: dict[str, Any], says: str) -> None:
+    with pytest.raises(InvalidInput, match=says) as error:
+        appearance.invert(body)
+    assert "\n" not in str(error.value)
+
+
+# Classes -------------------------------------------------------------------------------------------------------------
+
+
+def array(answer: dict[str, Any]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(answer["data"]), answer["dtype"]).reshape(answer["shape"])
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_members_of_a_pair_look_the_same(model: str) -> None:
+    state = appearance.invert({"target": saved("bati2021-15-b")["target"], "model": model})
+    body = {"target": state["target"], "lobe": 0, "material": state["material"], "model": model}
+    card = classes.class_(body)
+    assert card["kind"] == "dielectric pair"
+    feasible, absorption = array(card["feasible"]).astype(bool), array(card["absorption"])
+    assert feasible.shape == absorption.shape == (48, 48)
+    assert np.array_equal(np.isfinite(absorption), feasible)
+    inside, axis = np.argwhere(feasible), card["axes"][0]["values"]
+    for y, x in inside[:: len(inside) // 4]:
+        found = classes.member({**body, "point": [axis[x], axis[y]]})
+        assert deviation(found["material"], state["target"], model) < EXACT
+        check_physical(found["material"])
+        if model == "bati2021":
+            assert found["snapped"] is None
+            etas = [part.eta for part in Stack.from_dict(found["material"]).interfaces]
+            assert etas == pytest.approx([axis[x], axis[y]], rel=1e-6)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_member_lies_on_the_outline_of_all_where_nothing_absorbs_in_vain(model: str) -> None:
+    state = appearance.invert({"target": saved("bati2021-15-c")["target"], "model": model})
+    card = classes.class_({"target": state["target"], "lobe": 0, "material": state["material"], "model": model})
+    points = [point for line in card["outlines"] if line["channel"] == "all" for point in line["points"]]
+    apart = np.hypot(*(np.log(points) - np.log(card["member"])).T)
+    assert apart.min() < 0.03  # half of the distance of two columns
+
+
+def test_a_member_outside_snaps_to_the_class() -> None:
+    state = appearance.invert({"target": saved("bati2021-15-b")["target"], "model": "bati2021"})
+    body = {"target": state["target"], "lobe": 0, "material": state["material"], "model": "bati2021"}
+    x = classes.class_(body)["member"][0]
+    found = classes.member({**body, "point": [x, x]})  # where there would be no lower interface
+    assert deviation(found["material"], state["target"], "bati2021") < EXACT
+    assert Stack.from_dict(found["material"]).interfaces[0].eta == pytest.approx(x)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_conductor_moves_along_its_curves(model: str) -> None:
+    state = appearance.invert({"target": saved("bati2021-19-b")["target"], "model": model})
+    body = {"target": state["target"], "lobe": 1, "material": state["material"], "model": model}
+    card = classes.class_(body)
+    assert card["kind"] == "conductor"
+    goal = card["outlines"][1]["points"][28]
+    found = classes.member({**body, "point": goal})
+    assert deviation(found["material"], state["target"], model) < EXACT
+    metal = Stack.from_dict(found["material"]).interfaces[-1]
+    assert (metal.eta[1], metal.k[1]) == pytest.approx(goal, rel=0.02)  # curves are those of smooth metals
+    again = appearance.invert({**body, "material": found["material"], "target": found["target"]})
+    assert Stack.from_dict(again["material"]).interfaces[-1].eta == pytest.approx(metal.eta, rel=1e-6)
+
+
+# Coats and figures ---------------------------------------------------------------------------------------------------
+
+
+def test_a_coat_keeps_the_appearance_or_says_why_not() -> None:
+    bare = {"layers": [{"interface": {"conductor": "Au", "alpha": 0.2}}]}
+    answer = appearance.coated({"material": bare, "eta": 1.5, "alpha": 0.02, "keep": True, "model": "bati2021"})
+    (row,) = answer["lobes"]
+    assert row["energy_after"] == pytest.approx(row["energy_before"], abs=1e-6)
+    sharp = {"layers": [{"interface": {"conductor": "Au", "alpha": 0.001}}]}
+    refused = appearance.coated({"material": sharp, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})
+    assert set(refused) == {"error"}
+    assert "\n" not in refused["error"]
+
+
+def test_all_figures_are_saved_states() -> None:
+    states = appearance.targets({})["targets"]
+    assert {state["name"].split("-")[1] for state in states} == {str(n) for n in range(15, 23)}
+    assert [state["name"] for state in states if state["snapped"]] == ["bati2021-21-left"]
+    for state in states:
+        assert deviation(state["material"], state["target"], state["model"]) < EXACT

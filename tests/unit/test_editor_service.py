@@ -1,0 +1,286 @@
+"""What the editor's page asks, without a server: the session, shaders, objects, texts, and the files of a folder."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from velatura.editor import bundle
+from velatura.editor.folder import Conflict, Folder
+from velatura.editor.service import VERBS
+from velatura.errors import InvalidInput, MissingTool
+from velatura.model import MODELS
+from velatura.scenes import OBJECTS
+from velatura.stack import Interface, Stack, loads, preset, presets
+from velatura.stack.schema import parameters
+
+COAT: dict[str, Any] = {
+    "name": "Coat",
+    "layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"conductor": "Au"}}],
+}
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory that is empty."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def decoded(array: dict[str, Any]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(array["data"]), array["dtype"]).reshape(array["shape"])
+
+
+def changed(**keys: Any) -> dict[str, Any]:
+    """The coat with other keys of its first interface."""
+    first, *others = COAT["layers"]
+    return {**COAT, "layers": [{"interface": {**first["interface"], **keys}}, *others]}
+
+
+# Session
+
+
+def test_a_session_is_json_and_names_all_there_is() -> None:
+    session = json.loads(json.dumps(VERBS["session"]({}), allow_nan=False))
+    assert [each["name"] for each in session["presets"]] == list(presets())
+    assert [each["name"] for each in session["models"]] == [model.name for model in MODELS]
+    assert session["objects"] == list(OBJECTS)
+    assert session["opened"] is None
+    assert {"bk7", "water"} <= set(session["names"]["dielectrics"])
+    assert all(len(index["eta"]) == len(index["k"]) == 3 for index in session["names"]["conductors"].values())
+
+
+def test_parameters_are_those_that_are_declared() -> None:
+    schema = VERBS["session"]({})["schema"]
+    assert list(schema["interface"]) == list(parameters(Interface))
+    alpha = schema["interface"]["alpha"]
+    assert (alpha["kind"], alpha["low"], alpha["high"], alpha["default"], alpha["texturable"]) == (
+        "pair",
+        0,
+        1,
+        0,
+        True,
+    )
+    assert schema["interface"]["rotation"]["unit"] == "degrees"
+    assert (schema["interface"]["rotation"]["low"], schema["interface"]["eta"]["high"]) == (None, None)
+    assert schema["interface"]["eta"]["strict"] and schema["interface"]["eta"]["default"] is None
+    assert "mirror" in schema["interface"]["conductor"]["options"]
+
+
+def test_every_preset_can_be_sent_back() -> None:
+    for each in VERBS["session"]({})["presets"]:
+        assert Stack.from_dict(each["material"]) == preset(each["name"])
+
+
+def test_models_offer_switches_that_they_take() -> None:
+    for model in VERBS["session"]({})["models"]:
+        named = next(m for m in MODELS if m.name == model["name"])
+        for switch, values in model["switches"].items():
+            assert model["defaults"][switch] in values
+            for value in values:
+                named.with_switches(**{switch: value})
+
+
+# Shaders
+
+
+def shader(material: dict[str, Any], **more: Any) -> dict[str, Any]:
+    return VERBS["shader"]({"material": material, **more})
+
+
+def test_no_change_of_a_value_changes_the_code() -> None:
+    """Not to a smooth interface, an index of one, a named index, or a measured metal."""
+    key = shader(COAT)["key"]
+    for keys in ({"alpha": 0.0}, {"alpha": 1.0}, {"eta": 1.0}, {"eta": "bk7"}, {"eta": [1.4, 1.5, 1.6]}):
+        assert shader(changed(**keys))["key"] == key
+    assert shader({**COAT, "name": "Another", "exterior": 1.33})["key"] == key
+
+
+def test_no_change_of_a_value_changes_the_code_of_a_stretched_interface() -> None:
+    """Not to equal roughnesses, nor to a rotation where there was none."""
+    key = shader(changed(alpha=[0.1, 0.3]))["key"]
+    for keys in ({"alpha": [0.2, 0.2]}, {"alpha": [0.1, 0.3], "rotation": 0}, {"alpha": [0.1, 0.3], "rotation": 20}):
+        assert shader(changed(**keys))["key"] == key
+
+
+def test_layers_models_and_textures_change_the_code(here: Path) -> None:
+    (here / "wood.png").write_bytes(PIXEL)
+    texture = {"texture": "wood.png", "encoding": "srgb"}
+    base = COAT["layers"][1]
+    materials = [COAT, changed(alpha=[0.1, 0.2]), changed(alpha=texture), {**COAT, "layers": [base]}]
+    keys = [shader(material)["key"] for material in materials] + [shader(COAT, model="belcour2018")["key"]]
+    assert len(set(keys)) == len(keys)
+    (image,) = shader(changed(alpha=texture))["maps"]
+    assert (image["texture"], image["encoding"]) == ("wood.png", "srgb")
+    assert image["sampler"] in shader(changed(alpha=texture))["text"]
+
+
+def test_values_are_those_of_the_material() -> None:
+    made = shader(changed(eta=[1.4, 1.5, 1.6], alpha=0.25))
+    assert set(made["values"]) == set(made["uniforms"])
+    assert made["values"]["layer0_eta"] == [1.4, 1.5, 1.6]
+    assert made["values"]["layer0_alpha_u"] == 0.25
+    assert made["uniforms"]["layer0_alpha_u"] == "layer0.alpha_u"
+    assert (made["transmitted"], made["base"], made["thin"]) == (False, False, False)
+
+
+def test_tables_are_the_texture_that_the_shader_reads() -> None:
+    texture = decoded(VERBS["tables"]({"key": shader(COAT)["tables"]})["texture"])
+    assert texture.shape[1:] == (1024, 4)
+    assert np.isfinite(texture).all()
+    with pytest.raises(InvalidInput, match="no tables"):
+        VERBS["tables"]({"key": "nonsense"})
+
+
+# Objects, light, texts
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_an_object_is_the_one_that_is_rendered(name: str) -> None:
+    answer = VERBS["object"]({"name": name})
+    body = answer["parts"][0]
+    surface = OBJECTS[name].surface()
+    assert [part["role"] for part in answer["parts"]] == ["object", "plinth", "ground"]
+    np.testing.assert_array_equal(decoded(body["triangles"]), surface.triangles)
+    np.testing.assert_allclose(decoded(body["positions"]), surface.positions, atol=1e-6)
+    assert answer["view"]["fov"] == OBJECTS[name].view.fov
+
+
+def test_a_furnace_is_one_everywhere() -> None:
+    assert (decoded(VERBS["environment"]({"name": "furnace"})["picture"]) == 1).all()
+
+
+def test_a_text_is_read_as_it_was_written(here: Path) -> None:
+    (here / "wood.png").write_bytes(PIXEL)
+    material = changed(alpha={"texture": "wood.png", "channel": "r"})
+    text = VERBS["write"]({"material": material})["text"]
+    assert loads(text) == Stack.from_dict(material)
+    assert VERBS["read"]({"text": text})["material"] == material
+
+
+@pytest.mark.parametrize(
+    ("verb", "body", "reason"),
+    [
+        ("read", {"text": "layers: ["}, "is not valid YAML"),
+        ("read", {"text": "layers: [{interface: {eta: -1}}]"}, "eta: must be above 0"),
+        ("read", {}, "text: must be text, got nothing"),
+        ("write", {"material": []}, "material: must be an object"),
+        ("shader", {"material": {"layers": [{"diffuse": {}}]}}, "needs an interface"),
+        ("shader", {"material": COAT, "model": "velatur"}, "did you mean velatura"),
+        ("shader", {"material": COAT, "switches": {"tir": "often"}}, "tir: must be one of"),
+        ("object", {"name": "bal"}, "did you mean ball"),
+        ("environment", {"name": "moon"}, "unknown environment"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(verb: str, body: dict[str, Any], reason: str) -> None:
+    with pytest.raises(InvalidInput, match=reason) as refused:
+        VERBS[verb](body)
+    assert "\n" not in str(refused.value)
+
+
+# Files
+
+
+def test_a_material_is_saved_and_opened_again(here: Path) -> None:
+    verbs = Folder().verbs
+    saved = verbs["save"]({"file": "coat.yaml", "material": COAT, "version": None})
+    assert verbs["list"]({}) == {"files": ["coat.yaml"], "textures": []}
+    opened = verbs["open"]({"file": "coat.yaml"})
+    assert opened == {"material": COAT, "version": saved["version"]}
+    verbs["save"]({"file": "coat.json", "material": COAT, "version": None})
+    assert json.loads((here / "coat.json").read_text()) == COAT
+
+
+def test_of_two_that_save_the_second_is_told() -> None:
+    verbs = Folder().verbs
+    verbs["save"]({"file": "coat.yaml", "material": COAT, "version": None})
+    version = verbs["open"]({"file": "coat.yaml"})["version"]
+    with pytest.raises(Conflict, match="exists already"):
+        verbs["save"]({"file": "coat.yaml", "material": COAT, "version": None})
+    verbs["save"]({"file": "coat.yaml", "material": changed(alpha=0.3), "version": version})
+    with pytest.raises(Conflict, match="has changed"):
+        verbs["save"]({"file": "coat.yaml", "material": COAT, "version": version})
+    assert verbs["open"]({"file": "coat.yaml"})["material"] == changed(alpha=0.3)
+    Path("coat.yaml").unlink()
+    with pytest.raises(Conflict, match="been removed"):
+        verbs["save"]({"file": "coat.yaml", "material": COAT, "version": version})
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../out.yaml", "/tmp/out.yaml", "..\\out.yaml", ".hidden.yaml", "a/b.yaml", "", "a\x00.yaml", "out.py", ".."],
+)
+def test_nothing_but_plain_names(here: Path, name: str) -> None:
+    bodies: dict[str, Any] = {"save": {"material": COAT, "version": None}, "open": {}, "texture": {"data": ""}}
+    for verb, body in bodies.items():
+        with pytest.raises(InvalidInput):
+            Folder().verbs[verb]({"file": name, **body})
+    assert list(here.iterdir()) == [] and not list(here.parent.glob("out.*"))
+
+
+def test_links_lead_nowhere_else(here: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    outside = tmp_path_factory.mktemp("outside") / "coat.yaml"
+    outside.write_text("layers: [{interface: {eta: 1.5}}]")
+    (here / "link.yaml").symlink_to(outside)
+    (here / "loop.yaml").symlink_to("loop.yaml")
+    (here / "folder.yaml").mkdir()
+    verbs = Folder().verbs
+    assert verbs["list"]({})["files"] == []
+    for name in ("link.yaml", "loop.yaml", "folder.yaml"):
+        with pytest.raises(InvalidInput):
+            verbs["open"]({"file": name})
+        with pytest.raises(InvalidInput):
+            verbs["save"]({"file": name, "material": COAT, "version": None})
+    assert "1.5" in outside.read_text()
+
+
+def test_a_texture_is_a_picture_and_overwrites_nothing(here: Path) -> None:
+    verbs = Folder().verbs
+    data = base64.b64encode(PIXEL).decode()
+    assert verbs["texture"]({"file": "wood.png", "data": data}) == {"file": "wood.png"}
+    assert verbs["texture"]({"file": "wood.png", "data": data}) == {"file": "wood.png"}
+    (here / "wood.png").write_bytes(b"another")
+    assert verbs["texture"]({"file": "wood.png", "data": data}) == {"file": "wood-2.png"}
+    for name in ("text.png", "text.jpg", "text.exr", "text.hdr"):
+        with pytest.raises(InvalidInput, match="no picture"):
+            verbs["texture"]({"file": name, "data": base64.b64encode(b"not a picture").decode()})
+    with pytest.raises(InvalidInput, match="base64"):
+        verbs["texture"]({"file": "grain.png", "data": "!"})
+    assert sorted(path.name for path in here.iterdir()) == ["wood-2.png", "wood.png"]
+
+
+def test_what_cannot_be_written_leaves_nothing(here: Path) -> None:
+    with pytest.raises(InvalidInput, match="cannot be written"):
+        Folder().verbs["save"]({"file": f"{'a' * 250}.yaml", "material": COAT, "version": None})
+    assert list(here.iterdir()) == []
+
+
+def test_a_file_of_the_folder_is_opened_to_be_saved_back(here: Path) -> None:
+    (here / "coat.yaml").write_text(VERBS["write"]({"material": COAT})["text"])
+    folder = Folder()
+    first = folder.first("coat.yaml")
+    assert (first["file"], first["version"]) == ("coat.yaml", folder.verbs["open"]({"file": "coat.yaml"})["version"])
+    assert folder.first("coated-gold")["file"] is None
+    with pytest.raises(InvalidInput, match="did you mean coated-gold"):
+        folder.first("coated-gld")
+
+
+# The page
+
+
+def test_a_missing_page_is_told_with_what_builds_it(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bundle, "STATIC", here)
+    assert not bundle.finding().ok
+    with pytest.raises(MissingTool, match="pip install"):
+        bundle.require()
+    for name in ("index.html", "editor.js", "widget.js"):
+        (here / name).touch()
+    assert bundle.require() == here
