@@ -1,18 +1,19 @@
 """The editor's viewport: its stills against Mitsuba's, and what it costs (SwiftShader, so run it on a quiet machine).
 
 Stills: root mean square of the difference in linear radiance relative to white, beside the noise of either picture.
-Times: to a first picture, to a picture after a new shader, of frames while a value is dragged, and of a sample; and
-of a frame with a new roughness beside one of three.js with MeshPhysicalMaterial and clearcoat, by turns.
+Times: to a first picture, of frames while a value is dragged, and of a sample; and of a frame with a new roughness
+beside one of three.js with MeshPhysicalMaterial and clearcoat, by turns.
+Adding: from a layer more to the picture with it, in a page that has seen nothing of the kind.
 
-    python benchmarks/editor.py [--size 96] [--samples 1024] [--spp 2048] [--only stills|times]
+    python benchmarks/editor.py [--size 96] [--samples 1024] [--spp 2048] [--only stills|times|adding]
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from pathlib import Path
+from statistics import median
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
@@ -27,6 +28,21 @@ STILLS = (
     ("glossy-plastic", "ball"),
     ("frosted-metal", "sphere"),
     ("frosted-glass", "sphere"),
+)
+
+ADDED = {
+    "interface": {"interface": {"eta": 1.4, "alpha": 0.1}},
+    "medium": {"medium": {"depth": 0.5, "sigma_a": 0.3}},
+    "diffuse": {"diffuse": {"albedo": 0.5}},
+}
+ADDED_TO = (
+    "bare-gold",
+    "wet-copper",
+    "coated-gold",
+    "frosted-glass",
+    "three-dielectrics-over-metal",
+    "pearl-lacquer",
+    "furnace",
 )
 
 THREE = "export * as three from 'three';"
@@ -143,7 +159,7 @@ async (material) => {
 
 
 def stills(size: int, samples: int, spp: int) -> None:
-    with tempfile.TemporaryDirectory() as folder, viewport.stage(Path(folder), size, size) as opened:
+    with viewport.stage(size, size) as opened:
         for preset, scene in STILLS:
             found = viewport.compare(opened, vt.preset(preset), scene, "studio", samples, spp)
             print(
@@ -154,14 +170,11 @@ def stills(size: int, samples: int, spp: int) -> None:
 
 
 def times() -> None:
-    with tempfile.TemporaryDirectory() as folder, viewport.stage(Path(folder), 640, 360, THREE) as opened:
+    with viewport.stage(640, 360, THREE) as opened:
         page = opened.page
         page.evaluate("viewport.setBudget({ samples: 0 })")
-        two, three = (bodies.document(vt.preset(name)) for name in ("coated-gold", "three-dielectrics-over-metal"))
+        two = bodies.document(vt.preset("coated-gold"))
         print(f"first picture {page.evaluate(FIRST, two) / 1e3:.2f} s")
-        asked, drawn = page.evaluate(ANOTHER, three)
-        print(f"other layers: {asked / 1e3:.2f} s for the shader, {drawn / 1e3:.2f} s to compile and draw")
-        page.evaluate(ANOTHER, two)
         print(f"dragging a roughness at 640 x 360: {page.evaluate(DRAG, 'layer0_alpha_u'):.1f} frames/s")
         print(f"a sample at 640 x 360: {page.evaluate(SAMPLE) / 1e3:.2f} s")
         found = page.evaluate(BESIDE, two)
@@ -172,19 +185,40 @@ def times() -> None:
         )
 
 
+def adding() -> None:
+    found = []
+    for preset in ADDED_TO:
+        before = bodies.document(vt.preset(preset))
+        opaque = before["layers"][-1]
+        for kind, layer in ADDED.items():
+            if kind == "diffuse" and kind in opaque:
+                continue
+            # A base lies below, in the place of an opaque one; all else on top
+            layers = [*before["layers"][:-1], layer] if kind == "diffuse" else [layer, *before["layers"]]
+            with viewport.stage(640, 360) as opened:
+                opened.page.evaluate("viewport.setBudget({ samples: 0 })")
+                opened.page.evaluate(FIRST, before)
+                opened.page.wait_for_function("() => viewport.previewed")
+                found.append(sum(opened.page.evaluate(ANOTHER, {**before, "layers": layers})) / 1e3)
+            print(f"{kind:10} {preset:30} {found[-1]:.2f} s", flush=True)
+    print(f"adding a layer: median {median(found):.2f} s, at most {max(found):.2f} s")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--size", type=int, default=96)
     parser.add_argument("--samples", type=int, default=1024)
     parser.add_argument("--spp", type=int, default=2048)
-    parser.add_argument("--only", choices=("stills", "times"))
+    parser.add_argument("--only", choices=("stills", "times", "adding"))
     arguments = parser.parse_args()
     if why := viewport.missing():
         print(f"skipped: {why}")
         return
-    if arguments.only != "stills":
+    if arguments.only in (None, "times"):
         times()
-    if arguments.only != "times":
+    if arguments.only in (None, "adding"):
+        adding()
+    if arguments.only in (None, "stills"):
         stills(arguments.size, arguments.samples, arguments.spp)
 
 

@@ -72,12 +72,24 @@ class _Numpy:
         total = sum(np.asarray(w)[..., None] * flat[i] for i, w in corners)
         return [total[..., c] for c in range(channels)]
 
+    @staticmethod
+    def each(function: Callable[..., Value], nodes: Sequence[float], values: Sequence[Value]) -> list[Value]:
+        return [function(x, *values) for x in nodes]
+
+    @staticmethod
+    def repeat(function: Callable[..., Sequence[Value]], times: int, state: Sequence[Value]) -> Sequence[Value]:
+        for _ in range(times):
+            state = function(*state)
+        return state
+
 
 class _Float:
     """Python floats: NumPy's functions, without letting NumPy's own scalars out.
 
     (A NumPy scalar times a Dr.Jit array would be a NumPy array.)
     """
+
+    each, repeat = staticmethod(_Numpy.each), staticmethod(_Numpy.repeat)
 
     def __getattr__(self, name: str) -> Callable[..., Value]:
         function = getattr(_Numpy, name)
@@ -91,6 +103,8 @@ class _Float:
 
 
 class _DrJit:
+    each, repeat = staticmethod(_Numpy.each), staticmethod(_Numpy.repeat)
+
     def __init__(self) -> None:
         import drjit as dr
 
@@ -207,3 +221,16 @@ def maximum_channel(colour: Value) -> Value:
 def interpolate(table: Gridded, *coordinates: Value) -> list[Value]:
     """Multilinear interpolation of a table at coordinates in [0, 1], one array per channel of the table."""
     return _dialect(*coordinates).interpolate(table, coordinates)
+
+
+def each(function: Callable[..., Value], nodes: Sequence[float], *values: Value) -> list[Value]:
+    """`function` of every node, a constant, and of the values; a loop where it is recorded.
+
+    It may answer a list of values. `values` choose the dialect, though the function may read others, too.
+    """
+    return _dialect(*values).each(function, nodes, values)
+
+
+def repeat(function: Callable[..., Sequence[Value]], times: int, *state: Value) -> Sequence[Value]:
+    """A state, one value or several, after `function` was applied to it so many times; a loop where it is recorded."""
+    return _dialect(*state).repeat(function, times, state)

@@ -26,6 +26,7 @@ SAME = 0.5  # of 255: mean difference of pictures of one material
 OTHER = 1.0  # of 255: what a change of the material makes at least
 REFUSED = "the server responded with a status of 4"
 AWAY = "ERR_CONNECTION_REFUSED"
+PREVIEWS = "[...velatura.viewport.device.programs.keys()].filter((text) => text.includes('PARTS =')).length"
 
 
 @pytest.fixture
@@ -211,20 +212,23 @@ def test_dragging_never_compiles(visit: Open) -> None:
 
 
 def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
-    """Expected: once the picture can wait, the code for an interface and for a medium on top is there."""
+    """Expected: once the picture can wait, the programs for an interface on top are there; a medium needs no others."""
     page = visit()
     open_preset(page, "Wet copper")
-    bakes = "[...velatura.viewport.device.programs.keys()].filter((text) => text.includes('vt_bake_node')).length"
-    known = page.page.evaluate(bakes)
     page.page.evaluate("velatura.viewport.setSize(64, 48); velatura.viewport.setBudget({ samples: 16 })")
+    coming = "(velatura.viewport.coming?.shader?.lobes ?? []).map(({ layers }) => layers[0]).join()"
     for _ in range(600):
-        if page.page.evaluate(bakes) == known + 2:
+        if page.page.evaluate(coming) == "0,1,2":
             break
         page.page.wait_for_timeout(100)
+    page.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")  # look no further
+    known = page.page.evaluate(PREVIEWS)
     page.page.get_by_role("button", name="Interface", exact=True).click()
     page.settled()
+    page.page.get_by_role("button", name="Medium", exact=True).click()
+    page.settled()
     assert len(page.page.evaluate("velatura.shader().lobes")) == 3
-    assert page.page.evaluate(bakes) == known + 2
+    assert page.page.evaluate(PREVIEWS) == known
 
 
 # Errors --------------------------------------------------------------------------------------------------------------
@@ -260,15 +264,16 @@ def test_a_number_out_of_range_is_refused_in_words(visit: Open) -> None:
     assert said(page).inner_text() == ""
 
 
-def drop(page: Visit, selector: str, name: str, text: str) -> None:
+def drop(page: Visit, selector: str, name: str, content: str | bytes) -> None:
+    data = content.encode() if isinstance(content, str) else content
     page.page.evaluate(
-        """([selector, name, text]) => {
+        """([selector, name, bytes]) => {
           const dataTransfer = new DataTransfer();
-          dataTransfer.items.add(new File([text], name));
+          dataTransfer.items.add(new File([Uint8Array.from(bytes)], name));
           const event = new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true });
           document.querySelector(selector).dispatchEvent(event);
         }""",
-        [selector, name, text],
+        [selector, name, list(data)],
     )
 
 
@@ -313,6 +318,86 @@ def test_two_tabs_have_a_state_each_and_do_not_overwrite_one_another(visit: Open
     one.page.get_by_role("button", name="Overwrite it").click()
     said(one).get_by_text("Saved gold.yaml").wait_for()
     assert vt.load(served.folder / "gold.yaml").flat()["layer0_alpha_u"] == 0.1
+
+
+# The view ------------------------------------------------------------------------------------------------------------
+
+
+def test_light_from_a_file_fills_the_picture(visit: Open) -> None:
+    """Expected: in even green light all is green, by half of the exposure darker, and after a reload as before."""
+    page = visit()
+    green = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" + bytes([0, 128, 0, 128]) * 8
+    drop(page, "canvas", "green.hdr", green)
+    lit = page.picture()
+    assert page.page.get_by_label("Light", exact=True).input_value() == "file:green.hdr"
+    assert lit[..., 1].min() > 20
+    assert lit[..., [0, 2]].max() < 2
+    page.page.get_by_label("Exposure, in stops", exact=True).fill("-1")
+    page.page.get_by_label("Exposure, in stops", exact=True).press("Enter")
+    darker = page.picture()
+    assert np.all(darker[..., 1] < lit[..., 1])
+    page.page.reload()
+    page.ready()
+    assert difference(page.picture(), darker) < SAME
+
+
+def test_fingers_turn_the_object_and_bring_it_closer(visit: Open) -> None:
+    page = visit(viewport={"width": 900, "height": 600}, has_touch=True)
+    touch = page.page.context.new_cdp_session(page.page)
+    box = page.page.locator("canvas").first.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def put(kind: str, *points: tuple[float, float]) -> None:
+        where = [{"x": x + dx, "y": y + dy, "id": k} for k, (dx, dy) in enumerate(points)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": where})
+
+    def camera() -> tuple[np.ndarray, float]:
+        eye = np.subtract(*(np.array(page.page.evaluate(f"velatura.viewport.camera.{key}")) for key in KEYS))
+        return eye, float(np.linalg.norm(eye))
+
+    start, far = camera()
+    put("touchStart", (0, 0))
+    put("touchMove", (60, 0))
+    put("touchEnd")
+    turned, away = camera()
+    assert away == pytest.approx(far)
+    assert abs(np.arctan2(turned[0], turned[2]) - np.arctan2(start[0], start[2])) > 0.2
+    assert turned[1] == pytest.approx(start[1])
+
+    put("touchStart", (-40, 0), (40, 0))
+    put("touchMove", (-80, 0), (80, 0))
+    put("touchEnd")
+    assert camera()[1] == pytest.approx(far / 2, rel=0.1)
+    page.settled()
+
+
+KEYS = ("origin", "target")
+
+
+def test_two_models_differ_where_they_do(visit: Open) -> None:
+    """Expected: the difference of a model from itself is one flat grey, that from another is not; a split screen has
+    either model on its side of the line, which is dragged."""
+    page = visit()
+    open_preset(page, "Three dielectric layers over metal")
+    alone = page.picture()
+    page.page.get_by_label("Compare", exact=True).select_option("difference")
+    page.page.get_by_label("With", exact=True).select_option("velatura")
+    assert np.ptp(page.picture()) < 2
+    page.page.get_by_label("With", exact=True).select_option("belcour2018")
+    assert np.ptp(page.picture()) > 10
+
+    page.page.get_by_label("Compare", exact=True).select_option("split")
+    line = page.page.get_by_role("slider", name="Where the picture is split")
+    halves = page.picture()
+    assert difference(halves[:, :30], alone[:, :30]) < SAME
+    assert difference(halves[:, 34:], alone[:, 34:]) > SAME
+    at, picture = line.bounding_box(), page.page.locator("canvas").first.bounding_box()
+    page.page.mouse.move(at["x"] + at["width"] / 2, at["y"] + 50)
+    page.page.mouse.down()
+    page.page.mouse.move(picture["x"] + picture["width"] - 2, at["y"] + 50, steps=3)
+    page.page.mouse.up()
+    assert page.state("view.split") > 0.95
+    assert difference(page.picture()[:, :58], alone[:, :58]) < SAME
 
 
 # Looks ---------------------------------------------------------------------------------------------------------------

@@ -22,8 +22,8 @@ BOUND = 0.01
 
 
 @pytest.fixture(scope="module")
-def stage(tmp_path_factory: pytest.TempPathFactory) -> Iterator[viewport.Stage]:
-    with viewport.stage(tmp_path_factory.mktemp("page"), 32, 32) as opened:
+def stage() -> Iterator[viewport.Stage]:
+    with viewport.stage(32, 32) as opened:
         yield opened
 
 

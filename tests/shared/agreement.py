@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
 
 import numpy as np
+import viewport
 from chromium import Browser
 
+from velatura import tables
+from velatura.editor import bodies
 from velatura.model import bsdf
 from velatura.shader import Recording, Shader, constant, record, shader, variance
 from velatura.stack import Kind, Stack, is_colour
@@ -187,16 +191,12 @@ def compare(pattern: Pattern, model: str, count: int, seed: int, browser: Browse
 def read_back(stack: Stack, made: Shader, wi: np.ndarray, browser: Browser) -> np.ndarray:
     """What a shader with parameters reads of the lobes that it has drawn: for each name in `shown`, energies and, but
     for a base, alphas and rotation, shape (lobes, 6, N)."""
-    flat = stack.flat()
-    uniforms = {
-        f"vt_parameters.{place}": np.broadcast_to(constant(name, flat[name]), 3 if is_colour(name) else 1).tolist()
+    values = {
+        place: np.broadcast_to(constant(name, stack.flat()[name]), 3 if is_colour(name) else 1).tolist()
         for name, place in made.uniforms.items()
     }
+    uniforms = {f"vt_parameters.{place}": value for place, value in values.items()}
     uniforms["vt_shown[0]"] = [1.0] * len(made.shown)
-    assert made.baking is not None
-    drawing = "out vec4 result;\nvoid main() { result = vt_bake(ivec2(gl_FragCoord.xy)); }\n"
-    tables = {"vt_tables": made.tables}
-    baked = browser.draw(f"#version 300 es\n{made.baking.text}{drawing}", tables, *made.baking.size, uniforms)
     answers = []
     for name in made.shown:
         alphas = "vec4(0.0)" if name == "base" else f"vec4(l.{name}.alpha_u, l.{name}.alpha_v, l.{name}.rotation, 0.0)"
@@ -214,10 +214,33 @@ void main() {{
     }}
 }}
 """
-    textures = {"inputs": np.pad(wi.T, ((0, 0), (0, 1)))[:, None], "vt_baked": baked.pixels}
+    textures = {"inputs": np.pad(wi.T, ((0, 0), (0, 1)))[:, None], "vt_baked": in_javascript(made, values, browser)}
     drawn = browser.draw(f"#version 300 es\n{made.text}{main}", textures, len(answers), wi.shape[1], uniforms)
     pairs = np.moveaxis(drawn.pixels.astype(float), 0, -1).reshape(len(made.shown), 2, 4, -1)
     return np.concatenate([pairs[:, 0, :3], pairs[:, 1, :3]], axis=1)
+
+
+def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Browser) -> np.ndarray:
+    """The texture of lobes that the page works out, shape (height, width, 4), for values by place in the struct."""
+    assert made.baked is not None
+    tape, known = made.baked.tape, dict(tables.load().items())
+    job = {
+        "baked": {**vars(tape), "nodes": made.baked.nodes, "sides": made.baked.sides},
+        "tables": {name: bodies.array(known[name].data) for name in tape.tables},
+        "values": {place: value[0] if len(value) == 1 else value for place, value in values.items()},
+    }
+    browser.page.evaluate(viewport.script("export * from './render/bake.js'; export * from './arrays.js';") + ";1")
+    found = browser.page.evaluate(_BAKE, job)
+    return np.array(found["texels"], np.float32).reshape(found["height"], found["width"], 4)
+
+
+_BAKE = """
+({ baked, tables, values }) => {
+  const decoded = Object.entries(tables).map(([name, table]) => [name, page.decode(table)]);
+  const made = new page.Bake(baked, Object.fromEntries(decoded));
+  return { texels: [...made.draw(values)], height: made.height, width: made.width };
+}
+"""
 
 
 def _random_layer(kind: str, shape: str, count: int, rng: np.random.Generator) -> dict[str, np.ndarray]:

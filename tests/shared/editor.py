@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import chromium
 import numpy as np
@@ -75,10 +75,14 @@ def _environment() -> dict[str, str]:
 
 
 class Visit:
-    """A page of the editor, with what its console has complained about."""
+    """A page of the editor, with what its console has complained about; a slow machine has its time."""
+
+    open: ClassVar[list[Visit]] = []  # all that were begun
 
     def __init__(self, page: Any, address: str) -> None:
+        self.open.append(self)
         self.page = page
+        page.set_default_timeout(60_000)
         self.complaints: list[str] = []
         page.on("console", self._listen)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
@@ -93,6 +97,16 @@ class Visit:
         """Wait until there is a picture; from then on the preview alone is drawn, which is the same every time."""
         self.page.wait_for_function("() => window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
         self.page.evaluate("window.velatura.viewport.setBudget({ samples: 0 })")
+
+    def told(self) -> str:
+        """What the page says of itself, for whoever asks why a test has failed."""
+        if self.page.is_closed():
+            return "closed"
+        told = """({ quiet, problems, viewport, store, session }) => JSON.stringify({
+          quiet, problems, held: viewport.held, previewed: viewport.previewed, samples: viewport.samples,
+          focus: document.activeElement?.outerHTML.slice(0, 200), layers: store.get().layers, view: store.get().view,
+        })"""
+        return f"{self.page.evaluate(f'({told})(window.velatura)')}\n{self.complaints}"
 
     def state(self, path: str = "") -> Any:
         """A part of the state: `state("layers.0.keys.alpha")`."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from velatura import ops, tables
 from velatura.ops import Value
-from velatura.shader.symbol import Operand, Symbol, in_order, operand
+from velatura.shader.symbol import Operand, Symbol, in_order, inside, operand
 
 _ARITHMETIC: dict[str, Callable[..., Any]] = {
     "add": operator.add,
@@ -35,15 +35,30 @@ def evaluate(outputs: Sequence[Value], values: Mapping[str, Any]) -> list[Any]:
             return done[x]
         return np.array(x)[:, None] if isinstance(x, tuple) else x
 
-    for symbol in in_order(outputs):
-        done[symbol] = _evaluated(symbol, [of(x) for x in symbol.args], values)
+    order = in_order(outputs)
+    within = inside(order)
+    for symbol in order:
+        if symbol.kind == "loop":
+            done[symbol] = _looped(symbol, values)
+        elif within[symbol] <= values.keys():
+            done[symbol] = _evaluated(symbol, [of(x) for x in symbol.args], values)
     return [of(operand(x)) for x in outputs]
 
 
+def _looped(loop: Symbol, values: Mapping[str, Any]) -> list[Any]:
+    bound, nodes, times = loop.detail
+    if nodes:
+        return [x for node in nodes for x in evaluate(loop.args, {**values, bound[0]: node})]
+    state = evaluate(loop.args[: len(bound)], values)
+    for _ in range(times):
+        state = evaluate(loop.args[len(bound) :], {**values, **dict(zip(bound, state))})
+    return state
+
+
 def _evaluated(symbol: Symbol, args: list[Any], values: Mapping[str, Any]) -> Any:
-    if symbol.op == "input":
+    if symbol.op in ("input", "bound"):
         return values[symbol.detail]
-    if symbol.op == "component":
+    if symbol.op in ("component", "item"):
         return args[0][symbol.detail]
     if symbol.op == "colour":
         return np.stack(np.broadcast_arrays(*args))

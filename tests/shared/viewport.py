@@ -90,17 +90,21 @@ class Stage:
         return data.reshape(found["height"], found["width"], 4)[..., :3].astype(float)
 
 
+def script(entry: str) -> str:
+    """Modules of the page bundled: what the text of an entry exports is in `page`."""
+    options = ["--bundle", "--format=iife", "--global-name=page", "--log-level=warning"]
+    made = subprocess.run([ESBUILD, *options], cwd=PAGE, input=entry, text=True, check=True, stdout=subprocess.PIPE)
+    return made.stdout
+
+
 @contextmanager
-def stage(folder: Path, width: int, height: int, exports: str = "") -> Iterator[Stage]:
-    """A stage of so many pixels, its script bundled into a folder, for as long as the block runs.
+def stage(width: int, height: int, exports: str = "") -> Iterator[Stage]:
+    """A stage of so many pixels, for as long as the block runs.
 
     `exports` are statements of JavaScript; what they export is in `page` as well.
     """
     from playwright.sync_api import sync_playwright
 
-    bundle = folder / "viewport.js"
-    options = [f"--outfile={bundle}", "--bundle", "--format=iife", "--global-name=page", "--log-level=warning"]
-    subprocess.run([ESBUILD, *options], cwd=PAGE, input=_ENTRY + exports, text=True, check=True)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium.path(), args=chromium.FLAGS.split())
         try:
@@ -112,7 +116,7 @@ def stage(folder: Path, width: int, height: int, exports: str = "") -> Iterator[
             page.set_content(
                 f"<canvas width={width} height={height} style='width:{width}px;height:{height}px'></canvas>"
             )
-            page.add_script_tag(path=str(bundle))
+            page.add_script_tag(content=script(_ENTRY + exports))
             page.evaluate(_OPEN)
             yield opened
         finally:
@@ -134,6 +138,13 @@ def compare(
 ) -> Comparison:
     """The page's still against Mitsuba's picture of the same: nothing is clipped, and all pixels count."""
     opened.show(stack, scene, env, model)
+    return compared(opened, stack, scene, env, samples, spp, model)
+
+
+def compared(
+    opened: Stage, stack: Stack, scene: str, env: str, samples: int, spp: int, model: str = DEFAULT
+) -> Comparison:
+    """As `compare`, of what is shown already."""
     half = opened.trace(samples // 2)
     still = opened.trace(samples)
     size = still.shape[1], still.shape[0]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from velatura import tables
 from velatura.editor import bundle
 from velatura.editor.folder import Conflict, Folder
 from velatura.editor.service import VERBS
@@ -132,8 +133,20 @@ def test_values_are_those_of_the_material() -> None:
     assert (made["transmitted"], made["base"], made["thin"]) == (False, False, False)
 
 
-def test_tables_are_the_texture_that_the_shader_reads() -> None:
-    texture = decoded(VERBS["tables"]({"key": shader(COAT)["tables"]})["texture"])
+def test_tables_are_those_that_are_read(here: Path) -> None:
+    """A uniform material is worked out by a tape, which reads tables by name; a textured one by a shader."""
+    baked = shader(COAT)["baked"]
+    assert shader(COAT)["tables"] is None
+    for name in baked["tables"]:
+        expected = dict(tables.load().items())[name].data
+        np.testing.assert_array_equal(decoded(VERBS["table"]({"name": name})["table"]), expected)
+    with pytest.raises(InvalidInput, match="did you mean conductor"):
+        VERBS["table"]({"name": "conducter"})
+
+    (here / "pixel.png").write_bytes(PIXEL)
+    textured = shader(changed(alpha={"texture": "pixel.png"}))
+    assert textured["baked"] is None
+    texture = decoded(VERBS["tables"]({"key": textured["tables"]})["texture"])
     assert texture.shape[1:] == (1024, 4)
     assert np.isfinite(texture).all()
     with pytest.raises(InvalidInput, match="no tables"):

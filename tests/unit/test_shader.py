@@ -12,9 +12,10 @@ from evaluation import evaluate
 import velatura as vt
 from velatura import ops, tables
 from velatura.errors import InvalidInput
-from velatura.shader import Recording, glsl, record, shader
+from velatura.shader import Recording, glsl, record, shader, source
 from velatura.shader.graph import Graph
 from velatura.shader.symbol import Symbol, colour, component, in_order, number
+from velatura.shader.tape import tape
 
 X, Y = np.random.default_rng(1).uniform(0.05, 0.95, (2, 20))
 RGB = np.random.default_rng(2).uniform(0.05, 0.95, (3, 20))
@@ -162,7 +163,7 @@ def test_a_constant_is_no_uniform() -> None:
     names = ["layer0_eta", "layer2_eta", "layer2_k"]
     free, fixed = shader(stack, "belcour2018"), shader(stack, "belcour2018", names)
     assert set(free.uniforms) - set(fixed.uniforms) == set(names)
-    assert len(fixed.text) < 0.8 * len(free.text)
+    assert len(fixed.text) < 0.85 * len(free.text)
     assert "m.layer0.eta" not in fixed.text
 
 
@@ -224,12 +225,51 @@ def test_no_change_of_a_value_changes_the_code(model: str) -> None:
 
 
 def test_a_uniform_material_is_shaded_without_its_layers() -> None:
-    """The program that shades reads neither tables nor media; the one that draws the lobes does."""
+    """The program reads neither tables nor media; the tape that works out the lobes does."""
     made = shader(vt.preset("varnished-paint"), values="uniforms")
-    assert made.baking is not None
+    assert made.baked is not None
     assert "vt_tables" not in made.text
-    assert "vt_tables" in made.baking.text
-    assert made.text.count("\n") < made.baking.text.count("\n") / 2
+    assert "sigma_a" not in made.text
+    assert "dielectric_multi" in made.baked.tape.tables
+    assert "m.layer1.sigma_a" in made.baked.tape.inputs
+    assert "layer1_sigma_a" in made.uniforms
+
+
+def test_another_medium_is_shaded_by_the_same_program() -> None:
+    coat, metal = {"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"eta": 0.2, "k": 3, "alpha": 0.3}}
+    medium = {"medium": {"depth": 0.5, "sigma_a": 0.4}}
+    bare, filled = (shader(vt.Stack(layers), values="uniforms") for layers in ([coat, metal], [coat, medium, metal]))
+    assert bare.text == filled.text
+    assert bare.key != filled.key
+
+
+# Tapes
+
+
+def test_a_tape_works_out_what_is_the_same_once() -> None:
+    x, c = number("x"), colour("c")
+    made = tape([x * c + 2.0, c * x, ops.select(x < 2.0, 1.0, component(c, 1))])
+    assert (made.inputs, made.constants) == (["x", "c"], [2.0, 1.0])
+    assert [step[0] for step in made.steps] == ["multiply", "add", "less", "component", "select"]
+    assert made.outputs == [5, 4, 8]
+
+
+# Loops
+
+
+def test_what_is_read_has_loops_and_what_is_run_has_none() -> None:
+    def powers(x: object) -> list:
+        values = ops.each(lambda node, y: node * y + 1.0, [0.25, 0.5], x)
+        return [*values, *ops.repeat(lambda a, b: [b, a + b], 3, 0.0 * x, x)]
+
+    with source.naming(Symbol):
+        texts = printed(sum(powers(number("x"))))
+    assert "const float nodes[2] = float[2](0.25, 0.5);" in texts
+    assert texts.count("for (int") == 2
+    unrolled = printed(sum(powers(number("x"))))
+    assert "for" not in unrolled
+    (found,) = evaluate([sum(powers(number("x")))], {"x": X})
+    np.testing.assert_allclose(found, 0.75 * X + 2 + 5 * X)
 
 
 @pytest.mark.parametrize(

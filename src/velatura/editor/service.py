@@ -30,6 +30,7 @@ from velatura.stack.layers import LAYERS
 from velatura.stack.schema import Parameter, Record, parameters, unknown
 from velatura.stack.spectra import MIRROR
 from velatura.stack.values import Angle, Brushing, Choice, Colour, Conductor, Flag, Index, Pair, Scalar, Text
+from velatura.tables import load as load_tables
 
 #: What the page shows a parameter as.
 KINDS: dict[type[Parameter], str] = {
@@ -141,6 +142,14 @@ def tables(body: Body) -> Answer:
     return {"texture": array(kept_tables(field(body, "key", str)))}
 
 
+def table(body: Body) -> Answer:
+    """A table of averages by its name, channels on the last axis."""
+    name, known = field(body, "name", str), dict(load_tables().items())
+    if name not in known:
+        raise InvalidInput(unknown("table", name, known))
+    return {"table": array(known[name].data)}
+
+
 def read(body: Body) -> Answer:
     """The material in a text, YAML or JSON."""
     return {"material": document(loads(field(body, "text", str), "the text"))}
@@ -183,6 +192,7 @@ VERBS: dict[str, Verb] = {
     "session": session,
     "shader": shader,
     "tables": tables,
+    "table": table,
     "read": read,
     "write": write,
     "object": object_,

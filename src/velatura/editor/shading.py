@@ -35,7 +35,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
     return {
         "key": made.key,
         "text": made.text,
-        "baking": made.baking and made.baking.text,
+        "baked": _baked(made),
         "uniforms": {name: made.uniforms[name] for name in free},
         "tables": kept,
         "maps": [
@@ -69,10 +69,18 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
 
 
 @functools.lru_cache(64)
-def _made(stack: Stack, model: Model) -> tuple[Shader, str]:
-    """The code, and the key of its tables."""
+def _made(stack: Stack, model: Model) -> tuple[Shader, str | None]:
+    """The code, and the key of its tables; those of a tape are known by their names."""
     made = shader(stack, model, values="uniforms")
-    return made, _kept(made.tables)
+    return made, None if made.baked else _kept(made.tables)
+
+
+def _baked(made: Shader) -> dict[str, Any] | None:
+    """What works out the lobes of a uniform material, for a texture of so many nodes and sides."""
+    if made.baked is None:
+        return None
+    tape = made.baked.tape
+    return {**vars(tape), "tables": tape.tables, "nodes": made.baked.nodes, "sides": made.baked.sides}
 
 
 # Tables are kept by what they hold, so that the page fetches those that several shaders read only once

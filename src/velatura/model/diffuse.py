@@ -74,25 +74,27 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     """
     if prepared.base is None:
         return prepared
-    inside = _Inside.of(prepared)
-    cosines = [settle(node + 0 * prepared.base.n) for node, _ in _NODES]
-    measures = [2 * weight * cosine for cosine, (_, weight) in zip(cosines, _NODES)]
-    lit = [_halfway(cosine, inside.interfaces) for cosine in cosines]
+    inside, nodes = _Inside.of(prepared), [node for node, _ in _NODES]
+    measures = [2 * weight * node for node, weight in _NODES]
+
+    def lit(node: Value, n: Value) -> Direction:
+        return _halfway(settle(node + 0 * n), inside.interfaces)
+
     worth: Row = ()
     reflected: Value = 0.0
     if inside.interfaces:
         # Light leaves by the way that it comes in
-        entered = [settle(_entered(prepared, wi)) for wi in lit]
+        entered = ops.each(lambda node, n: settle(_entered(prepared, lit(node, n))), nodes, prepared.base.n)
         leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in range(parts.COUNT)]
         even = parts.even(inside.indices[0])
         squared = inside.indices[0] * inside.indices[0]
         leaves = [ops.divide(x, squared * w) for x, w in zip(leaves, even)]
         worth, reflected = inside.solved(leaves, settle)
     base = dataclasses.replace(prepared.base, worth=tuple(worth), mean_reflectance=reflected)
-    prepared = dataclasses.replace(prepared, base=base)
-    through = [settle(_through(prepared, wi)) for wi in lit]
+    known = dataclasses.replace(prepared, base=base)
+    through = ops.each(lambda node, n: settle(_through(known, lit(node, n))), nodes, base.n)
     transmitted = _sum(measure * t for measure, t in zip(measures, through)) / (base.n * base.n)
-    return dataclasses.replace(prepared, base=dataclasses.replace(base, mean_transmittance=transmitted))
+    return dataclasses.replace(known, base=dataclasses.replace(base, mean_transmittance=transmitted))
 
 
 def _through(prepared: Prepared, wi: Direction) -> Value:
@@ -166,13 +168,21 @@ class _Inside:
         going_down = down([none] * len(self.interfaces))
         if exchanges:
             # Sweep up and down, and go on as the last two sweeps did
-            gains: list[Value] = []
-            for _ in range(SWEEPS):
-                before, going_down = going_down, down(up(going_down))
-                gains.append(_sum(b - a for p, q in zip(before, going_down) for a, b in zip(p, q)))
-            ratio = ops.clip(ops.divide(gains[-1], gains[-2]), 0.0, SLOWEST)
+            *others, last = going_down
+            begin = [x for row in others for x in row]
+
+            def sweep(_: Value, gain: Value, *rows: Value) -> list[Value]:
+                """The gains of the last two sweeps, and the rows before the last one and after it."""
+                now = rows[len(begin) :]
+                *swept, _ = down(up([*_split(now), last]))
+                after = [x for row in swept for x in row]
+                return [gain, _sum(b - a for a, b in zip(now, after)), *now, *after]
+
+            gain_before, gain, *rows = ops.repeat(sweep, SWEEPS, 0.0, 0.0, *begin, *begin)
+            ratio = ops.clip(ops.divide(gain, gain_before), 0.0, SLOWEST)
             rest = ratio / (1 - ratio)
-            going_down = [[b + (b - a) * rest for a, b in zip(p, q)] for p, q in zip(before, going_down)]
+            before, after = rows[: len(begin)], rows[len(begin) :]
+            going_down = [*_split([b + (b - a) * rest for a, b in zip(before, after)]), last]
         worth = [a * b for a, b in zip(kept[0], going_down[0])]
         even = parts.even(self.indices[-1])
         return settle(worth), settle(_sum(w * a * b for w, a, b in zip(even, kept[-1], up(going_down)[-1])))
@@ -210,6 +220,11 @@ def _seen(rows: Sequence[Row], kept: Row, worth: Row) -> Row:
     """What the nodes are worth before an interface and a medium that keeps so much, from what they are after them."""
     after = [a * b for a, b in zip(kept, worth)]
     return [_sum(part * x for part, x in zip(row, after)) for row in rows]
+
+
+def _split(values: Row) -> list[Row]:
+    """The rows of several media, which follow one another."""
+    return [values[k : k + parts.COUNT] for k in range(0, len(values), parts.COUNT)]
 
 
 def _added(a: Row, b: Row) -> Row:

@@ -28,6 +28,7 @@ from velatura.optics import fresnel, phase
 from velatura.optics.ggx import Direction
 
 FAINT = 1e-4  # albedo that the tables' errors come close to
+DIM = 3e-4  # albedo of whose parts the tables tell little
 CONTRAST_MIN = 0.02  # of two indices, below which an interface is hardly there
 
 
@@ -225,7 +226,7 @@ def _seen(
     sin2, across = 1 - cos_top * cos_top, 1.0
     if not layer.opaque:
         assert layer.eta is not None
-        picked = 1 - ops.divide(fresnel.dielectric(cos_theta, layer.n12), ops.mean(r))
+        picked = 1 - (fresnel.dielectric(cos_theta, layer.n12) + DIM) / (ops.mean(r) + DIM)
         across = 1 + k.selected * sin2 * ops.select(layer.n12 < 1, ops.clip(picked, 0.0, 1.0), 0.0)
     # Cut off what does not leave: steep angles, and all beyond the cone
     ratio = above.n_exit / above.n

@@ -1,7 +1,8 @@
-"""The lobes of a uniform material, drawn once over direction into a texture, and read back from it.
+"""The lobes of a uniform material, worked out once over direction for a texture, and read back from it.
 
-What is drawn, and how lobes are made of it again, are those of `velatura.model.memo`: energies, gains, and roughness as
-a matrix, over the cosine, and over the azimuth where an interface is anisotropic.
+A tape works them out, so that another stack of layers asks for no compiler. What they are, and how lobes are made of
+them again, are those of `velatura.model.memo`: energies, gains, and roughness as a matrix, over the cosine, and over
+the azimuth where an interface is anisotropic.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import prod
 from typing import NamedTuple
 
 from velatura import ops
@@ -21,14 +21,14 @@ from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.shader import glsl
-from velatura.shader.graph import Graph
-from velatura.shader.symbol import Operand, Symbol, component, in_order, number, operand
+from velatura.shader.symbol import Operand, Symbol, component, number, operand
+from velatura.shader.tape import Tape, tape
 from velatura.stack import Stack
 from velatura.tables import curve
 
 _OF_BASE = 6  # columns: its scale and its energy
 PLANE = (95, 49)  # nodes over the cosine, twice as dense as those of most tables, and the azimuth
-PLACE = "place"  # in the code: coordinates of cosine and azimuth, from 0 to 1, and the side, 0 above and 1 below
+PLACE = "place"  # an input: coordinates of cosine and azimuth, from 0 to 1, and the side, 0 above and 1 below
 
 
 class Group(NamedTuple):
@@ -41,11 +41,11 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True)
 class Bake:
-    """What is drawn for a direction, as columns of numbers, four to a texel: first what the layers above a diffuse base
-    transmit, if there is one, then the lobes.
+    """What is worked out for a direction, as columns of numbers, four to a texel: first what the layers above a diffuse
+    base transmit, if there is one, then the lobes.
 
     `body` reads its lobes from the texture. A line of texels holds one of them for all cosines; lines go over azimuths,
-    sides and texels.
+    sides and texels. `nodes` are those over the cosine and maybe the azimuth.
     """
 
     columns: Sequence[Operand]
@@ -54,53 +54,19 @@ class Bake:
     groups: Sequence[Group]
 
     @property
-    def size(self) -> tuple[int, int]:
-        """Texels along x and y."""
-        return self.nodes[0], self._sides * prod(self.nodes[1:]) * self._texels
-
-    @property
-    def _sides(self) -> int:
+    def sides(self) -> int:
+        """1 where light comes from above only."""
         return 1 if self.body.below is None else 2
 
-    @property
-    def _texels(self) -> int:
-        return len(self.columns) // 4
-
     @cached_property
-    def symbols(self) -> list[Symbol]:
-        """All that is worked out, and all inputs."""
-        return in_order(self.columns)
-
-    def drawing(self) -> str:
-        """`vt_bake_node`, all texels of a node, and `vt_bake`, a texel of the texture."""
-        lines, texts = glsl.statements([(column, "number") for column in self.columns])
-        texels = [f"texels[{k}] = vec4({', '.join(texts[4 * k : 4 * k + 4])});" for k in range(self._texels)]
-        turns = prod(self.nodes[1:])
-        place = (
-            f"vec3(float(node.x) / {float(self.nodes[0] - 1)}, float(node.y % {turns}) / {float(max(turns - 1, 1))}, "
-            f"float(node.y / {turns}))"
-        )
-        begin = [f"vec3 {PLACE} = {place};", "VtMaterial m = vt_parameters;"]
-        end = ["", f"vec4 texels[{self._texels}];", *texels, "return texels;"]
-        width, height = self.size
-        constants = (
-            "// Of the texture, and how many texels a node has: blocks of lines, one above the other\n"
-            f"const ivec2 VT_BAKED = ivec2({width}, {height});\nconst int VT_TEXELS = {self._texels};\n"
-        )
-        node = glsl.block("vec4[VT_TEXELS] vt_bake_node(ivec2 node)", [*begin, *lines, *end])
-        return "\n".join([constants, node, _TEXEL])
+    def tape(self) -> Tape:
+        """The columns from the values of the material, `m.layer0.eta` and so on, and from a `place`."""
+        return tape(self.columns)
 
     def reading(self) -> str:
         """The sampler, and functions that read each group."""
-        return "".join([_READING[len(self.nodes)].format(*self.nodes, sides=self._sides), *map(_reader, self.groups)])
+        return "".join([_READING[len(self.nodes)].format(*self.nodes, sides=self.sides), *map(_reader, self.groups)])
 
-
-_TEXEL = """\
-vec4 vt_bake(ivec2 texel) {
-    int lines = VT_BAKED.y / VT_TEXELS;
-    return vt_bake_node(ivec2(texel.x, texel.y % lines))[texel.y / lines];
-}
-"""
 
 _READING = {
     1: """\
@@ -146,7 +112,7 @@ def bake(stack: Stack, values: Mapping[str, Value], body: bsdf.Body) -> Bake:
     nodes = curve.LINE if body.above.variance is Isotropic else PLANE
     w = curve.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
 
-    # Draw what is seen of a direction
+    # Work out what is seen of a direction
     columns, facets = _seen(stack, values, body, w)
     base, groups = body.base(w), []
     if base:
@@ -156,7 +122,7 @@ def bake(stack: Stack, values: Mapping[str, Value], body: bsdf.Body) -> Bake:
     groups.append(Group("lobes", len(groups), len(columns) // 4 - len(groups)))
 
     # And read it
-    return Bake(Graph().unique(columns), _read(body, nodes, groups, facets), nodes, groups)
+    return Bake([operand(x) for x in columns], _read(body, nodes, groups, facets), nodes, groups)
 
 
 def _seen(stack: Stack, values: Mapping[str, Value], body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:

@@ -9,7 +9,7 @@ from itertools import chain, count
 import numpy as np
 
 from velatura.shader import atlas
-from velatura.shader.symbol import Kind, Operand, Symbol, in_order, is_colour
+from velatura.shader.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
 
 TYPES: dict[Kind, str] = {
     "number": "float",
@@ -109,21 +109,63 @@ class _Statements:
         order = in_order(outputs)
         self.uses = Counter(x for symbol in order for x in symbol.args if isinstance(x, Symbol))
         self.uses.update(x for x in outputs if isinstance(x, Symbol))
+        self.inside = inside(order)
+        self.open: frozenset[str] = frozenset()  # what is bound where we are
         self.text: dict[Symbol, tuple[str, int]] = {}
         self.taken = set(_WORDS.split())
         self.lines: list[str] = []
+        self._write([symbol for symbol in order if not self.inside[symbol]])
+
+    def _write(self, order: Sequence[Symbol]) -> None:
         title = ""
         for symbol in order:
-            text, precedence = self._expression(symbol)
-            if self._inline(symbol, text):
+            text, precedence = ("", _ATOM) if symbol.kind == "loop" else self._expression(symbol)
+            if symbol.kind != "loop" and self._inline(symbol, text):
                 self.text[symbol] = text, precedence
                 continue
             if symbol.place.title != title:
                 title = symbol.place.title
                 self.lines += ["", *([f"// {title}"] if title else [])]
             name = self._name(symbol)
-            self.lines.append(f"{_type(symbol)} {name} = {text};")
+            if symbol.kind == "loop":
+                self._loop(symbol, name)
+            else:
+                self.lines.append(f"{_type(symbol)} {name} = {text};")
             self.text[symbol] = name, _ATOM
+
+    def _loop(self, symbol: Symbol, name: str) -> None:
+        """A loop that fills an array, or goes from one state to the next."""
+        bound, nodes, times = symbol.detail
+        count = len(symbol.args) - (0 if nodes else len(bound))
+        results, wide = symbol.args[-count:], any(is_colour(x) for x in symbol.args)
+        kind, index = "vec3" if wide else "float", self._free("i")
+        if nodes:
+            values = self._free("nodes")
+            listed = f"float[{times}]({', '.join(map(literal, nodes))})"
+            self.lines += [f"const float {values}[{times}] = {listed};", f"{kind} {name}[{count * times}];"]
+        else:
+            begin = ", ".join(self.of(x, wide=wide) for x in symbol.args[:count])
+            self.lines += [f"{kind} {name}[{count}] = {kind}[{count}]({begin}), {name}_next[{count}];"]
+        self.lines.append(f"for (int {index} = 0; {index} < {times}; {index}++) {{")
+
+        # Write what depends on what is bound
+        before, self.lines = self.lines, []
+        outside, self.open = self.open, self.open | set(bound)
+        body = [x for x in in_order(results) if set(bound) & self.inside[x] and self.inside[x] <= self.open]
+        for x in body:
+            if x.op == "bound":
+                self.text[x] = f"{values}[{index}]" if nodes else f"{name}[{bound.index(x.detail)}]", _ATOM
+        self._write([x for x in body if x.op != "bound"])
+        place = f"{count} * {index} + " if nodes and count > 1 else ""
+        for k, result in enumerate(results):
+            at = (f"{place}{k}" if count > 1 else index) if nodes else str(k)
+            self.lines.append(f"{name}{'' if nodes else '_next'}[{at}] = {self.of(result, wide=wide)};")
+        if not nodes:
+            self.lines.append(f"{name} = {name}_next;")
+        for x in body:
+            del self.text[x]
+        self.open = outside
+        self.lines = [*before, *(f"    {line}".rstrip() for line in self.lines), "}"]
 
     def of(self, x: Operand, least: int = 0, wide: bool = False) -> str:
         """An argument, in parentheses where it binds less than `least`; a number made a colour where it is `wide`."""
@@ -136,7 +178,7 @@ class _Statements:
         return f"({text})" if precedence < least else text
 
     def _inline(self, symbol: Symbol, text: str) -> bool:
-        if symbol.op in ("input", "component") and len(text) < _LONG:
+        if symbol.op in ("input", "component", "item") and len(text) < _LONG:
             return True
         return self.uses[symbol] == 1 and not symbol.hint and symbol.kind != "texels" and len(text) < _LONG
 
@@ -144,7 +186,10 @@ class _Statements:
         name = symbol.hint or symbol.place.function.strip("_<>")
         if symbol.kind == "texels":
             name = symbol.detail.name if symbol.op == "baked" else symbol.detail
-        name = "value" if name in ("", "lambda", "genexpr", "listcomp") else name.replace("__", "_")
+        return self._free("value" if name in ("", "lambda", "genexpr", "listcomp") else name.replace("__", "_"))
+
+    def _free(self, name: str) -> str:
+        """The name, or with a number where it is taken."""
         free = (x for x in chain([name], (f"{name}_{n}" for n in count(2))) if x not in self.taken)
         self.taken.add(chosen := next(free))
         return chosen
@@ -158,6 +203,8 @@ class _Statements:
             return f"vt_{symbol.detail}({', '.join(self.of(x, wide=wide) for x in args)})", _ATOM
         if op == "baked":
             return f"vt_baked_{symbol.detail.name}(vec3({', '.join(map(self.of, args))}))", _ATOM
+        if op == "item":
+            return f"{self.of(args[0], _ATOM)}[{symbol.detail}]", _ATOM
         if op == "component":
             texel, channel = divmod(symbol.detail, 4)
             of_texels = isinstance(args[0], Symbol) and args[0].kind == "texels"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from velatura.ops import Value
 from velatura.shader.symbol import Operand, Symbol, in_order, operand
 
-_COMMUTE = {"add", "multiply", "minimum", "maximum", "both"}
+COMMUTE = {"add", "multiply", "minimum", "maximum", "both"}
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Graph:
         if symbol.op == "select" and args[1] is args[2]:
             return args[1]
         names = [(type(x).__name__, id(x) if isinstance(x, Symbol) else x) for x in args]
-        key = (symbol.op, symbol.detail, *(sorted(names, key=repr) if symbol.op in _COMMUTE else names))
+        key = (symbol.op, symbol.detail, *(sorted(names) if symbol.op in COMMUTE else names))
         found = self._known.setdefault(key, symbol)
         if found is not symbol:
             found.hint = found.hint or symbol.hint

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.merge import merging
 from velatura.shader import atlas, glsl, material
+from velatura.shader.bake import Bake
 from velatura.shader.recording import SHOWN, Recording, part, record
 from velatura.shader.symbol import Kind, Operand, Symbol
 from velatura.stack import Stack, Texture
@@ -21,11 +23,11 @@ from velatura.stack import Stack, Texture
 class Shader:
     """GLSL ES 3.00, the texture of tables that it reads (float32, shape (height, width, 4)), and its uniforms.
 
-    `uniforms` are the values that the struct of the material holds: flat names (`layer0_eta`) and where they lie in
-    the struct (`layer0.eta`). `maps` are the textures of the material by sampler.
+    `uniforms` are the values that the struct of the material holds, or that `baked` reads: flat names (`layer0_eta`)
+    and where they lie in the struct (`layer0.eta`). `maps` are the textures of the material by sampler.
 
-    Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baking` is the program
-    that draws the lobes, None where a texture makes them differ from point to point. The tables are that program's.
+    Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baked` is what works out
+    the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point.
     `lobes` are the layers whose light each reflected lobe is, seen from above.
     """
 
@@ -35,21 +37,13 @@ class Shader:
     maps: Mapping[str, Texture]
     lobes: Sequence[Sequence[int]]
     shown: Sequence[str]
-    baking: Baking | None
+    baked: Bake | None
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Equal for equal code."""
-        text = self.text + (self.baking.text if self.baking else "")
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-@dataclass(frozen=True)
-class Baking:
-    """The program that draws the lobes: `vt_bake(ivec2 texel)`, for a texture of floats of a size (width, height)."""
-
-    text: str
-    size: tuple[int, int]
+        tape = self.baked.tape if self.baked else None
+        return hashlib.sha256(f"{self.text}{tape}".encode()).hexdigest()[:16]
 
 
 def shader(
@@ -72,7 +66,7 @@ def shader(
     """
     recording = record(stack, model, constant, values == "uniforms", **switches)
     baked, read = recording.baked, recording.read
-    texture, tables = _tables(baked.symbols if baked else recording.symbols)
+    texture, tables = _tables(recording.symbols)
     name = "A material" if recording.shown else " ".join(stack.name.split()) or "A material"
     structs = material.structs(stack, list(read))
     parameters = f"uniform VtMaterial {material.PARAMETERS};\n"
@@ -82,7 +76,8 @@ def shader(
         *([parameters, f"uniform float {SHOWN}[{len(recording.shown)}];\n"] if recording.shown else []),
         material.filled(stack, list(read), bool(recording.shown)),
         _lobes_struct(recording),
-        *([baked.reading()] if baked else tables),
+        *tables,
+        *([baked.reading()] if baked else []),
         glsl.HELPERS,
         _lobes(recording),
         _function(
@@ -97,15 +92,14 @@ def shader(
             "vec3({}, {}, {})",
         ),
     ]
-    drawing = [_PRECISION, structs, parameters, *tables, glsl.HELPERS, baked.drawing()] if baked else []
     return Shader(
         text="\n".join(parts),
         tables=texture,
-        uniforms=read,
+        uniforms=recording.parameters,
         maps={sampler: image for image, sampler in material.maps(stack, list(read)).items()},
         lobes=_interfaces(recording),
         shown=recording.shown,
-        baking=Baking("\n".join(drawing), baked.size) if baked else None,
+        baked=baked,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeGuard
 
 from velatura.errors import InvalidInput
@@ -51,11 +51,17 @@ class Recording:
 
     @cached_property
     def read(self) -> dict[str, str]:
-        """The values of the material that anything reads, by flat name, and their place in the struct."""
-        symbols = [*self.symbols, *(self.baked.symbols if self.baked else [])]
-        details = {s.detail for s in symbols if s.op == "input"}
+        """The values of the material that the code reads, by flat name, and their place in the struct."""
+        return self._places({s.detail for s in self.symbols if s.op == "input"})
+
+    @property
+    def parameters(self) -> dict[str, str]:
+        """Those that anything reads: a tape, which stands for the code that works out the lobes, reads others."""
+        return {**self._places(set(self.baked.tape.inputs)), **self.read} if self.baked else self.read
+
+    def _places(self, inputs: Collection[str]) -> dict[str, str]:
         places = {name: material.place(name) for name in self.stack.flat()}
-        return {name: place for name, place in places.items() if f"m.{place}" in details}
+        return {name: place for name, place in places.items() if f"m.{place}" in inputs}
 
 
 def record(
@@ -87,15 +93,15 @@ def record(
     wi, wo, u = _direction("wi"), _direction("wo"), _direction("u")
 
     # Run the model
+    kind = structure(stack) if parameters else variance(stack)
+    prepared = partial(bsdf.body, stack.kinds, values, stack.thin, chosen, kind, constant=False)
+    uniform = not any(isinstance(value, Varying) for value in flat.values())
+    baked = bake(stack, values, prepared()) if parameters and uniform else None
+    shown: list[str] = []
     with source.naming(Symbol):
-        kind = structure(stack) if parameters else variance(stack)
-        body = bsdf.body(stack.kinds, values, stack.thin, chosen, kind, constant=False)
-        baked: Bake | None = None
-        shown: list[str] = []
+        body = baked.body if baked else prepared()
         if parameters:
-            uniform = not any(isinstance(value, Varying) for value in flat.values())
-            baked = bake(stack, values, body) if uniform else None
-            body, shown = _weighed(baked.body if baked else body)
+            body, shown = _weighed(body)
         base = body.above.base if baked is None else None  # what is read of a base holds all of it
         fields, kinds = _fields(bsdf.scattered(body, wi), base.worth if base else ())
         value, density = bsdf.eval_pdf(body, wi, wo)

@@ -1,4 +1,4 @@
-"""What the model's own source calls its values: names of variables, and the titles of blocks."""
+"""What the model's own source calls its values, where somebody is to read them: names, and the titles of blocks."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import linecache
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from types import CodeType, FrameType
@@ -28,8 +29,19 @@ class Place(NamedTuple):
     title: str
 
 
+NOWHERE = Place("", "")
+_naming: ContextVar[bool] = ContextVar("naming", default=False)
+
+
+def is_read() -> bool:
+    """Whether what is recorded now is to be read by people."""
+    return _naming.get()
+
+
 def place() -> Place:
-    """The place in the model that runs now."""
+    """The place in the model that runs now; nowhere, if nobody is to read of it."""
+    if not is_read():
+        return NOWHERE
     function, title = "", ""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None:
@@ -77,9 +89,11 @@ def naming(symbol: type[Named]) -> Iterator[None]:
                 _hint(symbol, name, held.get(name))
 
     sys.setprofile(look)
+    outside = _naming.set(True)
     try:
         yield
     finally:
+        _naming.reset(outside)
         sys.setprofile(before)
 
 

@@ -8,9 +8,9 @@ by themselves: constants are floats, or NumPy arrays of three channels.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
+from contextvars import ContextVar
 from itertools import count
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,10 +18,11 @@ from velatura import tables
 from velatura.ops import Value
 from velatura.shader import source
 
-Kind: TypeAlias = Literal["number", "colour", "condition", "conditions", "texels"]
+Kind: TypeAlias = Literal["number", "colour", "condition", "conditions", "texels", "loop"]
 Operand: TypeAlias = "Symbol | float | bool | tuple[float, ...]"
 
 _serials = count()
+_depth: ContextVar[int] = ContextVar("depth", default=0)  # of loops that are being recorded
 _CONDITIONS = {"less", "greater", "at_most", "at_least", "both"}
 
 
@@ -30,10 +31,12 @@ class Symbol:
 
     Args:
         op: what was done: an elementary function by its name in `ops`, an operator (`add`, `less`, ...), or `input`,
-            `texels`, `value`, `component`, `colour`.
-        args: what it was done to; constants as floats, or as three of them.
-        kind: number, colour, the truth of either, or the channels of a table.
-        detail: name of an input or table, number of a component.
+            `texels`, `value`, `component`, `colour`; of loops `bound`, which stands for a node or for a value of the
+            state, `each`, `repeat`, and `item`.
+        args: what it was done to; constants as floats, or as three of them; of a loop its results, which are made of
+            what is bound, and before them the state that it begins with.
+        kind: number, colour, the truth of either, the channels of a table, or a loop.
+        detail: name of an input, a table or what is bound, number of a component or item, the `Loop`.
 
     Attributes:
         serial: numbers symbols in the order in which they were made.
@@ -53,8 +56,9 @@ class Symbol:
 
     def with_args(self, args: tuple[Operand, ...]) -> Symbol:
         """The same operation, made at the same place, on other arguments."""
-        other = copy(self)
-        other.args = args
+        other = object.__new__(Symbol)
+        other.op, other.args, other.kind, other.detail = self.op, args, self.kind, self.detail
+        other.serial, other.place, other.hint = self.serial, self.place, self.hint
         return other
 
     def __add__(self, other: Value) -> Value:
@@ -166,8 +170,16 @@ def _known(op: str, args: tuple[Operand, ...]) -> Value | None:
     return np.array(found) if isinstance(found, tuple) else found
 
 
+class Loop(NamedTuple):
+    """What is bound in it, by name, and the nodes that it runs over, or how many times it runs."""
+
+    bound: tuple[str, ...]
+    nodes: tuple[float, ...]
+    times: int
+
+
 class Recorder:
-    """The elementary functions on symbols."""
+    """The elementary functions on symbols; loops are kept where they are to be read, and unrolled elsewhere."""
 
     def __getattr__(self, op: str) -> Callable[..., Value]:
         if op.startswith("_"):
@@ -205,6 +217,41 @@ class Recorder:
         texels = Symbol("texels", args, "texels", name)
         return [Symbol("component", (texels,), "number", c) for c in range(channels)]
 
+    def each(self, function: Callable[..., Value], nodes: Sequence[float], values: Sequence[Value]) -> list[Value]:
+        if not source.is_read():
+            return [function(x, *values) for x in nodes]
+        node = Symbol("bound", (), "number", f"node{_depth.get()}")
+        made = _within(function, node, *values)
+        results = tuple(operand(x) for x in (made if isinstance(made, list) else [made]))
+        loop = Symbol("each", results, "loop", Loop((node.detail,), tuple(nodes), len(nodes)))
+        items = [_items(loop, results, k * len(results)) for k in range(len(nodes))]
+        return items if isinstance(made, list) else [item for (item,) in items]
+
+    def repeat(self, function: Callable[..., Sequence[Value]], times: int, state: Sequence[Value]) -> Sequence[Value]:
+        if not source.is_read():
+            for _ in range(times):
+                state = function(*state)
+            return state
+        bound = [Symbol("bound", (), "colour", f"state{_depth.get()}[{k}]") for k in range(len(state))]
+        results = tuple(operand(x) for x in _within(function, *bound))
+        begin = tuple(operand(x) for x in state)
+        loop = Symbol("repeat", (*begin, *results), "loop", Loop(tuple(x.detail for x in bound), (), times))
+        return [Symbol("item", (loop,), "colour", k) for k in range(len(state))]
+
+
+def _within(function: Callable[..., Value], *args: Value) -> Value:
+    """What a function answers in a loop."""
+    outside = _depth.set(_depth.get() + 1)
+    try:
+        return function(*args)
+    finally:
+        _depth.reset(outside)
+
+
+def _items(loop: Symbol, results: Sequence[Operand], first: int) -> list[Symbol]:
+    kind: Kind = "colour" if any(is_colour(x) for x in results) else "number"
+    return [Symbol("item", (loop,), kind, first + k) for k in range(len(results))]
+
 
 Symbol.dialect = Recorder()
 
@@ -219,3 +266,13 @@ def in_order(outputs: Sequence[Value]) -> list[Symbol]:
             found.add(symbol)
             waiting.extend(x for x in symbol.args if isinstance(x, Symbol))
     return sorted(found, key=lambda symbol: (symbol.op != "input", symbol.serial))
+
+
+def inside(order: Sequence[Symbol]) -> dict[Symbol, frozenset[str]]:
+    """By symbol: what it depends on of what is bound in the loops around it."""
+    found: dict[Symbol, frozenset[str]] = {}
+    for symbol in order:
+        own = {symbol.detail} if symbol.op == "bound" else set()
+        inner = own.union(*(found[x] for x in symbol.args if isinstance(x, Symbol)))
+        found[symbol] = frozenset(inner.difference(symbol.detail.bound) if symbol.kind == "loop" else inner)
+    return found

@@ -84,7 +84,7 @@ def tir(tables: Tables, form: str, eta: Value, cos_theta: Value, alpha: Value) -
         return ops.select(eta < 1, _fetch_inside(tables.tir_clean, eta, cos_theta, alpha)[0], 1.0)
     outside = tables.tir_published_outside
     channels = ops.interpolate(outside, coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha))
-    above = 1 - _dot(channels, [fresnel.dielectric(c, eta) for c in outside.nodes])
+    above = 1 - _dot(channels, ops.each(fresnel.dielectric, outside.nodes, eta))
     return ops.select(eta < 1, _fetch_inside(tables.tir_published, eta, cos_theta, alpha)[0], above)
 
 
@@ -112,16 +112,19 @@ def _mean_fresnel_inside(tables: Tables, row: Row, cos_theta: Value, alpha: Valu
         return _fetch_inside(inside, row.eta, cos_theta, alpha)[0]
     absorbing = tables.absorbing_inside_multi if row.multiple else tables.absorbing_inside
     channels = _fetch_inside(absorbing, row.eta, cos_theta, alpha)
-    theta_c = _critical_angle(row.eta)
-    angles = [coordinates.to_angle(x, theta_c) for x in absorbing.nodes]
-    reflectance = _raised(absorbing, [fresnel.conductor(c, row.eta, row.kappa) for c in angles])
+    reflectance = _raised(absorbing, ops.each(_conductor_inside, absorbing.nodes, row.eta, row.kappa))
     return 1 - _dot(channels, [1 - f for f in reflectance])
+
+
+def _conductor_inside(x: Value, eta: Value, kappa: Value) -> Value:
+    """Reflectance of a conductor at a coordinate on the angular axis."""
+    return fresnel.conductor(coordinates.to_angle(x, _critical_angle(eta)), eta, kappa)
 
 
 def _at_nodes(reflectance: Callable[..., Value], nodes: Sequence[float], *index: Value) -> Sequence[Value]:
     """Fresnel at all cosines: of few numbers in NumPy by one call, since there calls are what costs."""
     if not all(isinstance(x, np.ndarray) and x.size <= FEW for x in index):
-        return [reflectance(c, *index) for c in nodes]
+        return ops.each(reflectance, nodes, *index)
     found: Sequence[Value] = reflectance(np.reshape(nodes, (-1, *(1,) * max(x.ndim for x in index))), *index)
     return found
 

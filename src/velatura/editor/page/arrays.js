@@ -15,6 +15,11 @@ const TYPES = {
 export function decode({ dtype, shape, data }) {
   const type = TYPES[dtype];
   if (!type) throw new Error(`an array of ${dtype}, which is none of ${Object.keys(TYPES).join(', ')}`);
-  const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-  return { array: new type(bytes.buffer), shape };
+  return { array: new type(bytesOf(data).buffer), shape };
+}
+
+/** Of base64; older browsers have no function for it. */
+function bytesOf(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+  return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 }

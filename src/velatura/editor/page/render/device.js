@@ -43,6 +43,13 @@ export class Device {
     return { handle, width, height };
   }
 
+  /** Other texels for a texture of four floats each. */
+  fill({ handle, width, height }, data) {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, handle);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.FLOAT, data);
+  }
+
   /** A texture of a decoded image, from its upper row on. */
   image(bitmap, encoding) {
     const { gl } = this;
@@ -93,16 +100,6 @@ export class Device {
       gl.deleteFramebuffer(handle);
       gl.deleteRenderbuffer(buffer);
     }
-  }
-
-  /** Copies one of a target's textures into another one, from a line on, as far as there are lines. */
-  copy(from, index, to, line) {
-    const { gl } = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, from.handle);
-    gl.readBuffer(gl.COLOR_ATTACHMENT0 + index);
-    gl.bindTexture(gl.TEXTURE_2D, to.handle);
-    const lines = Math.min(from.height, to.height - line);
-    if (lines > 0) gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, 0, line, 0, 0, from.width, lines);
   }
 
   /** The pixels of a target, from its lower row on. */

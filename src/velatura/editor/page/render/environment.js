@@ -110,15 +110,21 @@ function smaller(picture) {
 function irradiance(data, width, height) {
   const sums = new Float64Array(27);
   const basis = new Float64Array(9);
-  for (let y = 0; y < height; y++) {
-    const theta = (Math.PI * y) / (height - 1);
-    const area = ((2 * Math.PI * Math.PI) / (width * (height - 1))) * Math.sin(theta);
+  for (let y = 0; y < height - 1; y++) {
+    // Between four texels lies a cell of a band around the axis
+    const [above, below] = [y, y + 1].map((row) => (Math.PI * row) / (height - 1));
+    const area = (2 * Math.PI * (Math.cos(above) - Math.cos(below))) / width, theta = (above + below) / 2;
     for (let x = 0; x < width; x++) {
-      const phi = (2 * Math.PI * (x + 0.5)) / width;
-      const d = [Math.sin(phi) * Math.sin(theta), Math.cos(theta), -Math.cos(phi) * Math.sin(theta)];
-      harmonics(d, basis);
-      for (let k = 0; k < 27; k++)
-        sums[k] += area * basis[Math.floor(k / 3)] * data[3 * (y * width + x) + (k % 3)];
+      const phi = (2 * Math.PI * (x + 1)) / width;
+      const a = 3 * (y * width + x), b = 3 * (y * width + ((x + 1) % width)), row = 3 * width;
+      harmonics(
+        [Math.sin(phi) * Math.sin(theta), Math.cos(theta), -Math.cos(phi) * Math.sin(theta)],
+        basis,
+      );
+      for (let c = 0; c < 3; c++) {
+        const light = (area * (data[a + c] + data[b + c] + data[a + row + c] + data[b + row + c])) / 4;
+        for (let k = 0; k < 9; k++) sums[3 * k + c] += light * basis[k];
+      }
     }
   }
   // Convolve with the cosine, and scale each function as it is in the basis

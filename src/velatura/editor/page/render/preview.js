@@ -84,6 +84,14 @@ export class Preview {
     return device.draw(this.spreading, { ...own, ...named(seen) }, target);
   }
 
+  /** Draws a pixel by a program that is to draw the object. */
+  warm(program, uniforms) {
+    const { device, coarse } = this;
+    const pixel = device.target(1, 1, ['RGBA16F']);
+    device.draw(program, { ...uniforms, ...named(coarse), seen_every: COARSE }, pixel);
+    device.free(pixel);
+  }
+
   draw(projection) {
     const { gl } = this.device;
     this.device.use(this.program, { camera_projection: projection });

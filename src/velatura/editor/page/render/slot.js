@@ -1,7 +1,8 @@
 // A material on the stage: its programs, its parameters, its lobes, and the light that was added up.
 
-import { bake, probe } from './glsl/bake.glsl.js';
+import { Bake } from './bake.js';
 import { preview } from './glsl/preview.glsl.js';
+import { probe } from './glsl/probe.glsl.js';
 import { tracer } from './glsl/tracer.glsl.js';
 import { sobol } from './sobol.js';
 
@@ -18,55 +19,33 @@ export class Slot {
     const { device } = this;
     if (this.shader?.key !== shader.key) {
       const asked = (this.asked = shader);
-      const [traced, previewed, baking, tables, ...maps] = await Promise.all([
+      const [traced, previewed, tables, looked, ...maps] = await Promise.all([
         device.program(tracer(shader)),
         device.program(preview(shader)),
-        shader.baking && device.program(bake(shader.baking, this.texelsAtOnce(shader))),
         shader.tables && this.load.tables(shader.tables),
+        Promise.all((shader.baked?.tables ?? []).map((name) => this.load.table(name))),
         ...(shader.maps ?? []).map(({ texture, encoding }) => this.load.image(texture, encoding)),
       ]);
       if (this.asked !== asked) return;
-      Object.assign(this, { shader, traced, previewed, baking, textures: { vt_tables: tables } });
+      device.free(this.textures?.vt_baked);
+      Object.assign(this, { shader, traced, previewed, textures: { vt_tables: tables } });
       shader.maps?.forEach(({ sampler }, i) => (this.textures[sampler] = maps[i]));
-      this.setBaked();
+      this.setBaked(Object.fromEntries((shader.baked?.tables ?? []).map((name, k) => [name, looked[k]])));
     }
     this.setValues(values);
   }
 
-  /**
-   * How many texels of a node are drawn at once: what the device can, or fewer, so that all draws are alike.
-   */
-  texelsAtOnce({ baking }) {
-    const { gl } = this.device;
-    const { texels } = sizeOf(baking);
-    return Math.ceil(texels / Math.ceil(texels / gl.getParameter(gl.MAX_DRAW_BUFFERS)));
-  }
-
-  setBaked() {
+  setBaked(tables) {
     const { device, shader } = this;
-    device.free(this.nodes, this.baked);
-    this.nodes = this.baked = null;
-    if (!shader.baking) return;
-    const { width, height, texels } = sizeOf(shader.baking);
-    this.baked = device.texture('RGBA32F', width, height);
-    this.nodes = device.target(width, height / texels, Array(this.texelsAtOnce(shader)).fill('RGBA32F'));
-    this.textures.vt_baked = this.baked;
-  }
-
-  /** Draws the lobes of all nodes, and puts them into the texture: block above block. */
-  bake() {
-    const { device, nodes, baked } = this;
-    for (let first = 0; first * nodes.height < baked.height; first += nodes.textures.length) {
-      device.draw(this.baking, { ...this.parameters, vt_tables: this.textures.vt_tables, first }, nodes);
-      nodes.textures.forEach((_, k) => device.copy(nodes, k, baked, (first + k) * nodes.height));
-    }
+    this.bake = shader.baked && new Bake(shader.baked, tables);
+    if (this.bake) this.textures.vt_baked = device.texture('RGBA32F', this.bake.width, this.bake.height);
   }
 
   setValues(values) {
     this.values = values;
-    this.parameters = {};
+    this.placed = {};
     for (const [name, place] of Object.entries(this.shader.uniforms)) {
-      if (name in values) this.parameters[`vt_parameters.${place}`] = values[name];
+      if (name in values) this.placed[place] = values[name];
     }
     this.outdated = true;
   }
@@ -75,12 +54,13 @@ export class Slot {
     this.lobe = lobe;
   }
 
-  /** All that the code of the material reads; lobes are drawn anew where values have changed. */
+  /** All that the code of the material reads; lobes are worked out anew where values have changed. */
   uniforms() {
-    if (this.outdated && this.baked) this.bake();
+    if (this.outdated && this.bake) this.device.fill(this.textures.vt_baked, this.bake.draw(this.placed));
     this.outdated = false;
     const shown = Array.from({ length: SHOWN }, (_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
-    return { ...this.parameters, ...this.textures, vt_shown: shown };
+    const parameters = Object.entries(this.placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
+    return { ...Object.fromEntries(parameters), ...this.textures, vt_shown: shown };
   }
 
   /** The lobes at cosines and azimuths, up to 64 each, seen from above: read back from the device. */
@@ -160,15 +140,6 @@ export class Slot {
   get sum() {
     return this.sums[0];
   }
-}
-
-/** Of the texture of a baking, and how many texels a node has. */
-function sizeOf(baking) {
-  const [width, height, texels] = baking
-    .match(/VT_BAKED = ivec2\((\d+), (\d+)\);\nconst int VT_TEXELS = (\d+)/)
-    .slice(1)
-    .map(Number);
-  return { width, height, texels };
 }
 
 function gathered(place, pixels, k, lobes, cosines, azimuths) {

@@ -11,6 +11,7 @@ import { Slot } from './slot.js';
 import { sobol } from './sobol.js';
 
 const QUIET = 150; // milliseconds without a change, after which paths are traced
+const SLOW = 100; // milliseconds for a preview, from which on a quicker one comes before it
 const SLICE = 40; // milliseconds that the device may be busy without a break
 const FIRST = 4; // samples from which on they are shown
 const TRUSTED = 16; // samples from which on the preview shows through no more
@@ -41,6 +42,7 @@ export class Viewport {
     this.listeners = new Set();
     this.frames = [];
     this.held = false;
+    this.took = Infinity; // milliseconds, the last preview with all pixels
     this.rows = 8;
     this.row = 0;
     this.stopped = new AbortController();
@@ -88,11 +90,11 @@ export class Viewport {
     this.changed();
   }
 
-  /** Makes ready for a material that may come: compiles its programs, and draws its lobes once. */
+  /** Makes ready for a material that may come: compiles its programs, and draws a pixel, which some devices wait for. */
   async prepare(shader) {
     const slot = (this.coming ??= new Slot(this.device, this.load));
     await slot.setMaterial(shader, shader.values);
-    slot.uniforms();
+    this.preview.warm(slot.previewed, { ...slot.uniforms(), ...this.uniforms() });
   }
 
   /** Other values of the same material: nothing is compiled. */
@@ -147,7 +149,7 @@ export class Viewport {
    * Whether something is being dragged: until it is let go, previews in fewer pixels are all that is drawn.
    */
   moving(held) {
-    if (this.held && !held) this.previewed = false;
+    if (this.held && !held) this.previewed = this.quick = false;
     this.held = held;
     this.lastChange = performance.now();
     this.wake?.();
@@ -290,6 +292,7 @@ export class Viewport {
           const { array, shape } = decode((await this.call('tables', { key })).texture);
           return this.device.texture('RGBA32F', shape[1], shape[0], array);
         }),
+      table: (name) => once(`table ${name}`, async () => decode((await this.call('table', { name })).table)),
       image: (name, encoding) => once(`${encoding} ${name}`, () => this.image(name, encoding)),
     };
   }
@@ -338,7 +341,7 @@ export class Viewport {
       slot.samples = 0;
     }
     this.row = 0;
-    this.previewed = false;
+    this.previewed = this.quick = false;
     this.lastChange = this.started = performance.now();
     this.wake?.();
   }
@@ -382,14 +385,18 @@ export class Viewport {
     });
   }
 
+  /** In fewer pixels while something is dragged, and at first, where the last one with all of them took long. */
   async drawPreview() {
-    this.previewed = true;
-    const uniforms = this.uniforms();
+    const quick = this.held || (!this.quick && this.took > SLOW);
+    this.quick = quick && !this.held;
+    this.previewed = !this.quick;
+    const uniforms = this.uniforms(), start = performance.now();
     this.preview.update(uniforms.camera_projection);
-    for (const slot of this.seen()) slot.drawPreview(this.preview, uniforms, this.held);
+    for (const slot of this.seen()) slot.drawPreview(this.preview, uniforms, quick);
     this.show();
-    await this.device.done();
-    this.frames = [...this.frames.slice(-100), performance.now()];
+    const time = await this.device.done();
+    if (!quick) this.took = time - start;
+    this.frames = [...this.frames.slice(-100), time];
   }
 
   /**

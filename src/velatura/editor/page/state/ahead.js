@@ -4,7 +4,7 @@ import { addLayer } from './commands.js';
 import { documentOf, enabled, pattern } from './material.js';
 
 const PAUSE = 1000; // milliseconds between two looks at whether there is time
-const ENOUGH = 8; // samples, after which the picture can wait
+const ENOUGH = 1; // samples, after which the picture can wait
 
 /** Follows a store: `{stop()}`; `drawn` tells the shape that the picture has. */
 export function lookAhead({ store, viewport, call, drawn }) {

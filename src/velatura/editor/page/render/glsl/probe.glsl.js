@@ -1,18 +1,4 @@
-// The lobes over direction: drawn once for all that read them, and read for plots.
-
-/** Draws `count` texels of every node at once, from the `first` on. */
-export const bake = (baking, count) => `#version 300 es
-${baking}
-uniform int first;
-${each(count, (k) => `layout(location = ${k}) out vec4 baked_${k};`)}
-
-void main() {
-  vec4 texels[VT_TEXELS] = vt_bake_node(ivec2(gl_FragCoord.xy));
-  ${each(count, (k) => `baked_${k} = texels[min(first + ${k}, VT_TEXELS - 1)];`)}
-}
-`;
-
-const each = (count, f) => Array.from({ length: count }, (_, k) => f(k)).join('\n');
+// The lobes of a material, read for plots.
 
 /**
  * Two rows of pixels for each lobe and azimuth: energy and alpha_u, then alpha_v and rotation; cosines along
