@@ -3,7 +3,7 @@
 Stills: root mean square of the difference in linear radiance relative to white, beside the noise of either picture.
 Times: to a first picture, of frames while a value is dragged, and of a sample; and of a frame with a new roughness
 beside one of three.js with MeshPhysicalMaterial and clearcoat, by turns.
-Adding: from a layer more to the picture with it, in a page that has seen nothing of the kind.
+Adding: from a click to the picture with one more layer, at once in a new page of a new server, and a while later.
 
     python benchmarks/editor.py [--size 96] [--samples 1024] [--spp 2048] [--only stills|times|adding]
 """
@@ -12,11 +12,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
+import editor
 import viewport
 
 import velatura as vt
@@ -30,11 +33,6 @@ STILLS = (
     ("frosted-glass", "sphere"),
 )
 
-ADDED = {
-    "interface": {"interface": {"eta": 1.4, "alpha": 0.1}},
-    "medium": {"medium": {"depth": 0.5, "sigma_a": 0.3}},
-    "diffuse": {"diffuse": {"albedo": 0.5}},
-}
 ADDED_TO = (
     "bare-gold",
     "wet-copper",
@@ -44,6 +42,8 @@ ADDED_TO = (
     "pearl-lacquer",
     "furnace",
 )
+
+FORESEEN = 5000  # milliseconds in which nobody does anything, so that the page gets ready for one more layer
 
 THREE = "export * as three from 'three';"
 FIRST = """
@@ -57,14 +57,14 @@ async (material) => {
   return performance.now() - start;
 }
 """
-ANOTHER = """
-async (material) => {
-  const frames = viewport.frames.length, start = performance.now();
-  const shader = await answer('shader', { material });
-  const asked = performance.now();
-  await viewport.setMaterial('a', shader);
-  while (viewport.frames.length === frames) await new Promise((resolve) => setTimeout(resolve, 5));
-  return [asked - start, performance.now() - asked];
+ADD = """
+async (kind) => {
+  const { viewport } = velatura, { key } = viewport.slots.a.shader, start = performance.now();
+  document.querySelector(`[data-add=${kind}]`).click();
+  while (viewport.slots.a.shader.key === key) await new Promise((resolve) => setTimeout(resolve, 2));
+  viewport.frames = [];
+  while (!viewport.frames.length) await new Promise((resolve) => setTimeout(resolve, 2));
+  return (performance.now() - start) / 1000;
 }
 """
 DRAG = """
@@ -185,23 +185,25 @@ def times() -> None:
         )
 
 
-def adding() -> None:
-    found = []
+def adding(chromium: Any) -> None:
+    found: dict[bool, list[float]] = {False: [], True: []}
     for preset in ADDED_TO:
-        before = bodies.document(vt.preset(preset))
-        opaque = before["layers"][-1]
-        for kind, layer in ADDED.items():
-            if kind == "diffuse" and kind in opaque:
+        for kind in ("interface", "medium", "diffuse"):
+            if kind == "diffuse" and (preset == "bare-gold" or vt.preset(preset).kinds[-1] == kind):
                 continue
-            # A base lies below, in the place of an opaque one; all else on top
-            layers = [*before["layers"][:-1], layer] if kind == "diffuse" else [layer, *before["layers"]]
-            with viewport.stage(640, 360) as opened:
-                opened.page.evaluate("viewport.setBudget({ samples: 0 })")
-                opened.page.evaluate(FIRST, before)
-                opened.page.wait_for_function("() => viewport.previewed")
-                found.append(sum(opened.page.evaluate(ANOTHER, {**before, "layers": layers})) / 1e3)
-            print(f"{kind:10} {preset:30} {found[-1]:.2f} s", flush=True)
-    print(f"adding a layer: median {median(found):.2f} s, at most {max(found):.2f} s")
+            for foreseen, times in found.items():
+                with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder), preset) as server:
+                    page = editor.Visit(chromium.new_page(viewport={"width": 1280, "height": 720}), server.address)
+                    page.settled()
+                    if foreseen:
+                        page.page.evaluate("velatura.viewport.setBudget({ samples: 1 })")
+                        page.page.wait_for_timeout(FORESEEN)
+                    times.append(page.page.evaluate(ADD, kind))
+                    page.page.close()
+            print(f"{kind:10} {preset:30} {found[False][-1]:.2f} s at once, {found[True][-1]:.2f} s later", flush=True)
+    for foreseen, times in found.items():
+        when = f"{FORESEEN / 1000:.0f} s later" if foreseen else "at once"
+        print(f"adding a layer {when}: median {median(times):.2f} s, at most {max(times):.2f} s")
 
 
 def main() -> None:
@@ -217,7 +219,8 @@ def main() -> None:
     if arguments.only in (None, "times"):
         times()
     if arguments.only in (None, "adding"):
-        adding()
+        with editor.browser() as chromium:
+            adding(chromium)
     if arguments.only in (None, "stills"):
         stills(arguments.size, arguments.samples, arguments.spp)
 

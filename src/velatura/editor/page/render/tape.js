@@ -90,21 +90,26 @@ export class Tape {
    */
   constructor({ inputs, constants, steps, outputs }, tables, given) {
     this.tables = tables;
-    this.once = []; // what is called before all blocks
-    this.always = []; // and for each of them
     this.spare = []; // arrays of a block that nobody reads any more
     this.inputs = inputs.map((name) => [name, valueOf(given[name])]);
-    const values = [...this.inputs.map(([, value]) => value), ...constants.map(valueOf)];
-    const freed = lastUses(steps, outputs, values.length);
-    steps.forEach((step, k) => {
-      values.push(this.planned(step, values));
-      for (const old of freed[k]) if (values[old].count > 1) this.spare.push(...values[old].channels);
+    this.values = [...this.inputs.map(([, value]) => value), ...constants.map(valueOf)];
+    this.first = this.values.length;
+    const freed = lastUses(steps, outputs, this.first);
+    this.steps = steps.map((step, k) => {
+      const planned = this.planned(step);
+      this.values.push(planned.value);
+      for (const old of freed[k].map((x) => this.values[x])) if (old.count > 1) this.spare.push(...old.channels);
+      return planned;
     });
-    this.outputs = outputs.map((k) => values[k].channels[0]);
+    this.outputs = outputs;
+    this.once = this.steps.filter(({ value }) => value.count === 1).flatMap(({ calls }) => calls);
+    this.known = new Map(); // calls for every block, by how choices that are the same for all numbers come out
   }
 
-  /** Calls take(columns, first, end) with the outputs for the numbers from `first` to `end` of the inputs; a column
-   * has a single number where it is the same for all of them. */
+  /**
+   * Calls take(columns, first, end) with the outputs for the numbers from `first` to `end` of the inputs; a column has
+   * a single number where it is the same for all of them.
+   */
   run(inputs, take) {
     let total = 1;
     for (const [name, { channels, count }] of this.inputs) {
@@ -112,45 +117,68 @@ export class Tape {
       else channels.forEach((channel, c) => (channel[0] = channels.length > 1 ? inputs[name][c] : inputs[name]));
     }
     this.once.forEach(call);
+    const calls = this.needed(), columns = this.outputs.map((k) => this.values[k].channels[0]);
     for (let first = 0; first < total; first += BLOCK) {
       const end = Math.min(first + BLOCK, total);
       for (const [name, { channels, count }] of this.inputs)
         if (count > 1) channels[0].set(inputs[name].subarray(first, end));
-      this.always.forEach(call);
-      take(this.outputs, first, end);
+      calls.forEach(call);
+      take(columns, first, end);
     }
   }
 
-  /** The value of a step, and the calls that work it out. */
-  planned([op, ...rest], values) {
-    const detail = DETAILED.includes(op) ? rest.shift() : null;
-    const args = rest.map((k) => values[k]);
-    if (op === 'component') return { ...args[0], channels: [args[0].channels[detail]], wide: false };
-    const count = Math.max(...args.map((x) => x.count));
-    const calls = count > 1 ? this.always : this.once;
-    if (op === 'texels' || op === 'value') return this.lookedUp(this.tables[detail], args, count, calls);
+  /** The calls for every block, without those for what is not chosen, whatever the number. */
+  needed() {
+    const { steps, values, first } = this;
+    const chosen = steps.map(({ op, args, value }) => {
+      if (op !== 'select' || value.count === 1 || values[args[0]].count > 1) return null;
+      const truths = values[args[0]].channels.map(([truth]) => truth);
+      return truths.every((truth) => truth === truths[0]) ? args[truths[0] ? 1 : 2] : null;
+    });
+    const key = chosen.filter((k) => k !== null).join();
+    if (!this.known.has(key)) {
+      const read = new Set(this.outputs);
+      for (let k = steps.length - 1; k >= 0; k--)
+        if (read.has(first + k)) for (const x of chosen[k] === null ? steps[k].args : [chosen[k]]) read.add(x);
+      const kept = steps.filter(({ value }, k) => value.count > 1 && read.has(first + k));
+      this.known.set(
+        key,
+        kept.flatMap(({ calls }) => calls),
+      );
+    }
+    return this.known.get(key);
+  }
+
+  /** A step with its value and the calls that work it out. */
+  planned([op, ...args]) {
+    const detail = DETAILED.includes(op) ? args.shift() : null;
+    const given = args.map((k) => this.values[k]);
+    const made = (value, calls) => ({ op, args, value, calls });
+    if (op === 'component') return made({ ...given[0], channels: [given[0].channels[detail]], wide: false }, []);
+    const count = Math.max(...given.map((x) => x.count));
+    if (op === 'texels' || op === 'value') return made(...this.lookedUp(this.tables[detail], given, count));
     if (op === 'mean' || op === 'maximum_channel') {
-      const made = this.value(count, 1);
-      calls.push(loop(op, made, 0, [0, 1, 2].map((c) => [args[0], c])));
-      return made;
+      const value = this.value(count, 1);
+      return made(value, [loop(op, value, 0, [0, 1, 2].map((c) => [given[0], c]))]);
     }
-    const wide = op === 'colour' || args.some((x) => x.wide);
-    const made = this.value(count, wide ? 3 : 1, wide);
-    made.channels.forEach((_, c) => {
-      calls.push(loop(op, made, c, op === 'colour' ? [[args[c], 0]] : args.map((x) => [x, x.wide ? c : 0])));
-    });
-    return made;
+    const wide = op === 'colour' || given.some((x) => x.wide);
+    const value = this.value(count, wide ? 3 : 1, wide);
+    const read = (c) => (op === 'colour' ? [[given[c], 0]] : given.map((x) => [x, x.wide ? c : 0]));
+    return made(
+      value,
+      value.channels.map((_, c) => loop(op, value, c, read(c))),
+    );
   }
 
-  /** Multilinear interpolation. */
-  lookedUp({ array, shape }, places, count, calls) {
-    const wide = places.some((x) => x.wide), made = this.value(count, wide ? 3 : shape.at(-1), wide);
-    const colours = wide ? made.channels.map((channel) => [channel]) : [made.channels];
-    colours.forEach((channels, c) => {
+  /** Multilinear interpolation: a value, and the calls for it. */
+  lookedUp({ array, shape }, places, count) {
+    const wide = places.some((x) => x.wide), value = this.value(count, wide ? 3 : shape.at(-1), wide);
+    const colours = wide ? value.channels.map((channel) => [channel]) : [value.channels];
+    const calls = colours.map((channels, c) => {
       const axes = places.map((x) => x.channels[x.wide ? c : 0]);
-      calls.push({ f: shape.length > 3 ? space : plane, o: channels, n: count, a: array, s: shape, b: axes });
+      return { f: shape.length > 3 ? space : plane, o: channels, n: count, a: array, s: shape, b: axes };
     });
-    return made;
+    return [value, calls];
   }
 
   value(count, channels, wide = false) {

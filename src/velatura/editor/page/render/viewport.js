@@ -161,6 +161,11 @@ export class Viewport {
     return Math.min(...this.seen().map((slot) => slot.samples));
   }
 
+  /** Whether there is nothing to do but to trace paths. */
+  get idle() {
+    return Boolean(this.previewed) && !this.held && this.budget.samples > 0;
+  }
+
   /** Of previews, over the last second in which there were any. */
   get framesPerSecond() {
     const last = this.frames.at(-1);

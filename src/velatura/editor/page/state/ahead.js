@@ -1,10 +1,10 @@
-// Makes ready what may come next, while nobody does anything: the code for one more layer.
+// Makes ready what may come next, while nobody does anything: all for one more layer of either kind.
 
 import { addLayer } from './commands.js';
-import { documentOf, enabled, pattern } from './material.js';
+import { documentOf, pattern } from './material.js';
 
-const PAUSE = 1000; // milliseconds between two looks at whether there is time
-const ENOUGH = 1; // samples, after which the picture can wait
+const PAUSE = 500; // milliseconds between two looks at whether there is time
+const KINDS = ['interface', 'medium', 'diffuse'];
 
 /** Follows a store: `{stop()}`; `drawn` tells the shape that the picture has. */
 export function lookAhead({ store, viewport, call, drawn }) {
@@ -14,11 +14,9 @@ export function lookAhead({ store, viewport, call, drawn }) {
   async function look() {
     const state = store.get();
     const shape = JSON.stringify([pattern(state), state.model, state.switches]);
-    if (shape !== ready && shape === drawn() && viewport.samples >= ENOUGH && !viewport.held) {
+    if (shape !== ready && shape === drawn() && viewport.idle) {
       ready = shape;
-      await prepare(state, 'interface');
-      // No medium lies on another
-      if (enabled(state)[0].kind !== 'medium') await prepare(state, 'medium');
+      for (const kind of KINDS) if (store.get() === state) await prepare(state, kind);
     }
     if (timer !== null) timer = setTimeout(look, PAUSE);
   }

@@ -7,6 +7,7 @@ import { blurredEnvironment } from './environment.glsl.js';
 export const COARSE = 2;
 
 const SAMPLES = 3; // of a lobe
+const FEWER = 2; // where pixels are fewer, too
 
 /** What lights the object of a material, as call("shader") has it. */
 export const preview = (shader) => `#version 300 es
@@ -62,20 +63,21 @@ void main() {
 
   // Look where each of them goes; steps between blurred pictures come at other places for each direction
   vec3 light = vec3(0.0);
+  int samples = seen_every > 1 ? ${FEWER} : ${SAMPLES};
   for (int k = 0; k < PARTS; k++) {
     float share = shares[k] / total;
-    for (int j = 0; j < ${SAMPLES}; j++) {
-      float u = (float(j) + 0.5) / ${SAMPLES}.0;
+    for (int j = 0; j < samples; j++) {
+      float u = (float(j) + 0.5) / float(samples);
       vec3 wo = vt_sample(m, l, wi, vec3(before + 0.5 * share, fract(0.5 + float(j) * 0.61803399), u));
       vec4 f = vt_eval_pdf(m, l, wi, wo);
       if (f.a > 0.0) {
         vec3 direction = s * wo.x + t * wo.y + n * wo.z;
-        light += f.rgb * (share / f.a) * environment_cone(direction, share / (${SAMPLES}.0 * f.a), u - 0.5);
+        light += f.rgb * (share / f.a) * environment_cone(direction, share / (float(samples) * f.a), u - 0.5);
       }
     }
     before += share;
   }
-  radiance = vec4(light / ${SAMPLES}.0 * texelFetch(shade, seen_every * pixel, 0).rgb, 1.0);
+  radiance = vec4(light / float(samples) * texelFetch(shade, seen_every * pixel, 0).rgb, 1.0);
 }
 `;
 
