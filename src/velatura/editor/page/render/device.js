@@ -112,6 +112,25 @@ export class Device {
     return pixels;
   }
 
+  /** The same, once the device has come to it; the page's work goes on meanwhile. */
+  async readLater({ handle, width, height }) {
+    const { gl } = this;
+    const buffer = gl.createBuffer();
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
+    gl.bufferData(gl.PIXEL_PACK_BUFFER, 16 * width * height, gl.STREAM_READ);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, handle);
+    gl.readBuffer(gl.COLOR_ATTACHMENT0);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, 0);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+    await this.done();
+    const pixels = new Float32Array(4 * width * height);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
+    gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, pixels);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+    gl.deleteBuffer(buffer);
+    return pixels;
+  }
+
   // Programs
 
   /** A program, compiled once; the page's work goes on meanwhile. Raises Error with the compiler's words. */

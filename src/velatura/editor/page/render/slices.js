@@ -40,10 +40,11 @@ export class Slices {
     this.uniforms = { ...slot.uniforms(), ...incidence, vt_shown: this.only(null) };
   }
 
-  /** Waits for the programs. */
+  /** Waits for the programs, and for what most plots show; a disc is drawn when it is asked for. */
   async ready() {
     const texts = [lobesProgram(this.shader, this.parts), valuesProgram(this.shader)];
     [this.lobes, this.values_] = await Promise.all(texts.map((text) => this.device.program(text)));
+    [this.table, this.polar] = await Promise.all([this.drawnTable(), this.drawnPolar()]);
     return this;
   }
 
@@ -58,13 +59,13 @@ export class Slices {
   curves() {
     return {
       angles: Array.from({ length: DEGREES }, (_, i) => i),
-      parts: this.table().map((part) => sliced(part, 0, -1)),
+      parts: this.table.map((part) => sliced(part, 0, -1)),
     };
   }
 
   /** For the angle that is chosen, of each part the same and its `rotation` in radians. */
   chosen() {
-    return this.table().map((part) => {
+    return this.table.map((part) => {
       const { energy, alpha, rotation } = sliced(part, -1);
       return { energy: energy[0], alpha: alpha?.map(([value]) => value), rotation: rotation?.[0] };
     });
@@ -76,13 +77,9 @@ export class Slices {
     return this.kept.get(key);
   }
 
-  table() {
-    return this.once('table', () => this.drawnTable());
-  }
-
-  drawnTable() {
+  async drawnTable() {
     const width = DEGREES + 1;
-    const pixels = this.drawn(this.lobes, width, 2 * this.parts.length, {});
+    const pixels = await this.drawn(this.lobes, width, 2 * this.parts.length, [{}]);
     const at = (x, y, channel) => pixels[4 * (y * width + x) + channel];
     const row = (value) => Array.from({ length: width }, (_, x) => value(x));
     return this.parts.map(({ kind }, k) => ({
@@ -99,17 +96,13 @@ export class Slices {
    * positive towards the mirror direction and up to 180 all around, for `all` parts together and for each of
    * `parts`, colours.
    */
-  polar() {
-    return this.once('polar', () => this.drawnPolar());
-  }
-
-  drawnPolar() {
+  async drawnPolar() {
     const { angles } = this.directions();
-    const rows = [null, ...this.parts.keys()].map((part) => {
-      const uniforms = { vt_disc: 0, vt_shown: this.only(part) };
-      return colours(this.drawn(this.values_, angles.length, 1, uniforms));
-    });
-    return { angles, all: rows[0], parts: rows.slice(1) };
+    const rows = [null, ...this.parts.keys()].map((part) => ({ vt_disc: 0, vt_shown: this.only(part) }));
+    const pixels = await this.drawn(this.values_, angles.length, rows.length, rows);
+    const length = 4 * angles.length;
+    const [all, ...parts] = rows.map((_, k) => colours(pixels.subarray(k * length, (k + 1) * length)));
+    return { angles, all, parts };
   }
 
   /** The angles of a polar slice, and the texture that the device reads them from. */
@@ -154,18 +147,29 @@ export class Slices {
    */
   disc(size, reflected, part = null) {
     const uniforms = { vt_disc: reflected ? 1 : -1, vt_size: size, vt_shown: this.only(part) };
-    return this.once(`disc ${size} ${reflected} ${part}`, () =>
-      this.drawn(this.values_, size, size, uniforms),
-    );
+    return this.once(`disc ${size} ${reflected} ${part}`, () => {
+      const target = this.target(this.values_, size, size, [uniforms]);
+      const pixels = this.device.read(target);
+      this.device.free(target);
+      return pixels;
+    });
   }
 
-  drawn(program, width, height, uniforms) {
-    const known = { ...this.uniforms, vt_directions: this.directions().texture };
-    const target = this.device.target(width, height, ['RGBA32F']);
-    this.device.draw(program, { ...known, ...uniforms }, target);
-    const pixels = this.device.read(target);
+  /** As many bands of rows as there are uniforms. */
+  async drawn(program, width, height, bands) {
+    const target = this.target(program, width, height, bands);
+    const pixels = await this.device.readLater(target);
     this.device.free(target);
     return pixels;
+  }
+
+  target(program, width, height, bands) {
+    const known = { ...this.uniforms, vt_directions: this.directions().texture };
+    const target = this.device.target(width, height, ['RGBA32F']), rows = height / bands.length;
+    bands.forEach((uniforms, k) =>
+      this.device.draw(program, { ...known, ...uniforms }, target, [k * rows, (k + 1) * rows]),
+    );
+    return target;
   }
 
   dispose() {
@@ -221,7 +225,7 @@ void main() {
     vec2 along = vec2(cos(vt_azimuth), sin(vt_azimuth));
     vec3 wi = vec3(sin(radians(vt_angle)) * along, vt_side * cos(radians(vt_angle))), wo;
     if (vt_disc == 0) {
-        float turn = texelFetch(vt_directions, ivec2(gl_FragCoord.xy), 0).r;
+        float turn = texelFetch(vt_directions, ivec2(gl_FragCoord.x, 0), 0).r;
         wo = vec3(-sin(turn) * along, vt_side * cos(turn));
     } else {
         vec2 place = 2.0 * gl_FragCoord.xy / vt_size - 1.0;

@@ -70,7 +70,7 @@ export class Slot {
     const program = await device.program(probe(shader, places));
     const target = device.target(cosines.length, 2 * places.length * azimuths.length, ['RGBA32F']);
     device.draw(program, { ...this.uniforms(), cosines, azimuths }, target);
-    const pixels = device.read(target);
+    const pixels = await device.readLater(target);
     device.free(target);
     return places.map((place, k) =>
       gathered(place, pixels, k, places.length, cosines.length, azimuths.length),

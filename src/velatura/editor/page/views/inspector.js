@@ -30,7 +30,7 @@ const CHANNELS = ['red', 'green', 'blue'];
 export function mountInspector(element, { store, viewport, session, call, onLobes }) {
   let local = { tab: 'polar', angle: 45, azimuth: 0, below: false, logarithmic: true, cursors: {} };
   const slices = {}; // by slot
-  const latest = {}; // slices that may not be ready
+  const making = {}; // whether slices are on their way, by slot
   const changed = { a: true, b: true };
   let problem = '';
   let stale = true;
@@ -73,7 +73,7 @@ export function mountInspector(element, { store, viewport, session, call, onLobe
       if (name === 'b' && !isCompared()) {
         replace(name, undefined);
         changed[name] = true;
-      } else if (changed[name] && slot.shader) {
+      } else if (changed[name] && slot.shader && !making[name] && (viewport.previewed || viewport.held)) {
         changed[name] = false;
         make(name, slot);
       }
@@ -81,14 +81,14 @@ export function mountInspector(element, { store, viewport, session, call, onLobe
   }
 
   async function make(name, slot) {
-    const asked = (latest[name] = new Slices(slot, local));
+    making[name] = true;
     try {
-      await asked.ready();
-      if (latest[name] === asked) replace(name, asked);
+      replace(name, await new Slices(slot, local).ready());
     } catch (error) {
       problem = error.message;
       paint();
     }
+    making[name] = false;
   }
 
   function replace(name, made) {
@@ -182,11 +182,11 @@ export function mountInspector(element, { store, viewport, session, call, onLobe
   const PLOTS = {
     polar() {
       const { a, b } = slices;
-      const slice = a.polar();
+      const slice = a.polar;
       const beyond = a.parts[lobe()]?.kind === 'transmitted' && a.refracted !== null;
       const cursor = local.cursors.polar ?? (beyond ? 180 - a.refracted : a.angle);
       const whole = a.shader.transmitted;
-      const other = b?.polar();
+      const other = b?.polar;
       const place = nearest(slice.angles, cursor);
       const side = Math.abs(cursor) > 90 ? 'transmitted, ' : '';
       const angle = Math.abs(cursor) > 90 ? 180 - Math.abs(cursor) : Math.abs(cursor);
