@@ -216,8 +216,7 @@ def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
     page = visit()
     open_preset(page, "Wet copper")
     page.page.evaluate("velatura.viewport.setSize(64, 48); velatura.viewport.setBudget({ samples: 16 })")
-    coming = "velatura.viewport.coming?.shader?.base && velatura.shader('a').uniforms.layer1_k"
-    page.page.wait_for_function(f"() => {coming}")
+    page.page.wait_for_function("() => 'layer1_albedo' in (velatura.viewport.coming?.shader?.values ?? {})")  # the last
     page.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")  # look no further
     known = page.page.evaluate(PREVIEWS)
     page.page.get_by_role("button", name="Interface", exact=True).click()
@@ -325,6 +324,7 @@ def test_light_from_a_file_fills_the_picture(visit: Open) -> None:
     page = visit()
     green = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" + bytes([0, 128, 0, 128]) * 8
     drop(page, "canvas", "green.hdr", green)
+    page.page.wait_for_function("() => velatura.viewport.sources.environment.width === 4")
     lit = page.picture()
     assert page.page.get_by_label("Light", exact=True).input_value() == "file:green.hdr"
     assert lit[..., 1].min() > 20

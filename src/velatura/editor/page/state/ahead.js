@@ -6,9 +6,10 @@ import { documentOf, pattern } from './material.js';
 const PAUSE = 500; // milliseconds between two looks at whether there is time
 const KINDS = ['interface', 'medium', 'diffuse'];
 
-/** Follows a store: `{stop()}`; `drawn` tells the shape that the picture has. */
+/** Follows a store: `{quiet, stop()}`; `drawn` tells the shape that the picture has. */
 export function lookAhead({ store, viewport, call, drawn }) {
   let ready = ''; // the shape that all is ready for
+  let busy = false;
   let timer = setTimeout(look, PAUSE);
 
   async function look() {
@@ -16,7 +17,9 @@ export function lookAhead({ store, viewport, call, drawn }) {
     const shape = JSON.stringify([pattern(state), state.model, state.switches]);
     if (shape !== ready && shape === drawn() && viewport.idle) {
       ready = shape;
+      busy = true;
       for (const kind of KINDS) if (store.get() === state) await prepare(state, kind);
+      busy = false;
     }
     if (timer !== null) timer = setTimeout(look, PAUSE);
   }
@@ -32,6 +35,9 @@ export function lookAhead({ store, viewport, call, drawn }) {
   }
 
   return {
+    get quiet() {
+      return !busy;
+    },
     stop() {
       clearTimeout(timer);
       timer = null;
