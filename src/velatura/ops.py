@@ -41,7 +41,19 @@ class Gridded(Protocol):
     def texture(self, dialect: Any) -> Any: ...
 
 
-class _Numpy:
+class Unrolled:
+    """Loops of a dialect that has none of its own."""
+
+    def each(self, function: Callable[..., Value], nodes: Sequence[float], values: Sequence[Value]) -> list[Value]:
+        return [function(x, *values) for x in nodes]
+
+    def repeat(self, function: Callable[..., Sequence[Value]], times: int, state: Sequence[Value]) -> Sequence[Value]:
+        for _ in range(times):
+            state = function(*state)
+        return state
+
+
+class _Numpy(Unrolled):
     exp, log, power, sin, cos = np.exp, np.log, np.power, np.sin, np.cos
     arctan2, absolute, minimum, maximum = np.arctan2, np.abs, np.minimum, np.maximum
     select = staticmethod(np.where)
@@ -72,24 +84,12 @@ class _Numpy:
         total = sum(np.asarray(w)[..., None] * flat[i] for i, w in corners)
         return [total[..., c] for c in range(channels)]
 
-    @staticmethod
-    def each(function: Callable[..., Value], nodes: Sequence[float], values: Sequence[Value]) -> list[Value]:
-        return [function(x, *values) for x in nodes]
 
-    @staticmethod
-    def repeat(function: Callable[..., Sequence[Value]], times: int, state: Sequence[Value]) -> Sequence[Value]:
-        for _ in range(times):
-            state = function(*state)
-        return state
-
-
-class _Float:
+class _Float(Unrolled):
     """Python floats: NumPy's functions, without letting NumPy's own scalars out.
 
     (A NumPy scalar times a Dr.Jit array would be a NumPy array.)
     """
-
-    each, repeat = staticmethod(_Numpy.each), staticmethod(_Numpy.repeat)
 
     def __getattr__(self, name: str) -> Callable[..., Value]:
         function = getattr(_Numpy, name)
@@ -102,9 +102,7 @@ class _Float:
         return on_floats
 
 
-class _DrJit:
-    each, repeat = staticmethod(_Numpy.each), staticmethod(_Numpy.repeat)
-
+class _DrJit(Unrolled):
     def __init__(self) -> None:
         import drjit as dr
 

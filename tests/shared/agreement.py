@@ -223,10 +223,10 @@ void main() {{
 def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Browser) -> np.ndarray:
     """The texture of lobes that the page works out, shape (height, width, 4), for values by place in the struct."""
     assert made.baked is not None
-    tape, known = made.baked.tape, dict(tables.load().items())
+    baked, known = made.baked.to_dict(), dict(tables.load().items())
     job = {
-        "baked": {**vars(tape), "nodes": made.baked.nodes, "sides": made.baked.sides},
-        "tables": {name: bodies.array(known[name].data) for name in tape.tables},
+        "baked": baked,
+        "tables": {name: bodies.array(known[name].data) for name in baked["tables"]},
         "values": {place: value[0] if len(value) == 1 else value for place, value in values.items()},
     }
     browser.page.evaluate(viewport.script("export * from './render/bake.js'; export * from './arrays.js';") + ";1")

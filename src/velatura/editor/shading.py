@@ -35,7 +35,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
     return {
         "key": made.key,
         "text": made.text,
-        "baked": _baked(made),
+        "baked": made.baked and made.baked.to_dict(),
         "uniforms": {name: made.uniforms[name] for name in free},
         "tables": kept,
         "maps": [
@@ -73,14 +73,6 @@ def _made(stack: Stack, model: Model) -> tuple[Shader, str | None]:
     """The code, and the key of its tables; those of a tape are known by their names."""
     made = shader(stack, model, values="uniforms")
     return made, None if made.baked else _kept(made.tables)
-
-
-def _baked(made: Shader) -> dict[str, Any] | None:
-    """What works out the lobes of a uniform material, for a texture of so many nodes and sides."""
-    if made.baked is None:
-        return None
-    tape = made.baked.tape
-    return {**vars(tape), "tables": tape.tables, "nodes": made.baked.nodes, "sides": made.baked.sides}
 
 
 # Tables are kept by what they hold, so that the page fetches those that several shaders read only once

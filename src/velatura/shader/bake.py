@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from velatura import ops
 from velatura.model import bsdf, memo
@@ -62,6 +62,10 @@ class Bake:
     def tape(self) -> Tape:
         """The columns from the values of the material, `m.layer0.eta` and so on, and from a `place`."""
         return tape(self.columns)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What runs it needs, in JSON's types: the tape, the tables that it looks up, and for which nodes and sides."""
+        return {**vars(self.tape), "tables": self.tape.tables, "nodes": self.nodes, "sides": self.sides}
 
     def reading(self) -> str:
         """The sampler, and functions that read each group."""

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from velatura import tables
-from velatura.ops import Value
+from velatura.ops import Unrolled, Value
 from velatura.shader import source
 
 Kind: TypeAlias = Literal["number", "colour", "condition", "conditions", "texels", "loop"]
@@ -178,7 +178,7 @@ class Loop(NamedTuple):
     times: int
 
 
-class Recorder:
+class Recorder(Unrolled):
     """The elementary functions on symbols; loops are kept where they are to be read, and unrolled elsewhere."""
 
     def __getattr__(self, op: str) -> Callable[..., Value]:
@@ -219,7 +219,7 @@ class Recorder:
 
     def each(self, function: Callable[..., Value], nodes: Sequence[float], values: Sequence[Value]) -> list[Value]:
         if not source.is_read():
-            return [function(x, *values) for x in nodes]
+            return super().each(function, nodes, values)
         node = Symbol("bound", (), "number", f"node{_depth.get()}")
         made = _within(function, node, *values)
         results = tuple(operand(x) for x in (made if isinstance(made, list) else [made]))
@@ -229,9 +229,7 @@ class Recorder:
 
     def repeat(self, function: Callable[..., Sequence[Value]], times: int, state: Sequence[Value]) -> Sequence[Value]:
         if not source.is_read():
-            for _ in range(times):
-                state = function(*state)
-            return state
+            return super().repeat(function, times, state)
         bound = [Symbol("bound", (), "colour", f"state{_depth.get()}[{k}]") for k in range(len(state))]
         results = tuple(operand(x) for x in _within(function, *bound))
         begin = tuple(operand(x) for x in state)

@@ -112,13 +112,14 @@ def _mean_fresnel_inside(tables: Tables, row: Row, cos_theta: Value, alpha: Valu
         return _fetch_inside(inside, row.eta, cos_theta, alpha)[0]
     absorbing = tables.absorbing_inside_multi if row.multiple else tables.absorbing_inside
     channels = _fetch_inside(absorbing, row.eta, cos_theta, alpha)
-    reflectance = _raised(absorbing, ops.each(_conductor_inside, absorbing.nodes, row.eta, row.kappa))
+    theta_c = _critical_angle(row.eta)
+    reflectance = _raised(absorbing, ops.each(_conductor_inside, absorbing.nodes, theta_c, row.eta, row.kappa))
     return 1 - _dot(channels, [1 - f for f in reflectance])
 
 
-def _conductor_inside(x: Value, eta: Value, kappa: Value) -> Value:
+def _conductor_inside(x: Value, theta_c: Value, eta: Value, kappa: Value) -> Value:
     """Reflectance of a conductor at a coordinate on the angular axis."""
-    return fresnel.conductor(coordinates.to_angle(x, _critical_angle(eta)), eta, kappa)
+    return fresnel.conductor(coordinates.to_angle(x, theta_c), eta, kappa)
 
 
 def _at_nodes(reflectance: Callable[..., Value], nodes: Sequence[float], *index: Value) -> Sequence[Value]:

@@ -2,14 +2,16 @@
 
 import { Bake } from './bake.js';
 import { preview } from './glsl/preview.glsl.js';
-import { probe } from './glsl/probe.glsl.js';
 import { tracer } from './glsl/tracer.glsl.js';
 import { sobol } from './sobol.js';
 
 const SHOWN = 8; // lobes that may be shown alone
 
 export class Slot {
-  /** `load` gives what a shader names: tables(key) -> texture, image(name, encoding) -> texture. */
+  /**
+   * `load` gives what a shader names: tables(key) -> texture, table(name) -> {array, shape},
+   * image(name, encoding) -> texture.
+   */
   constructor(device, load) {
     Object.assign(this, { device, load, shader: null, lobe: null, samples: 0 });
   }
@@ -61,20 +63,6 @@ export class Slot {
     const shown = Array.from({ length: SHOWN }, (_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
     const parameters = Object.entries(this.placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
     return { ...Object.fromEntries(parameters), ...this.textures, vt_shown: shown };
-  }
-
-  /** The lobes at cosines and azimuths, up to 64 each, seen from above: read back from the device. */
-  async lobes(cosines, azimuths) {
-    const { device, shader } = this;
-    const places = shader.shown;
-    const program = await device.program(probe(shader, places));
-    const target = device.target(cosines.length, 2 * places.length * azimuths.length, ['RGBA32F']);
-    device.draw(program, { ...this.uniforms(), cosines, azimuths }, target);
-    const pixels = await device.readLater(target);
-    device.free(target);
-    return places.map((place, k) =>
-      gathered(place, pixels, k, places.length, cosines.length, azimuths.length),
-    );
   }
 
   // The picture
@@ -140,25 +128,4 @@ export class Slot {
   get sum() {
     return this.sums[0];
   }
-}
-
-function gathered(place, pixels, k, lobes, cosines, azimuths) {
-  const count = cosines * azimuths;
-  const lobe = {
-    place,
-    energy: new Float32Array(3 * count),
-    alpha_u: new Float32Array(count),
-    alpha_v: new Float32Array(count),
-    rotation: new Float32Array(count),
-  };
-  for (let i = 0; i < count; i++) {
-    const row = 2 * (Math.floor(i / cosines) * lobes + k);
-    const at = 4 * (row * cosines + (i % cosines));
-    const next = at + 4 * cosines;
-    lobe.energy.set(pixels.subarray(at, at + 3), 3 * i);
-    lobe.alpha_u[i] = pixels[at + 3];
-    lobe.alpha_v[i] = pixels[next];
-    lobe.rotation[i] = pixels[next + 1];
-  }
-  return lobe;
 }

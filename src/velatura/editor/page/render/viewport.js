@@ -189,14 +189,6 @@ export class Viewport {
     return { width, height, data };
   }
 
-  /**
-   * The lobes over directions of light: {cos, azimuths, lobes: [{place, energy, alpha_u, ...}], transmitted}.
-   */
-  async lobes(slot, cos = steps(64, 1 / 64, 1), azimuths = new Float32Array(1)) {
-    const lobes = await this.slots[slot].lobes(cos, azimuths);
-    return { cos, azimuths, lobes, transmitted: this.slots[slot].shader.transmitted };
-  }
-
   /** A small square picture of another material on the same object, from here; an ImageData. */
   async thumbnail(shader, values, size, samples) {
     const slot = (this.small ??= new Slot(this.device, this.load));
@@ -547,8 +539,4 @@ function stretched({ width, height, data }, columns, rows) {
 function stands(role, environment) {
   if (role === 'ground') return environment === 'sky';
   return role === 'object' || environment !== 'furnace';
-}
-
-function steps(count, first, last) {
-  return Float32Array.from({ length: count }, (_, i) => first + ((last - first) * i) / (count - 1));
 }
