@@ -64,16 +64,16 @@ export class Device {
   filtered(filter, wrap, mipmaps) {
     const { gl } = this;
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl[filter]);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, mipmaps ? gl.LINEAR_MIPMAP_NEAREST : gl[filter]);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, mipmaps ? gl.LINEAR_MIPMAP_LINEAR : gl[filter]);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl[wrap]);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, mipmaps ? gl.CLAMP_TO_EDGE : gl[wrap]);
     if (mipmaps) gl.generateMipmap(gl.TEXTURE_2D);
   }
 
-  /** What is drawn into: one or more textures, and maybe a buffer of depths. */
-  target(width, height, formats, depth = false) {
+  /** What is drawn into: one or more textures, with `options` as for these, and maybe a buffer of depths. */
+  target(width, height, formats, { depth = false, ...options } = {}) {
     const { gl } = this;
-    const textures = formats.map((format) => this.texture(format, width, height));
+    const textures = formats.map((format) => this.texture(format, width, height, null, options));
     const handle = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, handle);
     textures.forEach((texture, i) => {
@@ -100,6 +100,13 @@ export class Device {
       gl.deleteFramebuffer(handle);
       gl.deleteRenderbuffer(buffer);
     }
+  }
+
+  /** Makes all numbers of a target's first texture the same. */
+  clear({ handle }, value) {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, handle);
+    gl.clearBufferfv(gl.COLOR, 0, Array(4).fill(value));
   }
 
   /** The pixels of a target, from its lower row on. */
@@ -198,18 +205,19 @@ export class Device {
     return program.places.get(name);
   }
 
-  /** Draws all pixels of a target (null: the canvas), or `rows` from the first to below the second. */
-  draw(program, uniforms, target, rows = null) {
+  /** Draws all pixels of a target (null: the canvas), or `rows` and `columns` from the first to below the second. */
+  draw(program, uniforms, target, { rows, columns } = {}) {
     const { gl } = this;
     const width = target?.width ?? gl.drawingBufferWidth;
     const height = target?.height ?? gl.drawingBufferHeight;
     const [low, high] = rows ?? [0, height];
+    const [left, right] = columns ?? [0, width];
     this.use(program, uniforms);
     gl.bindFramebuffer(gl.FRAMEBUFFER, target?.handle ?? null);
     gl.viewport(0, 0, width, height);
     gl.disable(gl.DEPTH_TEST);
     gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(0, low, width, high - low);
+    gl.scissor(left, low, right - left, high - low);
     gl.bindVertexArray(this.empty);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.SCISSOR_TEST);

@@ -1,8 +1,11 @@
 // The preview: surfaces drawn once for a view, all around them lit once, and lit again whenever a value
 // changes.
 
+import { Box3, Matrix4, Vector3, Vector4 } from 'three';
+
 import { COARSE, coarsening, spreading, surroundings } from './glsl/preview.glsl.js';
 import { raster, rasterVertex } from './glsl/raster.glsl.js';
+import { OBJECT } from './scene.js';
 
 const SEEN = ['RGBA16F', 'RGBA16F', 'RG32F'];
 
@@ -49,16 +52,17 @@ export class Preview {
     gl.bindVertexArray(null);
     this.buffers.push(indices);
     this.count = scene.triangles.length;
+    this.corners = corners(scene);
     this.outdated = true;
   }
 
   setSize(width, height) {
     const { device } = this;
     device.free(this.seen, this.coarse, this.coarseLight);
-    this.seen = device.target(width, height, SEEN, true);
+    this.seen = device.target(width, height, SEEN, { depth: true });
     const size = [width, height].map((length) => Math.ceil(length / COARSE));
     this.coarse = device.target(...size, SEEN);
-    this.coarseLight = device.target(...size, ['RGBA16F']);
+    this.coarseLight = device.target(...size, ['RGBA16F'], { filter: 'LINEAR' });
     this.outdated = true;
   }
 
@@ -66,6 +70,7 @@ export class Preview {
   update(projection) {
     if (!this.outdated) return;
     this.outdated = false;
+    this.bounds = projected(this.corners, projection);
     this.draw(projection);
     this.device.draw(this.coarsening, named(this.seen), this.coarse);
   }
@@ -78,18 +83,22 @@ export class Preview {
   /** Draws the object by a program into its surroundings; in fewer pixels where it has to be `quick`. */
   drawObject(program, uniforms, target, quick) {
     const { device, seen, coarse, coarseLight } = this;
-    if (!quick) return device.draw(program, { ...uniforms, ...named(seen), seen_every: 1 }, target);
-    device.draw(program, { ...uniforms, ...named(coarse), seen_every: COARSE }, coarseLight);
-    const own = { coarse_light: coarseLight.textures[0], coarse_normal: coarse.textures[0] };
-    return device.draw(this.spreading, { ...own, ...named(seen) }, target);
+    const draw = (program, uniforms, target) => device.draw(program, uniforms, target, within(this.bounds, target));
+    if (!quick) return draw(program, { ...uniforms, ...named(seen), seen_every: 1 }, target);
+    device.clear(coarseLight, 0);
+    draw(program, { ...uniforms, ...named(coarse), seen_every: COARSE }, coarseLight);
+    return draw(this.spreading, { coarse_light: coarseLight.textures[0], ...named(seen) }, target);
   }
 
-  /** Draws a pixel by a program that is to draw the object. */
+  /** Draws a pixel by a program that is to draw the object, once: some devices compile only then, beside other work. */
   warm(program, uniforms) {
     const { device, coarse } = this;
+    if (program.warm) return;
+    program.warm = true;
     const pixel = device.target(1, 1, ['RGBA16F']);
     device.draw(program, { ...uniforms, ...named(coarse), seen_every: COARSE }, pixel);
     device.free(pixel);
+    device.gl.flush();
   }
 
   draw(projection) {
@@ -113,4 +122,33 @@ export class Preview {
 
 function named({ textures: [normal, tangent, uv] }) {
   return { seen_normal: normal, seen_tangent: tangent, seen_uv: uv };
+}
+
+/** The eight corners of the box around the object. */
+function corners({ positions, materials }) {
+  const box = new Box3(), point = new Vector3();
+  materials.forEach((material, i) => material === OBJECT && box.expandByPoint(point.fromArray(positions, 3 * i)));
+  const { min, max } = box;
+  return Array.from({ length: 8 }, (_, k) => [k & 1 ? min.x : max.x, k & 2 ? min.y : max.y, k & 4 ? min.z : max.z]);
+}
+
+/** Where corners are seen, as parts of the picture: its columns and rows, each from the first to the last. */
+function projected(corners, projection) {
+  const matrix = new Matrix4().fromArray(projection);
+  const seen = corners.map((corner) => new Vector4(...corner, 1).applyMatrix4(matrix));
+  if (seen.some(({ w }) => w <= 0)) return { columns: [0, 1], rows: [0, 1] }; // beside or behind the camera
+  const extent = (axis) => {
+    const places = seen.map((point) => 0.5 + (0.5 * point[axis]) / point.w);
+    return [Math.min(...places), Math.max(...places)];
+  };
+  return { columns: extent('x'), rows: extent('y') };
+}
+
+/** The pixels of a target that a part of the picture has to do with. */
+function within({ columns, rows }, { width, height }) {
+  const pixels = ([first, last], count) => {
+    const end = Math.min(Math.max(Math.ceil(last * count) + 1, 0), count);
+    return [Math.min(Math.max(Math.floor(first * count) - 1, 0), end), end];
+  };
+  return { columns: pixels(columns, width), rows: pixels(rows, height) };
 }

@@ -6,7 +6,8 @@ import { MeshBVH, MeshBVHUniformStruct, SAH } from 'three-mesh-bvh';
 export const NODES_WIDTH = 1024; // texels
 export const TRIANGLES_WIDTH = 2048;
 export const MAX_DEPTH = 6; // surfaces met by a path, and the light at last
-const MATERIALS = { object: 0, plinth: 1, ground: 1 };
+export const OBJECT = 0; // the material of its vertices
+const MATERIALS = { object: OBJECT, plinth: 1, ground: 1 };
 const TEXELS = 8; // of a triangle
 const MOST_TRIANGLES = 500_000;
 const LEAF = 0xffff0000;

@@ -167,7 +167,7 @@ export class Slices {
     const known = { ...this.uniforms, vt_directions: this.directions().texture };
     const target = this.device.target(width, height, ['RGBA32F']), rows = height / bands.length;
     bands.forEach((uniforms, k) =>
-      this.device.draw(program, { ...known, ...uniforms }, target, [k * rows, (k + 1) * rows]),
+      this.device.draw(program, { ...known, ...uniforms }, target, { rows: [k * rows, (k + 1) * rows] }),
     );
     return target;
   }

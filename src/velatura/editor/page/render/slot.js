@@ -56,9 +56,12 @@ export class Slot {
     this.lobe = lobe;
   }
 
-  /** All that the code of the material reads; lobes are worked out anew where values have changed. */
-  uniforms() {
-    if (this.outdated && this.bake) this.device.fill(this.textures.vt_baked, this.bake.draw(this.placed));
+  /** All that the code of the material reads; lobes are worked out anew where values have changed, maybe `quick`. */
+  uniforms(quick = false) {
+    if (this.bake && (this.outdated || (this.rough && !quick))) {
+      this.device.fill(this.textures.vt_baked, this.bake.draw(this.placed, quick));
+      this.rough = quick;
+    }
     this.outdated = false;
     const shown = Array.from({ length: SHOWN }, (_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
     const parameters = Object.entries(this.placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
@@ -95,13 +98,14 @@ export class Slot {
     const shade = this.shades[0].textures[0];
     if (!this.surrounded) view.drawSurroundings({ ...uniforms, shade }, this.preview);
     this.surrounded = true;
-    view.drawObject(this.previewed, { ...this.uniforms(), ...uniforms, shade }, this.preview, quick);
+    if (this.outdated) view.warm(this.previewed, { ...this.textures, ...uniforms, shade });
+    view.drawObject(this.previewed, { ...this.uniforms(quick), ...uniforms, shade }, this.preview, quick);
   }
 
   forget() {
     this.samples = 0;
     this.surrounded = false;
-    this.clear(this.shades[0], 1);
+    this.device.clear(this.shades[0], 1);
   }
 
   /** Adds the pass that was drawn to the light before. */
@@ -112,16 +116,10 @@ export class Slot {
       added: this.pass.textures[0],
       within: sobol(this.samples).within,
     };
-    if (this.samples === 0) this.clear(before, 0);
+    if (this.samples === 0) this.device.clear(before, 0);
     this.device.draw(adding, uniforms, sum);
     this.sums.reverse();
     this.samples++;
-  }
-
-  clear(target, value) {
-    const { gl } = this.device;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target.handle);
-    gl.clearBufferfv(gl.COLOR, 0, Array(4).fill(value));
   }
 
   /** Light added up, and its weight in A. */

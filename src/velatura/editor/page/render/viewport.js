@@ -149,7 +149,7 @@ export class Viewport {
    * Whether something is being dragged: until it is let go, previews in fewer pixels are all that is drawn.
    */
   moving(held) {
-    if (this.held && !held) this.previewed = this.quick = false;
+    if (this.held && !held) this.outdate();
     this.held = held;
     this.lastChange = performance.now();
     this.wake?.();
@@ -338,9 +338,15 @@ export class Viewport {
       slot.samples = 0;
     }
     this.row = 0;
-    this.previewed = this.quick = false;
+    this.outdate();
     this.lastChange = this.started = performance.now();
     this.wake?.();
+  }
+
+  /** Asks for another preview. */
+  outdate() {
+    this.previewed = this.quick = false;
+    this.drawing = null;
   }
 
   /** Another view, or other light. */
@@ -385,8 +391,7 @@ export class Viewport {
   /** In fewer pixels while something is dragged, and at first, where the last one with all of them took long. */
   async drawPreview() {
     const quick = this.held || (!this.quick && this.took > SLOW);
-    this.quick = quick && !this.held;
-    this.previewed = !this.quick;
+    const drawing = (this.drawing = {});
     const uniforms = this.uniforms(), start = performance.now();
     this.preview.update(uniforms.camera_projection);
     for (const slot of this.seen()) slot.drawPreview(this.preview, uniforms, quick);
@@ -394,6 +399,9 @@ export class Viewport {
     const time = await this.device.done();
     if (!quick) this.took = time - start;
     this.frames = [...this.frames.slice(-100), time];
+    if (this.drawing !== drawing) return; // for something has changed
+    this.quick = quick && !this.held;
+    this.previewed = !this.quick;
   }
 
   /**
@@ -418,7 +426,7 @@ export class Viewport {
     const slots = this.seen();
     for (const slot of slots) {
       const sample = { ...slot.uniforms(), ...uniforms, ...sobol(slot.samples), sample_number: slot.samples };
-      this.device.draw(slot.traced, sample, slot.pass, [this.row, this.row + rows]);
+      this.device.draw(slot.traced, sample, slot.pass, { rows: [this.row, this.row + rows] });
     }
     this.row = (this.row + rows) % this.canvas.height;
     if (this.row === 0) {

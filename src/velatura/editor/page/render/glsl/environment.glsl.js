@@ -72,12 +72,11 @@ export const blurredEnvironment = /* glsl */ `
 ${MAPPING}
 uniform highp sampler2D environment_blurred; // radiance, with smaller and smaller pictures
 
-// Radiance from a cone of a solid angle, from the picture that is blurred as much, or by a level more or less
-vec3 environment_cone(vec3 d, float solid_angle, float level) {
+// Radiance from a cone of a solid angle, from pictures that are blurred as much
+vec3 environment_cone(vec3 d, float solid_angle) {
   vec2 size = vec2(textureSize(environment_blurred, 0));
   float sin_theta = sqrt(max(1.0 - d.y * d.y, 1e-4));
   float texels = solid_angle * size.x * size.y / (19.7392088 * sin_theta);
-  level += 0.5 * log2(max(texels, 1e-4));
-  return textureLod(environment_blurred, environment_uv(d), max(level, 0.0)).rgb;
+  return textureLod(environment_blurred, environment_uv(d), 0.5 * log2(max(texels, 1.0))).rgb;
 }
 `;

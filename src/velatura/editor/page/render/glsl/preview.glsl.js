@@ -8,6 +8,7 @@ export const COARSE = 2;
 
 const SAMPLES = 3; // of a lobe
 const FEWER = 2; // where pixels are fewer, too
+const LARGE = 0.2; // share of the energy up to which one sample of a lobe is enough
 
 /** What lights the object of a material, as call("shader") has it. */
 export const preview = (shader) => `#version 300 es
@@ -61,23 +62,24 @@ void main() {
   float total = 0.0, before = 0.0;
   for (int k = 0; k < PARTS; k++) total += shares[k];
 
-  // Look where each of them goes; steps between blurred pictures come at other places for each direction
+  // Look where each of them goes
   vec3 light = vec3(0.0);
-  int samples = seen_every > 1 ? ${FEWER} : ${SAMPLES};
   for (int k = 0; k < PARTS; k++) {
     float share = shares[k] / total;
+    int samples = share < ${LARGE} ? 1 : seen_every > 1 ? ${FEWER} : ${SAMPLES};
+    float each = share / float(samples);
     for (int j = 0; j < samples; j++) {
       float u = (float(j) + 0.5) / float(samples);
       vec3 wo = vt_sample(m, l, wi, vec3(before + 0.5 * share, fract(0.5 + float(j) * 0.61803399), u));
       vec4 f = vt_eval_pdf(m, l, wi, wo);
       if (f.a > 0.0) {
         vec3 direction = s * wo.x + t * wo.y + n * wo.z;
-        light += f.rgb * (share / f.a) * environment_cone(direction, share / (float(samples) * f.a), u - 0.5);
+        light += f.rgb * (each / f.a) * environment_cone(direction, each / f.a);
       }
     }
     before += share;
   }
-  radiance = vec4(light / float(samples) * texelFetch(shade, seen_every * pixel, 0).rgb, 1.0);
+  radiance = vec4(light * texelFetch(shade, seen_every * pixel, 0).rgb, 1.0);
 }
 `;
 
@@ -103,7 +105,7 @@ void main() {
   vec4 normal = texelFetch(seen_normal, pixel, 0);
   if (normal.w == 1.0) discard;
   vec3 light;
-  if (normal.w < 0.5) light = environment_cone(camera_ray(gl_FragCoord.xy), 0.0, 0.0);
+  if (normal.w < 0.5) light = environment_cone(camera_ray(gl_FragCoord.xy), 0.0);
   else light = 0.18 * diffuse_light(normal.xyz);
   radiance = vec4(light * texelFetch(shade, pixel, 0).rgb, 1.0);
 }
@@ -131,33 +133,16 @@ void main() {
 }
 `;
 
-/** Light of fewer pixels, spread over all: between the four around, by how close they lie and are turned. */
+/** Light of fewer pixels, spread over all: between the four around, as far as they show the object. */
 export const spreading = /* glsl */ `#version 300 es
 precision highp float;
-uniform highp sampler2D coarse_light;
-uniform highp sampler2D coarse_normal;
+uniform highp sampler2D coarse_light; // 0 where the object is not, in A, too
 uniform highp sampler2D seen_normal;
 out vec4 radiance;
 
 void main() {
-  vec4 normal = texelFetch(seen_normal, ivec2(gl_FragCoord.xy), 0);
-  if (normal.w != 1.0) discard;
-  vec2 place = gl_FragCoord.xy / ${COARSE}.0 - 0.5;
-  ivec2 node = ivec2(floor(place)), last = textureSize(coarse_light, 0) - 1;
-  vec2 upper = place - vec2(node);
-  vec4 sum = vec4(0.0);
-  for (int k = 0; k < 4; k++) {
-    ivec2 corner = ivec2(k & 1, k >> 1), at = clamp(node + corner, ivec2(0), last);
-    vec4 other = texelFetch(coarse_normal, at, 0);
-    vec2 weights = mix(1.0 - upper, upper, vec2(corner));
-    float alike = max(dot(normal.xyz, other.xyz), 0.0);
-    alike *= alike;
-    alike *= alike;
-    alike *= alike;
-    alike *= alike;
-    float weight = other.w == 1.0 ? weights.x * weights.y * (alike + 1e-4) : 0.0;
-    if (weight > 0.0) sum += weight * vec4(texelFetch(coarse_light, at, 0).rgb, 1.0);
-  }
-  radiance = vec4(sum.rgb / sum.a, 1.0);
+  if (texelFetch(seen_normal, ivec2(gl_FragCoord.xy), 0).w != 1.0) discard;
+  vec4 light = texture(coarse_light, gl_FragCoord.xy / (${COARSE}.0 * vec2(textureSize(coarse_light, 0))));
+  radiance = vec4(light.rgb / light.a, 1.0);
 }
 `;
