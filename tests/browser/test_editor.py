@@ -442,6 +442,17 @@ def test_nothing_sticks_out_of_the_window(visit: Open, width: int) -> None:
         assert panel["y"] >= picture["y"] + picture["height"]
 
 
+def test_the_picture_keeps_its_size_while_all_else_changes(visit: Open) -> None:
+    """Every other size begins its light anew."""
+    page = visit()
+    size = page.page.locator("canvas").first.bounding_box()
+    page.page.get_by_role("button", name="Interface", exact=True).click()
+    page.page.wait_for_selector(".inspector .legend")
+    page.page.get_by_role("tab", name="Disc").click()
+    page.settled()
+    assert page.page.locator("canvas").first.bounding_box() == size
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_is_readable_in_light_and_dark(visit: Open, scheme: str) -> None:
     page = visit(color_scheme=scheme)

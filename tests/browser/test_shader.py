@@ -12,7 +12,17 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from agreement import PATTERNS, compare, differences, in_browser, in_numpy, random_case, read_back
+from agreement import (
+    PATTERNS,
+    compare,
+    differences,
+    in_browser,
+    in_javascript,
+    in_numpy,
+    placed,
+    random_case,
+    read_back,
+)
 
 import velatura as vt
 from velatura.model import bsdf, named
@@ -107,6 +117,18 @@ def test_lobes_that_are_drawn_once_are_the_lobes(layers: list, model: str, page:
             missed += [np.where(lit, np.abs(alpha - truth), 0) / 2e-3 for alpha, truth in ((alpha_u, u), (alpha_v, v))]
         assert np.quantile(missed, 0.99) < 1
         assert np.max(missed) < 5
+
+
+def test_quick_lobes_are_those_of_every_second_direction(page: chromium.Browser) -> None:
+    """Expected: the same at these, and near enough for something that moves between them."""
+    stack = vt.Stack.from_dict({"layers": [STEEP, TINTED, BRUSHED]})
+    made = shader(stack, values="uniforms")
+    fine, quick = (
+        in_javascript(made, placed(stack, made), page, quick).reshape(-1, 49, 95, 4) for quick in (False, True)
+    )
+    np.testing.assert_array_equal(quick[:, ::2, ::2], fine[:, ::2, ::2])
+    assert np.any(quick != fine)
+    np.testing.assert_allclose(quick, fine, atol=0.02)
 
 
 def test_a_wrong_constant_is_seen(page: chromium.Browser) -> None:

@@ -191,10 +191,7 @@ def compare(pattern: Pattern, model: str, count: int, seed: int, browser: Browse
 def read_back(stack: Stack, made: Shader, wi: np.ndarray, browser: Browser) -> np.ndarray:
     """What a shader with parameters reads of the lobes that it has drawn: for each name in `shown`, energies and, but
     for a base, alphas and rotation, shape (lobes, 6, N)."""
-    values = {
-        place: np.broadcast_to(constant(name, stack.flat()[name]), 3 if is_colour(name) else 1).tolist()
-        for name, place in made.uniforms.items()
-    }
+    values = placed(stack, made)
     uniforms = {f"vt_parameters.{place}": value for place, value in values.items()}
     uniforms["vt_shown[0]"] = [1.0] * len(made.shown)
     answers = []
@@ -220,7 +217,15 @@ void main() {{
     return np.concatenate([pairs[:, 0, :3], pairs[:, 1, :3]], axis=1)
 
 
-def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Browser) -> np.ndarray:
+def placed(stack: Stack, made: Shader) -> dict[str, list[float]]:
+    """The values of a stack by their place in the struct of its shader, as many as a uniform holds."""
+    return {
+        place: np.broadcast_to(constant(name, stack.flat()[name]), 3 if is_colour(name) else 1).tolist()
+        for name, place in made.uniforms.items()
+    }
+
+
+def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Browser, quick: bool = False) -> np.ndarray:
     """The texture of lobes that the page works out, shape (height, width, 4), for values by place in the struct."""
     assert made.baked is not None
     baked, known = made.baked.to_dict(), dict(tables.load().items())
@@ -228,6 +233,7 @@ def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Brow
         "baked": baked,
         "tables": {name: bodies.array(known[name].data) for name in baked["tables"]},
         "values": {place: value[0] if len(value) == 1 else value for place, value in values.items()},
+        "quick": quick,
     }
     browser.page.evaluate(viewport.script("export * from './render/bake.js'; export * from './arrays.js';") + ";1")
     found = browser.page.evaluate(_BAKE, job)
@@ -235,10 +241,10 @@ def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Brow
 
 
 _BAKE = """
-({ baked, tables, values }) => {
+({ baked, tables, values, quick }) => {
   const decoded = Object.entries(tables).map(([name, table]) => [name, page.decode(table)]);
   const made = new page.Bake(baked, Object.fromEntries(decoded));
-  return { texels: [...made.draw(values)], height: made.height, width: made.width };
+  return { texels: [...made.draw(values, quick)], height: made.height, width: made.width };
 }
 """
 
