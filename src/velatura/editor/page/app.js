@@ -236,9 +236,13 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     // The picture
 
     shader: (slot = 'a') => picture?.shader(slot),
+    /** Whether Python is, or will be, asked about the picture. */
+    get pending() {
+      return !picture.quiet;
+    },
     /** Whether Python has answered all that it was asked about the picture, and about what may come. */
     get quiet() {
-      return picture.quiet && appearance.quiet && ahead.quiet;
+      return !app.pending && appearance.quiet && ahead.quiet;
     },
     /** Calls f(slot) after the values or the material of a slot have changed. Returns what ends that. */
     onLobes(f) {

@@ -163,7 +163,12 @@ export class Viewport {
 
   /** Whether there is nothing to do but to trace paths. */
   get idle() {
-    return Boolean(this.previewed) && !this.held && this.budget.samples > 0;
+    return this.previewed > 0 && !this.held && this.budget.samples > 0;
+  }
+
+  /** Whether the preview has been there, as it is, for so many milliseconds. */
+  rested(milliseconds) {
+    return this.previewed > 0 && performance.now() - this.previewed > milliseconds;
   }
 
   /** Of previews, over the last second in which there were any. */
@@ -345,7 +350,8 @@ export class Viewport {
 
   /** Asks for another preview. */
   outdate() {
-    this.previewed = this.quick = false;
+    this.previewed = 0; // the time from which on there is a preview
+    this.quick = false;
     this.drawing = null;
   }
 
@@ -401,7 +407,7 @@ export class Viewport {
     this.frames = [...this.frames.slice(-100), time];
     if (this.drawing !== drawing) return; // for something has changed
     this.quick = quick && !this.held;
-    this.previewed = !this.quick;
+    this.previewed = this.quick ? 0 : time;
   }
 
   /**

@@ -18,16 +18,18 @@ const TABS = [
   { name: 'blur', title: 'Blur' },
   { name: 'validations', title: 'Validations' },
 ];
+const PAUSE = 200; // milliseconds after a preview, in which nothing may change before plots are made
 const CHANNELS = ['red', 'green', 'blue'];
 
 /**
  * Shows the inspector in an element; it follows the store and what the viewport draws.
  *
  * @param {HTMLElement} element
- * @param {{store, viewport, session, call, onLobes}} app
+ * @param {{store, viewport, session, call, onLobes, pending}} app
  * @returns {{destroy: function}}
  */
-export function mountInspector(element, { store, viewport, session, call, onLobes }) {
+export function mountInspector(element, app) {
+  const { store, viewport, session, call, onLobes } = app;
   let local = { tab: 'polar', angle: 45, azimuth: 0, below: false, logarithmic: true, cursors: {} };
   const slices = {}; // by slot
   const making = {}; // whether slices are on their way, by slot
@@ -73,12 +75,15 @@ export function mountInspector(element, { store, viewport, session, call, onLobe
       if (name === 'b' && !isCompared()) {
         replace(name, undefined);
         changed[name] = true;
-      } else if (changed[name] && slot.shader && !making[name] && (viewport.previewed || viewport.held)) {
+      } else if (changed[name] && slot.shader && !making[name] && isTime()) {
         changed[name] = false;
         make(name, slot);
       }
     }
   }
+
+  /** Plots come after pictures; while something is dragged they follow. */
+  const isTime = () => viewport.held || (viewport.rested(PAUSE) && !app.pending);
 
   async function make(name, slot) {
     making[name] = true;
