@@ -106,6 +106,7 @@ export class Viewport {
   /** Some of {rotation (degrees), exposure (stops), mode, split, lobe (its number, or null for all)}. */
   setView(view) {
     const before = this.settings;
+    if (Object.entries(view).every(([key, value]) => before[key] === value)) return;
     this.settings = { ...before, ...view };
     const { rotation, mode, lobe } = this.settings;
     if (lobe !== before.lobe) Object.values(this.slots).forEach((slot) => slot.setLobe(lobe));
