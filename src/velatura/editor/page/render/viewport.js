@@ -94,7 +94,7 @@ export class Viewport {
   async prepare(shader) {
     const slot = (this.coming ??= new Slot(this.device, this.load));
     await slot.setMaterial(shader, shader.values);
-    this.preview.warm(slot.previewed, { ...slot.uniforms(), ...this.uniforms() });
+    this.preview.warm(slot.previewed, { ...slot.textures, ...this.uniforms() });
   }
 
   /** Other values of the same material: nothing is compiled. */
