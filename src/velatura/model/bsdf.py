@@ -327,6 +327,8 @@ def _chosen_direction(where: Value, a: Direction, b: Direction) -> Direction:
 
 
 def _chosen(where: Value, a: Lobe, b: Lobe) -> Lobe:
+    """The lobe a where a condition holds, else b; of one kind, both drawn with facets or neither."""
+    assert type(a.variance) is type(b.variance) and (a.facets is None) == (b.facets is None)
     variance = type(a.variance)(
         *(ops.select(where, p, q) for p, q in zip(vars(a.variance).values(), vars(b.variance).values()))
     )

@@ -26,6 +26,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.ops import Value
 from velatura.optics import fresnel, phase
 from velatura.optics.ggx import Direction
+from velatura.tables import Average
 
 FAINT = 1e-4  # albedo that the tables' errors come close to
 DIM = 3e-4  # albedo of whose parts the tables tell little
@@ -84,8 +85,8 @@ def _down(prepared: Prepared, wi: Direction, plane: _Plane) -> tuple[State, list
             state, lobe = _at(prepared, state, layer, plane, wi[2])
             reflected.append(lobe)
     # What the first interface reflects is known exactly
-    if reflected and isinstance(prepared.layers[0], PreparedInterface):
-        reflected[0] = _exact(prepared, prepared.layers[0], plane, reflected[0], wi[2])
+    if prepared.once:
+        reflected[0] = _exact(prepared, prepared.once, plane, reflected[0], wi[2])
     return state, reflected
 
 
@@ -263,12 +264,13 @@ def _lobe(prepared: Prepared, plane: _Plane, energy: Value, roughness: Variance,
     return Lobe(energy, plane.unseen(roughness), drawn, gain)
 
 
-def _exact(prepared: Prepared, layer: PreparedInterface, plane: _Plane, lobe: Lobe, cos_theta: Value) -> Lobe:
+def _exact(prepared: Prepared, once: Average, plane: _Plane, lobe: Lobe, cos_theta: Value) -> Lobe:
     """The lobe of the first interface as the reflection by facets that it is."""
-    assert prepared.once is not None
+    layer = prepared.layers[0]
+    assert isinstance(layer, PreparedInterface)
     cosine = ops.maximum(cos_theta, COS_MIN)
-    once = prepared.once(cosine, _fetched(plane.seen(layer.s_r), cosine, layer.opaque))
-    gain = ops.select(once > FAINT, ops.divide(lobe.energy, once), 1.0)
+    albedo = once(cosine, _fetched(plane.seen(layer.s_r), cosine, layer.opaque))
+    gain = ops.select(albedo > FAINT, ops.divide(lobe.energy, albedo), 1.0)
     return replace(lobe, variance=layer.s_r, roughness=layer.roughness, gain=gain, facets=layer)
 
 

@@ -84,7 +84,8 @@ class PreparedBase:
 class Prepared:
     """The layers from the top, a diffuse base apart; the model's parts that they were prepared for.
 
-    For the recursion in momentum, `once` is the albedo of the first interface where light meets its facets once.
+    For the recursion in momentum, `once` is the albedo of the first interface where light meets its facets once; None
+    where a medium lies above the first interface, or below the last one.
     """
 
     model: Model
@@ -147,8 +148,9 @@ def prepare(
     prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], base)
     if model.calibrations is None:
         return prepared
-    first = next((layer for layer in layers if isinstance(layer, PreparedInterface)), None)
-    once = averages.once(first.eta, first.kappa) if first else None
+    # A pane under a medium is drawn alike from both sides, or a lobe could not be chosen by the side that light is on
+    first = layers[0] if layers and kinds[-1] != "medium" else None
+    once = averages.once(first.eta, first.kappa) if isinstance(first, PreparedInterface) else None
     return replace(prepared, once=once)
 
 
