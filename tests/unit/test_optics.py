@@ -301,6 +301,12 @@ def test_phase_function_is_normalised_and_has_mean_cosine_g(g: float) -> None:
 
 
 @pytest.mark.parametrize("g", ASYMMETRIES)
+def test_the_share_scattered_forwards_is_the_integral_over_the_half_in_front(g: float) -> None:
+    in_front = quad(lambda c: 2 * pi * phase.henyey_greenstein(c, g), 0, 1, epsabs=1e-10, limit=200)[0]
+    assert phase.forwards(g) == pytest.approx(in_front, abs=1e-8 if g else 1e-3)  # an even phase function has g of 1e-3
+
+
+@pytest.mark.parametrize("g", ASYMMETRIES)
 @pytest.mark.parametrize("u", [0.0, 0.1, 0.5, 0.99])
 def test_phase_sampling_inverts_the_distribution(g: float, u: float) -> None:
     cos_theta = phase.sample_henyey_greenstein(g, u)

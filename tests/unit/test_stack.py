@@ -206,6 +206,14 @@ def test_textures_are_relative_to_the_file(tmp_path: Path, monkeypatch: pytest.M
     assert Stack.from_flat(stack.kinds, stack.flat()) == stack
 
 
+@pytest.mark.parametrize("axes", ["uv", "vu"])
+def test_one_axis_is_changed_and_the_other_kept(axes: str) -> None:
+    changed, kept = (f"layer0_alpha_{axis}" for axis in axes)
+    brushed = Stack([Interface(conductor="Au", alpha=(0.1, 0.3))])
+    values = brushed.replace(**{changed: 0.5}).flat()
+    assert (values[changed], values[kept]) == (0.5, brushed.flat()[kept])
+
+
 # Files ---------------------------------------------------------------------------------------------------------------
 
 
