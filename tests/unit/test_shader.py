@@ -119,7 +119,7 @@ def test_what_is_used_twice_has_a_name() -> None:
 
 def test_names_and_titles_are_those_of_the_model() -> None:
     text = shader(vt.preset("coated-gold"), "belcour2018").text
-    assert "// Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 33-36)" in text
+    assert "// Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 28-31)" in text
     assert "vec3 bounces = 1.0 / max(1.0 - " in text
 
 

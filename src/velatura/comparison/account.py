@@ -115,7 +115,7 @@ def _sampled_base(base: Base) -> _Light:
 
 @functools.cache
 def _uniform(count: int) -> tuple[Array, Array]:
-    """Pairs of numbers in [0, 1), spread evenly (Roberts' sequence)."""
+    """Pairs of numbers in [0, 1), spread evenly (Roberts 2018)."""
     i = np.arange(count)
     return (0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1
 

@@ -17,7 +17,7 @@ Light = tuple[Array, Array]  # directions (3, n) and their energies (n,)
 
 
 def uniform(count: int) -> Array:
-    """Points (4, n) in four dimensions, spread evenly (Roberts' sequence)."""
+    """Points (4, n) in four dimensions, spread evenly (Roberts 2018)."""
     root = 1.1673039782614187  # of x^5 = x + 1
     return (0.5 + np.arange(count) * root ** -np.arange(1.0, 5.0)[:, None]) % 1
 

@@ -1,6 +1,6 @@
 """Inverse design: the stacks that give the lobes that are asked for at normal incidence.
 
-After Bati, Pacanowski & Barla 2021, "An Inverse Method for the Exploration of Layered Material Appearance". Stacks are
+After Bati et al. 2021, "An Inverse Method for the Exploration of Layered Material Appearance". Stacks are
 read by the model's own recursion, so that what is found holds for the model that renders it.
 """
 

@@ -89,14 +89,14 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
             above = _totally_reflected(above, own.leaving)
     r_i0, t_0i, t_i0 = above.r_i0, above.t_0i, above.t_i0
 
-    # Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 33-36)
+    # Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 28-31)
     bounces = 1 / ops.maximum(1 - r_i0 * own.r_12, LOSS_MIN)
     m_r0i = t_0i * own.r_12 * t_i0 * bounces
     m_ri0 = own.t_21 * r_i0 * own.t_12 * bounces
     m_rr = mean(r_i0 * own.r_12 * bounces)
     e_ri0 = mean(own.r_21 + m_ri0)
 
-    # Add up the variances of what they bounce between (Eqs. 41-44)
+    # Add up the variances of what they bounce between (Belcour 2018, Eqs. 38, 49-51)
     back_and_forth = (own.s_r + above.s_ri0) * m_rr
     lobe = None
     if not isinstance(layer, PreparedMedium):
@@ -119,7 +119,8 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
 
 
 def _totally_reflected(above: State, leaving: Value) -> State:
-    """Move what cannot leave upwards from the light that is transmitted to the light that is reflected (5.1)."""
+    """Move what cannot leave upwards from the light that is transmitted to the light that is reflected (Belcour 2018,
+    Eqs. 34-35)."""
     r_i0 = ops.clip(above.r_i0 + (1 - leaving) * above.t_i0, 0.0, 1.0)
     return replace(above, r_i0=r_i0, t_i0=above.t_i0 * leaving)
 

@@ -113,7 +113,7 @@ def _at(
     leaves_again = k.again * leaves
     trapped = (1 - leaves) * above.t_i0 * kept / ops.maximum(1 - r_again * kept * (1 - leaves_again), LOSS_MIN)
 
-    # Sum the bounces between the stack and the interface (Belcour 2018, Eqs. 33-36)
+    # Sum the bounces between the stack and the interface (Belcour 2018, Eqs. 28-31)
     bounces = 1 / ops.maximum(1 - above.r_i0 * r, LOSS_MIN)
     out = above.t_i0 * leaves * ops.exp(-k.path * lit * above.depth) + trapped * r_again * leaves_again
     energy = above.t_0i * r * bounces * out
@@ -173,7 +173,7 @@ def _through(above: State, medium: PreparedMedium) -> State:
     path = 1 / ops.maximum(above.cos_theta, COS_MIN)
     t = ops.exp(-depth * path)
 
-    # Add a width for each time that it is scattered (Belcour 2018, Eq. 22, as a roughness)
+    # Add a width for each time that it is scattered (Belcour 2018, Eq. 21, as a roughness)
     g = ops.clip(medium.g, G_MIN, 1.0)
     s_g = ops.power((1 - g) / g, 0.8) / (1 + g)
     alpha2 = ops.power(s_g / (1 + s_g), 2 / 1.1)

@@ -41,7 +41,7 @@ class Operator:
 def interface(
     prepared: Prepared, layer: PreparedInterface, cos_theta: Value, s_t0i: Variance, wi: Direction
 ) -> Operator:
-    """Reflection and refraction by a rough interface (Eqs. 7-13), lit with variance s_t0i at cos_theta."""
+    """Reflection and refraction by a rough interface lit with variance s_t0i at cos_theta (Belcour 2018, Eqs. 7-13)."""
     model, none = prepared.model, prepared.variance.uniform(0.0)
     lit = (s_t0i + layer.s_r).roughness(prepared.f)  # as rough as interface and light together
 
@@ -80,13 +80,13 @@ def reflectance(prepared: Prepared, layer: PreparedInterface, cos_theta: Value, 
 
 
 def _transmitted(prepared: Prepared, roughness: Roughness, ratio: Value, passes: Value) -> Variance:
-    """Variance of a refraction: that of a reflection by a rescaled roughness (Eq. 10 in magnitudes)."""
+    """Variance of a refraction: that of a reflection by a rescaled roughness (Belcour 2018, Eq. 10 in magnitudes)."""
     scale = ops.select(passes, 0.5 * ops.absolute(1 - ratio), 0.0)
     return prepared.variance.of(roughness.scaled(scale), prepared.f)
 
 
 def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) -> Operator:
-    """Absorption and forward scattering by a medium (Eqs. 15-17, 22-24)."""
+    """Absorption and forward scattering by a medium (Belcour 2018, Eqs. 15-17, 21-24)."""
     path = 1 / ops.maximum(cos_theta, COS_MIN)
     g = ops.clip(layer.g, G_MIN, 1.0)
     scattered = ops.select(layer.g > 0, layer.tau_s * path, 0.0)

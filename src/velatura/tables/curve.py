@@ -108,7 +108,7 @@ def _to_azimuth(t: Value) -> Value:
 
 def evenly(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:
     """Three uniform numbers for every sample, the same at all nodes, that fill the cube evenly, the last two the square
-    (Roberts' sequence)."""
+    (Roberts 2018)."""
     index, real = _index(nodes * samples, number)
     i = index % samples
     # Fractions of i x 0.7549 and i x 0.5698, from integers that overflow

@@ -62,7 +62,7 @@ def mirror_row(tables: Tables) -> Row:
 
 
 def fgd(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
-    """Directional albedo of a GGX interface (Belcour 2018, Eq. 2 and 4.1), shape of colour against direction."""
+    """Directional albedo of a GGX interface (Belcour 2018, Eq. 2; section 4.1), shape of colour against direction."""
     channels = ops.interpolate(row.table, coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha))
     above = _dot(channels, row.reflectance)
     if not row.rarer:

@@ -42,7 +42,7 @@ def albedo(cos_theta: np.ndarray, alpha_x: np.ndarray, alpha_y: np.ndarray, norm
 
     The outgoing masking, averaged over visible normals.
     """
-    # Spread numbers evenly over the square (Roberts' sequence)
+    # Spread numbers evenly over the square (Roberts 2018)
     i = np.arange(normals)
     u_1, u_2 = (0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1
     wi = np.sqrt(1 - cos_theta**2), 0.0, cos_theta
