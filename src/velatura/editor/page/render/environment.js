@@ -15,7 +15,7 @@ export function readPicture(name, bytes) {
   try {
     read = loader.setDataType(FloatType).parse(bytes);
   } catch (error) {
-    throw new Error(`${name}: not a readable picture (${error.message ?? error})`);
+    throw new Error(`${name}: not a readable picture (${error.message ?? error})`, { cause: error });
   }
   const { width, height, data } = read;
   const channels = data.length / (width * height);

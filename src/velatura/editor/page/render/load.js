@@ -19,7 +19,7 @@ export async function loadObject(file, plinth = []) {
   try {
     root = await read(file);
   } catch (error) {
-    throw new Error(`${file.name}: not a readable object (${error.message ?? error})`);
+    throw new Error(`${file.name}: not a readable object (${error.message ?? error})`, { cause: error });
   }
   const meshes = [];
   root.updateMatrixWorld(true);

@@ -79,7 +79,7 @@ const FORMS = {
 
 /** A control that may give way to a texture. */
 function simple(context, control, span = SPANS[context.key]) {
-  const { value, spec } = context;
+  const { value } = context;
   if (isTexture(value)) return textured(context);
   return {
     control: control({ ...context, ...(span && { span }) }),

