@@ -9,9 +9,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from velatura import checks as checks
+    from velatura import comparison as comparison
+    from velatura import inverse as inverse
+    from velatura import kernel as kernel
+    from velatura import model as model
+    from velatura import reference as reference
+    from velatura import scenes as scenes
+    from velatura import shader as shader
+    from velatura import stack as stack
+    from velatura import tables as tables
     from velatura.api import bsdf, check, lobes, register, render
     from velatura.comparison import compare
     from velatura.editor.widget import Editor as Editor
+    from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Interface, Medium, Stack, Texture, load, preset, presets, save
 
@@ -21,6 +32,7 @@ _HOMES = {
     "velatura.api": ("bsdf", "check", "lobes", "register", "render"),
     "velatura.comparison": ("compare",),
     "velatura.editor.widget": ("Editor",),
+    "velatura.errors": ("InvalidInput", "LawBroken", "MissingTool", "NoSolution", "VelaturaError"),
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": ("Diffuse", "Interface", "Medium", "Stack", "Texture", "load", "preset", "presets", "save"),
 }
@@ -31,10 +43,15 @@ __all__ = [
     "MODELS",
     "Diffuse",
     "Interface",
+    "InvalidInput",
+    "LawBroken",
     "Medium",
+    "MissingTool",
     "Model",
+    "NoSolution",
     "Stack",
     "Texture",
+    "VelaturaError",
     "bsdf",
     "check",
     "compare",

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from velatura.model.models import DEFAULT, SWITCHES, Model, named
-from velatura.model.statistics import statistics as lobes
-from velatura.stack import Stack, dumps, load
+from velatura.model.statistics import Statistics, statistics
+from velatura.stack import Material, Stack, dumps, load
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from velatura.checks import Report
 
 __all__ = ["bsdf", "check", "lobes", "register", "render"]
@@ -28,7 +30,36 @@ def register() -> None:
     kernel.register()
 
 
-def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: Any) -> Any:
+def lobes(
+    stack: Material, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
+) -> Statistics:
+    """Energy, covariance and roughness of every lobe of a material (Belcour 2018, section 5), in NumPy.
+
+    Args:
+        stack: a material (a stack, a file, or a preset's name).
+        cos_theta: cosines of the directions of incidence, in (0, 1]: a number, or a list of N.
+        phi: their azimuths from the tangent, radians: one for all, or N.
+        model: a named model or its name, its choices changed by `switches` (`reflectance="fresnel"`, `tir="off"`, ...).
+
+    Returns:
+        For each interface k from the top, of what is reflected, in double precision, by C = 3 colours and N directions:
+
+        energy[k]: (C, N), fraction of the incident energy;
+        covariance[k]: (3, N), xx, xy and yy in the space of the model's roughness map, in the shading frame;
+        alpha[k]: (2, N), GGX roughness along two axes;
+        rotation[k]: (N,), the angle from the tangent to the first of them, radians anticlockwise seen from outside.
+
+        `transmitted` holds the same four of what leaves below, or is None where nothing does. With
+        `channels="separate"` all but the energy have a leading axis of colours. A diffuse base is no lobe.
+
+    Raises:
+        InvalidInput: not a valid material, a cosine outside its range, lists of different lengths, an unknown model or
+            switch, or a texture, since lobes are those of one point.
+    """
+    return statistics(load(stack), cos_theta, phi, model, **switches)
+
+
+def bsdf(stack: Material, model: str | Model = DEFAULT, **switches: Any) -> Any:
     """A `mi.BSDF` of a material (a stack, a file, or a preset's name), in the variant that is set (else llvm_ad_rgb).
 
     Args:
@@ -41,7 +72,7 @@ def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: Any) -> A
     """
     from velatura import kernel
 
-    described = stack if isinstance(stack, Stack) else load(stack)
+    described = load(stack)
     if model in PLUGINS:
         options = {"type": PLUGINS[str(model)], **switches}
     else:
@@ -53,7 +84,7 @@ def bsdf(stack: Stack | str, model: str | Model = DEFAULT, **switches: Any) -> A
 
 
 def render(
-    stack: Stack | str,
+    stack: Material,
     scene: str = "ball",
     env: str | None = None,
     spp: int = 64,
@@ -63,7 +94,7 @@ def render(
     progress: Callable[[int, int], None] | None = None,
     **switches: str,
 ) -> Any:
-    """A picture of a material: linear RGB of shape (height, width, 3).
+    """A picture of a material (a stack, a file, or a preset's name): linear RGB of shape (height, width, 3).
 
     Args:
         scene: "ball", "sphere", "teapot", "plane", "wedges", "lid", or a Mitsuba scene file whose BSDF "material" is to
@@ -111,10 +142,10 @@ def check(
     from velatura import checks
 
     def made(thing: Any) -> Any:
-        return bsdf(thing, model, **switches) if isinstance(thing, Stack | str) else thing
+        return bsdf(thing, model, **switches) if isinstance(thing, Material) else thing
 
-    if isinstance(material, Stack | str):
-        material = material if isinstance(material, Stack) else load(material)
+    if isinstance(material, Material):
+        material = load(material)
         lossless = lossless or _lossless(material)
     return checks.check(
         made(material),

@@ -66,7 +66,9 @@ VALUES = {
     one_layer("eta: Au"): "layer 0 (interface): eta: Au is a metal; write conductor: Au",
     one_layer("conductor: gould"): "layer 0 (interface): conductor: unknown metal 'gould' (did you mean gold?)",
     one_layer("conductor: au"): "layer 0 (interface): conductor: unknown metal 'au' (did you mean Au?)",
-    one_layer("conductor: xyzzy"): "layer 0 (interface): conductor: unknown metal 'xyzzy'",
+    one_layer("conductor: xyzzy"): (
+        "layer 0 (interface): conductor: unknown metal 'xyzzy' (`velatura schema` lists all; or write eta and k)"
+    ),
     one_layer("conductor: bk7"): "layer 0 (interface): conductor: bk7 is a dielectric; write eta: bk7",
     one_layer("conductor: 3"): "layer 0 (interface): conductor: must be the name of a metal, got 3",
     # What belongs together

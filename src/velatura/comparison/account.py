@@ -14,10 +14,10 @@ from velatura.errors import InvalidInput
 from velatura.model import Model, adding, bsdf, mixture, recursion, variance_kind
 from velatura.model.diffuse import Base
 from velatura.model.statistics import number
+from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import Lobe
 from velatura.reference.distribution import BINS
-from velatura.reference.trace import directions
 from velatura.stack import Stack
 
 Array = NDArray[np.floating]

@@ -12,7 +12,7 @@ from velatura.comparison.result import Account, Comparison
 from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
-from velatura.stack import Diffuse, Interface, Stack, load
+from velatura.stack import Diffuse, Interface, Material, Stack, load
 
 COSINES = (1.0, 0.7, 0.35)
 PATHS = 3 * 10**6
@@ -21,7 +21,7 @@ Progress = Callable[[int, int], None]
 
 
 def compare(
-    stack: Stack | str,
+    stack: Material,
     models: Sequence[str | Model] | None = None,
     cos_theta: Sequence[float] = COSINES,
     paths: int = PATHS,
@@ -51,7 +51,7 @@ def compare(
         MissingTool: LLVM is missing or too old.
     """
     # Refuse what cannot work before anything slow begins
-    described = stack if isinstance(stack, Stack) else load(stack)
+    described = load(stack)
     chosen = {m.name: m for m in (_every(switches) if models is None else [named(m, **switches) for m in models])}
     if not chosen:
         raise InvalidInput("models: name at least one")

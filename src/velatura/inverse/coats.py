@@ -19,7 +19,7 @@ from velatura.model import Model, lobes, named, prepare, variance_kind
 from velatura.model.diffuse import under, with_means
 from velatura.model.statistics import Statistics, number, statistics
 from velatura.model.variance import Roughness
-from velatura.stack import Diffuse, Interface, Layer, Medium, Stack
+from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, load
 
 KEEP = 64  # partial stacks that are followed
 
@@ -52,7 +52,7 @@ class Coated:
 
 
 def coat(
-    stack: Stack,
+    stack: Material,
     eta: float = 1.5,
     alpha: float = 0.0,
     keep_appearance: bool = False,
@@ -63,16 +63,18 @@ def coat(
     """A material under a dielectric coat.
 
     Args:
+        stack: a material (a stack, a file, or a preset's name).
         eta, alpha: absolute index and roughness of the coat.
         keep_appearance: change the material below, so that its lobes at normal incidence keep energy and variance, and
             a diffuse base its energy, unless it would have to be brighter than white.
         eta_max: largest index that a dielectric may be given.
 
     Raises:
-        InvalidInput: a texture, an index or a roughness outside its range, an unknown model or switch.
+        InvalidInput: not a valid material, a texture, an index or a roughness outside its range, an unknown model or
+            switch.
         NoSolution: no material keeps the appearance; the message names the layer and the constraint.
     """
-    chosen = named(model, **switches)
+    chosen, stack = named(model, **switches), load(stack)
     top = Interface(eta=eta, alpha=alpha)
     if keep_appearance:
         below: tuple[Layer, ...] = _kept(

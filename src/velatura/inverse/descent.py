@@ -15,11 +15,11 @@ import numpy as np
 from velatura.inverse import angles
 from velatura.inverse.above import CLEAR, Array
 from velatura.inverse.angles import ReflectanceTable, radiance
-from velatura.model import Model, bsdf, variance_kind
+from velatura.model import Model, bsdf, named, variance_kind
 from velatura.model.mixture import ALPHA_MIN
 from velatura.model.statistics import number
 from velatura.ops import Value
-from velatura.stack import RGB, Layer, Medium, Stack, is_colour
+from velatura.stack import RGB, Layer, Material, Medium, Stack, is_colour, load
 
 STEP = 1e-5  # of a value, to see how the model changes
 ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: what a round changes, as a share of what there is
@@ -66,13 +66,14 @@ class Free:
         return float(np.log(kept)) if self.logarithmic else kept
 
 
-def fit(table: ReflectanceTable, starts: Sequence[Stack], model: Model, eta_max: float = 4.0) -> Fit:
-    """The closest of the stacks that descents from all starts come to.
+def fit(table: ReflectanceTable, starts: Sequence[Material], model: str | Model, eta_max: float = 4.0) -> Fit:
+    """The closest of the stacks that descents from all starts (stacks, files, or presets' names) come to.
 
     Raises:
-        InvalidInput: a texture in a start, which has no one value.
+        InvalidInput: not a valid material, an unknown model, or a texture in a start, which has no one value.
     """
-    ends = sorted((Descent(table, start, model, eta_max).run() for start in starts), key=lambda end: end[0])
+    model = named(model)
+    ends = sorted((Descent(table, load(start), model, eta_max).run() for start in starts), key=lambda end: end[0])
     stack = ends[0][1]
     by_angle = angles.report(table, angles.table_of(stack, table.directions, model))
     return Fit(stack, model, ends[0][0], by_angle, [error for error, _ in ends])

@@ -19,7 +19,7 @@ from velatura.inverse.stacks import alternatives, model_of
 from velatura.inverse.target import Target, read
 from velatura.model import Model, named, variance_kind
 from velatura.model.variance import Isotropic
-from velatura.stack import Diffuse, Interface, Layer, Medium, Stack
+from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, load
 
 STARTS = 4
 TRIED = 3  # sets of interfaces from which simplification descends
@@ -49,19 +49,22 @@ def fit_target(
     return fit(table, [_with_media(solution.stack) for solution in found], chosen, wanted.eta_max)
 
 
-def simplify(stack: Stack, interfaces: int, model: str | Model = MODEL, eta_max: float = 4.0, **switches: str) -> Fit:
+def simplify(
+    stack: Material, interfaces: int, model: str | Model = MODEL, eta_max: float = 4.0, **switches: str
+) -> Fit:
     """The stack of fewer interfaces whose reflectance comes closest to that of a stack, at all angles.
 
     It keeps some of the interfaces, the last one if nothing passes it, and a diffuse base; their values, and absorption
     below each but the last, then descend. Only what is reflected is compared.
 
     Args:
+        stack: a material (a stack, a file, or a preset's name).
         interfaces: how many are kept, at least 1, and fewer than there are.
 
     Raises:
-        InvalidInput: no such number of interfaces, a texture, an unknown model or switch.
+        InvalidInput: not a valid material, no such number of interfaces, a texture, an unknown model or switch.
     """
-    chosen = named(model, **switches)
+    chosen, stack = named(model, **switches), load(stack)
     count = len(stack.interfaces)
     if not 1 <= interfaces < count:
         raise InvalidInput(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from velatura.errors import InvalidInput
 from velatura.model.adding import Lobe
@@ -14,6 +15,7 @@ from velatura.model.models import DEFAULT, Model, named
 from velatura.model.prepare import prepare, variance_kind
 from velatura.model.recursion import lobes
 from velatura.model.sides import with_index_below
+from velatura.optics.directions import directions
 from velatura.stack import Named, Stack, Varying, is_colour, spectra
 
 
@@ -45,40 +47,26 @@ class Statistics:
 
 def statistics(
     stack: Stack,
-    cos_theta: float | Sequence[float] | np.ndarray,
-    phi: float | Sequence[float] | np.ndarray = 0.0,
+    cos_theta: ArrayLike,
+    phi: ArrayLike = 0.0,
     model: str | Model = DEFAULT,
     **switches: str,
 ) -> Statistics:
-    """Energy, covariance and roughness of every lobe of a stack (Belcour 2018, section 5).
-
-    Args:
-        cos_theta: cosines of the directions of incidence, in (0, 1], shape (N,) or a number.
-        phi: their azimuths from the tangent, radians, broadcast against cos_theta.
-        model: name of a model, its choices changed by `switches` (`reflectance="fresnel"`, `tir="off"`, ...).
-
-    Raises:
-        InvalidInput: a cosine outside its range, an unknown model or switch, a texture where a number is needed.
-    """
+    """The lobes of a stack, as `velatura.lobes` says."""
     chosen = named(model, **switches)
-    cosine, azimuth = (np.atleast_1d(np.asarray(x, float)) for x in np.broadcast_arrays(cos_theta, phi))
-    if not (np.all(cosine > 0) and np.all(cosine <= 1)):
-        raise InvalidInput(
-            f"cos_theta: must lie in 0 (excluded) to 1, got {cosine[~((cosine > 0) & (cosine <= 1))][0]:g}"
-        )
+    x, y, z = directions(cos_theta, phi).T
     flat = stack.flat()
     values = {name: number(name, value) for name, value in flat.items()}
     values = with_index_below(stack.kinds, values, stack.thin)
     prepared = prepare(stack.kinds, values, chosen, variance_kind(stack.kinds, flat))
-    sine = np.sqrt(1 - cosine**2)
-    reflected, transmitted = lobes(prepared, (sine * np.cos(azimuth), sine * np.sin(azimuth), cosine))
-    each = [_collect(lobe, chosen, len(cosine)) for lobe in reflected]
+    reflected, transmitted = lobes(prepared, (x, y, z))
+    each = [_collect(lobe, chosen, len(z)) for lobe in reflected]
     return Statistics(
         energy=[lobe.energy for lobe in each],
         covariance=[lobe.covariance for lobe in each],
         alpha=[lobe.alpha for lobe in each],
         rotation=[lobe.rotation for lobe in each],
-        transmitted=_collect(transmitted, chosen, len(cosine)) if stack.transmits else None,
+        transmitted=_collect(transmitted, chosen, len(z)) if stack.transmits else None,
     )
 
 

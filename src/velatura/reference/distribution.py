@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from velatura.reference.trace import directions, trace
-from velatura.stack import Stack
+from velatura.optics.directions import directions
+from velatura.reference.trace import trace
+from velatura.stack import Material, Stack, load
 
 BINS = 40
 
@@ -29,9 +29,9 @@ class Distribution:
 
 
 def distribution(
-    stack: Stack,
-    cos_theta: Any,
-    phi: Any = 0.0,
+    stack: Material,
+    cos_theta: ArrayLike,
+    phi: ArrayLike = 0.0,
     paths: int = 3 * 10**6,
     seed: int = 0,
     microsurface: bool = False,
@@ -42,6 +42,7 @@ def distribution(
     Raises:
         InvalidInput, MissingTool: as `statistics`.
     """
+    stack = load(stack)
     grids = [_grids(stack, wi, paths, seed, microsurface, bins) for wi in directions(cos_theta, phi)]
     reflected, transmitted = (np.stack([pair[side] for pair in grids], axis=1) for side in (0, 1))
     return Distribution(reflected, transmitted if stack.transmits else None)

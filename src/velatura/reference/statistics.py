@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from velatura.optics import fresnel, ggx
+from velatura.optics.directions import directions
 from velatura.reference import roughness
-from velatura.reference.trace import directions, ends, relative_index
-from velatura.stack import Diffuse, Interface, Stack
+from velatura.reference.trace import ends, relative_index
+from velatura.stack import Diffuse, Interface, Material, Stack, load
 
 Array = NDArray[np.floating]
 
@@ -52,9 +52,9 @@ class Statistics:
 
 
 def statistics(
-    stack: Stack,
-    cos_theta: Any,
-    phi: Any = 0.0,
+    stack: Material,
+    cos_theta: ArrayLike,
+    phi: ArrayLike = 0.0,
     paths: int = 10**6,
     seed: int = 0,
     microsurface: bool = False,
@@ -67,16 +67,19 @@ def statistics(
     transmitted light are those of its mirror image and of `wi` refracted through the whole stack (Belcour 2018, 4.2).
 
     Args:
-        cos_theta: cosines of the directions of incidence, in (0, 1], shape (N,) or a number.
-        phi: their azimuths from the tangent, radians, broadcast against cos_theta.
+        stack: a material (a stack, a file, or a preset's name).
+        cos_theta: cosines of the directions of incidence, in (0, 1]: a number, or a list of N.
+        phi: their azimuths from the tangent, radians: one for all, or N.
         paths: walks for each direction.
         seed: of the random numbers; the same one gives the same result.
         microsurface: whether light scatters many times between the facets of an interface (Heitz et al. 2016).
 
     Raises:
-        InvalidInput: a cosine outside its range, or a texture where a number is needed.
+        InvalidInput: no valid material, a cosine outside its range, lists of different lengths, or a texture where a
+            number is needed.
         MissingTool: LLVM is missing or too old; the message says what to install.
     """
+    stack = load(stack)
     columns = [_column(stack, wi, paths, seed, microsurface) for wi in directions(cos_theta, phi)]
     truncated = np.array([lost for _, lost in columns])
     values, errors = (_collect([[pair[i] for pair in lobes] for lobes, _ in columns]) for i in (0, 1))

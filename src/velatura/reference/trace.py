@@ -36,20 +36,6 @@ class Ends:
     truncated: float
 
 
-def directions(cos_theta: Any, phi: Any) -> Array:
-    """Unit vectors (N, 3) of the given cosines and azimuths, broadcast against each other.
-
-    Raises:
-        InvalidInput: a cosine outside (0, 1].
-    """
-    cosine, azimuth = (np.atleast_1d(np.asarray(x, float)) for x in np.broadcast_arrays(cos_theta, phi))
-    outside = ~((cosine > 0) & (cosine <= 1))
-    if outside.any():
-        raise InvalidInput(f"cos_theta: must lie in 0 (excluded) to 1, got {cosine[outside][0]:g}")
-    sine = np.sqrt(1 - cosine**2)
-    return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=-1)
-
-
 def ends(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) -> Ends:
     """All paths at once; see `trace`."""
     parts = list(trace(stack, wi, paths, seed, microsurface))
@@ -64,9 +50,11 @@ def trace(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) ->
     """Walk paths that come from the direction wi (3,), some millions at a time.
 
     Raises:
-        InvalidInput: the stack holds a texture.
+        InvalidInput: the stack holds a texture, or there are no paths.
         MissingTool: LLVM is missing or too old.
     """
+    if paths < 1:
+        raise InvalidInput(f"paths: must be at least 1, got {paths}")
     kernel.require_llvm()
     layers = _layers(stack, microsurface)
     for start in range(0, paths, _AT_ONCE):

@@ -16,7 +16,7 @@ from velatura.shader import atlas, glsl, material
 from velatura.shader.bake import Bake
 from velatura.shader.recording import SHOWN, Recording, part, record
 from velatura.shader.symbol import Kind, Operand, Symbol
-from velatura.stack import Stack, Texture
+from velatura.stack import Material, Texture, load
 
 
 @dataclass(frozen=True)
@@ -47,16 +47,17 @@ class Shader:
 
 
 def shader(
-    stack: Stack,
+    stack: Material,
     model: str | Model = DEFAULT,
     constant: Collection[str] = (),
     values: Literal["literals", "uniforms"] = "literals",
     **switches: str,
 ) -> Shader:
-    """A stack as GLSL ES 3.00: the structs `VtMaterial` and `VtLobes`, and functions on them.
+    """A material as GLSL ES 3.00: the structs `VtMaterial` and `VtLobes`, and functions on them.
 
     Args:
-        stack: its kinds of layers make the code; its values go into `vt_material`, which gives them.
+        stack: a material (a stack, a file, or a preset's name). Its kinds of layers make the code; its values go into
+            `vt_material`, which gives them.
         constant: flat names of values that never change, which are worked out now and are not in the struct.
         values: plain values as `literals`, or as `uniforms` that somebody changes; then the code is the same for all
             of them, be roughnesses equal or not, and lobes are drawn once for a change, and read.
@@ -64,6 +65,7 @@ def shader(
     Raises:
         InvalidInput: as `record`.
     """
+    stack = load(stack)
     recording = record(stack, model, constant, values == "uniforms", **switches)
     baked, read = recording.baked, recording.read
     texture, tables = _tables(recording.symbols)

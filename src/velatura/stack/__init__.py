@@ -1,7 +1,7 @@
 """What a material is: layers, their parameters, and the files that hold them. It does no optics and no rendering."""
 
 from velatura.stack.describe import json_schema, parameter_table
-from velatura.stack.io import dumps, load, loads, preset, presets, save
+from velatura.stack.io import Material, dumps, load, loads, preset, presets, save
 from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, is_colour, within
 from velatura.stack.spectra import Named, names, rgb, spectrum
 from velatura.stack.stack import Stack
@@ -14,6 +14,7 @@ __all__ = [
     "Interface",
     "Kind",
     "Layer",
+    "Material",
     "Medium",
     "Named",
     "Stack",

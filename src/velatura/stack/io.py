@@ -9,31 +9,38 @@ import os
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import yaml
 
 from velatura.errors import InvalidInput
 from velatura.files import whole
-from velatura.stack.schema import unknown
+from velatura.stack.schema import show, unknown
 from velatura.stack.stack import Stack
 
 _PRESETS = Path(__file__).with_name("presets")
 _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 _LARGEST = 100_000  # values in a file
 
+#: What names a material wherever one is asked for: a stack, a file, or the name of a preset.
+Material: TypeAlias = Stack | str | Path
+
 
 # In ------------------------------------------------------------------------------------------------------------------
 
 
-def load(material: str | Path) -> Stack:
-    """The stack in a material file (.yaml, .yml or .json), or the preset of that name.
+def load(material: Material) -> Stack:
+    """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack as it is.
 
     A bare word without an extension is a preset. Texture paths are relative to the file.
 
     Raises:
         InvalidInput: no such file or preset, or what is in it is not a material; one line that names the file.
     """
+    if isinstance(material, Stack):
+        return material
+    if not isinstance(material, str | Path):
+        raise InvalidInput(f"a material must be a stack, a file or the name of a preset, got {show(material)}")
     path = Path(material)
     if str(material) in presets() or (not path.suffix and path.parent == Path() and not os.path.isdir(path)):
         return preset(str(material))
@@ -98,7 +105,8 @@ def preset(name: str) -> Stack:
         InvalidInput: there is none.
     """
     if name not in presets():
-        raise InvalidInput(f"{unknown('preset', name, presets())}; a material file ends in {', '.join(_FORMATS)}")
+        unknown_name = unknown("preset", name, presets(), "`velatura presets` lists all")
+        raise InvalidInput(f"{unknown_name}; a material file ends in {', '.join(_FORMATS)}")
     return load(_PRESETS / f"{name}.yaml")
 
 

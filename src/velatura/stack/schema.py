@@ -21,15 +21,15 @@ from velatura.errors import InvalidInput
 RecordType = TypeVar("RecordType", bound="Record")
 
 
-def unknown(what: str, name: object, known: Iterable[str]) -> str:
-    """One line about an unknown name, with the nearest known one where there is one that looks alike."""
+def unknown(what: str, name: object, known: Iterable[str], listed: str = "") -> str:
+    """One line about an unknown name: the known one that looks alike; else all, or where so many are `listed`."""
     lower_case = {option.lower(): option for option in known}
-    near = difflib.get_close_matches(str(name).lower(), lower_case, n=1)
+    near = difflib.get_close_matches(str(name).lower(), lower_case, n=1, cutoff=0.65)
     if near:
         return f"unknown {what} {show(name)} (did you mean {lower_case[near[0]]}?)"
     if len(lower_case) <= 16:
         return f"unknown {what} {show(name)} (known: {', '.join(lower_case.values())})"
-    return f"unknown {what} {show(name)}"
+    return f"unknown {what} {show(name)}" + (f" ({listed})" if listed else "")
 
 
 def show(value: object) -> str:

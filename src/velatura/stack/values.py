@@ -14,6 +14,8 @@ from velatura.stack.spectra import MIRROR, Named, names
 
 RGB: TypeAlias = tuple[float, float, float]
 
+LISTED = "`velatura schema` lists all"
+
 # Words, switches and files -------------------------------------------------------------------------------------------
 
 
@@ -95,7 +97,7 @@ class Conductor(Parameter):
         if value in dielectrics:
             raise ValueError(f"{value} is a dielectric; write eta: {value}")
         if value not in (MIRROR, *conductors):
-            raise ValueError(unknown("metal", value, (MIRROR, *conductors)))
+            raise ValueError(unknown("metal", value, (MIRROR, *conductors), f"{LISTED}; or write eta and k"))
         return value
 
     def json_schema(self) -> dict[str, Any]:
@@ -235,7 +237,7 @@ class Index(Colour):
             value = value.name
         if isinstance(value, str):
             if value not in self._names():
-                raise ValueError(unknown("name", value, self._names()))
+                raise ValueError(unknown("name", value, self._names(), f"{LISTED}; or write numbers"))
             return value
         return super().check(value)
 
