@@ -165,6 +165,14 @@ def test_a_smooth_stack_is_a_mirror_of_all_its_lobes() -> None:
     assert np.all(np.array(bsdf.eval(ctx, si, bs.wo)) == 0)
 
 
+def test_many_smooth_layers_are_a_mirror_without_loss() -> None:
+    layers = [vt.Interface(eta=1.5 if k % 2 == 0 else 1.3) for k in range(29)]
+    bsdf = vt.bsdf(vt.Stack([*layers, vt.Interface(conductor="mirror")]), model="belcour2018")
+    si = interaction(direction(0.1, 0.3))
+    _, weight = bsdf.sample(mi.BSDFContext(), si, 0.3, mi.Point2f(0.2, 0.7))
+    assert np.allclose(weight, 1, atol=1e-3)
+
+
 @pytest.mark.parametrize("form", ["forward", "symmetric"])
 def test_paint_alone_is_diffuse(form: str) -> None:
     bsdf = vt.bsdf(vt.Stack([vt.Diffuse(albedo=(0.5, 0.3, 0.1))]), form=form)

@@ -160,6 +160,26 @@ def test_the_furnace_keeps_all_energy(name: str, tir: str) -> None:
     assert np.allclose(sum(found.energy), 1, atol=1e-6)
 
 
+@pytest.mark.parametrize("count", [20, 29, 100])
+def test_many_smooth_layers_keep_all_energy(count: int) -> None:
+    """Total reflection as published keeps ever less from coming back, in the end 1e-15 of all light and less."""
+    layers = [Interface(eta=1.5 if k % 2 == 0 else 1.3) for k in range(count)]
+    found = statistics(Stack([*layers, Interface(conductor="mirror")]), [1.0, 0.5, 0.1, 0.02], model="belcour2018")
+    assert np.allclose(sum(found.energy), 1, atol=1e-6)
+
+
+def test_many_layers_and_an_absorbing_medium_are_summed_as_by_hand() -> None:
+    """The energy of a mirror below a stack and a medium of transmittance t is t^2 t_0 t_1 / (1 - r t^2)."""
+    coats = [Interface(eta=1.5), Interface(eta=1.3)]
+    bare = statistics(Stack(coats), 1.0, **PLAIN)
+    assert bare.transmitted is not None
+    passed = bare.transmitted.energy[0, 0]  # as much in either direction, and nothing is absorbed
+    t = np.exp(-0.3)
+    stack = Stack([*coats, Medium(sigma_a=0.3), Interface(conductor="mirror")])
+    found = statistics(stack, 1.0, **PLAIN).energy[-1][0, 0]
+    assert isclose(found, t * t * passed * passed / (1 - (1 - passed) * t * t), rel_tol=1e-12)
+
+
 def test_separate_channels_agree_with_their_mean_where_colour_is_none() -> None:
     stack = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=0.3, k=3.0, alpha=0.2)])
     mean, separate = (statistics(stack, [1.0, 0.4], channels=c, **PAPER) for c in SWITCHES["channels"])

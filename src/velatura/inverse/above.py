@@ -150,7 +150,8 @@ class Above:
         if np.ndim(tau) == 0 and tau == 0:
             return self
         t, state = np.exp(-np.asarray(tau)), self.state
-        passed = {"r_i0": state.r_i0 * t * t, "t_0i": state.t_0i * t, "t_i0": state.t_i0 * t}
+        a_i0 = 1 - t + t * (state.a_i0 + state.r_i0 * (1 - t))
+        passed = {"r_i0": state.r_i0 * t * t, "t_0i": state.t_0i * t, "t_i0": state.t_i0 * t, "a_i0": a_i0}
         return dataclasses.replace(self, state=dataclasses.replace(state, **passed))
 
     def below(self, layers: Layers, reflectance: Value | None = None) -> tuple[Above, adding.Lobe]:

@@ -16,8 +16,6 @@ from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
-LOSS_MIN = 1e-6  # of one bounce between the stack and a layer; light that loses less is trapped, and blurred out
-
 
 @dataclass(frozen=True)
 class Lobe:
@@ -36,12 +34,17 @@ class Lobe:
 
 @dataclass(frozen=True)
 class State:
-    """The stack so far: energies (colours), variances, the cosine below it and the products of Snell's factors."""
+    """The stack so far: energies (colours), variances, the cosine below it and the products of Snell's factors.
+
+    Of the light that comes up to it, r_i0 returns, t_i0 leaves and a_i0 is absorbed. Each is kept apart, since 1 - r_i0
+    would be lost to rounding where nearly all light returns.
+    """
 
     cos_theta: Value
     r_i0: Value
     t_0i: Value
     t_i0: Value
+    a_i0: Value
     s_t0i: Variance
     s_ti0: Variance
     s_ri0: Variance
@@ -75,7 +78,7 @@ def _down(prepared: Prepared, wi: Direction) -> tuple[State, list[Lobe]]:
 def top(prepared: Prepared, cos_theta: Value) -> State:
     """Nothing above: all light passes, unblurred."""
     none = prepared.variance.uniform(0.0)
-    return State(cos_theta, 0.0, 1.0, 1.0, none, none, none, 1.0, 1.0)
+    return State(cos_theta, 0.0, 1.0, 1.0, 0.0, none, none, none, 1.0, 1.0)
 
 
 def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Direction) -> tuple[State, Lobe | None]:
@@ -90,7 +93,8 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
     r_i0, t_0i, t_i0 = above.r_i0, above.t_0i, above.t_i0
 
     # Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 28-31)
-    bounces = 1 / ops.maximum(1 - r_i0 * own.r_12, LOSS_MIN)
+    gone = above.a_i0 + r_i0 * own.a_12
+    bounces = 1 / ops.maximum(gone + t_i0 + r_i0 * own.t_12, ops.TINY)  # 1 - r_i0 r_12
     m_r0i = t_0i * own.r_12 * t_i0 * bounces
     m_ri0 = own.t_21 * r_i0 * own.t_12 * bounces
     m_rr = mean(r_i0 * own.r_12 * bounces)
@@ -109,6 +113,7 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
         r_i0=own.r_21 + m_ri0,
         t_0i=t_0i * own.t_12 * bounces,
         t_i0=own.t_21 * t_i0 * bounces,
+        a_i0=own.a_21 + own.t_21 * gone * bounces,
         s_t0i=(above.s_t0i * own.j_12 + own.s_t12 + back_and_forth * own.j_12).bounded(),
         s_ti0=(own.s_t21 * above.j_i0 + above.s_ti0 + back_and_forth * above.j_i0).bounded(),
         s_ri0=(own.s_r * (mean(own.r_21) * share) + from_above * (mean(m_ri0) * share)).bounded(),
@@ -122,7 +127,8 @@ def _totally_reflected(above: State, leaving: Value) -> State:
     """Move what cannot leave upwards from the light that is transmitted to the light that is reflected (Belcour 2018,
     Eqs. 34-35)."""
     r_i0 = ops.clip(above.r_i0 + (1 - leaving) * above.t_i0, 0.0, 1.0)
-    return replace(above, r_i0=r_i0, t_i0=above.t_i0 * leaving)
+    # However often it is reflected, in the end it leaves
+    return replace(above, r_i0=r_i0, t_i0=ops.maximum(above.t_i0 * leaving, ops.TINY))
 
 
 def _each(colour: Value) -> Value:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from velatura import ops, tables
-from velatura.model.adding import LOSS_MIN, Lobe
+from velatura.model.adding import Lobe
 from velatura.model.calibration import Calibration
 from velatura.model.operators import COS_MIN, G_MIN
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
@@ -30,6 +30,7 @@ from velatura.tables import Average
 
 FAINT = 1e-4  # albedo that the tables' errors come close to
 DIM = 3e-4  # albedo of whose parts the tables tell little
+LOSS_MIN = 1e-6  # of one bounce between the stack and a layer
 CONTRAST_MIN = 0.02  # of two indices, below which an interface is hardly there
 
 

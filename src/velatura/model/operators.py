@@ -19,7 +19,8 @@ G_MIN = 1e-3  # keeps the variance of a phase function finite where it scatters 
 
 @dataclass(frozen=True)
 class Operator:
-    """One layer: energies reflected and transmitted downwards (12) and upwards (21), variances, Snell's factors.
+    """One layer: energies reflected, transmitted and absorbed of light that goes down (12) and up (21), variances,
+    Snell's factors.
 
     `cos_theta` is the cosine below the layer, `leaving` the share of the light coming up from it that total internal
     reflection lets out (None: all of it).
@@ -29,6 +30,8 @@ class Operator:
     t_12: Value
     r_21: Value
     t_21: Value
+    a_12: Value
+    a_21: Value
     s_r: Variance
     s_t12: Variance
     s_t21: Variance
@@ -51,7 +54,7 @@ def interface(
     if layer.leaving is not None:
         leaving = ops.clip(layer.leaving(*fetched(prepared, lit, cos_theta, wi)), 0.0, 1.0)
     if layer.opaque:
-        return Operator(r, 0.0, 0.0, 0.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
+        return Operator(r, 0.0, 0.0, 0.0, 1 - r, 1.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
 
     # Refract, unless Snell's law has no solution
     sin2_t = (1 - cos_theta * cos_theta) / (layer.n12 * layer.n12)
@@ -62,7 +65,8 @@ def interface(
     n = ratio if model.scale == "angles" else layer.n12
     s_t12 = _transmitted(prepared, layer.roughness, 1 / n, passes)
     s_t21 = _transmitted(prepared, layer.roughness, n, passes)
-    return Operator(r, t, ops.select(passes, r, 0.0), t, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
+    r_21, a_12, a_21 = ops.select(passes, r, 0.0), ops.select(passes, 0.0, 1 - r), ops.select(passes, 0.0, 1.0)
+    return Operator(r, t, r_21, t, a_12, a_21, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
 
 
 def reflectance(prepared: Prepared, layer: PreparedInterface, cos_theta: Value, lit: Roughness, wi: Direction) -> Value:
@@ -101,7 +105,8 @@ def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) ->
         t, s_g = ops.exp(scattered - layer.tau * path), s_g * mean
     s_t = prepared.variance.uniform(ops.select(layer.g > 0, s_g, 0.0))
     none = prepared.variance.uniform(0.0)
-    return Operator(0.0, t, 0.0, t, none, s_t, s_t, 1.0, 1.0, cos_theta, None)
+    a = ops.maximum(1 - t, 0.0)
+    return Operator(0.0, t, 0.0, t, a, a, none, s_t, s_t, 1.0, 1.0, cos_theta, None)
 
 
 def fetched(
