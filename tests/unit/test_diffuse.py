@@ -131,3 +131,11 @@ def test_what_enters_smoothly_goes_where_snell_says() -> None:
     found = np.array(parts.entering(SHIPPED, COSINES, 0 * COSINES, 0 * COSINES + 1.55))[: len(parts.OPEN)]
     for power in (1, 2):
         np.testing.assert_allclose(np.array(parts.OPEN) ** power @ found, p2**power, atol=2e-3)
+
+
+@pytest.mark.parametrize("exterior", [1.3, 1.6, 2.5])
+def test_below_a_medium_of_lower_index_no_light_is_negative(exterior: float) -> None:
+    """Beyond the critical angle next to nothing enters, which polynomials know to a share of .001 only."""
+    albedo, _ = seen(vt.Stack([vt.Interface(eta=1.1), vt.Diffuse(albedo=0.9)], exterior=exterior))
+    assert np.min(albedo) >= 0
+    assert np.max(albedo[:, -1]) < 1e-3

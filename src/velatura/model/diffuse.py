@@ -104,7 +104,8 @@ def _through(prepared: Prepared, wi: Direction) -> Value:
     kept = _passed(inside.depth_above, wi[2])
     if not inside.interfaces:
         return kept
-    return kept * _sum(a * b for a, b in zip(_entered(prepared, wi), prepared.base.worth))
+    # Parts may be negative, and so may their sum be by a little where next to nothing enters
+    return kept * ops.clip(_sum(a * b for a, b in zip(_entered(prepared, wi), prepared.base.worth)), 0.0, 1.0)
 
 
 def _entered(prepared: Prepared, wi: Direction) -> Row:

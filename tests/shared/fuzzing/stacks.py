@@ -1,0 +1,156 @@
+"""Random stacks of every shape, from what a user might write to the ends of what is accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from velatura.errors import InvalidInput
+from velatura.stack import Diffuse, Interface, Layer, Medium, Stack, names
+
+BASES = ("dielectric", "thin", "metal", "named", "mirror", "diffuse")
+METALS, GLASSES = names()
+
+
+def random_stack(rng: np.random.Generator, absurd: bool = False, most: int = 4, base: str | None = None) -> Stack:
+    """A stack of up to `most` dielectrics, media between them and above the first, over a base (None: any).
+
+    `absurd`: every value may lie anywhere in the range that is accepted, most often near its ends.
+    """
+    draw = _Absurd(rng) if absurd else _Tame(rng)
+    base = base or str(rng.choice(BASES))
+    transmits = base in ("dielectric", "thin")
+    layers: list[Layer] = []
+    turned = rng.random() < 0.3  # else all interfaces share their axes
+    uneven = 0.0 if rng.random() < 0.5 else 0.5  # share of anisotropic interfaces
+    for _ in range(rng.integers(1 if transmits else 0, most + 1)):
+        if rng.random() < 0.35:
+            layers.append(draw.accepted(draw.medium))
+        layers.append(draw.accepted(lambda: Interface(eta=draw.dielectric(layers), **draw.surface(uneven, turned))))
+    if not transmits and rng.random() < 0.35:
+        layers.append(draw.accepted(draw.medium))
+    if base == "metal":
+        layers.append(
+            draw.accepted(lambda: Interface(eta=draw.metal(), k=draw.extinction(), **draw.surface(uneven, turned)))
+        )
+    elif base in ("named", "mirror"):
+        metal = "mirror" if base == "mirror" else str(rng.choice(METALS))
+        layers.append(draw.accepted(lambda: Interface(conductor=metal, **draw.surface(uneven, turned))))
+    elif base == "diffuse":
+        layers.append(Diffuse(albedo=draw.albedo()))
+    return draw.accepted(lambda: Stack(layers, exterior=draw.exterior(), thin=base == "thin"))
+
+
+class _Tame:
+    """Values as users give them, the special ones among them."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+
+    def accepted(self, make: Callable[[], Any]) -> Any:
+        """What is made of values that are drawn until they are accepted."""
+        while True:
+            try:
+                return make()
+            except InvalidInput:
+                continue
+
+    def any(self, *choices: Callable[[], Any]) -> Any:
+        return choices[self.rng.integers(len(choices))]()
+
+    def colour(self, number: Callable[[], float]) -> Any:
+        return tuple(number() for _ in range(3)) if self.rng.random() < 0.4 else number()
+
+    def uniform(self, low: float, high: float) -> float:
+        return float(self.rng.uniform(low, high))
+
+    def exterior(self) -> float:
+        return self.any(lambda: 1.0, lambda: 1.0, lambda: 1.0, lambda: 1.33, lambda: self.uniform(1, 1.8))
+
+    def dielectric(self, above: list[Layer]) -> Any:
+        before = [layer.eta for layer in above if isinstance(layer, Interface)]
+        return self.any(
+            lambda: self.uniform(1, 2.5),
+            lambda: self.uniform(1.2, 1.8),
+            lambda: self.colour(lambda: self.uniform(1.3, 1.7)),
+            lambda: str(self.rng.choice(GLASSES)),
+            lambda: before[-1] if before else 1.0,
+            lambda: 1.0,
+        )
+
+    def metal(self) -> Any:
+        return self.colour(lambda: self.uniform(0.1, 3))
+
+    def extinction(self) -> Any:
+        return self.colour(lambda: self.any(lambda: self.uniform(0, 6), lambda: self.uniform(2, 5), lambda: 0.0))
+
+    def alpha(self) -> float:
+        return self.any(
+            lambda: self.uniform(0.02, 0.6),
+            lambda: self.uniform(0, 1),
+            lambda: 10 ** self.uniform(-3, 0),
+            lambda: self.any(lambda: 0.0, lambda: 0.0, lambda: 1.0),
+        )
+
+    def surface(self, uneven: float, turned: bool) -> dict[str, Any]:
+        if self.rng.random() >= uneven:
+            return {"alpha": self.alpha()}
+        return {"alpha": (self.alpha(), self.alpha()), "rotation": self.rotation() if turned else 0.0}
+
+    def rotation(self) -> float:
+        return self.any(lambda: self.uniform(-180, 180), lambda: 90.0, lambda: self.uniform(-720, 720))
+
+    def medium(self) -> Medium:
+        absorbing, scattering = (self.rng.random() < share for share in (0.7, 0.4))
+        return Medium(
+            depth=self.any(lambda: 1.0, lambda: self.uniform(0, 2), lambda: self.uniform(0, 0.1)),
+            sigma_a=self.colour(lambda: self.uniform(0, 2)) if absorbing else 0.0,
+            sigma_s=self.colour(lambda: self.uniform(0, 2)) if scattering else 0.0,
+            g=self.any(lambda: self.uniform(-0.9, 0.95), lambda: self.uniform(0.5, 0.98), lambda: 0.0),
+        )
+
+    def albedo(self) -> Any:
+        return self.any(lambda: self.colour(lambda: self.uniform(0, 1)), lambda: 1.0, lambda: 0.0)
+
+
+class _Absurd(_Tame):
+    """Values from the whole range; those beyond it are drawn again."""
+
+    def positive(self) -> float:
+        """Above 0, of any size."""
+        return 10 ** self.any(lambda: self.uniform(-4, 4), lambda: self.uniform(-1, 1))
+
+    def exterior(self) -> float:
+        return self.any(super().exterior, self.positive)
+
+    def dielectric(self, above: list[Layer]) -> Any:
+        return self.any(lambda: super(_Absurd, self).dielectric(above), lambda: self.colour(self.positive))
+
+    def metal(self) -> Any:
+        return self.colour(self.positive)
+
+    def extinction(self) -> Any:
+        return self.colour(lambda: self.any(self.positive, lambda: 0.0))
+
+    def alpha(self) -> float:
+        tiny = lambda: 10 ** self.uniform(-30, -1)  # noqa: E731
+        return self.any(super().alpha, tiny, lambda: 1 - tiny())
+
+    def rotation(self) -> float:
+        return self.any(super().rotation, lambda: self.positive() * self.rng.choice([-1.0, 1.0]))
+
+    def medium(self) -> Medium:
+        return Medium(
+            depth=self.any(lambda: 1.0, lambda: 0.0, self.positive),
+            sigma_a=self.colour(lambda: self.any(lambda: 0.0, self.positive)),
+            sigma_s=self.colour(lambda: self.any(lambda: 0.0, self.positive)),
+            g=self.any(lambda: 0.0, lambda: self.uniform(-1, 1), self._near_one),
+        )
+
+    def _near_one(self) -> float:
+        return float(self.rng.choice([-1.0, 1.0]) * (1 - 10 ** self.uniform(-15, 0)))
+
+    def albedo(self) -> Any:
+        return self.colour(lambda: self.any(lambda: 0.0, lambda: 1.0, lambda: self.uniform(0, 1)))
