@@ -10,10 +10,22 @@ import sys
 from collections.abc import Iterator
 
 
+def one_line(text: str) -> str:
+    """A text with what would end or garble its line (line breaks, control characters) written as Python escapes it.
+
+    What stands for a byte of a file's name that is no UTF-8 stays as it is.
+    """
+    kept = (c if c.isprintable() or "\udc80" <= c <= "\udcff" else c.encode("unicode_escape").decode() for c in text)
+    return "".join(kept)
+
+
 class VelaturaError(Exception):
-    """Any failure that Velatura foresees."""
+    """Any failure that Velatura foresees, in one line."""
 
     exit_status = 1
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(message))
 
 
 class InvalidInput(VelaturaError, ValueError):

@@ -7,6 +7,7 @@ that a process ends as it should when it is interrupted, when nobody reads what 
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -179,6 +180,33 @@ def test_nobody_reads() -> None:
     status = process.wait(timeout=120)
     assert process.stderr is not None
     assert (status, process.stderr.read()) == (1, "")
+
+
+def shell(command: str, cwd: Path, **environment: str) -> tuple[int, str, str]:
+    """The command, written as `velatura`, in a shell."""
+    whole = command.replace("velatura", f"{sys.executable} -m velatura")
+    ended = subprocess.run(whole, shell=True, cwd=cwd, capture_output=True, env={**os.environ, **environment})
+    return ended.returncode, ended.stdout.decode(), ended.stderr.decode()
+
+
+@pytest.mark.parametrize(
+    ("output", "says"),
+    [(">/dev/full", "no space left on device"), (">&-", "standard output is closed"), ("2>/dev/full >&-", "")],
+)
+def test_an_output_that_takes_nothing(output: str, says: str, tmp_path: Path) -> None:
+    """Expected: one line, where there is a place for it, and status 1."""
+    line = f"velatura: {says}\n" if says else ""
+    assert shell(f"velatura schema {output}", tmp_path) == (1, "", line)
+
+
+def test_output_is_utf8_in_every_locale(tmp_path: Path) -> None:
+    """Expected: names of materials and of files come out as they are, also where Python would write ASCII."""
+    (tmp_path / "é.yaml").write_text('name: "Lack, größe 1"\nlayers: [{interface: {eta: 1.5}}]', encoding="utf-8")
+    plain = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    status, out, err = shell("velatura lobes é.yaml && velatura export é.yaml --to json", tmp_path, **plain)
+    assert (status, err) == (0, "")
+    assert out.count("Lack, größe 1") == 2 and "°" in out
+    assert shell("velatura lobes ü.yaml", tmp_path, **plain)[::2] == (2, "velatura: ü.yaml: file not found\n")
 
 
 def test_an_llvm_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

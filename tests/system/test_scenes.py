@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -269,6 +270,20 @@ def test_an_exr_holds_the_linear_picture(tmp_path: Path, mi: Any) -> None:
     image = np.random.default_rng(0).uniform(0.0, 20.0, (5, 7, 3)).astype(np.float32)
     scenes.write_image(image, tmp_path / "a.exr")
     assert np.array_equal(mi.Bitmap(str(tmp_path / "a.exr")), image)
+
+
+def test_a_full_disk_is_told_in_one_line(tmp_path: Path) -> None:
+    """Rationale: Mitsuba's own files raise a RuntimeError there. A limit on the size of files stands for the disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, before[1]))
+    try:
+        for name in ("a.exr", "a.png"):
+            noise = np.random.default_rng(0).random((64, 64, 3), np.float32)
+            with pytest.raises(InvalidInput, match=rf"^.*{name}: cannot be written: file too large$"):
+                scenes.write_image(noise, tmp_path / name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_interrupt_is_one_whatever_the_renderer_makes_of_it(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,7 +19,6 @@ import numpy as np
 import pytest
 
 import velatura
-from velatura.cli import main
 from velatura.errors import MissingTool, NoSolution
 
 Run = Callable[..., tuple[int, str, str]]
@@ -137,6 +136,7 @@ def test_size_in_pixels(
         (["lobes", "M", "--phi", "up"], ["--phi"]),
         (["lobes", "nowhere.yaml"], ["nowhere.yaml", "not found"]),
         (["lobes", "no-such-preset"], ["no-such-preset"]),
+        (["lobes", "a\nb.yaml"], ["a\\nb.yaml: file not found"]),
         (["lobes"], ["M"]),
         (["lobe"], ["lobe", "lobes"]),
         (["lobes", "M", "--jsn"], ["--jsn"]),
@@ -285,10 +285,27 @@ def test_foreseen_errors_give_their_status(
     assert "Traceback" not in err
 
 
-def test_unforeseen_errors_are_not_swallowed(
-    material: str, calls: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_unforeseen_error_says_whose_it_is_before_its_traceback(
+    run: Run, material: str, calls: dict[str, Any], tmp_path: Path
 ) -> None:
     calls["meanwhile"] = raising(ZeroDivisionError())
-    monkeypatch.setattr(sys, "argv", ["velatura", "render", material, "-o", str(tmp_path / "a.png")])
-    with pytest.raises(ZeroDivisionError):
-        main()
+    status, out, err = run("render", material, "-o", str(tmp_path / "a.png"))
+    assert (status, out) == (1, "")
+    first, then, *_, last = err.splitlines()
+    assert first.startswith("velatura: this is a mistake of Velatura's own")
+    assert (then, last) == ("Traceback (most recent call last):", "ZeroDivisionError")
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [
+        (OSError(28, "No space left on device", "a.png"), "a.png: no space left on device"),
+        (OSError("the pipe is closed"), "the pipe is closed"),
+        (MemoryError(), "there is not enough memory for this"),
+    ],
+)
+def test_what_the_system_refuses_is_one_line(
+    run: Run, material: str, calls: dict[str, Any], tmp_path: Path, error: Exception, says: str
+) -> None:
+    calls["meanwhile"] = raising(error)
+    assert run("render", material, "-o", str(tmp_path / "a.png")) == (1, "", f"velatura: {says}\n")

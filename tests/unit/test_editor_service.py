@@ -271,9 +271,13 @@ def test_a_texture_is_a_picture_and_overwrites_nothing(here: Path) -> None:
 
 
 def test_what_cannot_be_written_leaves_nothing(here: Path) -> None:
+    verbs, name = Folder().verbs, f"{'a' * 250}.yaml"
+    version = verbs["save"]({"file": name, "material": COAT, "version": None})["version"]
+    (here / name).chmod(0o444)
+    before = (here / name).read_bytes()
     with pytest.raises(InvalidInput, match="cannot be written"):
-        Folder().verbs["save"]({"file": f"{'a' * 250}.yaml", "material": COAT, "version": None})
-    assert list(here.iterdir()) == []
+        verbs["save"]({"file": name, "material": COAT, "version": version})
+    assert [(path.name, path.read_bytes()) for path in here.iterdir()] == [(name, before)]
 
 
 def test_a_file_of_the_folder_is_opened_to_be_saved_back(here: Path) -> None:

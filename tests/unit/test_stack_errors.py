@@ -207,7 +207,7 @@ def test_a_missing_texture_is_named(tmp_path: Path) -> None:
             "coated-gild",
             "unknown preset 'coated-gild' (did you mean coated-gold?); a material file ends in .yaml, .yml, .json",
         ),
-        ("x\0.yaml", "x\0.yaml: cannot be read: embedded null byte"),
+        ("x\0.yaml", "x\\x00.yaml: cannot be read: embedded null byte"),
         ("x" * 300 + ".yaml", "x" * 300 + ".yaml: cannot be read: file name too long"),
     ],
 )

@@ -5,13 +5,16 @@ A verb imports what it needs when it runs, so that `velatura --help` loads neith
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import io
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
 from types import FrameType
-from typing import Annotated, cast
+from typing import Annotated
 
 import typer
 
@@ -34,10 +37,8 @@ from velatura.cli import (
     simplify,
     tables,
 )
-from velatura.errors import VelaturaError
-
-# What Typer raises for a wrong option; caught, so that it is reported in one line like every other wrong input.
-UsageError = cast(type[typer.BadParameter], typer.BadParameter.__base__)
+from velatura.errors import VelaturaError, one_line
+from velatura.files import reason
 
 INTERRUPTED = 130  # as a shell reports a process that ended by Ctrl-C
 
@@ -89,20 +90,48 @@ def _options(
 def main() -> None:
     """Run the command line on `sys.argv` and exit with its status.
 
-    Invalid input, a missing tool and the like end in one line on standard error; what nobody foresaw, in a traceback.
+    Invalid input, a missing tool, a full disk and the like end in one line on standard error; a mistake of Velatura's
+    own says that it is one, before its traceback.
     """
     with _interrupts() as interrupts:
         try:
+            _open_streams()
             status = app(sys.argv[1:] or ["--help"], prog_name="velatura", standalone_mode=False)
             sys.stdout.flush()
         except BaseException as error:
             status = INTERRUPTED if interrupts else _explain(error)
     if status == INTERRUPTED:
         _complain("interrupted")
+    _drop_output()
     sys.exit(status)
 
 
-@contextmanager
+def _open_streams() -> None:
+    """UTF-8 whatever the locale. Raises OSError where standard output is closed."""
+    for number in range(3):  # a stream that is closed would give its number to the next file that is opened
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    sys.stderr = sys.stderr or os.fdopen(2, "w")
+    if sys.stdout is None:
+        raise OSError(errno.EBADF, "standard output is closed")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # Names of files that are no UTF-8 come out as they are
+            stream.reconfigure(encoding="utf-8", errors="surrogateescape")
+
+
+def _drop_output() -> None:
+    """Drop what is left to print where it cannot be, so that Python does not complain of it at exit."""
+    try:
+        if sys.stdout:
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextlib.contextmanager
 def _interrupts() -> Iterator[list[int]]:
     """Notes each Ctrl-C while the block runs: libraries turn the exception that it raises into all sorts of others."""
     noted: list[int] = []
@@ -121,19 +150,29 @@ def _interrupts() -> Iterator[list[int]]:
 
 
 def _explain(error: BaseException) -> int:
-    """The status for an error that was foreseen, once it is told; raises any other."""
+    """The status for an error, once it is reported; an exit is passed on."""
     if isinstance(error, VelaturaError):
         _complain(str(error))
         return error.exit_status
-    if isinstance(error, UsageError):
+    if isinstance(error, typer.TyperException):  # a wrong option
         _complain(error.format_message())
         return error.exit_code
-    if isinstance(error, BrokenPipeError):
-        # The reader has gone (`velatura lobes ... | head`): nothing is left to say, not even at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if isinstance(error, BrokenPipeError):  # the reader has gone (`velatura lobes ... | head`): nothing is left to say
         return 1
-    raise error
+    if isinstance(error, OSError):
+        _complain(": ".join(filter(None, (str(error.filename or ""), reason(error)))))
+        return 1
+    if isinstance(error, MemoryError):
+        _complain("there is not enough memory for this")
+        return 1
+    if not isinstance(error, Exception):
+        raise error
+    _complain("this is a mistake of Velatura's own; please report it, with the lines that follow")
+    with contextlib.suppress(OSError):
+        traceback.print_exception(error)
+    return 1
 
 
 def _complain(message: str) -> None:
-    print(f"velatura: {message}", file=sys.stderr)
+    with contextlib.suppress(OSError):
+        print(f"velatura: {one_line(message)}", file=sys.stderr)

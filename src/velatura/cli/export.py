@@ -30,6 +30,7 @@ class To(str, Enum):
 
 
 ENDINGS = {To.glsl: (".glsl", ".frag"), To.json: (".json",), To.mitsuba_xml: (".xml",), To.python: (".py",)}
+TABLES = ".bin"
 
 
 def export(
@@ -52,6 +53,8 @@ def export(
     """Write a material for other programs: a shader, JSON, a scene of Mitsuba, or a Python script."""
     if output is not None:
         files.check_writable(output, f"{to.value} output", ENDINGS[to])
+        if to is To.glsl:
+            files.check_writable(_tables(output), "a file of tables", (TABLES,))
     if constant and to is not To.glsl:
         raise InvalidInput(f"--constant: only for --to glsl, not for {to.value}")
     stack, switches = options.read(material, settings)
@@ -65,13 +68,18 @@ def export(
     if output is None:
         print(text, end="")
         return
-    tables = output.with_suffix(".tables.bin")
+    tables = _tables(output)
     if beside is not None:
         with files.whole(tables) as unfinished:
             unfinished.write_bytes(beside)
     with files.whole(output) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
     print(output if beside is None else f"{output}, and its tables {tables}")
+
+
+def _tables(output: Path) -> Path:
+    """The file of a shader's tables, beside it."""
+    return output.with_suffix(f".tables{TABLES}")
 
 
 def _glsl(stack: Stack, model: Model, constant: list[str]) -> tuple[str, bytes | None]:

@@ -144,12 +144,9 @@ def _version(path: Path) -> str | None:
 
 def _write(path: Path, data: bytes, check: Callable[[Path], None] = lambda path: None) -> None:
     """Write a file that passes a check, whole or not at all."""
-    try:
-        with whole(path) as unfinished:
-            unfinished.write_bytes(data)
-            check(unfinished)
-    except OSError as error:
-        raise InvalidInput(f"{path.name}: cannot be written ({error.strerror})") from None
+    with whole(path) as unfinished:
+        unfinished.write_bytes(data)
+        check(unfinished)
 
 
 def _check_picture(path: Path) -> None:

@@ -99,10 +99,16 @@ def write_image(image: ArrayLike, path: Name) -> None:
     """
     target = check_writable(path)
     mi = kernel.mitsuba()
+    formats = mi.Bitmap.FileFormat
     if target.suffix.lower() == ".png":
         pixels: Any = np.round(255.0 * tone_map(image)).astype(np.uint8)
+        format = formats.PNG
     else:
         pixels = np.asarray(image, dtype=np.float32)
+        format = formats.OpenEXR
 
+    # Encode it in memory: Mitsuba's own files end in a RuntimeError where the disk is full
+    stream = mi.MemoryStream()
+    mi.Bitmap(pixels).write(stream, format)
     with files.whole(target) as unfinished:
-        mi.Bitmap(pixels).write(str(unfinished))
+        unfinished.write_bytes(stream.raw_buffer())

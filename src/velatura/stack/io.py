@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from velatura.errors import InvalidInput
-from velatura.files import whole
+from velatura.files import reason, whole
 from velatura.stack.schema import show, unknown
 from velatura.stack.stack import Stack
 
@@ -95,7 +95,7 @@ def _text(path: Path) -> str:
     except FileNotFoundError:
         raise InvalidInput(f"{path}: file not found") from None
     except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: cannot be read: {_reason(error)}") from None
+        raise InvalidInput(f"{path}: cannot be read: {reason(error)}") from None
 
 
 def preset(name: str) -> Stack:
@@ -126,13 +126,10 @@ def save(stack: Stack, path: str | Path) -> None:
     """
     path = Path(path)
     data = dumps(stack, _format(path), path.parent).encode("utf-8")
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise InvalidInput(f"{path}: there is no folder {path.parent}")
-    try:
-        with whole(path) as unfinished:
-            unfinished.write_bytes(data)
-    except OSError as error:
-        raise InvalidInput(f"{path}: cannot be written: {_reason(error)}") from None
+    with whole(path) as unfinished:
+        unfinished.write_bytes(data)
 
 
 def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) -> str:
@@ -247,7 +244,3 @@ def _format(path: Path, what: str = "a material file") -> str:
     if path.suffix.lower() not in _FORMATS:
         raise InvalidInput(f"{path}: {what} ends in {', '.join(_FORMATS)}")
     return _FORMATS[path.suffix.lower()]
-
-
-def _reason(error: Exception) -> str:
-    return (getattr(error, "strerror", None) or str(error)).lower()
