@@ -147,10 +147,43 @@ def test_a_coat_that_keeps_the_appearance(run: Run, folder: Path) -> None:
     assert files(folder) == {"kept.yaml"}
 
 
+def test_the_model_is_named_where_it_is_not_the_one_that_renders(run: Run, folder: Path) -> None:
+    """Expected: one line where it is another, none where it is the same; always in JSON."""
+    line = "Holds for bati2021; renders are by velatura, whose lobes differ: --model velatura answers for it."
+    for arguments in (
+        ["invert", "pair.yaml"],
+        ["coat", "coated-gold"],
+        ["simplify", "coated-gold", "--interfaces", "1"],
+    ):
+        assert line in run(*arguments)[1].splitlines()
+        assert json.loads(run(*arguments, "--json")[1])["model"] == "bati2021"
+    for arguments in (["invert", "pair.yaml"], ["coat", "coated-gold", "--keep-appearance"]):
+        assert "renders" not in run(*arguments, "--model", "velatura")[1]
+    assert json.loads(run("invert", "bright.yaml", "--model", "velatura", "--json")[1])["model"] == "velatura"
+
+
+def test_a_kept_appearance_is_held_to_the_model_that_renders(run: Run, folder: Path) -> None:
+    """Expected: how far it is kept by that one, as vt.lobes has it, and the lobe that the coat itself adds."""
+    _, out, _ = run("coat", "coated-gold", "--alpha", "0.1", "--keep-appearance", "-o", "kept.yaml")
+    before, after = vt.lobes("coated-gold", 1.0), vt.lobes("kept.yaml", 1.0)
+    energy, alpha = (
+        max(abs(x - y).max() for x, y in zip(getattr(before, name), getattr(after, name)[1:]))
+        for name in ("energy", "alpha")
+    )
+    assert energy > 0.01 < alpha
+    assert f"Kept by bati2021; by velatura, which renders, energy changes by up to {energy:.4f} and alpha by " in out
+    assert f"by up to {alpha:.4f}: --model velatura keeps them by it." in out
+    coat = vt.lobes("kept.yaml", 1.0, model="bati2021").energy[0][0, 0]
+    row = next(line for line in out.splitlines() if "coat " in line and "│" in line)
+    assert row.replace("│", " ").split() == ["coat", f"{coat:.4f}", "0.1000"]
+
+
 def test_stacks_by_their_difference_at_grazing_angles(run: Run, folder: Path) -> None:
-    """Expected: a line for each stack, from the same to the most different; and a sheet of renders."""
+    """Expected: a line for each stack, from the same to the most different, and the model; and a sheet of renders."""
     status, out, _ = run("explore", "pair.yaml", "--count", "3")
-    apart = [float(line.split()[0]) for line in out.splitlines()]
+    *stacks, model = out.splitlines()
+    assert model.startswith("Holds for bati2021; renders are by velatura")
+    apart = [float(line.split()[0]) for line in stacks]
     assert (status, len(apart), apart[0]) == (0, 3, 0)
     assert apart == sorted(apart)
     assert run("explore", "pair.yaml", "--count", "2", "--sheet", "--size", "16", "--spp", "1")[0] == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from velatura.inverse import Coated
+    from velatura.stack import Stack
 
 
 def coat(
@@ -45,12 +47,16 @@ def coat(
     if output:
         save(coated.stack, output)
     if as_json:
-        report = {"stack": coated.stack.to_dict(), "lobes": coated.change(), **_diffuse(coated)}
-        print(json.dumps(report, allow_nan=False))
+        answer = {"stack": coated.stack.to_dict(), "coat": _own(coated), "lobes": coated.change(), **_diffuse(coated)}
+        print(json.dumps({"model": coated.model.name, **answer}, allow_nan=False))
         return
     from rich.console import Console
 
-    Console().print(_table(coated.change(), _diffuse(coated)))
+    Console().print(_table(coated))
+    if keep_appearance:
+        _say_how_kept(stack, coated)
+    else:
+        invert.say_for_which(coated.model)
     print(output if output else dumps(coated.stack, "yaml"), end="\n" if output else "")
 
 
@@ -62,23 +68,53 @@ def _diffuse(coated: Coated) -> dict[str, dict[str, list[float]]]:
     return {"diffuse": {"energy_before": before.tolist(), "energy_after": after.tolist()}}
 
 
-def _table(rows: list[dict[str, Any]], diffuse: dict[str, dict[str, list[float]]]) -> Table:
-    """A row per interface of the bare material, and one for a diffuse base."""
+def _say_how_kept(stack: Stack, coated: Coated) -> None:
+    """Print how far the lobes change by the model that renders by default, where they are kept by another."""
+    import velatura
+    from velatura.model import DEFAULT
+
+    if coated.model.name == DEFAULT:
+        return
+    rendered = replace(coated, before=velatura.lobes(stack, 1.0), after=velatura.lobes(coated.stack, 1.0))
+    by = {
+        quantity: max(
+            abs(after - before)
+            for row in rendered.change()
+            for before, after in zip(row[f"{quantity}_before"], row[f"{quantity}_after"])
+        )
+        for quantity in ("energy", "alpha")
+    }
+    print(
+        f"Kept by {coated.model.name}; by {DEFAULT}, which renders, energy changes by up to {by['energy']:.4f} "
+        f"and alpha by up to {by['alpha']:.4f}: --model {DEFAULT} keeps them by it."
+    )
+
+
+def _own(coated: Coated) -> dict[str, list[float]]:
+    """The coat's own lobe, which is new."""
+    return {"energy": coated.after.energy[0][:, 0].tolist(), "alpha": coated.after.alpha[0][..., 0].tolist()}
+
+
+def _table(coated: Coated) -> Table:
+    """A row for the coat, one per interface of the bare material, and one for a diffuse base."""
     from rich.table import Table
 
-    table = Table("lobe", title="At normal incidence, without and with the coat", title_justify="left")
+    title = f"At normal incidence, without and with the coat ({coated.model.name})"
+    table = Table("lobe", title=title, title_justify="left")
     for column in ("energy", "with coat", "alpha", "with coat"):
         table.add_column(column, justify="right")
-    for n, row in enumerate(rows, 1):
-        table.add_row(str(n), *(" ".join(f"{x:.4f}" for x in _flat(row[key])) for key in row))
-    for name, row in diffuse.items():
-        table.add_row(name, *(" ".join(f"{x:.4f}" for x in _flat(row[key])) for key in row), "", "")
+    own = _own(coated)
+    table.add_row("coat", "", _cell(own["energy"]), "", _cell(own["alpha"]))
+    for n, row in enumerate(coated.change(), 1):
+        table.add_row(str(n), *(_cell(row[key]) for key in row))
+    for name, diffuse in _diffuse(coated).items():
+        table.add_row(name, *(_cell(diffuse[key]) for key in diffuse), "", "")
     return table
 
 
-def _flat(values: Any) -> list[float]:
+def _cell(values: Any) -> str:
     """Numbers in a line, one where they are all alike."""
     import numpy as np
 
-    numbers = [float(x) for x in np.ravel(values)]
-    return numbers[:1] if len(set(numbers)) == 1 else numbers
+    numbers = [f"{x:.4f}" for x in np.ravel(values)]
+    return numbers[0] if len(set(numbers)) == 1 else " ".join(numbers)

@@ -47,6 +47,7 @@ def explore(
     order = np.argsort(apart, kind="stable")
     for n in order:
         print(f"{apart[n]:.4f}  {_told(found[n])}")
+    invert.say_for_which(found[0].model)
     if path:
         labels = [f"difference {apart[n]:.3f}" for n in order]
         _render([found[n].stack for n in order], labels, path, found[0].model, env, spp, size, seed)

@@ -51,12 +51,13 @@ def show(found: Fit, output: Path | None, as_json: bool) -> None:
     if output:
         save(found.stack, output)
     if as_json:
-        report = {"stack": found.stack.to_dict(), "error": found.error, "by_angle": found.by_angle}
-        print(json.dumps(report | {"errors": found.errors}, allow_nan=False))
+        answer = {"stack": found.stack.to_dict(), "error": found.error, "by_angle": found.by_angle}
+        print(json.dumps({"model": found.model.name, **answer, "errors": found.errors}, allow_nan=False))
         return
     from rich.console import Console
 
     Console().print(_table(found))
+    invert.say_for_which(found.model)
     print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
 
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from velatura.inverse import Solution, Target
+    from velatura.model import Model
 
 ENDINGS = (".yaml", ".yml", ".json")
 
@@ -53,7 +54,8 @@ def invert(
     except Infeasible as error:
         if as_json:
             nearest = error.nearest.to_dict() if error.nearest else None
-            print(json.dumps({"feasible": False, "why": error.why, "nearest": nearest}, allow_nan=False))
+            report = {"feasible": False, "model": name, "why": error.why, "nearest": nearest}
+            print(json.dumps(report, allow_nan=False))
         raise
     paths = _write(found, output, folder, Path(target).stem)
     if picture:
@@ -62,13 +64,15 @@ def invert(
     if as_json:
         first = found[0]
         classes = [members.to_dict() for members in first.classes]
-        report = {"feasible": True, "stack": first.stack.to_dict(), "class": {"lobes": classes}}
+        answer = {"stack": first.stack.to_dict(), "class": {"lobes": classes}}
+        report = {"feasible": True, "model": first.model.name, **answer}
         print(json.dumps(report | ({"stacks": [s.stack.to_dict() for s in found]} if count > 1 else {})))
         return
     from rich.console import Console
 
     for solution in found:
         Console().print(_table(solution))
+    say_for_which(found[0].model)
     for path in [*paths, *([picture] if picture else [])]:
         print(path)
 
@@ -86,6 +90,16 @@ def read(target: str, model: str | None, settings: list[str] | None) -> tuple[Ta
             raise InvalidInput(f"--set {key}: {unknown('switch', key, SWITCHES)}")
         switches[key] = value
     return inverse.load_target(target), model or inverse.MODEL, switches
+
+
+def say_for_which(model: Model) -> None:
+    """Print for which model an answer holds, where renders are by another unless it is named there too."""
+    from velatura.model import DEFAULT
+
+    if model.name != DEFAULT:
+        print(
+            f"Holds for {model.name}; renders are by {DEFAULT}, whose lobes differ: --model {DEFAULT} answers for it."
+        )
 
 
 def draw_classes(solution: Solution, path: Path) -> None:

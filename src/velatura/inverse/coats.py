@@ -28,12 +28,14 @@ KEEP = 64  # partial stacks that are followed
 class Coated:
     """A coated stack, and the lobes at normal incidence without and with the coat: those of the stack come last.
 
-    diffuse: energy (3,) that a diffuse base scatters back up, without and with the coat; None without one.
+    model: by which these are the lobes. diffuse: energy (3,) that a diffuse base scatters back up, without and with the
+    coat; None without one.
     """
 
     stack: Stack
     before: Statistics
     after: Statistics
+    model: Model
     diffuse: tuple[Array, Array] | None
 
     def change(self) -> list[dict[str, list[float]]]:
@@ -92,7 +94,7 @@ def coat(
         if keep_appearance:
             coated = with_albedo(coated, wanted, chosen)
         diffuse = wanted, scattered(coated, chosen)
-    return Coated(coated, before, after, diffuse)
+    return Coated(coated, before, after, chosen, diffuse)
 
 
 def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
