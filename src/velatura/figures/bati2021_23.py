@@ -35,8 +35,8 @@ def compute(
         assert read.transmitted is not None
         energies = {"reflected": np.sum(read.energy, axis=0).T, "transmitted": read.transmitted.energy.T}
         numbers[name] = {key: energy.tolist() for key, energy in energies.items()}
-        halves = canvas.spheres(stacks[found], looks.MODEL, "studio", size, spp, seed)
-        numbers["pictures"][name] = halves.mean(axis=0).tolist()
+        passes = canvas.spheres(stacks[found], looks.MODEL, "studio", size, spp, seed)
+        numbers["pictures"][name] = passes.mean(axis=0).tolist()
     return numbers
 
 

@@ -29,11 +29,11 @@ SCALE = 0.25  # difference in radiance that is drawn in full colour
 def compute(
     presets: Sequence[str] = PRESETS,
     size: int = canvas.SIZE,
-    spp: int = 4 * canvas.SAMPLES,
+    spp: int = canvas.SAMPLES,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """For each preset the `rmse` of every model, freed of noise, `mean` radiances, and `pictures`.
+    """For each preset, by `name`, `canvas.errors` of every model and `mean` radiances; and `pictures`.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
@@ -43,11 +43,10 @@ def compute(
         stack = preset(name)
         true = canvas.spheres(stack, "reference", "studio", size, spp, seed)
         images = {model: canvas.spheres(stack, model, "studio", size, spp, seed) for model in MODELS}
-        rmse = {model: canvas.rmse(image, true) for model, image in images.items()}
         means = {who: float(each.mean()) for who, each in [("reference", true), *images.items()]}
-        rows.append({"preset": name, "rmse": rmse, "mean": means})
+        rows.append({"name": name, **canvas.errors(images, true), "mean": means})
         seen = {**images, "reference": true}
-        pictures.append({who: halves.mean(axis=0).tolist() for who, halves in seen.items()})
+        pictures.append({who: passes.mean(axis=0).tolist() for who, passes in seen.items()})
     return {"presets": rows, "pictures": pictures}
 
 
@@ -62,12 +61,12 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     for row, told, seen in zip(axes, numbers["presets"], numbers["pictures"]):
         truth = np.array(seen["reference"])
         for axis, model in zip(row, MODELS):
-            canvas.show(axis, seen[model], f"{told['preset']}\n{model}")
+            canvas.show(axis, seen[model], f"{told['name']}\n{model}")
         canvas.show(row[2], seen["reference"], "reference")
         for axis, model in zip(row[3:], MODELS):
             difference = (np.array(seen[model]) - truth).mean(axis=-1)
             axis.imshow(difference, cmap="RdBu_r", vmin=-SCALE, vmax=SCALE)
-            axis.set_title(f"{model} - reference\nRMSE {told['rmse'][model]:.4f}", fontsize=8)
+            axis.set_title(f"{model} - reference\n{canvas.error_label(told, model)}", fontsize=8)
             axis.set_axis_off()
     canvas.save(figure, path)
 

@@ -2,8 +2,8 @@
 
 The model beside two references: one with all bounces, one with a single reflection at each interface. The paper prints
 neither material nor scene: here it is a coat of index 2.4 over copper, both of alpha 0.05, on a sphere in the studio.
-The higher the index, the more light comes back to the metal, and takes on more of its colour. The model is the forward
-one.
+The higher the index, the more light comes back to the metal, and takes on more of its colour. The model has the
+symmetric form, which the paper renders; the forward one stands beside it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ COSINES = (1.0, 0.7, 0.4)
 
 #: One reflection at each interface: a path meets the coat, the metal, and the coat again.
 SINGLE = {"max_depth": 3}
-COLUMNS: dict[str, tuple[str, dict[str, Any]]] = {
-    "model": ("belcour2018", {}),
+COLUMNS: dict[str, tuple[str, dict[str, Any]]] = canvas.FORMS | {
     "all": ("reference", {}),
     "single": ("reference", SINGLE),
 }
@@ -37,9 +36,9 @@ def compute(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """For the `model`, the reference with `all` bounces and with `single` ones: what is reflected over `cos`.
+    """For both forms, the reference with `all` bounces and with `single` ones: what is reflected over `cos`.
 
-    `albedo` by colour, `saturation` as 1 - blue / red, and `rmse` against all bounces, freed of noise; `pictures`.
+    `albedo` by colour, `saturation` as 1 - blue / red, and `canvas.errors` against all bounces; `pictures`.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
@@ -56,25 +55,27 @@ def compute(
         numbers["saturation"][column] = (1 - albedo[:, 2] / albedo[:, 0]).tolist()
         images[column] = canvas.spheres(stack, name, "studio", size, spp, seed + (column == "single"), **options)
 
-    numbers["rmse"] = {column: canvas.rmse(images[column], images["all"]) for column in ("model", "single")}
-    numbers["pictures"] = {column: halves.mean(axis=0).tolist() for column, halves in images.items()}
+    numbers["pictures"] = {column: passes.mean(axis=0).tolist() for column, passes in images.items()}
+    true = images.pop("all")
+    numbers |= canvas.errors(images, true)
     return numbers
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The three spheres, and the saturation of what they reflect over the angle of incidence.
+    """The spheres, and the saturation of what they reflect over the angle of incidence.
 
     Raises:
         InvalidInput: the file cannot be written.
     """
-    figure = canvas.canvas(13, 3.3)
-    *spheres, plot = figure.subplots(1, 4, width_ratios=(1, 1, 1, 1.2))
-    titles = {"model": "belcour2018", "all": "reference, all bounces", "single": "reference, one reflection a layer"}
+    figure = canvas.canvas(16, 3.3)
+    *spheres, plot = figure.subplots(1, 5, width_ratios=(1, 1, 1, 1, 1.2))
+    titles = {name: f"belcour2018, {name}" for name in canvas.FORMS}
+    titles |= {"all": "reference, all bounces", "single": "reference, one reflection a layer"}
+    styles = canvas.STYLES | {"all": {"color": "black"}, "single": {"color": "black", "linestyle": "--"}}
     angles = np.degrees(np.arccos(numbers["cos"]))
     for axes, (column, title) in zip(spheres, titles.items()):
         canvas.show(axes, numbers["pictures"][column], title)
-        colour, style = ("C0", "-") if column == "model" else ("black", "-" if column == "all" else "--")
-        plot.plot(angles, numbers["saturation"][column], color=colour, linestyle=style, marker=".", label=title)
+        plot.plot(angles, numbers["saturation"][column], marker=".", label=title, **styles[column])
     plot.set(title="saturation, 1 - blue / red", xlabel="angle of incidence (°)", ylim=(0, None))
     plot.legend(fontsize="small")
     canvas.save(figure, path)

@@ -2,8 +2,8 @@
 
 Nothing absorbs, so that an object that keeps all energy cannot be seen. The stack is the paper's (indices 1.3 and 1 by
 turns), with smooth interfaces, and once more with dielectrics of alpha 0.1, which is chosen here: the paper prints no
-roughness. The object is a sphere. The model is the forward one; the reference lets light meet one facet of an interface
-at a time, and loses what meets a second one.
+roughness. The object is a sphere. The model has the symmetric form, which the paper renders; the forward one stands
+beside it. The reference lets light meet one facet of an interface at a time, and loses what meets a second one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 from velatura.figures import canvas
 from velatura.stack import preset
 
-MODELS = ("belcour2018", "weidlich_wilkie", "reference")
 STACKS = {"smooth": "furnace", "rough": "furnace-rough"}
 ANGLES = (0, 15, 30, 45, 60, 70, 80, 85)  # degrees
 
@@ -30,7 +29,7 @@ def compute(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """For `smooth` and `rough`, by model: the `albedo` over `angles` (degrees), 1 where all is kept; and `pictures`.
+    """For `smooth` and `rough`, by column: the `albedo` over `angles` (degrees), 1 where all is kept; and `pictures`.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
@@ -38,12 +37,12 @@ def compute(
     cosines = np.cos(np.radians(angles))
     numbers: dict[str, Any] = {"angles": [float(angle) for angle in angles], "pictures": {}}
     numbers |= {name: {} for name in STACKS}
-    for name, model in canvas.track([(name, model) for name in STACKS for model in MODELS], progress):
-        stack = preset(STACKS[name])
-        kept = [float(canvas.sampled(stack, model, cosine, paths, seed).weight.mean()) for cosine in cosines]
-        numbers[name][model] = kept
-        halves = canvas.spheres(stack, model, "furnace", size, spp, seed)
-        numbers["pictures"].setdefault(name, {})[model] = halves.mean(axis=0).tolist()
+    for name, column in canvas.track([(name, column) for name in STACKS for column in canvas.COLUMNS], progress):
+        stack, (model, switches) = preset(STACKS[name]), canvas.COLUMNS[column]
+        samples = (canvas.sampled(stack, model, cosine, paths, seed, **switches) for cosine in cosines)
+        numbers[name][column] = [float(each.weight.mean()) for each in samples]
+        passes = canvas.spheres(stack, model, "furnace", size, spp, seed, **switches)
+        numbers["pictures"].setdefault(name, {})[column] = passes.mean(axis=0).tolist()
     return numbers
 
 
@@ -53,14 +52,14 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     Raises:
         InvalidInput: the file cannot be written.
     """
-    figure = canvas.canvas(13, 6)
-    for row, name in zip(figure.subplots(2, 4, width_ratios=(1, 1, 1, 1.4)), STACKS):
-        for plot, model in zip(row, MODELS):
+    figure = canvas.canvas(16, 6)
+    for row, name in zip(figure.subplots(2, 5, width_ratios=(1, 1, 1, 1, 1.4)), STACKS):
+        for plot, (column, style) in zip(row, canvas.STYLES.items()):
             # Half as bright, since white would not be told from brighter
-            canvas.show(plot, 0.5 * np.array(numbers["pictures"][name][model]), f"{model}, {name}")
-            row[-1].plot(numbers["angles"], numbers[name][model], color=canvas.COLOURS[model], marker=".", label=model)
+            canvas.show(plot, 0.5 * np.array(numbers["pictures"][name][column]), f"{column}, {name}")
+            row[-1].plot(numbers["angles"], numbers[name][column], marker=".", label=column, **style)
         row[-1].axhline(1, color="0.7", linewidth=1)
-        row[-1].set(title=f"energy kept, {name}", xlabel="angle of incidence (°)", ylim=(0, 1.3))
+        row[-1].set(title=f"energy kept, {name}", xlabel="angle of incidence (°)", ylim=(0, None))
         row[-1].legend(fontsize="small", loc="lower left")
     canvas.save(figure, path)
 

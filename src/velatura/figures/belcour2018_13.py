@@ -1,8 +1,8 @@
 """Belcour 2018, figure 13: frosted metal, a rough coat over a smooth metal, by three models.
 
-The object, light and sizes of the paper's scene are not printed: here it is a sphere in the studio. The model is the
-forward one. `blur` says as a number what the picture shows: half of the light leaves within this distance of the mirror
-direction, on the projected disc.
+The object, light and sizes of the paper's scene are not printed: here it is a sphere in the studio. The model has the
+symmetric form, which the paper renders; the forward one stands beside it. `blur` says as a number what the picture
+shows: half of the light leaves within this distance of the mirror direction, on the projected disc.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from velatura.api import lobes
 from velatura.figures import canvas
 from velatura.stack import preset
 
-MODELS = ("belcour2018", "weidlich_wilkie", "reference")
 COSINES = (1.0, 0.7, 0.4)
 
 
@@ -29,7 +28,7 @@ def compute(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """By model: `rmse` against the reference (freed of noise), `blur` and `albedo` over `cos`; `pictures`.
+    """By column: `canvas.errors` against the reference, `blur` and `albedo` over `cos`; `pictures`.
 
     Also the roughness of the base's lobe, by the model and by random walks.
 
@@ -39,14 +38,16 @@ def compute(
     stack = preset("frosted-metal")
     numbers: dict[str, Any] = {"cos": list(COSINES), "blur": {}, "albedo": {}}
     images = {}
-    for name in canvas.track(MODELS, progress):
-        each = [canvas.sampled(stack, name, cosine, paths, seed) for cosine in COSINES]
+    for name in canvas.track(list(canvas.COLUMNS), progress):
+        model, switches = canvas.COLUMNS[name]
+        each = [canvas.sampled(stack, model, cosine, paths, seed, **switches) for cosine in COSINES]
         numbers["albedo"][name] = [s.weight.mean(axis=0).tolist() for s in each]
         numbers["blur"][name] = [_blur(s.wo, s.weight.mean(axis=1), cosine) for s, cosine in zip(each, COSINES)]
-        images[name] = canvas.spheres(stack, name, "studio", size, spp, seed)
+        images[name] = canvas.spheres(stack, model, "studio", size, spp, seed, **switches)
 
-    numbers["rmse"] = {name: canvas.rmse(images[name], images["reference"]) for name in MODELS[:-1]}
-    numbers["pictures"] = {name: halves.mean(axis=0).tolist() for name, halves in images.items()}
+    numbers["pictures"] = {name: passes.mean(axis=0).tolist() for name, passes in images.items()}
+    true = images.pop("reference")
+    numbers |= canvas.errors(images, true)
     numbers["base_alpha"] = {
         "belcour2018": lobes(stack, COSINES, model="belcour2018", **canvas.CHOICES).alpha[1][0].tolist(),
         "walk": reference.statistics(stack, COSINES, 0.0, paths, seed).alpha[1][0].tolist(),
@@ -68,15 +69,14 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     Raises:
         InvalidInput: the file cannot be written.
     """
-    figure = canvas.canvas(9, 6.2)
-    axes = figure.subplots(2, 3)
+    figure = canvas.canvas(12, 6.2)
+    axes = figure.subplots(2, 4)
     truth = np.array(numbers["pictures"]["reference"])
-    for column, name in zip(axes.T, MODELS):
+    for column, name in zip(axes.T, canvas.COLUMNS):
         image = np.array(numbers["pictures"][name])
         canvas.show(column[0], image, name)
         if name != "reference":
-            title = f"RMSE {numbers['rmse'][name]:.4f}"
-            drawn = canvas.show_difference(column[1], image, truth, 0.1, title)
+            drawn = canvas.show_difference(column[1], image, truth, 0.1, canvas.error_label(numbers, name))
     axes[1, -1].set_axis_off()
     figure.colorbar(drawn, ax=axes, shrink=0.5, label="minus the reference")
     canvas.save(figure, path)

@@ -1,7 +1,8 @@
 """Belcour 2018, figure 14: gold under a scattering medium that grows deeper.
 
 g = 0.7, no absorption and a scattering coefficient of 1, as printed; the depths, the gold's alpha of 0.01 and the
-object, a hollow ball, are chosen here. Beside the medium as published stands the one that scatters many times.
+object, a hollow ball, are chosen here. Beside the medium as published stands the one that scatters many times, and
+beside the symmetric form, which the paper renders, the forward one.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from velatura.stack import Interface, Medium, Stack
 
 DEPTHS = (0.1, 0.5, 1.0)
 COLUMNS: cells.Columns = {
-    medium: ("belcour2018", {"reflectance": "fgd", "tir": "published", "medium": medium})
+    title: ("belcour2018", {"reflectance": "fgd", "tir": "published", "medium": medium, "form": form})
     for medium in ("shipped", "doubled")
+    for title, form in ((medium, "symmetric"), (f"{medium}, forward", "forward"))
 }
 
 

@@ -2,7 +2,8 @@
 
 Index and roughness of the coat and the extinction of the smooth metal (index 1) come from images, as in the paper.
 The images are chosen here: a checkerboard for the index (1.2 and 1.8), bands for alpha (0 to 0.4), and a gradient of
-colours for the extinction (up to 4); so is the object, a hollow ball.
+colours for the extinction (up to 4); so is the object, a hollow ball. The forward form stands beside the symmetric
+one, which the paper renders.
 """
 
 from __future__ import annotations
@@ -15,14 +16,13 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import canvas, cells
+from velatura.figures.belcour2018_15 import COLUMNS
 from velatura.stack import Interface, Stack
-
-COLUMNS: cells.Columns = {"belcour2018": ("belcour2018", {"reflectance": "fgd", "tir": "published"})}
 
 
 def compute(
     size: int = canvas.SIZE,
-    spp: int = cells.SAMPLES,
+    spp: int = canvas.SAMPLES,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
@@ -45,7 +45,7 @@ def compute(
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The truth, the model, and what it has too much or too little.
+    """The truth, both forms, and what each has too much or too little.
 
     Raises:
         InvalidInput: the file cannot be written.

@@ -2,19 +2,19 @@
 
 Indices 2 and 0.01 + i, and no multiple scattering between the facets of one interface, as in the paper. It prints
 neither which roughnesses it shows nor its scene: alpha here is .1, .4, .7 and 1, on a sphere in the studio. The model
-is the forward one.
+has the symmetric form, which the paper renders; the forward one stands beside it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from velatura.comparison import compare
 from velatura.figures import canvas
+from velatura.model import named
 from velatura.stack import Interface, Stack
 
 MODEL = "belcour2018"
@@ -29,56 +29,55 @@ def compute(
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Lists over `alpha`, for light along the normal: total variation, and for model and walk the second lobe.
+    """A list of `cells`, one for each `alpha`, for light along the normal; and `pictures`.
 
-    `base_alpha` and `base_energy` are those of the second lobe, `albedo` is all that is reflected (of the model, as it
-    is evaluated), `noise` the part of the total variation that is the walk's own. `rmse` is that of `pictures`, freed
-    of noise.
+    By form, `canvas.errors` and the `total_variation`, of which `noise` is the walk's own part; by form and `walk` the
+    `albedo`, all that is reflected (of the model, as it is evaluated), and of the second lobe `base_alpha`
+    and `base_energy`.
 
     Raises:
         InvalidInput, MissingTool: as `vt.compare`.
     """
-    numbers: dict[str, Any] = {"alpha": [float(alpha) for alpha in alphas], "paths": paths}
-    numbers |= {"total_variation": [], "noise": [], "rmse": []}
-    quantities = ("base_alpha", "base_energy", "albedo")
-    numbers |= {side: {quantity: [] for quantity in quantities} for side in ("model", "walk")}
-    numbers["pictures"] = {"model": [], "reference": []}
+    cells: list[dict[str, Any]] = []
+    pictures: list[dict[str, Any]] = []
+    models = [replace(named(MODEL, form=form, **canvas.CHOICES), name=form) for form in canvas.FORMS]
     for alpha in canvas.track(alphas, progress):
-        # What is told
+        # As numbers
         stack = Stack([Interface(eta=2.0, alpha=alpha), Interface(eta=0.01, k=1.0, alpha=alpha)])
-        found = compare(stack, [MODEL], [1.0], paths, seed, microsurface=False, **canvas.CHOICES)
-        numbers["total_variation"].append(float(found.total_variation[MODEL][0]))
-        numbers["noise"].append(float(found.noise[0]))
-        for side, told in (("model", found.models[MODEL]), ("walk", found.truth)):
-            base = told.reflected[1]
-            values = (base.alpha[0, 0], base.energy[:, 0].mean(), told.evaluated[:, 0].mean())
-            for quantity, value in zip(quantities, values):
-                numbers[side][quantity].append(float(value))
-        # What is seen
-        modelled, true = (canvas.spheres(stack, name, "studio", size, spp, seed) for name in (MODEL, "reference"))
-        numbers["rmse"].append(canvas.rmse(modelled, true))
-        numbers["pictures"]["model"].append(modelled.mean(axis=0).tolist())
-        numbers["pictures"]["reference"].append(true.mean(axis=0).tolist())
-    return numbers
+        found = compare(stack, models, [1.0], paths, seed, microsurface=False)
+        cell: dict[str, Any] = {"name": f"alpha {alpha:g}", "alpha": float(alpha), "noise": float(found.noise[0])}
+        cell["total_variation"] = {form: float(found.total_variation[form][0]) for form in canvas.FORMS}
+        cell |= {quantity: {} for quantity in ("base_alpha", "base_energy", "albedo")}
+        for side, account in {"walk": found.truth, **found.models}.items():
+            base = account.reflected[1]
+            cell["base_alpha"][side] = float(base.alpha[0, 0])
+            cell["base_energy"][side] = float(base.energy[:, 0].mean())
+            cell["albedo"][side] = float(account.evaluated[:, 0].mean())
+        # As pictures
+        images = {form: canvas.spheres(stack, MODEL, "studio", size, spp, seed, form=form) for form in canvas.FORMS}
+        true = canvas.spheres(stack, "reference", "studio", size, spp, seed)
+        cells.append(cell | canvas.errors(images, true))
+        seen = {**images, "reference": true}
+        pictures.append({name: passes.mean(axis=0).tolist() for name, passes in seen.items()})
+    return {"paths": paths, "cells": cells, "pictures": pictures}
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A column for each roughness: model, reference, and what the model has too much (red) or too little (blue).
+    """A column for each roughness: reference, and of both forms what each has too much (red) or too little (blue).
 
     Raises:
         InvalidInput: the file cannot be written.
     """
-    count = len(numbers["alpha"])
-    figure = canvas.canvas(2.4 * count + 0.6, 7.4)
-    axes = figure.subplots(3, count, squeeze=False)
-    for i, alpha in enumerate(numbers["alpha"]):
-        model, true = (np.array(numbers["pictures"][side][i]) for side in ("model", "reference"))
-        canvas.show(axes[0, i], model, f"{MODEL}, alpha {alpha:g}")
-        canvas.show(axes[1, i], true, "reference")
-        variation = numbers["total_variation"][i]
-        title = f"RMSE {numbers['rmse'][i]:.3f}, variation {variation:.2f}"
-        drawn = canvas.show_difference(axes[2, i], model, true, 0.2, title)
-    figure.colorbar(drawn, ax=axes[2, :], shrink=0.8, label="minus the reference")
+    count = len(numbers["cells"])
+    figure = canvas.canvas(2.6 * count + 0.6, 12.3)
+    axes = figure.subplots(5, count, squeeze=False)
+    for column, cell, seen in zip(axes.T, numbers["cells"], numbers["pictures"]):
+        canvas.show(column[0], seen["reference"], f"reference, {cell['name']}")
+        for n, form in enumerate(canvas.FORMS):
+            canvas.show(column[2 * n + 1], seen[form], f"{form}, variation {cell['total_variation'][form]:.2f}")
+            error = canvas.error_label(cell, form)
+            drawn = canvas.show_difference(column[2 * n + 2], seen[form], seen["reference"], 0.2, error)
+    figure.colorbar(drawn, ax=axes[-1, :], shrink=0.8, label="minus the reference")
     canvas.save(figure, path)
 
 

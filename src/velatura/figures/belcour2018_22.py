@@ -2,7 +2,7 @@
 
 The paper prints neither parameters nor scene, but that the frosted metal of figure 13 is among them. Here a coat of
 index 1.5 grows rougher down the grid, over three metals, on a sphere in the studio. As in the paper, the model is the
-symmetric one; the RMSE of the forward one is told as well.
+symmetric one; the RMSE of the forward one is given as well.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def compute(
     coats: Sequence[float] = COATS,
     metals: Sequence[str] = tuple(METALS),
     size: int = canvas.SIZE,
-    spp: int = 4 * canvas.SAMPLES,
+    spp: int = canvas.SAMPLES,
     paths: int = 200_000,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """A list of cells, coat by coat: `coat` (its alpha), `metal`, `rmse` of each form (freed of noise), `pictures`.
+    """A list of `cells`, coat by coat: `coat` (its alpha), `metal`, `canvas.errors` of each form; and `pictures`.
 
     For light along the normal, and for `model` and `walk`: the `base_alpha` and `base_energy` (by colour) of the second
     lobe. `mean` is the mean radiance of the pictures.
@@ -54,14 +54,14 @@ def compute(
             "model": lobes(stack, 1.0, model=MODEL, **canvas.CHOICES),
             "walk": reference.statistics(stack, 1.0, 0.0, paths, seed),
         }
-        cell: dict[str, Any] = {"coat": float(coat), "metal": metal}
+        cell: dict[str, Any] = {"name": f"{metal}, coat {coat:g}", "coat": float(coat), "metal": metal}
         cell["mean"] = {name: float(each.mean()) for name, each in [("reference", true), *images.items()]}
-        cell["rmse"] = {form: canvas.rmse(image, true) for form, image in images.items()}
+        cell |= canvas.errors(images, true)
         cell["base_alpha"] = {side: float(found.alpha[1][0, 0]) for side, found in told.items()}
         cell["base_energy"] = {side: found.energy[1][:, 0].tolist() for side, found in told.items()}
         cells.append(cell)
         seen = {"reference": true, "model": images[FORMS[0]]}
-        pictures.append({name: halves.mean(axis=0).tolist() for name, halves in seen.items()})
+        pictures.append({name: passes.mean(axis=0).tolist() for name, passes in seen.items()})
     return {"eta": ETA, "cells": cells, "pictures": pictures}
 
 
@@ -76,8 +76,8 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     figure = canvas.canvas(4 * columns, 2.3 * rows)
     pairs = figure.subplots(rows, 2 * columns, squeeze=False).reshape(-1, 2)
     for (left, right), cell, seen in zip(pairs, numbers["cells"], numbers["pictures"]):
-        canvas.show(left, seen["model"], f"{cell['metal']}, coat {cell['coat']:g}")
-        canvas.show(right, seen["reference"], f"reference, RMSE {cell['rmse'][FORMS[0]]:.4f}")
+        canvas.show(left, seen["model"], cell["name"])
+        canvas.show(right, seen["reference"], f"reference, {canvas.error_label(cell, FORMS[0])}")
     canvas.save(figure, path)
 
 

@@ -18,10 +18,21 @@ from velatura.stack import Stack, Texture
 Array = NDArray[np.floating]
 Item = TypeVar("Item")
 
-SIZE, SAMPLES = 128, 32  # of a sphere: pixels along a side, and samples of each
+SIZE, SAMPLES = 128, 128  # of a picture: pixels along a side, and samples of each
+PASSES = 8  # of a picture, each of its own random numbers: the noise of an error is that between them
 #: Of every model: light meets one facet of an interface at a time, as in the reference that it is compared with.
 CHOICES: dict[str, Any] = {"reflectance": "fgd"}
-COLOURS = {"belcour2018": "C0", "weidlich_wilkie": "C1", "reference": "black"}
+#: The model of Belcour 2018 in the form that the paper renders offline (its section 7), and in the other one.
+FORMS: dict[str, tuple[str, dict[str, Any]]] = {
+    form: ("belcour2018", {"form": form}) for form in ("symmetric", "forward")
+}
+COLUMNS: dict[str, tuple[str, dict[str, Any]]] = FORMS | {name: (name, {}) for name in ("weidlich_wilkie", "reference")}
+STYLES: dict[str, dict[str, Any]] = {
+    "symmetric": {"color": "C0"},
+    "forward": {"color": "C0", "linestyle": ":"},
+    "weidlich_wilkie": {"color": "C1"},
+    "reference": {"color": "black", "linestyle": "--"},
+}
 
 
 def track(items: Sequence[Item], progress: Callable[[int, int], None] | None) -> Iterator[Item]:
@@ -38,16 +49,17 @@ def bsdf(stack: Stack, model: str, **switches: Any) -> Any:
 
 
 def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:
-    """Two pictures of a sphere, linear RGB of shape (2, size, size, 3), by half of the samples each."""
+    """Pictures of a sphere, linear RGB of shape (passes, size, size, 3), each by its share of the samples."""
     return pictures("sphere", stack, model, env, size, spp, seed, **switches)
 
 
 def pictures(scene: str, stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:
     """As `spheres`, of any object."""
     made = bsdf(stack, model, **switches)
-    numbers = np.random.default_rng([seed, *model.encode()]).integers(2**31, size=2)
-    halves = [scenes.render(made, scene, env, max(spp // 2, 1), (size, size), int(number)) for number in numbers]
-    return np.array(halves)
+    count = max(min(PASSES, spp), 3)  # no fewer than a standard error takes
+    numbers = np.random.default_rng([seed, *model.encode()]).integers(2**31, size=count)
+    passes = [scenes.render(made, scene, env, max(spp // count, 1), (size, size), int(number)) for number in numbers]
+    return np.array(passes)
 
 
 def texture(path: Path, image: ArrayLike) -> Texture:
@@ -79,13 +91,31 @@ def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **sw
     return Probe(bsdf(stack, model, **switches)).sample(np.tile(wi, (paths, 1)), u)
 
 
-def rmse(halves: Array, others: Array) -> float:
-    """Root mean square difference of two pictures over pixels and colours, each given in two halves.
+def rmse(passes: Array, others: Array) -> tuple[float, float]:
+    """Root mean square difference of two pictures over pixels and colours, and its standard error.
 
-    The halves' noise is independent, so that it cancels from the mean of the product of their differences.
+    Both are given in passes. Noise is independent between passes, so that it cancels from the mean of the products of
+    different passes' differences. The standard error is the jackknife's, over passes.
     """
-    first, second = halves - others
-    return float(np.sqrt(max(np.mean(first * second), 0)))
+    differences = (passes - others).reshape(len(passes), -1)
+    products = differences @ differences.T / differences.shape[1]
+    np.fill_diagonal(products, 0)
+
+    def root(total: Any, count: int) -> Any:
+        return np.sqrt(np.maximum(total, 0) / (count * (count - 1)))
+
+    count, total = len(passes), products.sum()
+    without = root(total - 2 * products.sum(axis=0), count - 1)
+    return float(root(total, count)), float(np.sqrt(count - 1) * without.std())
+
+
+def errors(images: Mapping[str, Array], truth: Array) -> dict[str, dict[str, float]]:
+    """By name the `rmse` of pictures against the truth, freed of noise, and its standard error, `rmse_error`."""
+    found = {name: rmse(passes, truth) for name, passes in images.items()}
+    return {
+        "rmse": {name: value for name, (value, _) in found.items()},
+        "rmse_error": {name: error for name, (_, error) in found.items()},
+    }
 
 
 # Drawing
@@ -96,6 +126,11 @@ def canvas(width: float, height: float) -> Any:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def error_label(numbers: Mapping[str, Any], name: str) -> str:
+    """What `errors` found for a name."""
+    return f"RMSE {numbers['rmse'][name]:.4f} ± {numbers['rmse_error'][name]:.4f}"
 
 
 def show(axes: Any, image: ArrayLike, title: str) -> None:

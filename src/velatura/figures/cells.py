@@ -16,7 +16,6 @@ from velatura.figures import canvas
 from velatura.stack import Stack, Varying
 
 COSINES = (1.0, 0.7, 0.4, 0.2)
-SAMPLES = 4 * canvas.SAMPLES  # of a pixel: reflected highlights are noisy
 PATHS = 200_000
 
 Columns = Mapping[str, tuple[str, Mapping[str, str]]]  # by title: a model, and its choices
@@ -26,7 +25,7 @@ class Quality(NamedTuple):
     """Pixels along a side of a picture, samples of each, and paths of a walk."""
 
     size: int = canvas.SIZE
-    spp: int = SAMPLES
+    spp: int = canvas.SAMPLES
     paths: int = PATHS
 
 
@@ -43,7 +42,7 @@ class Cells:
         self,
         names: Collection[str] | None = None,
         size: int = canvas.SIZE,
-        spp: int = SAMPLES,
+        spp: int = canvas.SAMPLES,
         paths: int = PATHS,
         seed: int = 0,
         progress: Callable[[int, int], None] | None = None,
@@ -74,10 +73,11 @@ def compute(
     scene: str = "sphere",
     env: str = "studio",
 ) -> dict[str, Any]:
-    """A list of `cells` by `name`, with the `rmse` and `mean` radiance of each column, and their `pictures`.
+    """A list of `cells` by `name`: of each column `canvas.errors` and the `mean` radiance; and their `pictures`.
 
-    The RMSE is freed of noise. Where a stack does not vary over the surface, `alpha` is that of its last interface's
-    lobe by column and by `walk`, and `energy` its energy: lists over `cos`, alpha of pairs along the true lobe's axes.
+    Where a stack does not vary over the surface, `alpha` is that of its last interface's
+    lobe by column and by `walk`, `ratio` that of each column over the walk's, and `energy` its energy: lists over
+    `cos`, alpha and ratio of pairs along the true lobe's axes.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
@@ -87,13 +87,13 @@ def compute(
         images = {"reference": canvas.pictures(scene, stack, "reference", env, quality.size, quality.spp, seed)}
         for title, (model, choices) in columns.items():
             images[title] = canvas.pictures(scene, stack, model, env, quality.size, quality.spp, seed, **choices)
-        cell: dict[str, Any] = {"name": name}
-        cell["rmse"] = {title: canvas.rmse(images[title], images["reference"]) for title in columns}
-        cell["mean"] = {title: float(halves.mean()) for title, halves in images.items()}
+        found = canvas.errors({title: images[title] for title in columns}, images["reference"])
+        cell: dict[str, Any] = {"name": name, **found}
+        cell["mean"] = {title: float(passes.mean()) for title, passes in images.items()}
         if not any(isinstance(value, Varying) for value in stack.flat().values()):
             cell |= _last_lobe(stack, columns, quality.paths, seed)
         numbers["cells"].append(cell)
-        numbers["pictures"].append({title: halves.mean(axis=0).tolist() for title, halves in images.items()})
+        numbers["pictures"].append({title: passes.mean(axis=0).tolist() for title, passes in images.items()})
     return numbers
 
 
@@ -103,6 +103,7 @@ def _last_lobe(stack: Stack, columns: Columns, paths: int, seed: int) -> dict[st
     for title, (model, choices) in columns.items():
         told[title] = along(_last(lobes(stack, COSINES, 0.0, model, **choices)), true)
     return {
+        "ratio": {title: (told[title].alpha / true.alpha).T.tolist() for title in columns},
         "alpha": {title: lobe.alpha.T.tolist() for title, lobe in told.items()},
         "energy": {title: lobe.energy.mean(axis=0).tolist() for title, lobe in told.items()},
     }
@@ -137,7 +138,7 @@ def draw(numbers: dict[str, Any], path: str | Path, exposure: float = 1.0, bound
         canvas.show(line[0], exposure * np.array(seen["reference"]), f"reference, {cell['name']}")
         for n, title in enumerate(titles):
             canvas.show(line[2 * n + 1], exposure * np.array(seen[title]), title)
-            rmse = f"RMSE {cell['rmse'][title]:.4f}"
-            drawn = canvas.show_difference(line[2 * n + 2], seen[title], seen["reference"], bound, rmse)
+            error = canvas.error_label(cell, title)
+            drawn = canvas.show_difference(line[2 * n + 2], seen[title], seen["reference"], bound, error)
     figure.colorbar(drawn, ax=axes[-1, :], shrink=0.8, label="minus the reference")
     canvas.save(figure, path)

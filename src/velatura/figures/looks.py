@@ -84,8 +84,8 @@ def compute(
     for name, stack in canvas.track(list(stacks.items()), progress):
         read = statistics(stack, COSINES, model=MODEL, **switches)
         numbers["looks"].append({"name": name, "stack": stack.to_dict(), **_lobes(read)})
-        halves = canvas.pictures(scene, on_black(stack), MODEL, env, size, spp, seed, **switches)
-        numbers["pictures"].append(halves.mean(axis=0).tolist())
+        passes = canvas.pictures(scene, on_black(stack), MODEL, env, size, spp, seed, **switches)
+        numbers["pictures"].append(passes.mean(axis=0).tolist())
     return numbers
 
 
