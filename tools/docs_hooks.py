@@ -2,20 +2,33 @@
 
 `<!-- parameters -->` becomes the table of a material's parameters, `<!-- help VERB -->` the output of
 `velatura VERB --help`.
+
+`{{belcour2018-13: rmse/forward}}` becomes a number of `docs/figures/belcour2018-13.json`, which `make figures`
+computes. After the figure's name stand the keys that lead to the number; an item of a list has an index or its name. A
+number with a standard error (`x` beside `x_error`) is printed with it, others to three places, or to as many as ` to 2`
+asks for.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
 import sys
+from functools import cache
+from math import floor, log10
+from pathlib import Path
 from typing import Any
+
+FIGURES = Path(__file__).parents[1] / "docs" / "figures"
+PLACES = 3  # after the point
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Replaces the placeholders of a page."""
     markdown = re.sub(r"<!-- parameters -->", lambda _: _parameters(), markdown)
+    markdown = re.sub(r"\{\{(.*?)\}\}", lambda match: _number(match[1]), markdown)
     return re.sub(r"<!-- help( \w+)? -->", lambda match: _help((match[1] or "").split()), markdown)
 
 
@@ -29,3 +42,52 @@ def _help(verb: list[str]) -> str:
     command = [sys.executable, "-m", "velatura", *verb, "--help"]
     run = subprocess.run(command, check=True, capture_output=True, text=True, env={**os.environ, "COLUMNS": "100"})
     return f"```text\n{run.stdout.rstrip()}\n```"
+
+
+def _number(placeholder: str) -> str:
+    """What a placeholder stands for. Raises LookupError where no figure has that number."""
+    match = re.fullmatch(r"([a-z0-9-]+): (.+?)(?: to (\d))?", placeholder)
+    if not match:
+        raise LookupError(f"{{{{{placeholder}}}}} is none of the manual's placeholders")
+    name, path, places = match[1], match[2].split("/"), int(match[3] or PLACES)
+    try:
+        value, error = _found(name, path)
+    except (OSError, LookupError, TypeError) as missing:
+        raise LookupError(f"{{{{{placeholder}}}}}: docs/figures/{name}.json has no such number") from missing
+    return _written(value, places) if error is None else _with_error(value, error)
+
+
+@cache
+def _figure(name: str) -> Any:
+    return json.loads((FIGURES / f"{name}.json").read_text())
+
+
+def _found(name: str, path: list[str]) -> tuple[Any, Any]:
+    """The value that the keys of a figure lead to, and its standard error or None."""
+    value, error = _figure(name), None
+    for key in path:
+        if error is not None:
+            error = _item(error, key)
+        elif isinstance(value, dict):
+            error = value.get(f"{key}_error")
+        value = _item(value, key)
+    return value, error
+
+
+def _item(found: Any, key: str) -> Any:
+    if isinstance(found, list):
+        return found[int(key)] if key.isdigit() else {item["name"]: item for item in found}[key]
+    return found[key]
+
+
+def _written(value: Any, places: int) -> str:
+    if isinstance(value, list):
+        return ", ".join(_written(item, places) for item in value)
+    return re.sub(r"^(-?)0\.", r"\1.", f"{value:.{places}f}")
+
+
+def _with_error(value: float, error: float) -> str:
+    """Both to the first digit of the standard error, or to the second where the first is 1."""
+    first = floor(log10(error)) if error > 0 else -PLACES
+    places = max((1 if error >= 2 * 10**first else 2) - 1 - first, 0)
+    return f"{_written(value, places)} ± {_written(error, places)}"

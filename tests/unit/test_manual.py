@@ -1,0 +1,67 @@
+"""The manual's placeholders: numbers that the figures printed, and nothing that is typed."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from velatura.figures import FIGURES
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def hooks() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("docs_hooks", ROOT / "tools" / "docs_hooks.py")
+    assert spec and spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def example(hooks: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The hooks, with one figure's numbers."""
+    cell = {"name": "a coat, .5", "rmse": {"forward": 0.04973, "fine": 0.0135}}
+    cell["rmse_error"] = {"forward": 0.00169, "fine": 0.00086}
+    numbers = {"cells": [cell], "angles": [1.0, 0.25], "energy": {"red": -0.1234}}
+    (tmp_path / "some-figure.json").write_text(json.dumps(numbers))
+    monkeypatch.setattr(hooks, "FIGURES", tmp_path)
+    return hooks
+
+
+@pytest.mark.parametrize(
+    ("placeholder", "printed"),
+    [
+        ("some-figure: cells/a coat, .5/rmse/forward", ".0497 ± .0017"),
+        ("some-figure: cells/0/rmse/fine", ".0135 ± .0009"),
+        ("some-figure: angles", "1.000, .250"),
+        ("some-figure: angles/1 to 1", ".2"),
+        ("some-figure: energy/red", "-.123"),
+    ],
+)
+def test_a_placeholder_becomes_a_number(example: ModuleType, placeholder: str, printed: str) -> None:
+    assert example.on_page_markdown(f"| {{{{{placeholder}}}}} |") == f"| {printed} |"
+
+
+@pytest.mark.parametrize(
+    "placeholder",
+    ["other-figure: angles", "some-figure: angle", "some-figure: angles/7", "some-figure: cells/b/rmse", "angles", ""],
+)
+def test_an_unknown_placeholder_ends_the_build(example: ModuleType, placeholder: str) -> None:
+    with pytest.raises(LookupError, match=re.escape(f"{{{{{placeholder}}}}}")):
+        example.on_page_markdown(f"{{{{{placeholder}}}}}")
+
+
+def test_every_placeholder_of_the_page_of_figures_resolves(hooks: ModuleType) -> None:
+    page = (ROOT / "docs" / "figures.md").read_text()
+    assert "{{" not in hooks.on_page_markdown(page)
+
+
+def test_every_printed_figure_exists() -> None:
+    assert {path.stem for path in (ROOT / "docs" / "figures").glob("*.json")} <= set(FIGURES)
