@@ -31,6 +31,19 @@ from velatura.stack import rgb as rgb_of
 #: quarter of the mean of the three curves that make sRGB of a spectrum under D65.
 STEERING_NM = (445.0, 525.0, 585.0, 620.0)
 
+#: Textures of Mitsuba that are the same everywhere, and those of them that are numbers in spectral variants, too. All
+#: others are taken to vary, whatever they say (`mesh_attribute` says that it does not), and may ask a shape, which is
+#: not known while a plugin is made.
+_NUMBERS = ("UniformSpectrum", "RawConstantTexture")
+_SPECTRA = (
+    *_NUMBERS,
+    "SRGBReflectanceSpectrum",
+    "RegularSpectrum",
+    "IrregularSpectrum",
+    "D65Spectrum",
+    "BlackBodySpectrum",
+)
+
 #: What stands in the stack for a value that a plugin got as a texture object.
 _STAND_IN = {"alpha_u": 0.1, "alpha_v": 0.1, "eta": 1.5, "k": 1.0}
 
@@ -48,8 +61,8 @@ class Image:
 
     @property
     def varies(self) -> bool:
-        """Whether the value changes from point to point."""
-        return bool(self.texture.is_spatially_varying())
+        """Whether the value may change from point to point."""
+        return self.texture.class_name() not in _SPECTRA
 
     def at(self, si: Any, active: Any) -> Any:
         """The value at a surface point: a colour or spectrum, or a number."""
@@ -96,13 +109,17 @@ class Binding:
 
     def __init__(self, mi: Any, properties: Any, options: Collection[str] = ()) -> None:
         self.mi = mi
-        given = {name: properties[name] for name in list(properties.keys()) if name not in options}
+        given = {name: self._given(properties, name) for name in list(properties.keys()) if name not in options}
         objects: dict[str, Any] = {}
         for name, value in given.items():
             if isinstance(value, mi.Object):
+                if name == "exterior":
+                    raise InvalidInput(
+                        "exterior: must be a number, which is the same everywhere and for all wavelengths"
+                    )
                 axes = ("_u", "_v") if name.endswith("_alpha") else ("",)
                 objects.update({name + axis: value for axis in axes})
-        numbers = {k: _plain(v) for k, v in given.items() if not isinstance(v, mi.Object) and k != "material"}
+        numbers = {k: v for k, v in given.items() if not isinstance(v, mi.Object) and k != "material"}
         stand_ins = {name: _STAND_IN.get(name.partition("_")[2], 0.5) for name in objects}
         if "material" in given:
             self.stack = _described(str(given["material"])).replace(**numbers, **stand_ins)
@@ -185,7 +202,41 @@ class Binding:
         flags = self.mi.ParamFlags
         return flags.NonDifferentiable if name == "exterior" else flags.Differentiable
 
-    # How a value of the stack becomes one of Mitsuba's
+    # How a property becomes a value of the stack, and that one of Mitsuba's
+
+    def _given(self, properties: Any, name: str) -> Any:
+        """A property as a material file would hold it; a texture, or a spectrum in spectral variants, as it is."""
+        mi, value = self.mi, properties[name]
+        if isinstance(value, bool | int | float | str):
+            return value
+        if properties.type(name).name == "Spectrum":
+            bounded = name.endswith("_albedo")  # as Mitsuba's own plugins read a reflectance
+            value = properties.get_texture(name) if bounded else properties.get_unbounded_texture(name)
+        if isinstance(value, mi.Object):
+            if value.class_name() not in (_NUMBERS if mi.is_spectral else _SPECTRA):
+                return value
+            value = self._tried(name, value, colour=True)
+        try:
+            channels = np.ravel(np.array(value, float)).tolist()
+        except (RuntimeError, TypeError, ValueError):
+            allowed = "a number, a colour, a spectrum or a texture"
+            raise InvalidInput(f"{name}: must be {allowed}, got {type(value).__name__}") from None
+        return channels[0] if len(set(channels)) == 1 else tuple(channels)
+
+    def _tried(self, name: str, texture: Any, colour: bool) -> Any:
+        """The value of a texture that asks nothing of a shape.
+
+        Raises:
+            InvalidInput: it has none in this variant.
+        """
+        import drjit as dr
+
+        try:
+            return (texture.eval if colour else texture.eval_1)(dr.zeros(self.mi.SurfaceInteraction3f))
+        except (AttributeError, RuntimeError, TypeError):
+            needs = f"needs a texture of {'colours' if colour else 'numbers'} in the variant {self.mi.variant()}"
+            mend = "; write it as a spectrum" if colour and texture.class_name() in _SPECTRA else ""
+            raise InvalidInput(f"{name}: {needs}{mend}") from None
 
     def _bind(self, name: str, value: Any) -> None:
         mi = self.mi
@@ -199,18 +250,17 @@ class Binding:
             self.images[name] = self._spectrum(name, value)
         else:
             value = rgb_of(value) if isinstance(value, Named) else value
-            self.constants[name] = mi.Color3f(*value) if isinstance(value, tuple) else mi.Float(value)
+            if isinstance(value, tuple):
+                colour = mi.Color3f(*value)
+                self.constants[name] = mi.luminance(colour) if mi.is_monochromatic else colour
+            else:
+                self.constants[name] = mi.Float(value)
 
     def _object(self, name: str, texture: Any) -> Image:
-        import drjit as dr
-
-        image = Image(texture, is_colour(name), **_range(name))
-        try:
-            image.at(dr.zeros(self.mi.SurfaceInteraction3f), True)
-        except (RuntimeError, AttributeError, TypeError):
-            what = "colours" if image.colour else "numbers"
-            raise InvalidInput(f"{name}: needs a texture of {what} in the variant {self.mi.variant()}") from None
-        return image
+        colour, kind = is_colour(name), texture.class_name()
+        if kind in _SPECTRA or kind.startswith("BitmapTexture") or not isinstance(texture, self.mi.Texture):
+            self._tried(name, texture, colour)
+        return Image(texture, colour, **_range(name))
 
     def _image(self, name: str, image: Texture) -> Image:
         colour = is_colour(name) and image.channel in (None, "rgb")
@@ -257,16 +307,6 @@ def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
 
 def _described(material: str) -> Stack:
     return loads(material, "material.json") if material.lstrip().startswith("{") else load(material)
-
-
-def _plain(value: Any) -> Any:
-    """A property as a material file would hold it."""
-    if isinstance(value, bool | int | float | str):
-        return value
-    try:
-        return tuple(float(x) for x in value)
-    except TypeError:
-        raise InvalidInput(f"expected a number, a colour or a texture, got {type(value).__name__}") from None
 
 
 def _range(name: str) -> dict[str, float]:

@@ -77,7 +77,8 @@ def make(mi: Any) -> type:
                 self.body = self._prepared(binding.values(), number=number, settle=self._settled)
                 dr.eval(self.body)
             self.spectra: spectral.Spectra | None = None
-            if not binding.uniform and not binding.varies and dr.is_jit_v(mi.Float):
+            sampled = binding.stack.interfaces and not binding.uniform and not binding.varies
+            if sampled and dr.is_jit_v(mi.Float):
                 steering = {**binding.values(), **binding.steering}
                 fixed = self._prepared(steering, number=mi.Float, settle=self._settled)
                 dr.eval(fixed)
@@ -143,7 +144,7 @@ def make(mi: Any) -> type:
             through = si.wi.z * bs.wo.z < 0
             bs.sampled_component = dr.select(through, mi.UInt32(1), mi.UInt32(0))
             bs.sampled_type = dr.select(through, mi.UInt32(+self.kinds[-1]), mi.UInt32(+self.kinds[0]))
-            return bs, dr.select(active & (bs.pdf > 0), spectral.carried(mi, weight), 0)
+            return bs, mi.depolarizer(dr.select(active & (bs.pdf > 0), spectral.carried(mi, weight), 0))
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval_pdf(ctx, si, wo, active)[0]
@@ -153,9 +154,9 @@ def make(mi: Any) -> type:
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             if self.delta:
-                return mi.UnpolarizedSpectrum(0), mi.Float(0)
+                return mi.Spectrum(0), mi.Float(0)
             value, pdf = bsdf.eval_pdf(self._body(si, active), tuple(si.wi), tuple(wo), self._asked(ctx))
-            return spectral.carried(mi, value) & active, dr.select(active, pdf, 0)
+            return mi.depolarizer(spectral.carried(mi, value)) & active, dr.select(active, pdf, 0)
 
         def _asked(self, ctx: Any) -> bsdf.Asked:
             """Whether reflection and transmission are wanted, and of what."""

@@ -58,7 +58,7 @@ def make(mi: Any) -> type:
             bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, 0
             bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
             value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
-            return bs, dr.select(bs.pdf > 0, value / dr.maximum(bs.pdf, 1e-30), 0)
+            return bs, value / dr.maximum(bs.pdf, 1e-30) & (bs.pdf > 0)
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval_pdf(ctx, si, wo, active)[0]
@@ -68,12 +68,12 @@ def make(mi: Any) -> type:
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
-                return mi.UnpolarizedSpectrum(0), mi.Float(0)
+                return mi.Spectrum(0), mi.Float(0)
             kinds, values = self.binding.stack.kinds, self.binding.at(si, active)
             active = active & (si.wi.z > 0) & (wo.z > 0)
             value = evaluate(kinds, values, tuple(si.wi), tuple(wo))
             pdf = density(kinds, values, tuple(si.wi), tuple(wo))
-            return dr.select(active, mi.UnpolarizedSpectrum(value), 0), dr.select(active, pdf, 0)
+            return mi.depolarizer(mi.UnpolarizedSpectrum(value)) & active, dr.select(active, pdf, 0)
 
         def to_string(self) -> str:
             return f"WeidlichWilkie[kinds={', '.join(self.binding.stack.kinds)}]"

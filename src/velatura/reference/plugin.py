@@ -132,7 +132,7 @@ def make(mi: Any) -> type:
             passed = active & (path.alive ^ True) & self._asked(ctx, reflected)
             if ctx.mode == mi.TransportMode.Radiance:
                 path.weight /= bs.eta * bs.eta
-            return bs, dr.select(passed, path.weight, 0)
+            return bs, mi.depolarizer(dr.select(passed, path.weight, 0))
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             # Walk towards the upper side, by which light leaves
@@ -148,7 +148,7 @@ def make(mi: Any) -> type:
             if self.transmits and ctx.mode == mi.TransportMode.Radiance:
                 scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
                 path.value *= scale * scale
-            return dr.select(active, path.value, 0)
+            return mi.depolarizer(dr.select(active, path.value, 0))
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             flipped = si.wi.z < 0

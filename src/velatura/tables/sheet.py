@@ -50,7 +50,7 @@ def sample(average: Average, number: type, shape: tuple[int, ...], theta_c: Valu
     cosine = coordinates.to_cosine(x) if theta_c is None else coordinates.to_angle(x, theta_c)
     values = average(cosine, coordinates.to_roughness(y)) + dr.zeros(number, dr.width(x))
     colour = type(values) if dr.size_v(values) > 1 and any(c.index != values[0].index for c in values) else None
-    flat = dr.ravel(values) if colour else (values if dr.size_v(values) <= 1 else values[0])
+    flat = dr.ravel(values) if colour else (values if dr.depth_v(values) <= 1 else values[0])
     dr.eval(flat)
     dialect = sys.modules[number.__module__]
     channels = len(values) if colour else 1
