@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -122,7 +123,7 @@ class Binding:
         numbers = {k: v for k, v in given.items() if not isinstance(v, mi.Object) and k != "material"}
         stand_ins = {name: _STAND_IN.get(name.partition("_")[2], 0.5) for name in objects}
         if "material" in given:
-            self.stack = _described(str(given["material"])).replace(**numbers, **stand_ins)
+            self.stack = _described(mi, str(given["material"])).replace(**numbers, **stand_ins)
         else:
             self.stack = Stack.from_flat(None, {**numbers, **stand_ins})
         self.constants: dict[str, Any] = {}
@@ -305,8 +306,15 @@ def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
     return np.ascontiguousarray(texels[..., [channels.index(c) for c in wanted]])
 
 
-def _described(material: str) -> Stack:
-    return loads(material, "material.json") if material.lstrip().startswith("{") else load(material)
+def _described(mi: Any, material: str) -> Stack:
+    """The stack that a scene names; files are found as Mitsuba finds those of its own plugins, beside the scene."""
+
+    def find(path: str) -> str:
+        return str(mi.file_resolver().resolve(path))
+
+    if material.lstrip().startswith("{"):
+        return loads(material, "material.json", find=find)
+    return load(find(material) if Path(material).suffix else material)
 
 
 def _range(name: str) -> dict[str, float]:

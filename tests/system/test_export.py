@@ -77,6 +77,26 @@ def test_a_scene_of_mitsuba_can_include_it(preset: str, run: Run, tmp_path: Path
     assert str(found) == str(expected)
 
 
+def test_a_scene_and_its_images_may_be_moved(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the scene names its image relative to itself, and is read in another place from any folder."""
+    mi: Any = kernel.mitsuba()
+    here, there = tmp_path / "here", tmp_path / "there"
+    (here / "maps").mkdir(parents=True)
+    mi.Bitmap(np.full((2, 2, 1), 0.3, np.float32)).write(str(here / "maps/rough.exr"))
+    (here / "gold.yaml").write_text(
+        "layers:\n  - interface: {conductor: Au, alpha: {texture: maps/rough.exr}}\n", encoding="utf-8"
+    )
+    monkeypatch.chdir(here)
+    assert run("export", "gold.yaml", "--to", "mitsuba-xml", "-o", "gold.xml")[0] == 0
+    assert '"maps/rough.exr"' in (here / "gold.xml").read_text()
+    here.rename(there)
+    monkeypatch.chdir(tmp_path)
+    (there / "scene.xml").write_text(
+        '<scene version="3.0.0"><include filename="gold.xml"/><shape type="sphere"><ref id="material"/></shape></scene>'
+    )
+    assert "layer0_alpha_u.data" in str(mi.traverse(mi.load_file(str(there / "scene.xml"))))
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_script_runs(preset: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: it describes the same stack, and as a script renders it with the same model to the file named."""

@@ -225,6 +225,20 @@ def test_a_texture_of_python_varies_whatever_it_says(variant: str) -> None:
     assert left > 2 * right
 
 
+@pytest.mark.parametrize("variant", ["scalar_rgb"], indirect=True)
+def test_files_are_found_beside_the_scene(variant: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: a material file, its image, and an image that JSON text names, wherever the program runs."""
+    (folder / "paint.yaml").write_text("layers: [diffuse: {albedo: {texture: colours.exr}}]")
+    text = '{"layers": [{"diffuse": {"albedo": {"texture": "colours.exr"}}}]}'
+    monkeypatch.chdir(folder.parent)
+    for material in ("paint.yaml", text, str(folder / "paint.yaml")):
+        found = seen(folder, f"<bsdf type='layered'><string name='material' value='{material}'/></bsdf>")
+        expected = seen(folder, f'<bsdf type="diffuse">{COLOURS["bitmap"].replace("NAME", "reflectance")}</bsdf>')
+        np.testing.assert_allclose(found, expected, rtol=1e-4)
+    with pytest.raises(RuntimeError, match=r"InvalidInput: none\.yaml: file not found\s*$"):
+        seen(folder, '<bsdf type="layered"><string name="material" value="none.yaml"/></bsdf>')
+
+
 GREY = vt.Stack([vt.Interface(eta=1.5, alpha=0.2), vt.Medium(depth=0.5), vt.Interface(eta=0.5, k=2.0, alpha=0.3)])
 
 

@@ -63,6 +63,8 @@ def export(
     chosen = named(options.model_name(model), **switches)
     if to is To.glsl:
         text, beside = _glsl(stack, chosen, constant or [])
+    elif to is To.mitsuba_xml:
+        text, beside = _mitsuba_xml(stack, chosen, switches, output.parent if output else None), None
     else:
         text, beside = _WRITERS[to](stack, chosen, switches), None
     if output is None:
@@ -106,10 +108,14 @@ def _json(stack: Stack, model: Model, switches: Mapping[str, str]) -> str:
     return json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _mitsuba_xml(stack: Stack, model: Model, switches: Mapping[str, str]) -> str:
+def _mitsuba_xml(stack: Stack, model: Model, switches: Mapping[str, str], folder: Path | None) -> str:
+    """A scene to be included; paths are relative to its folder, where Mitsuba looks for them, or absolute without."""
     from velatura.stack import dumps
 
-    strings = {"material": json.dumps(json.loads(dumps(stack, "json")), ensure_ascii=False), "model": model.name}
+    strings = {
+        "material": json.dumps(json.loads(dumps(stack, "json", folder)), ensure_ascii=False),
+        "model": model.name,
+    }
     lines = [f'        <string name="{key}" value={_quoted(text)}/>' for key, text in {**strings, **switches}.items()]
     head = "<!-- Needs the plugins of Velatura: import velatura; velatura.register() -->"
     bsdf = ['    <bsdf type="layered" id="material">', *lines, "    </bsdf>"]
@@ -156,6 +162,5 @@ def _python(stack: Stack, model: Model, switches: Mapping[str, str]) -> str:
 
 _WRITERS: dict[To, Callable[[Stack, Model, Mapping[str, str]], str]] = {
     To.json: _json,
-    To.mitsuba_xml: _mitsuba_xml,
     To.python: _python,
 }

@@ -50,20 +50,27 @@ def load(material: Material) -> Stack:
     return loads(_text(path), name=str(path), folder=path.parent)
 
 
-def loads(text: str, name: str = "material.yaml", folder: str | Path = ".") -> Stack:
+def loads(
+    text: str,
+    name: str = "material.yaml",
+    folder: str | Path = ".",
+    find: Callable[[str], str] | None = None,
+) -> Stack:
     """The stack in a text.
 
     Args:
         text: YAML, or JSON where `name` ends in .json.
         name: what error messages call the text.
         folder: what texture paths are relative to.
+        find: where there is no such folder: the file that a path stands for.
 
     Raises:
         InvalidInput: the text is not a material; one line that begins with `name`.
     """
+    find = find or (lambda path: str(Path(folder, path)))
     try:
         fields = _parse(text, _FORMATS.get(Path(name).suffix.lower(), "yaml"))
-        return Stack.from_dict(_with_texture_paths(fields, lambda path: str(Path(folder, path))))
+        return Stack.from_dict(_with_texture_paths(fields, find))
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}") from None
     except RecursionError:
