@@ -18,7 +18,9 @@ away poisons neither value nor gradient.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from typing import Any, Protocol
 
@@ -149,6 +151,62 @@ def _dialect(*args: Value) -> Any:
         elif not isinstance(x, (float, int)):
             return getattr(type(x), "dialect", None) or _drjit()
     return found
+
+
+# What is printed of the model besides its values; numbers take no notice
+
+_readable: ContextVar[bool] = ContextVar("readable", default=False)
+_title: ContextVar[str] = ContextVar("title", default="")
+
+
+@contextmanager
+def readable() -> Iterator[None]:
+    """Records values for people to read meanwhile: with names, and loops as loops."""
+    outside = _readable.set(True)
+    try:
+        yield
+    finally:
+        _readable.reset(outside)
+
+
+def is_readable() -> bool:
+    """Whether what is recorded now is for people to read."""
+    return _readable.get()
+
+
+@contextmanager
+def block(title: str) -> Iterator[None]:
+    """A part of the model, and the title under which its values are printed."""
+    outside = _title.set(title)
+    try:
+        yield
+    finally:
+        _title.reset(outside)
+
+
+def title() -> str:
+    """The title of the innermost block; "" outside of all."""
+    return _title.get()
+
+
+def names(**values: Value) -> None:
+    """Names under which values are printed, unless they have been given others before; of a tuple or list by item."""
+    if not is_readable():
+        return
+    for name, value in values.items():
+        if isinstance(value, tuple | list):
+            parts = "xyz" if isinstance(value, tuple) and len(value) == 3 else range(len(value))
+            names(**{f"{name}_{part}": each for part, each in zip(parts, value)})
+        elif dialect := getattr(type(value), "dialect", None):
+            dialect.name(value, name)
+
+
+class Named:
+    """A record whose values are printed under the names of its fields."""
+
+    def __post_init__(self) -> None:
+        if is_readable():
+            names(**vars(self))
 
 
 def sqrt(x: Value) -> Value:

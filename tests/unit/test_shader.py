@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import compileall
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +16,7 @@ from evaluation import evaluate
 import velatura as vt
 from velatura import ops, tables
 from velatura.errors import InvalidInput
-from velatura.shader import Recording, glsl, record, shader, source
+from velatura.shader import Recording, glsl, record, shader
 from velatura.shader.graph import Graph
 from velatura.shader.symbol import Symbol, colour, component, in_order, number
 from velatura.shader.tape import tape
@@ -271,7 +275,7 @@ def test_what_is_read_has_loops_and_what_is_run_has_none() -> None:
         values = ops.each(lambda node, y: node * y + 1.0, [0.25, 0.5], x)
         return [*values, *ops.repeat(lambda a, b: [b, a + b], 3, 0.0 * x, x)]
 
-    with source.naming(Symbol):
+    with ops.readable():
         texts = printed(sum(powers(number("x"))))
     assert "const float nodes[2] = float[2](0.25, 0.5);" in texts
     assert texts.count("for (int") == 2
@@ -306,3 +310,38 @@ def test_the_texture_holds_the_tables() -> None:
             np.testing.assert_array_equal(nodes[..., :channels], table.data)
             start += -(-nodes.size // 4) * 4
     assert not flat[start:].any()
+
+
+@pytest.mark.parametrize("archive", [False, True], ids=["byte code", "zip"])
+def test_shaders_need_no_source_text(archive: bool, tmp_path: Path) -> None:
+    """The package as byte code alone, in a folder or in a zip, prints the shader that its source prints."""
+    own = Path(vt.__file__).parent
+    shutil.copytree(own, tmp_path / "velatura", ignore=shutil.ignore_patterns("page", "static", "__pycache__"))
+    compileall.compile_dir(tmp_path / "velatura", quiet=2, legacy=True)
+    for path in tmp_path.rglob("*.py"):
+        path.unlink()
+    place = Path(shutil.make_archive(str(tmp_path / "velatura"), "zip", tmp_path)) if archive else tmp_path
+    program = (
+        f"import sys; sys.path.insert(0, {str(place)!r}); import velatura as vt; from velatura.shader import shader;"
+        f"assert vt.__file__.startswith({str(place)!r}), vt.__file__;"
+        "print(shader(vt.preset('coated-gold'), 'belcour2018').key)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
+    assert done.stdout.strip() == shader(vt.preset("coated-gold"), "belcour2018").key, done.stderr
+
+
+def test_a_recording_leaves_profilers_alone() -> None:
+    seen: list[str] = []
+
+    def profiler(frame: object, event: str, argument: object) -> None:
+        seen.append(event)
+
+    sys.setprofile(profiler)
+    try:
+        shader(vt.preset("bare-gold"), "weier2020")
+        assert sys.getprofile() is profiler
+        before = len(seen)
+        vt.preset("bare-gold")
+        assert len(seen) > before
+    finally:
+        sys.setprofile(None)

@@ -18,7 +18,7 @@ from velatura.optics.ggx import Direction
 
 
 @dataclass(frozen=True)
-class Lobe:
+class Lobe(ops.Named):
     """Energy (a colour), variance in the space of the roughness map, and the GGX lobe that has it.
 
     The lobe is drawn as `gain` times its energy times a GGX reflection, or, where it is that of `facets`, times their
@@ -33,7 +33,7 @@ class Lobe:
 
 
 @dataclass(frozen=True)
-class State:
+class State(ops.Named):
     """The stack so far: energies (colours), variances, the cosine below it and the products of Snell's factors.
 
     Of the light that comes up to it, r_i0 returns, t_i0 leaves and a_i0 is absorbed. Each is kept apart, since 1 - r_i0
@@ -92,34 +92,35 @@ def add(prepared: Prepared, above: State, layer: operators.PreparedLayer, wi: Di
             above = _totally_reflected(above, own.leaving)
     r_i0, t_0i, t_i0 = above.r_i0, above.t_0i, above.t_i0
 
-    # Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 28-31)
-    gone = above.a_i0 + r_i0 * own.a_12
-    bounces = 1 / ops.maximum(gone + t_i0 + r_i0 * own.t_12, ops.TINY)  # 1 - r_i0 r_12
-    m_r0i = t_0i * own.r_12 * t_i0 * bounces
-    m_ri0 = own.t_21 * r_i0 * own.t_12 * bounces
-    m_rr = mean(r_i0 * own.r_12 * bounces)
-    e_ri0 = mean(own.r_21 + m_ri0)
+    with ops.block("Sum the bounces between the stack and the layer (Belcour 2018, Eqs. 28-31)"):
+        gone = above.a_i0 + r_i0 * own.a_12
+        bounces = 1 / ops.maximum(gone + t_i0 + r_i0 * own.t_12, ops.TINY)  # 1 - r_i0 r_12
+        m_r0i = t_0i * own.r_12 * t_i0 * bounces
+        m_ri0 = own.t_21 * r_i0 * own.t_12 * bounces
+        m_rr = mean(r_i0 * own.r_12 * bounces)
+        e_ri0 = mean(own.r_21 + m_ri0)
+        ops.names(gone=gone, bounces=bounces, m_r0i=m_r0i, m_ri0=m_ri0, m_rr=m_rr, e_ri0=e_ri0)
 
-    # Add up the variances of what they bounce between (Belcour 2018, Eqs. 38, 49-51)
-    back_and_forth = (own.s_r + above.s_ri0) * m_rr
-    lobe = None
-    if not isinstance(layer, PreparedMedium):
-        variance = (above.s_ti0 + (above.s_t0i + own.s_r + back_and_forth) * above.j_0i).bounded()
-        lobe = Lobe(m_r0i, variance, variance.roughness(prepared.f))
-    from_above = own.s_t12 + (own.s_t21 + above.s_ri0 + back_and_forth) * own.j_12
-    share = 1 / ops.maximum(e_ri0, ops.TINY)
-    below = State(
-        cos_theta=own.cos_theta,
-        r_i0=own.r_21 + m_ri0,
-        t_0i=t_0i * own.t_12 * bounces,
-        t_i0=own.t_21 * t_i0 * bounces,
-        a_i0=own.a_21 + own.t_21 * gone * bounces,
-        s_t0i=(above.s_t0i * own.j_12 + own.s_t12 + back_and_forth * own.j_12).bounded(),
-        s_ti0=(own.s_t21 * above.j_i0 + above.s_ti0 + back_and_forth * above.j_i0).bounded(),
-        s_ri0=(own.s_r * (mean(own.r_21) * share) + from_above * (mean(m_ri0) * share)).bounded(),
-        j_0i=above.j_0i * own.j_12,
-        j_i0=above.j_i0 * own.j_21,
-    )
+    with ops.block("Add up the variances of what they bounce between (Belcour 2018, Eqs. 38, 49-51)"):
+        back_and_forth = (own.s_r + above.s_ri0) * m_rr
+        lobe = None
+        if not isinstance(layer, PreparedMedium):
+            variance = (above.s_ti0 + (above.s_t0i + own.s_r + back_and_forth) * above.j_0i).bounded()
+            lobe = Lobe(m_r0i, variance, variance.roughness(prepared.f))
+        from_above = own.s_t12 + (own.s_t21 + above.s_ri0 + back_and_forth) * own.j_12
+        share = 1 / ops.maximum(e_ri0, ops.TINY)
+        below = State(
+            cos_theta=own.cos_theta,
+            r_i0=own.r_21 + m_ri0,
+            t_0i=t_0i * own.t_12 * bounces,
+            t_i0=own.t_21 * t_i0 * bounces,
+            a_i0=own.a_21 + own.t_21 * gone * bounces,
+            s_t0i=(above.s_t0i * own.j_12 + own.s_t12 + back_and_forth * own.j_12).bounded(),
+            s_ti0=(own.s_t21 * above.j_i0 + above.s_ti0 + back_and_forth * above.j_i0).bounded(),
+            s_ri0=(own.s_r * (mean(own.r_21) * share) + from_above * (mean(m_ri0) * share)).bounded(),
+            j_0i=above.j_0i * own.j_12,
+            j_i0=above.j_i0 * own.j_21,
+        )
     return below, lobe
 
 

@@ -83,12 +83,12 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     worth: Row = ()
     reflected: Value = 0.0
     if inside.interfaces:
-        # Light leaves by the way that it comes in
-        entered = ops.each(lambda node, n: settle(_entered(prepared, lit(node, n))), nodes, prepared.base.n)
-        leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in range(parts.COUNT)]
-        even = parts.even(inside.indices[0])
-        squared = inside.indices[0] * inside.indices[0]
-        leaves = [ops.divide(x, squared * w) for x, w in zip(leaves, even)]
+        with ops.block("Light leaves by the way that it comes in"):
+            entered = ops.each(lambda node, n: settle(_entered(prepared, lit(node, n))), nodes, prepared.base.n)
+            leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in range(parts.COUNT)]
+            even = parts.even(inside.indices[0])
+            squared = inside.indices[0] * inside.indices[0]
+            leaves = [ops.divide(x, squared * w) for x, w in zip(leaves, even)]
         worth, reflected = inside.solved(leaves, settle)
     base = dataclasses.replace(prepared.base, worth=tuple(worth), mean_reflectance=reflected)
     known = dataclasses.replace(prepared, base=base)

@@ -35,7 +35,7 @@ CONTRAST_MIN = 0.02  # of two indices, below which an interface is hardly there
 
 
 @dataclass(frozen=True)
-class State:
+class State(ops.Named):
     """The stack so far: energies (colours), tensors of momentum, and the medium below it.
 
     `cos_theta` is the cosine of the mean direction there, `n` its index and `n_exit` the lowest index above, which
@@ -100,66 +100,71 @@ def _at(
     facets = plane.seen(layer.s_r)
     alpha = ops.minimum(_size(facets), 1.0)
 
-    # Reflect
-    steep = _steepness(k, facets, cosine)
-    s_r = _stretched(facets, n * n * steep[0], n * n * steep[1])
-    lit = _fetched(_roughness(k, above.s_t0i + s_r, n, cosine), cosine, layer.opaque)
-    r = ops.clip(_reflectance(layer, cosine, lit), 0.0, 1.0)
+    with ops.block("Reflect"):
+        steep = _steepness(k, facets, cosine)
+        s_r = _stretched(facets, n * n * steep[0], n * n * steep[1])
+        lit = _fetched(_roughness(k, above.s_t0i + s_r, n, cosine), cosine, layer.opaque)
+        r = ops.clip(_reflectance(layer, cosine, lit), 0.0, 1.0)
+        ops.names(cosine=cosine, alpha=alpha, steep=steep, lit=lit, r=r)
 
-    # See how much of it leaves, and how much is trapped: returns to leave another time
-    leaves = _leaving(k, above, layer, s_r, cosine)
-    rarer = 0.0 if layer.opaque else ops.maximum(n - n * layer.n12, 0.0) / ops.maximum(n - above.n_exit, 1e-6)
-    r_again = r + (1 - r) * (k.rare * ops.minimum(rarer, 1.0))
-    kept = ops.exp(-k.slant * above.depth)
-    leaves_again = k.again * leaves
-    trapped = (1 - leaves) * above.t_i0 * kept / ops.maximum(1 - r_again * kept * (1 - leaves_again), LOSS_MIN)
+    with ops.block("See how much of it leaves, and how much is trapped: returns to leave another time"):
+        leaves = _leaving(k, above, layer, s_r, cosine)
+        rarer = 0.0 if layer.opaque else ops.maximum(n - n * layer.n12, 0.0) / ops.maximum(n - above.n_exit, 1e-6)
+        r_again = r + (1 - r) * (k.rare * ops.minimum(rarer, 1.0))
+        kept = ops.exp(-k.slant * above.depth)
+        leaves_again = k.again * leaves
+        trapped = (1 - leaves) * above.t_i0 * kept / ops.maximum(1 - r_again * kept * (1 - leaves_again), LOSS_MIN)
+        ops.names(leaves=leaves, r_again=r_again, kept=kept, trapped=trapped)
 
-    # Sum the bounces between the stack and the interface (Belcour 2018, Eqs. 28-31)
-    bounces = 1 / ops.maximum(1 - above.r_i0 * r, LOSS_MIN)
-    out = above.t_i0 * leaves * ops.exp(-k.path * lit * above.depth) + trapped * r_again * leaves_again
-    energy = above.t_0i * r * bounces * out
-    m_rr = ops.mean(above.r_i0 * r * bounces)
-    m_trapped = ops.mean(r * trapped)
-    back_and_forth = (s_r + above.s_ri0) * (k.bounced * m_rr) + (s_r + above.s_exit) * (k.trapped * m_trapped)
+    with ops.block("Sum the bounces between the stack and the interface (Belcour 2018, Eqs. 28-31)"):
+        bounces = 1 / ops.maximum(1 - above.r_i0 * r, LOSS_MIN)
+        out = above.t_i0 * leaves * ops.exp(-k.path * lit * above.depth) + trapped * r_again * leaves_again
+        energy = above.t_0i * r * bounces * out
+        m_rr = ops.mean(above.r_i0 * r * bounces)
+        m_trapped = ops.mean(r * trapped)
+        back_and_forth = (s_r + above.s_ri0) * (k.bounced * m_rr) + (s_r + above.s_exit) * (k.trapped * m_trapped)
+        ops.names(bounces=bounces, out=out, energy=energy, m_rr=m_rr, m_trapped=m_trapped)
 
-    # See the sum of all widths from above
-    width = above.s_ti0 + above.s_t0i + s_r + back_and_forth
-    lobe = _lobe(prepared, plane, energy, _seen(k, above, layer, width, r, cosine, cos_top), cos_top)
+    with ops.block("See the sum of all widths from above"):
+        width = above.s_ti0 + above.s_t0i + s_r + back_and_forth
+        lobe = _lobe(prepared, plane, energy, _seen(k, above, layer, width, r, cosine, cos_top), cos_top)
     if layer.opaque:
         return replace(above, t_0i=0.0), lobe
 
-    # Refract
-    n_below = n * layer.n12
-    cos_t = ops.sqrt(1 - (1 - cosine * cosine) / (layer.n12 * layer.n12))
-    steep_t = _steepness(k, facets, cos_t)
-    moved = [0.5 * (n_below * ops.sqrt(t) - n * ops.sqrt(i)) for t, i in zip(steep_t, steep)]
-    s_t = _stretched(facets, moved[0] * moved[0], moved[1] * moved[1])
-    contrast = ops.absolute(n_below - n) / ops.maximum(n_below, n)
-    entering = _kept(cosine, alpha, contrast, k.lost_down)
-    leaving = _kept(cos_t, alpha, contrast, k.lost_up)
-    t_12, t_21 = (1 - r) * entering, (1 - r) * leaving
-    passed = (1 - r + r * trapped * (1 - r_again)) * entering
+    with ops.block("Refract"):
+        n_below = n * layer.n12
+        cos_t = ops.sqrt(1 - (1 - cosine * cosine) / (layer.n12 * layer.n12))
+        steep_t = _steepness(k, facets, cos_t)
+        moved = [0.5 * (n_below * ops.sqrt(t) - n * ops.sqrt(i)) for t, i in zip(steep_t, steep)]
+        s_t = _stretched(facets, moved[0] * moved[0], moved[1] * moved[1])
+        contrast = ops.absolute(n_below - n) / ops.maximum(n_below, n)
+        entering = _kept(cosine, alpha, contrast, k.lost_down)
+        leaving = _kept(cos_t, alpha, contrast, k.lost_up)
+        t_12, t_21 = (1 - r) * entering, (1 - r) * leaving
+        passed = (1 - r + r * trapped * (1 - r_again)) * entering
+        ops.names(n_below=n_below, cos_t=cos_t, moved=moved, contrast=contrast, t_12=t_12, t_21=t_21, passed=passed)
 
-    # Add up
-    m_ri0 = t_12 * above.r_i0 * t_21 * bounces
-    share = 1 / ops.maximum(ops.mean(r + m_ri0), ops.TINY)
-    from_above = s_t + s_t + above.s_ri0 + back_and_forth
-    lowest = (n <= above.n_exit) & (n < n_below)
-    shadow = 1 / (1 + k.shadowed * alpha * alpha * contrast)
-    below = State(
-        cos_theta=cos_t,
-        n=n_below,
-        n_exit=ops.minimum(above.n_exit, n),
-        depth=above.depth,
-        r_i0=r + m_ri0,
-        t_0i=above.t_0i * bounces * passed,
-        t_i0=t_21 * above.t_i0 * bounces,
-        s_t0i=(_narrowed(k, above.s_t0i, n, n_below) + s_t + back_and_forth).bounded(),
-        s_ti0=(above.s_ti0 + s_t + back_and_forth).bounded(),
-        s_ri0=(s_r * (ops.mean(r) * share) + from_above * (ops.mean(m_ri0) * share)).bounded(),
-        s_exit=_chosen(lowest, s_r, above.s_exit),
-        shadow=above.shadow * shadow * shadow,
-    )
+    with ops.block("Add up"):
+        m_ri0 = t_12 * above.r_i0 * t_21 * bounces
+        share = 1 / ops.maximum(ops.mean(r + m_ri0), ops.TINY)
+        from_above = s_t + s_t + above.s_ri0 + back_and_forth
+        lowest = (n <= above.n_exit) & (n < n_below)
+        shadow = 1 / (1 + k.shadowed * alpha * alpha * contrast)
+        ops.names(m_ri0=m_ri0, share=share, shadow=shadow)
+        below = State(
+            cos_theta=cos_t,
+            n=n_below,
+            n_exit=ops.minimum(above.n_exit, n),
+            depth=above.depth,
+            r_i0=r + m_ri0,
+            t_0i=above.t_0i * bounces * passed,
+            t_i0=t_21 * above.t_i0 * bounces,
+            s_t0i=(_narrowed(k, above.s_t0i, n, n_below) + s_t + back_and_forth).bounded(),
+            s_ti0=(above.s_ti0 + s_t + back_and_forth).bounded(),
+            s_ri0=(s_r * (ops.mean(r) * share) + from_above * (ops.mean(m_ri0) * share)).bounded(),
+            s_exit=_chosen(lowest, s_r, above.s_exit),
+            shadow=above.shadow * shadow * shadow,
+        )
     return below, lobe
 
 
@@ -168,19 +173,21 @@ def _through(above: State, medium: PreparedMedium) -> State:
 
     Light that it scatters backwards is lost.
     """
-    # Sort out what goes on
-    forwards = phase.forwards(medium.g)
-    depth = medium.tau - medium.tau_s * forwards
-    path = 1 / ops.maximum(above.cos_theta, COS_MIN)
-    t = ops.exp(-depth * path)
+    with ops.block("Sort out what goes on"):
+        forwards = phase.forwards(medium.g)
+        depth = medium.tau - medium.tau_s * forwards
+        path = 1 / ops.maximum(above.cos_theta, COS_MIN)
+        t = ops.exp(-depth * path)
+        ops.names(forwards=forwards, depth=depth, path=path, t=t)
 
-    # Add a width for each time that it is scattered (Belcour 2018, Eq. 21, as a roughness)
-    g = ops.clip(medium.g, G_MIN, 1.0)
-    s_g = ops.power((1 - g) / g, 0.8) / (1 + g)
-    alpha2 = ops.power(s_g / (1 + s_g), 2 / 1.1)
-    along = above.n * above.cos_theta
-    often = ops.mean(medium.tau_s * forwards) * path
-    s_t = _stretched(type(above.s_t0i).uniform(_f2(alpha2) * often), along * along, above.n * above.n)
+    with ops.block("Add a width for each time that it is scattered (Belcour 2018, Eq. 21, as a roughness)"):
+        g = ops.clip(medium.g, G_MIN, 1.0)
+        s_g = ops.power((1 - g) / g, 0.8) / (1 + g)
+        alpha2 = ops.power(s_g / (1 + s_g), 2 / 1.1)
+        ops.names(g=g, s_g=s_g, alpha2=alpha2)
+        along = above.n * above.cos_theta
+        often = ops.mean(medium.tau_s * forwards) * path
+        s_t = _stretched(type(above.s_t0i).uniform(_f2(alpha2) * often), along * along, above.n * above.n)
     return replace(
         above,
         depth=above.depth + depth,
@@ -216,6 +223,7 @@ def _leaving(k: Calibration, above: State, layer: PreparedInterface, s_r: Varian
     ratio = ops.minimum(above.n_exit / above.n, 1.0)
     of_mean = 1 - fresnel.dielectric(cos_theta, ratio)
     share = ops.divide(layer.leaving(cos_theta, ops.minimum(_size(blur), 1.0)), of_mean)
+    ops.names(ratio=ratio, of_mean=of_mean, share=share)
     return ops.select(ratio < 1, ops.clip(share, 0.0, 1.0), 1.0)
 
 
@@ -230,13 +238,15 @@ def _seen(
         assert layer.eta is not None
         picked = 1 - (fresnel.dielectric(cos_theta, layer.n12) + DIM) / (ops.mean(r) + DIM)
         across = 1 + k.selected * sin2 * ops.select(layer.n12 < 1, ops.clip(picked, 0.0, 1.0), 0.0)
-    # Cut off what does not leave: steep angles, and all beyond the cone
-    ratio = above.n_exit / above.n
-    closed = ops.maximum(1 - ratio * ratio, 0.0)
-    x, y = (k.cone * (1 + wider * sin2) for wider in (k.cone_in, k.cone_across))
-    roughness = _stretched(roughness, above.shadow, above.shadow * across * across)
-    x2, y2 = _width2(_along(roughness)), _width2(_across(roughness))
-    return _stretched(roughness, 1 / (1 + x2 * closed / (x * x)), 1 / (1 + y2 * closed / (y * y)))
+        ops.names(picked=picked, across=across)
+    with ops.block("Cut off what does not leave: steep angles, and all beyond the cone"):
+        ratio = above.n_exit / above.n
+        closed = ops.maximum(1 - ratio * ratio, 0.0)
+        x, y = (k.cone * (1 + wider * sin2) for wider in (k.cone_in, k.cone_across))
+        roughness = _stretched(roughness, above.shadow, above.shadow * across * across)
+        x2, y2 = _width2(_along(roughness)), _width2(_across(roughness))
+        ops.names(closed=closed, x2=x2, y2=y2)
+        return _stretched(roughness, 1 / (1 + x2 * closed / (x * x)), 1 / (1 + y2 * closed / (y * y)))
 
 
 def _kept(cos_theta: Value, alpha: Value, contrast: Value, exponent: float) -> Value:
@@ -257,10 +267,10 @@ def _lobe(prepared: Prepared, plane: _Plane, energy: Value, roughness: Variance,
     """A lobe of an energy and a tensor of roughness, drawn so that it has that energy when it is evaluated."""
     alpha_u, alpha_v, rotation = roughness.roughness(prepared.f)
     drawn = Roughness(ops.minimum(alpha_u, 1.0), ops.minimum(alpha_v, 1.0), rotation + plane.azimuth)
-    # Look at its roughness along the plane and across it
-    u2, v2 = drawn.alpha_u * drawn.alpha_u, drawn.alpha_v * drawn.alpha_v
-    c, s = (1.0, 0.0) if isinstance(rotation, float) else (ops.cos(rotation), ops.sin(rotation))
-    x, y = ops.sqrt(u2 * c * c + v2 * s * s), ops.sqrt(u2 * s * s + v2 * c * c)
+    with ops.block("Look at its roughness along the plane and across it"):
+        u2, v2 = drawn.alpha_u * drawn.alpha_u, drawn.alpha_v * drawn.alpha_v
+        c, s = (1.0, 0.0) if isinstance(rotation, float) else (ops.cos(rotation), ops.sin(rotation))
+        x, y = ops.sqrt(u2 * c * c + v2 * s * s), ops.sqrt(u2 * s * s + v2 * c * c)
     gain = 1 / tables.drawn_albedo(tables.load(), ops.maximum(cos_theta, COS_MIN), x, y)
     return Lobe(energy, plane.unseen(roughness), drawn, gain)
 
@@ -279,7 +289,7 @@ def _exact(prepared: Prepared, once: Average, plane: _Plane, lobe: Lobe, cos_the
 
 
 @dataclass(frozen=True)
-class _Plane:
+class _Plane(ops.Named):
     """The plane of incidence: cosine and sine of its azimuth, and the azimuth (radians)."""
 
     cosine: Value
@@ -289,6 +299,7 @@ class _Plane:
     @classmethod
     def of(cls, wi: Direction) -> _Plane:
         radius = ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1])
+        ops.names(radius=radius)
         x = ops.select(radius > ops.TINY, ops.divide(wi[0], radius), 1.0)
         y = ops.select(radius > ops.TINY, ops.divide(wi[1], radius), 0.0)
         return cls(x, y, ops.arctan2(y, x))
@@ -307,6 +318,7 @@ def _turned(s: Variance, cosine: Value, sine: Value) -> Covariance:
     xx, xy, yy = s.matrix()
     c2, s2, cs = cosine * cosine, sine * sine, cosine * sine
     mixed = 2 * xy * cs
+    ops.names(c2=c2, s2=s2, cs=cs, mixed=mixed)
     return Covariance(xx * c2 + mixed + yy * s2, (yy - xx) * cs + xy * (c2 - s2), xx * s2 - mixed + yy * c2)
 
 
@@ -329,7 +341,9 @@ def _f2(width2: Value) -> Value:
 
 def _width2(s: Value) -> Value:
     """Square of a width, from f of it."""
-    return ops.select(s > ops.TINY, ops.power(ops.maximum(s, ops.TINY), 4 / 3), 0.0)
+    width2 = ops.select(s > ops.TINY, ops.power(ops.maximum(s, ops.TINY), 4 / 3), 0.0)
+    ops.names(width2=width2)
+    return width2
 
 
 def _size(s: Variance) -> Value:
@@ -340,6 +354,7 @@ def _size(s: Variance) -> Value:
 def _stretched(s: Variance, x2: Value, y2: Value) -> Variance:
     """A tensor of widths that are longer by sqrt(x2) in the plane, and by sqrt(y2) across it."""
     x, y = _f2(x2), _f2(y2)
+    ops.names(stretch=[x, y])
     if isinstance(s, PerAxis):
         return PerAxis(s.uu * x, s.vv * y)
     xx, xy, yy = s.matrix()
@@ -354,13 +369,15 @@ def _steepness(k: Calibration, facets: Variance, cos_theta: Value) -> tuple[Valu
 def _steep(k: Calibration, cos_theta: Value, along2: Value) -> tuple[Value, Value]:
     cos2 = cos_theta * cos_theta
     tilted = (1 - cos2) * along2
+    ops.names(cos2=cos2, tilted=tilted)
     return cos2 + k.steepness_in * tilted, cos2 + k.steepness_across * tilted
 
 
 def _roughness(k: Calibration, s: Variance, n: Value, cos_theta: Value) -> Variance:
     """Roughness of the interface that would spread the momentum by s, in a medium of index n."""
-    # In the plane, solve w^2 = n^2 a^2 (cos^2 + steepness sin^2 a^2)
-    cos2, w2 = cos_theta * cos_theta, _width2(_along(s)) / (n * n)
-    root = ops.sqrt(cos2 * cos2 + 4 * k.steepness_in * (1 - cos2) * w2)
-    x2, y2 = _steep(k, cos_theta, 2 * w2 / ops.maximum(cos2 + root, ops.TINY))
+    with ops.block("In the plane, solve w^2 = n^2 a^2 (cos^2 + steepness sin^2 a^2)"):
+        cos2, w2 = cos_theta * cos_theta, _width2(_along(s)) / (n * n)
+        root = ops.sqrt(cos2 * cos2 + 4 * k.steepness_in * (1 - cos2) * w2)
+        ops.names(cos2=cos2, root=root)
+        x2, y2 = _steep(k, cos_theta, 2 * w2 / ops.maximum(cos2 + root, ops.TINY))
     return _stretched(s, 1 / ops.maximum(n * n * x2, ops.TINY), 1 / ops.maximum(n * n * y2, ops.TINY))

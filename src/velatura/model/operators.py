@@ -18,7 +18,7 @@ G_MIN = 1e-3  # keeps the variance of a phase function finite where it scatters 
 
 
 @dataclass(frozen=True)
-class Operator:
+class Operator(ops.Named):
     """One layer: energies reflected, transmitted and absorbed of light that goes down (12) and up (21), variances,
     Snell's factors.
 
@@ -48,23 +48,24 @@ def interface(
     model, none = prepared.model, prepared.variance.uniform(0.0)
     lit = (s_t0i + layer.s_r).roughness(prepared.f)  # as rough as interface and light together
 
-    # Reflect, within the bounds that fits and rounding leave by their errors
-    r = ops.clip(reflectance(prepared, layer, cos_theta, lit, wi), 0.0, 1.0)
-    leaving = None
-    if layer.leaving is not None:
-        leaving = ops.clip(layer.leaving(*fetched(prepared, lit, cos_theta, wi)), 0.0, 1.0)
+    with ops.block("Reflect, within the bounds that fits and rounding leave by their errors"):
+        r = ops.clip(reflectance(prepared, layer, cos_theta, lit, wi), 0.0, 1.0)
+        leaving = None
+        if layer.leaving is not None:
+            leaving = ops.clip(layer.leaving(*fetched(prepared, lit, cos_theta, wi)), 0.0, 1.0)
     if layer.opaque:
         return Operator(r, 0.0, 0.0, 0.0, 1 - r, 1.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
 
-    # Refract, unless Snell's law has no solution
-    sin2_t = (1 - cos_theta * cos_theta) / (layer.n12 * layer.n12)
-    passes = sin2_t < 1
-    cos_t = ops.select(passes, ops.sqrt(1 - sin2_t), 1.0)
-    ratio = ops.select(passes, layer.n12 * cos_t / ops.maximum(cos_theta, COS_MIN), 1.0)
-    t = ops.select(passes, 1 - r, 0.0)
-    n = ratio if model.scale == "angles" else layer.n12
-    s_t12 = _transmitted(prepared, layer.roughness, 1 / n, passes)
-    s_t21 = _transmitted(prepared, layer.roughness, n, passes)
+    with ops.block("Refract, unless Snell's law has no solution"):
+        sin2_t = (1 - cos_theta * cos_theta) / (layer.n12 * layer.n12)
+        passes = sin2_t < 1
+        cos_t = ops.select(passes, ops.sqrt(1 - sin2_t), 1.0)
+        ratio = ops.select(passes, layer.n12 * cos_t / ops.maximum(cos_theta, COS_MIN), 1.0)
+        t = ops.select(passes, 1 - r, 0.0)
+        n = ratio if model.scale == "angles" else layer.n12
+        s_t12 = _transmitted(prepared, layer.roughness, 1 / n, passes)
+        s_t21 = _transmitted(prepared, layer.roughness, n, passes)
+        ops.names(sin2_t=sin2_t, passes=passes, cos_t=cos_t, ratio=ratio, t=t)
     r_21, a_12, a_21 = ops.select(passes, r, 0.0), ops.select(passes, 0.0, 1 - r), ops.select(passes, 0.0, 1.0)
     return Operator(r, t, r_21, t, a_12, a_21, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
 
@@ -96,6 +97,7 @@ def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) ->
     scattered = ops.select(layer.g > 0, layer.tau_s * path, 0.0)
     t = (1 + scattered) * ops.exp(-layer.tau * path)
     s_g = ops.power((1 - g) / g, 0.8) / (1 + g)
+    ops.names(path=path, g=g, scattered=scattered, t=t, s_g=s_g)
     mean = ops.mean(scattered)
     if prepared.model.medium == "weighted":
         # The variance of a mixture is the weighted mean (5.2)
@@ -121,9 +123,9 @@ def fetched(
         alpha = ops.minimum(u, v)
         x, y = x / (1 + (u - alpha) * (u - alpha)), y / (1 + (v - alpha) * (v - alpha))
         return ops.sqrt(1 - x * x - y * y), alpha
-    # What passes depends on the normals' slopes along the azimuth; what is lost hardly does
-    mean2 = 0.5 * (u * u + v * v)
-    along2 = mean2 if opaque else z * z * mean2 + u * u * x * x + v * v * y * y
+    with ops.block("What passes depends on the normals' slopes along the azimuth; what is lost hardly does"):
+        mean2 = 0.5 * (u * u + v * v)
+        along2 = mean2 if opaque else z * z * mean2 + u * u * x * x + v * v * y * y
     return cos_theta, ops.sqrt(along2)
 
 

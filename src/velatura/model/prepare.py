@@ -21,7 +21,7 @@ from velatura.tables import Average, Row, Tables
 
 
 @dataclass(frozen=True)
-class PreparedInterface:
+class PreparedInterface(ops.Named):
     """An interface between media of indices eta_1 above and eta_2 below (colours; kappa None for a dielectric).
 
     `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is the mean of
@@ -52,7 +52,7 @@ class PreparedInterface:
 
 
 @dataclass(frozen=True)
-class PreparedMedium:
+class PreparedMedium(ops.Named):
     """A medium by its optical depths along the normal (colours) and its asymmetry g."""
 
     tau: Value
@@ -144,6 +144,7 @@ def prepare(
             if kind == "dielectric":
                 lowest, n = ops.minimum(lowest, n), n * ops.mean(layer["eta"] / eta_1)
                 n_leaving = lowest / n if model.calibrations else ops.mean(eta_1 / layer["eta"])
+                ops.names(n_leaving=n_leaving)
                 eta_1 = layer["eta"]
     prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], base)
     if model.calibrations is None:
@@ -155,8 +156,8 @@ def prepare(
 
 
 def _medium(layer: Mapping[str, Value]) -> PreparedMedium:
-    # Scattered light stays in the lobe only where it goes forwards (model of Belcour 2018, 4.4)
-    tau_s = layer["sigma_s"] * layer["depth"]
+    with ops.block("Scattered light stays in the lobe only where it goes forwards (model of Belcour 2018, 4.4)"):
+        tau_s = layer["sigma_s"] * layer["depth"]
     return PreparedMedium(layer["sigma_a"] * layer["depth"] + tau_s, tau_s, layer["g"])
 
 

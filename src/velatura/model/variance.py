@@ -28,7 +28,7 @@ class Roughness(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Variance:
+class Variance(ops.Named):
     """Components of a variance; sums and multiples are taken component by component."""
 
     def __add__(self: V, other: V) -> V:
@@ -119,6 +119,7 @@ class Covariance(Variance):
     def of(cls, roughness: Roughness, f: RoughnessMap) -> Covariance:
         u, v = f.variance(roughness.alpha_u, roughness.alpha_v), f.variance(roughness.alpha_v, roughness.alpha_u)
         c, s = ops.cos(roughness.rotation), ops.sin(roughness.rotation)
+        ops.names(u=u, v=v, cosine=c, sine=s)
         return cls(u * c * c + v * s * s, (u - v) * c * s, u * s * s + v * c * c)
 
     @classmethod
@@ -126,13 +127,14 @@ class Covariance(Variance):
         return cls(s, 0.0 * s, s)
 
     def roughness(self, f: RoughnessMap) -> Roughness:
-        # Eigenvalues mean +- radius; where they agree the axes stay those of the frame
-        mean, half = 0.5 * (self.xx + self.yy), 0.5 * (self.xx - self.yy)
-        radius = ops.sqrt(half * half + self.xy * self.xy)
-        turned = radius > 1e-9 * mean
-        rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
-        u = mean + radius
-        v = ops.divide(ops.maximum(self.xx * self.yy - self.xy * self.xy, 0.0), u)  # mean - radius would cancel
+        with ops.block("Eigenvalues mean +- radius; where they agree the axes stay those of the frame"):
+            mean, half = 0.5 * (self.xx + self.yy), 0.5 * (self.xx - self.yy)
+            radius = ops.sqrt(half * half + self.xy * self.xy)
+            turned = radius > 1e-9 * mean
+            rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
+            u = mean + radius
+            v = ops.divide(ops.maximum(self.xx * self.yy - self.xy * self.xy, 0.0), u)  # mean - radius would cancel
+            ops.names(mean=mean, half=half, radius=radius, turned=turned, rotation=rotation, u=u, v=v)
         return Roughness(f.roughness(u, v), f.roughness(v, u), rotation)
 
     def matrix(self) -> tuple[Value, Value, Value]:

@@ -26,6 +26,7 @@ def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
     """
     r_s = 1 - 2 * ops.divide(eta * cos_t, cos_theta + eta * cos_t)
     r_p = 1 - 2 * ops.divide(cos_t, eta * cos_theta + cos_t)
+    ops.names(cos_t=cos_t, r_s=r_s, r_p=r_p)
     return 0.5 * (r_s * r_s + r_p * r_p)
 
 
@@ -40,6 +41,7 @@ def conductor(cos_theta: Value, eta: Value, kappa: Value) -> Value:
     p = cos2 * a2_plus_b2 + sin2 * sin2
     q = 2 * a * cos_theta * sin2
     r_p_over_r_s = 1 - ops.divide(2 * q, p + q)
+    ops.names(cos2=cos2, sin2=sin2, t=t, a2_plus_b2=a2_plus_b2, a=a, r_s=r_s, p=p, q=q, r_p_over_r_s=r_p_over_r_s)
     return 0.5 * r_s * (1 + r_p_over_r_s)
 
 

@@ -17,6 +17,7 @@ Direction = tuple[Value, Value, Value]
 def rotate(w: Direction, angle: Value) -> Direction:
     """Coordinates of `w` in a frame turned by `angle` (radians, anticlockwise seen from outside)."""
     c, s = ops.cos(angle), ops.sin(angle)
+    ops.names(cosine=c, sine=s)
     return c * w[0] + s * w[1], c * w[1] - s * w[0], w[2]
 
 
@@ -26,12 +27,14 @@ def dot(a: Direction, b: Direction) -> Value:
 
 def normalize(w: Direction) -> Direction:
     scale = 1 / ops.sqrt(ops.maximum(dot(w, w), ops.TINY))
+    ops.names(scale=scale)
     return w[0] * scale, w[1] * scale, w[2] * scale
 
 
 def reflect(w: Direction, h: Direction) -> Direction:
     """Mirror image of `w` about the normal `h`."""
     t = 2 * dot(w, h)
+    ops.names(t=t)
     return t * h[0] - w[0], t * h[1] - w[1], t * h[2] - w[2]
 
 
@@ -39,6 +42,7 @@ def ndf(h: Direction, alpha_u: Value, alpha_v: Value) -> Value:
     """Density D(h) of normals, whose projected integral is 1 (Walter 2007, Eq. 33, stretched)."""
     x, y = h[0] / alpha_u, h[1] / alpha_v
     q = x * x + y * y + h[2] * h[2]
+    ops.names(x=x, y=y, q=q)
     return 1 / (pi * alpha_u * alpha_v * q * q)
 
 
@@ -54,12 +58,13 @@ def sample_visible(wi: Direction, alpha_u: Value, alpha_v: Value, u1: Value, u2:
 
     Uniform on a cap of the sphere in the stretched space (Dupuy & Benyoub 2023).
     """
-    # Stretch to the hemisphere of unit roughness
-    vx, vy, vz = normalize((alpha_u * wi[0], alpha_v * wi[1], wi[2]))
-    # Draw a direction reflected there by a spherical cap
-    phi = 2 * pi * u1
-    z = (1 - u2) * (1 + vz) - vz
-    sin_theta = ops.sqrt(1 - z * z)
-    hx, hy, hz = sin_theta * ops.cos(phi) + vx, sin_theta * ops.sin(phi) + vy, z + vz
-    # Unstretch the half-vector
-    return normalize((alpha_u * hx, alpha_v * hy, ops.maximum(hz, 0.0)))
+    with ops.block("Stretch to the hemisphere of unit roughness"):
+        vx, vy, vz = normalize((alpha_u * wi[0], alpha_v * wi[1], wi[2]))
+    with ops.block("Draw a direction reflected there by a spherical cap"):
+        phi = 2 * pi * u1
+        z = (1 - u2) * (1 + vz) - vz
+        sin_theta = ops.sqrt(1 - z * z)
+        ops.names(phi=phi, z=z, sin_theta=sin_theta)
+        hx, hy, hz = sin_theta * ops.cos(phi) + vx, sin_theta * ops.sin(phi) + vy, z + vz
+    with ops.block("Unstretch the half-vector"):
+        return normalize((alpha_u * hx, alpha_v * hy, ops.maximum(hz, 0.0)))

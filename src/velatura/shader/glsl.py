@@ -123,8 +123,8 @@ class _Statements:
             if symbol.kind != "loop" and self._inline(symbol, text):
                 self.text[symbol] = text, precedence
                 continue
-            if symbol.place.title != title:
-                title = symbol.place.title
+            if symbol.title != title:
+                title = symbol.title
                 self.lines += ["", *([f"// {title}"] if title else [])]
             name = self._name(symbol)
             if symbol.kind == "loop":
@@ -180,13 +180,12 @@ class _Statements:
     def _inline(self, symbol: Symbol, text: str) -> bool:
         if symbol.op in ("input", "component", "item") and len(text) < _LONG:
             return True
-        return self.uses[symbol] == 1 and not symbol.hint and symbol.kind != "texels" and len(text) < _LONG
+        return self.uses[symbol] == 1 and not symbol.name and symbol.kind != "texels" and len(text) < _LONG
 
     def _name(self, symbol: Symbol) -> str:
-        name = symbol.hint or symbol.place.function.strip("_<>")
         if symbol.kind == "texels":
-            name = symbol.detail.name if symbol.op == "baked" else symbol.detail
-        return self._free("value" if name in ("", "lambda", "genexpr", "listcomp") else name.replace("__", "_"))
+            return self._free(symbol.detail.name if symbol.op == "baked" else symbol.detail)
+        return self._free(symbol.name.strip("_").replace("__", "_") or "value")
 
     def _free(self, name: str) -> str:
         """The name, or with a number where it is taken."""
@@ -232,7 +231,7 @@ class _Statements:
     def _clamps(self, symbol: Symbol) -> bool:
         """Whether it keeps a value that nothing else uses between two constants."""
         inner, high = symbol.args
-        if not isinstance(inner, Symbol) or inner.op != "maximum" or self.uses[inner] > 1 or inner.hint:
+        if not isinstance(inner, Symbol) or inner.op != "maximum" or self.uses[inner] > 1 or inner.name:
             return False
         x, low = inner.args
         return isinstance(x, Symbol) and isinstance(low, float) and isinstance(high, float)

@@ -40,7 +40,7 @@ class Graph:
         key = (symbol.op, symbol.detail, *(sorted(names) if symbol.op in COMMUTE else names))
         found = self._known.setdefault(key, symbol)
         if found is not symbol:
-            found.hint = found.hint or symbol.hint
+            found.name = found.name or symbol.name
         elif args != symbol.args:
             found = self._known[key] = symbol.with_args(args)
         return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TypeGuard
 
+from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, bsdf, memo, named, variance_kind
 from velatura.model.adding import Lobe
@@ -16,7 +17,7 @@ from velatura.model.prepare import PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.shader import material, source, symbol
+from velatura.shader import material, symbol
 from velatura.shader.bake import Bake, bake
 from velatura.shader.graph import Graph
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
@@ -98,7 +99,7 @@ def record(
     uniform = not any(isinstance(value, Varying) for value in flat.values())
     baked = bake(stack, values, prepared()) if parameters and uniform else None
     shown: list[str] = []
-    with source.naming(Symbol):
+    with ops.readable():
         body = baked.body if baked else prepared()
         if parameters:
             body, shown = _weighed(body)

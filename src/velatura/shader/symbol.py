@@ -14,9 +14,8 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from velatura import tables
+from velatura import ops, tables
 from velatura.ops import Unrolled, Value
-from velatura.shader import source
 
 Kind: TypeAlias = Literal["number", "colour", "condition", "conditions", "texels", "loop"]
 Operand: TypeAlias = "Symbol | float | bool | tuple[float, ...]"
@@ -40,25 +39,24 @@ class Symbol:
 
     Attributes:
         serial: numbers symbols in the order in which they were made.
-        place: the lines of the model that made it.
-        hint: a name that the model gives it.
+        title: of the block of the model that made it.
+        name: that the model gives it; "" for none.
     """
 
-    __slots__ = ("args", "detail", "hint", "kind", "op", "place", "serial")
+    __slots__ = ("args", "detail", "kind", "name", "op", "serial", "title")
     __array_ufunc__ = None  # so that NumPy leaves the arithmetic to this class
 
     dialect: Any
 
     def __init__(self, op: str, args: tuple[Operand, ...], kind: Kind, detail: Any = None) -> None:
         self.op, self.args, self.kind, self.detail = op, args, kind, detail
-        self.serial, self.place = next(_serials), source.place()
-        self.hint: str | None = None
+        self.serial, self.title, self.name = next(_serials), ops.title(), ""
 
     def with_args(self, args: tuple[Operand, ...]) -> Symbol:
-        """The same operation, made at the same place, on other arguments."""
+        """The same operation, made in the same block, on other arguments."""
         other = object.__new__(Symbol)
         other.op, other.args, other.kind, other.detail = self.op, args, self.kind, self.detail
-        other.serial, other.place, other.hint = self.serial, self.place, self.hint
+        other.serial, other.title, other.name = self.serial, self.title, self.name
         return other
 
     def __add__(self, other: Value) -> Value:
@@ -179,7 +177,11 @@ class Loop(NamedTuple):
 
 
 class Recorder(Unrolled):
-    """The elementary functions on symbols; loops are kept where they are to be read, and unrolled elsewhere."""
+    """The elementary functions on symbols; loops are kept where people are to read them, and unrolled elsewhere."""
+
+    @staticmethod
+    def name(x: Symbol, name: str) -> None:
+        x.name = x.name or name
 
     def __getattr__(self, op: str) -> Callable[..., Value]:
         if op.startswith("_"):
@@ -218,22 +220,24 @@ class Recorder(Unrolled):
         return [Symbol("component", (texels,), "number", c) for c in range(channels)]
 
     def each(self, function: Callable[..., Value], nodes: Sequence[float], values: Sequence[Value]) -> list[Value]:
-        if not source.is_read():
+        if not ops.is_readable():
             return super().each(function, nodes, values)
         node = Symbol("bound", (), "number", f"node{_depth.get()}")
         made = _within(function, node, *values)
         results = tuple(operand(x) for x in (made if isinstance(made, list) else [made]))
         loop = Symbol("each", results, "loop", Loop((node.detail,), tuple(nodes), len(nodes)))
+        loop.name = "at_nodes"
         items = [_items(loop, results, k * len(results)) for k in range(len(nodes))]
         return items if isinstance(made, list) else [item for (item,) in items]
 
     def repeat(self, function: Callable[..., Sequence[Value]], times: int, state: Sequence[Value]) -> Sequence[Value]:
-        if not source.is_read():
+        if not ops.is_readable():
             return super().repeat(function, times, state)
         bound = [Symbol("bound", (), "colour", f"state{_depth.get()}[{k}]") for k in range(len(state))]
         results = tuple(operand(x) for x in _within(function, *bound))
         begin = tuple(operand(x) for x in state)
         loop = Symbol("repeat", (*begin, *results), "loop", Loop(tuple(x.detail for x in bound), (), times))
+        loop.name = "state"
         return [Symbol("item", (loop,), "colour", k) for k in range(len(state))]
 
 

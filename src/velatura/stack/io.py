@@ -8,6 +8,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterable
+from importlib import resources
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -18,7 +19,7 @@ from velatura.files import reason, whole
 from velatura.stack.schema import show, unknown
 from velatura.stack.stack import Stack
 
-_PRESETS = Path(__file__).with_name("presets")
+_PRESETS = resources.files("velatura.stack") / "presets"
 _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 _LARGEST = 100_000  # values in a file
 
@@ -114,12 +115,12 @@ def preset(name: str) -> Stack:
     if name not in presets():
         unknown_name = unknown("preset", name, presets(), "`velatura presets` lists all")
         raise InvalidInput(f"{unknown_name}; a material file ends in {', '.join(_FORMATS)}")
-    return load(_PRESETS / f"{name}.yaml")
+    return loads((_PRESETS / f"{name}.yaml").read_text(encoding="utf-8"), name=f"{name}.yaml")
 
 
 def presets() -> tuple[str, ...]:
     """The names of all presets, sorted."""
-    return tuple(sorted(path.stem for path in _PRESETS.glob("*.yaml")))
+    return tuple(sorted(file.name.removesuffix(".yaml") for file in _PRESETS.iterdir()))
 
 
 # Out -----------------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from importlib import resources
 from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -181,7 +182,8 @@ def _srgb_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Wavelengths (95,) and the weights (3, 95) that turn a spectrum into linear sRGB; each row sums to 1."""
     import numpy as np
 
-    wavelengths_nm, x_bar, y_bar, z_bar, d65 = np.loadtxt(Path(__file__).with_name("cie1931.csv"), delimiter=",").T
+    with resources.files("velatura.stack").joinpath("cie1931.csv").open(encoding="utf-8") as file:
+        wavelengths_nm, x_bar, y_bar, z_bar, d65 = np.loadtxt(file, delimiter=",").T
     srgb_from_xyz = np.array(  # ITU-R BT.709 primaries
         [[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556], [0.055648, -0.204043, 1.057311]]
     )

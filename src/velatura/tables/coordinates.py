@@ -70,6 +70,7 @@ def from_angle(cos_theta: Value, theta_c: Value) -> Value:
     within = ops.sqrt(-beyond / ops.maximum(theta_c, 1e-6))
     share = ops.minimum(beyond / ops.maximum(pi / 2 - theta_c, 1e-6), 1.0)
     outwards = ops.sqrt(1 - ops.sqrt(1 - share))
+    ops.names(beyond=beyond, within=within, share=share, outwards=outwards)
     return 0.5 + 0.5 * ops.select(beyond < 0, within, -outwards)
 
 

@@ -63,8 +63,10 @@ def mirror_row(tables: Tables) -> Row:
 
 def fgd(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
     """Directional albedo of a GGX interface (Belcour 2018, Eq. 2; section 4.1), shape of colour against direction."""
-    channels = ops.interpolate(row.table, coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha))
+    from_cosine, from_roughness = coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha)
+    channels = ops.interpolate(row.table, from_cosine, from_roughness)
     above = _dot(channels, row.reflectance)
+    ops.names(from_cosine=from_cosine, from_roughness=from_roughness, above=above)
     if not row.rarer:
         return above
     of_mirror = 1.0 if row.multiple else _dot(channels, [1.0] * len(channels))
@@ -132,7 +134,9 @@ def _at_nodes(reflectance: Callable[..., Value], nodes: Sequence[float], *index:
 
 def _raised(table: Table, reflectance: Sequence[Value]) -> list[Value]:
     """Fresnel at the nodes of a table to the table's powers."""
-    return [prod([f] * n) for f, n in zip(reflectance, table.powers or (1,) * len(reflectance))]
+    raised = [prod([f] * n) for f, n in zip(reflectance, table.powers or (1,) * len(reflectance))]
+    ops.names(reflectance=raised)
+    return raised
 
 
 def _fetch_inside(table: Table, eta: Value, cos_theta: Value, alpha: Value) -> list[Value]:
@@ -147,7 +151,9 @@ def _fetch_inside(table: Table, eta: Value, cos_theta: Value, alpha: Value) -> l
 
 def _critical_angle(eta: Value) -> Value:
     below_1 = ops.minimum(eta, 1.0)
-    return ops.arctan2(below_1, ops.sqrt(1 - below_1 * below_1))
+    theta_c = ops.arctan2(below_1, ops.sqrt(1 - below_1 * below_1))
+    ops.names(below_1=below_1, theta_c=theta_c)
+    return theta_c
 
 
 def _in_corner(eta: Value, kappa: Value) -> Value:
@@ -163,4 +169,5 @@ def _dot(a: Sequence[Value], b: Sequence[Value]) -> Value:
     total = a[0] * b[0]
     for x, y in zip(a[1:], b[1:]):
         total = total + x * y
+        ops.names(total=total)
     return total

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import cache
+from importlib import resources
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -101,7 +102,7 @@ _loading = Lock()
 
 @cache
 def _loaded() -> Tables:
-    with np.load(FILE) as arrays:
+    with resources.files("velatura.tables").joinpath(FILE.name).open("rb") as file, np.load(file) as arrays:
         return Tables(**{f.name: _read(arrays, f.name) for f in fields(Tables)})
 
 

@@ -18,7 +18,6 @@ import { layerName, variantOf } from '../state/material.js';
 import { flag, iconButton, menu, numberField } from './controls.js';
 import { icons } from './icons.js';
 import { parameter, parametersOf } from './parameter.js';
-import { text } from './typing.js';
 
 const VARIANTS = [
   ['dielectric', 'Dielectric'],
@@ -68,7 +67,7 @@ function top(app, { name, exterior, thin }) {
       Name
       <input
         type="text"
-        .value=${text(name)}
+        .value=${live(name)}
         spellcheck="false"
         @change=${({ target }) => store.run(rename, target.value)}
       />
