@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from velatura import kernel, tables
+from velatura.errors import InvalidInput
 from velatura.optics import fresnel
 from velatura.tables import coordinates, walks, yardstick
 from velatura.tables.build import Built, makers
@@ -363,7 +364,7 @@ def test_a_failed_save_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest
     path = tmp_path / "tables.npz"
     path.write_text("before")
     monkeypatch.setattr(np, "savez_compressed", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(InvalidInput, match=r"tables\.npz: cannot be written: disk full"):
         tables.save(SHIPPED, path)
     assert [file.name for file in tmp_path.iterdir()] == ["tables.npz"]
     assert path.read_text() == "before"
