@@ -101,6 +101,37 @@ def test_a_diffuse_base_and_what_is_transmitted_have_their_lobes() -> None:
     np.testing.assert_allclose(below[1].mean, [[-0.6], [0]], atol=0.02)
 
 
+# Plugins beside the models
+
+
+def test_a_plugin_of_the_same_metal_is_the_truth(tmp_path: Path) -> None:
+    """Mitsuba's rough conductor and the walk are that metal, by name, dict and file; of lobes they say nothing."""
+    path = tmp_path / "mine.xml"
+    values = "".join(f'<float name="{k}" value="{v}"/>' for k, v in {"eta": 0.2, "k": 3.9, "alpha": 0.2}.items())
+    path.write_text(
+        f'<bsdf version="3.0.0" type="roughconductor"><string name="distribution" value="ggx"/>{values}</bsdf>'
+    )
+    plain = {"type": "roughconductor", "distribution": "ggx", "eta": 0.2, "k": 3.9, "alpha": 0.2, "id": "as a dict"}
+    found = vt.compare(Stack([METAL]), ["reference", plain, path], [0.8], paths=200_000, microsurface=False)
+    assert list(found.models) == ["reference", "as a dict", "mine"]
+    for name, account in found.models.items():
+        np.testing.assert_allclose(account.evaluated, found.truth.albedo, atol=5e-3)
+        assert found.total_variation[name] < found.noise + 0.015
+        assert np.isnan(found.roughness_error[name]) and np.isnan(account.albedo).all()
+        assert found.to_dict()["models"][name]["lobes"]["R1"]["energy"] == [[None] * 3]
+
+
+def test_the_baseline_is_further_from_the_truth_than_the_model(run: Run, tmp_path: Path) -> None:
+    """As Belcour 2018 compares them, on frosted metal; what the baseline has no value for is a dash."""
+    plot = str(tmp_path / "both.png")
+    arguments = ("compare", "frosted-metal", "--models", "velatura,weidlich_wilkie", "--paths", "100000", "--cos", "1")
+    status, out, err = run(*arguments, "--plot", plot)
+    assert (status, err) == (0, "")
+    *_, model, baseline, _ = (line.replace("│", " ").split() for line in out.splitlines())
+    assert (model[0], baseline[:2]) == ("velatura", ["weidlich_wilkie", "-"])
+    assert float(baseline[2]) > 3 * float(model[2])
+
+
 # Forms of the result
 
 
@@ -166,6 +197,13 @@ def test_the_error_of_a_picture_is_a_root_mean_square() -> None:
     [
         (["--models", "belcour2018,nobody"], "nobody"),
         (["--models", ""], "model"),
+        (["--models", "velatur"], "did you mean velatura?"),
+        (["--models", "velatura,velatura"], "velatura is there twice"),
+        (["--models", "blendbsdf"], "blendbsdf holds other BSDFs"),
+        (["--models", "measured"], 'models: measured: Property "filename" cannot be found!'),
+        (["--models", "sphere"], "sphere is no BSDF"),
+        (["--models", "none.xml"], "none.xml: cannot be read"),
+        (["--models", "principled", "--set", "tir=off"], "tir: for named models only"),
         (["--cos", "0"], "cos"),
         (["--cos", "1,x"], "--cos"),
         (["--paths", "1"], "--paths"),

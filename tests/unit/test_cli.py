@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 import velatura
+from velatura.cli import options
 from velatura.errors import MissingTool, NoSolution
 
 Run = Callable[..., tuple[int, str, str]]
@@ -228,6 +229,10 @@ def test_doctor_says_the_command_that_mends(run: Run, monkeypatch: pytest.Monkey
 
 def test_version(run: Run) -> None:
     assert run("--version") == (0, f"velatura {velatura.__version__}\n", "")
+
+
+def test_help_lists_the_models() -> None:
+    assert options.MODELS.split(", ") == [model.name for model in velatura.MODELS]
 
 
 def test_every_verb_has_help(run: Run) -> None:

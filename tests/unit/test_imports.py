@@ -30,7 +30,7 @@ MAY_IMPORT = {
     "reference": "stack optics ops kernel binding",
     "checks": "kernel",
     "scenes": "kernel",
-    "comparison": "stack optics model reference scenes api",
+    "comparison": "stack optics model reference checks scenes api kernel",
     "figures": "stack optics model inverse reference checks scenes comparison api kernel",
 }
 

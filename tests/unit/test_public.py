@@ -14,6 +14,14 @@ import velatura as vt
 from velatura.model.statistics import Statistics
 from velatura.stack import dumps
 
+
+def refusal(call: Callable[[], object]) -> str:
+    """What is said of a valid material: so it was read, and nothing slow was begun."""
+    with pytest.raises(vt.InvalidInput, match="fewer than the 2 that there are") as caught:
+        call()
+    return str(caught.value)
+
+
 ONE_DIRECTION = vt.inverse.Directions.of(np.array([30.0]), np.array([30.0]), np.array([180.0]))
 TABLE = vt.inverse.ReflectanceTable(ONE_DIRECTION, np.ones((3, 1)))
 
@@ -25,7 +33,7 @@ ASKED: dict[str, Callable[[Any], Any]] = {
     "reference.statistics": lambda m: vt.reference.statistics(m, 0.7, paths=100).energy[0],
     "reference.distribution": lambda m: vt.reference.distribution(m, 0.7, paths=100, bins=4).reflected,
     "inverse.coat": lambda m: vt.inverse.coat(m, 1.3).stack,
-    "inverse.simplify": lambda m: vt.inverse.simplify(m, 1).stack,
+    "inverse.simplify": lambda m: refusal(lambda: vt.inverse.simplify(m, 2)),
     "inverse.grazing": lambda m: vt.inverse.grazing(m),
     "inverse.on_black": lambda m: vt.inverse.on_black(m),
     "inverse.table_of": lambda m: vt.inverse.table_of(m, ONE_DIRECTION, "bati2021").value,

@@ -21,7 +21,7 @@ _STYLES = {"kept": "green", "declared": "yellow", "broken": "red"}
 
 def check(
     material: options.Material,
-    model: options.Model = None,
+    model: options.Bsdf = None,
     settings: options.Settings = None,
     plots: Annotated[
         Path | None, typer.Option(metavar="DIR", help="A folder for a plot of each law that is broken.")

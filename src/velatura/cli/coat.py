@@ -28,9 +28,7 @@ def coat(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="F", help="The coated material (YAML or JSON).")
     ] = None,
-    model: Annotated[
-        str | None, typer.Option("--model", metavar="NAME", help="The named model; else bati2021.")
-    ] = None,
+    model: invert.ModelName = None,
     settings: options.Settings = None,
     as_json: options.Json = False,
 ) -> None:

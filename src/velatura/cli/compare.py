@@ -21,7 +21,12 @@ if TYPE_CHECKING:
 def compare(
     material: options.Material,
     models: Annotated[
-        str | None, typer.Option(metavar="NAME,NAME,...", help="The named models to compare; else all.")
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME,...",
+            help=f"{options.MODELS}; else all of these. Also weidlich_wilkie, reference, a BSDF plugin of "
+            "Mitsuba's with its defaults (principled), or an XML file of one (mine.xml).",
+        ),
     ] = None,
     cos: Annotated[
         str, typer.Option(metavar="C,C,...", help="Cosines of the incident directions, in (0, 1].")

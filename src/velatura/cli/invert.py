@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ENDINGS = (".yaml", ".yml", ".json")
 
 TargetFile = Annotated[str, typer.Argument(metavar="TARGET", help="A target file (YAML or JSON).")]
-ModelName = Annotated[str | None, typer.Option("--model", metavar="NAME", help="The named model; else bati2021.")]
+ModelName = Annotated[str | None, typer.Option("--model", metavar="NAME", help=f"{options.MODELS}; else bati2021.")]
 Switches = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A switch of the model (tir=off); may be repeated."),

@@ -12,7 +12,17 @@ if TYPE_CHECKING:
     from velatura.stack import Stack
 
 Material = Annotated[str, typer.Argument(metavar="M", help="A material file (YAML or JSON), or the name of a preset.")]
-Model = Annotated[str | None, typer.Option("--model", metavar="NAME", help="The named model; else the default one.")]
+
+# By name, since the models themselves load NumPy (tests/unit/test_cli.py holds the two to each other).
+MODELS = "belcour2018, yamaguchi2019, weier2020, bati2021, realtime, velatura"
+
+Model = Annotated[str | None, typer.Option("--model", metavar="NAME", help=f"{MODELS}; else velatura.")]
+Bsdf = Annotated[
+    str | None,
+    typer.Option(
+        "--model", metavar="NAME", help=f"{MODELS}; reference, the walk; weidlich_wilkie, the baseline. Else velatura."
+    ),
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option(

@@ -28,7 +28,7 @@ def render(
         str | None,
         typer.Option(metavar="NAME|F", help="studio, sky, furnace, or an .hdr or .exr file; else the scene's own."),
     ] = None,
-    model: options.Model = None,
+    model: options.Bsdf = None,
     spp: Annotated[int, typer.Option(min=1, max=2**20, metavar="N", help="Samples per pixel.")] = 64,
     size: Annotated[str | None, typer.Option(metavar="N|WxH", help="Pixels; else 512, or the scene's own.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random numbers.")] = 0,

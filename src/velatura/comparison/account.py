@@ -28,7 +28,7 @@ BASE_SAMPLES = 2**17  # of a diffuse base, which is smooth
 
 
 @dataclasses.dataclass(frozen=True)
-class _Light:
+class Light:
     """Light that leaves: points (2, n) on the projected disc and their energies (3, n)."""
 
     points: Array
@@ -71,16 +71,16 @@ def _column(body: bsdf.Body, incident: Array) -> tuple[list[Lobe], Array]:
         lobes.append(_lobe(seen.base.energy, (np.nan, np.nan), np.nan, lights[-1]))
     if seen.transmitted:
         lobes.append(_described(seen.transmitted, _sampled_below(body, seen.transmitted, wi)))
-    return lobes, np.sum([_distribution(light) for light in lights], axis=0)
+    return lobes, np.sum([distribution(light) for light in lights], axis=0)
 
 
-def _sampled(body: bsdf.Body, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> _Light:
+def _sampled(body: bsdf.Body, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> Light:
     """A lobe as it is evaluated; one that is smooth, in its one direction.
 
     `place` is its place among the lobes that the symmetric form evaluates, None for a lobe that it does not.
     """
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
-        return _Light(-np.stack(wi[:2]), _colour(lobe.energy))
+        return Light(-np.stack(wi[:2]), _colour(lobe.energy))
     if body.above.model.form == "forward" or place is None:
         wo = mixture.sample([lobe], None, wi, 0.0, *_uniform(SAMPLES))
         return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo))
@@ -89,28 +89,28 @@ def _sampled(body: bsdf.Body, lobe: adding.Lobe, wi: Direction, place: int | Non
     return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo, [lit]))
 
 
-def _sampled_below(body: bsdf.Body, lobe: adding.Lobe, wi: Direction) -> _Light:
+def _sampled_below(body: bsdf.Body, lobe: adding.Lobe, wi: Direction) -> Light:
     """The transmitted lobe as it is evaluated, as energy."""
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
-        return _Light(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
+        return Light(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
     asked = bsdf.Asked(reflection=False, radiance=False)
     wo, _ = bsdf.sample(body, wi, 0.0, *_uniform(LIT_SAMPLES), asked)
     return _light(wo, *bsdf.eval_pdf(body, wi, wo, asked))
 
 
-def _light(wo: Direction, value: Array, density: Array) -> _Light:
+def _light(wo: Direction, value: Array, density: Array) -> Light:
     count = len(density)
     energy = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / count
-    return _Light(np.stack(wo[:2]), _colour(energy, count))
+    return Light(np.stack(wo[:2]), _colour(energy, count))
 
 
-def _sampled_base(base: Base) -> _Light:
+def _sampled_base(base: Base) -> Light:
     """Directions by the cosine law, uniform on the disc."""
     u1, u2 = _uniform(BASE_SAMPLES)
     radius, phi = np.sqrt(u1), 2 * np.pi * u2
     points = np.stack([radius * np.cos(phi), radius * np.sin(phi)])
     value = base.value((points[0], points[1], np.sqrt(1 - u1)))
-    return _Light(points, _colour(np.pi * value / BASE_SAMPLES, BASE_SAMPLES))
+    return Light(points, _colour(np.pi * value / BASE_SAMPLES, BASE_SAMPLES))
 
 
 @functools.cache
@@ -120,12 +120,12 @@ def _uniform(count: int) -> tuple[Array, Array]:
     return (0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1
 
 
-def _described(lobe: adding.Lobe, light: _Light) -> Lobe:
+def _described(lobe: adding.Lobe, light: Light) -> Lobe:
     alpha_u, alpha_v, rotation = (np.broadcast_to(x, 1)[0] for x in lobe.roughness)
     return _lobe(lobe.energy, (alpha_u, alpha_v), rotation, light)
 
 
-def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: _Light) -> Lobe:
+def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: Light) -> Lobe:
     """Moments on the disc weigh by the mean of the colours, as the truth's do; NaN where there is no light."""
     grey = light.energy.mean(axis=0)
     share = grey / (grey.sum() or np.nan)
@@ -135,7 +135,8 @@ def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: _Li
     return Lobe(_colour(energy)[:, 0], np.array(alpha), np.array(rotation), mean, covariance)
 
 
-def _distribution(light: _Light) -> Array:
+def distribution(light: Light) -> Array:
+    """Energies (3, bins, bins) over the projected disc."""
     x, y = np.clip((0.5 * (light.points + 1) * BINS).astype(int), 0, BINS - 1)
     grids = [np.bincount(x * BINS + y, energy, BINS * BINS) for energy in light.energy]
     return np.array(grids, float).reshape(3, BINS, BINS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +17,9 @@ SAMPLES = 256
 
 
 def pictures(
-    stack: Stack, models: Mapping[str, Model], seed: int, microsurface: bool, advance: Callable[[], None]
+    stack: Stack, models: Mapping[str, Any], seed: int, microsurface: bool, advance: Callable[[], None]
 ) -> Pictures:
-    """Render spheres in the studio; the truth twice, to tell its noise.
+    """Render spheres in the studio, by models and BSDFs; the truth twice, to tell its noise.
 
     Raises:
         InvalidInput, MissingTool: as `scenes.render`.
@@ -33,5 +34,6 @@ def pictures(
 
     halves = [sphere({**walk, "seed": number}, SAMPLES // 2, number) for number in range(2)]
     noise = float(np.sqrt(np.mean((halves[0] - halves[1]) ** 2))) / 2
-    images = {name: sphere(api.bsdf(stack, model), SAMPLES, 2) for name, model in models.items()}
+    bsdfs = {name: api.bsdf(stack, m) if isinstance(m, Model) else m for name, m in models.items()}
+    images = {name: sphere(bsdf, SAMPLES, 2) for name, bsdf in bsdfs.items()}
     return Pictures((halves[0] + halves[1]) / 2, noise, images)

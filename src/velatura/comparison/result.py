@@ -26,7 +26,8 @@ _FIELDS = {"energy": True, "alpha": True, "rotation": False, "mean": True, "cova
 class Account:
     """Where the light goes, for N directions of incidence, as a model or the truth has it.
 
-    reflected: lobes by the deepest interface from the top, a diffuse base last; transmitted: what leaves below, or
+    reflected: lobes by the deepest interface from the top, a diffuse base last (NaN of a plugin, which says nothing of
+    lobes); transmitted: what leaves below, or
     None. Their mean and covariance are those of the outgoing directions on the projected disc, and a model's alpha is
     that along the axes of the true lobe, wherever its own `rotation` has turned them. evaluated (3, N): the
     integral of `eval`, which is the albedo of what is rendered. distribution (3, N, bins, bins): energies of reflected
@@ -110,15 +111,15 @@ class Comparison:
 
         What is smoother than a model is ever evaluated counts as that smooth. NaN where there is no such lobe.
         """
-        return {name: float(np.nanmean(self._log_ratios(model))) for name, model in self.models.items()}
+        return {name: float(np.mean(self._log_ratios(model))) for name, model in self.models.items()}
 
     def _log_ratios(self, model: Account) -> Array:
-        ratios = [np.nan]
+        ratios: list[float] = []
         for lobe, true in zip(model.lobes, self.truth.lobes):
             smoothest = [np.maximum(alpha, ALPHA_MIN) for alpha in (lobe.alpha, true.alpha)]
             error = np.abs(np.log(smoothest[0] / smoothest[1]))[:, true.energy.mean(axis=0) > ENERGY_MIN]
             ratios.extend(error[np.isfinite(error)])
-        return np.array(ratios if len(ratios) == 1 else ratios[1:])
+        return np.array(ratios or [np.nan])
 
     def to_dict(self) -> dict[str, Any]:
         """All numbers but the distributions and pictures, as JSON can hold them: what is not known as None.

@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
 
+from velatura.comparison import plugins
 from velatura.comparison.account import account, along
 from velatura.comparison.pictures import pictures as spheres
+from velatura.comparison.plugins import Plugin
 from velatura.comparison.result import Account, Comparison
 from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
@@ -22,7 +24,7 @@ Progress = Callable[[int, int], None]
 
 def compare(
     stack: Material,
-    models: Sequence[str | Model] | None = None,
+    models: Sequence[Model | Plugin] | None = None,
     cos_theta: Sequence[float] = COSINES,
     paths: int = PATHS,
     seed: int = 0,
@@ -38,6 +40,9 @@ def compare(
     Args:
         stack: a material (a stack, a file, or a preset's name).
         models: names of models, or models; None means all that have the `switches`, which change the choices of each.
+            Also plugins, of which only `evaluated`, the distribution and pictures are known: "weidlich_wilkie" and
+            "reference", which are given the material; others of Mitsuba's, by name with its defaults ("principled"), as
+            an XML file, or as the dict of `mi.load_dict` ("id" is then its name here).
         cos_theta: cosines of the directions of incidence, in (0, 1].
         paths: of the truth, for each direction; at least 2.
         seed: of the truth's random numbers.
@@ -52,16 +57,26 @@ def compare(
     """
     # Refuse what cannot work before anything slow begins
     described = load(stack)
-    chosen = {m.name: m for m in (_every(switches) if models is None else [named(m, **switches) for m in models])}
-    if not chosen:
-        raise InvalidInput("models: name at least one")
+    asked = _every(switches) if models is None else [_model(m, switches) for m in models]
+    if microsurface is None:
+        microsurface = any(isinstance(m, Model) and m.reflectance == "fgd-multi" for m in asked)
     if paths < 2:
         raise InvalidInput(f"paths: must be at least 2, got {paths}")
-    if microsurface is None:
-        microsurface = any(model.reflectance == "fgd-multi" for model in chosen.values())
+    names = [m.name if isinstance(m, Model) else plugins.name_of(m) for m in asked]
+    if not names:
+        raise InvalidInput("models: name at least one")
+    if len(set(names)) < len(names):
+        raise InvalidInput(f"models: {max(names, key=names.count)} is there twice")
+    if switches and not any(isinstance(m, Model) for m in asked):
+        raise InvalidInput(f"{', '.join(switches)}: for named models only, and there is none among these")
+    made = [m if isinstance(m, Model) else plugins.made(m, described, microsurface) for m in asked]
+    chosen = dict(zip(names, made))
 
     # Let the models speak, then the truth, and set them side by side
-    told = {name: account(described, cos_theta, model) for name, model in chosen.items()}
+    told = {
+        name: account(described, cos_theta, m) if isinstance(m, Model) else plugins.account(m, described, cos_theta)
+        for name, m in chosen.items()
+    }
     advance = _counter(progress, 3 * len(cos_theta) + (len(chosen) + 2) * pictures)
     truth, error, noise = walked(described, cos_theta, paths, seed, microsurface, advance)
     return Comparison(
@@ -76,6 +91,13 @@ def compare(
         models={name: _beside(model, truth) for name, model in told.items()},
         pictures=spheres(described, chosen, seed, microsurface, advance) if pictures else None,
     )
+
+
+def _model(model: Model | Plugin, switches: dict[str, str]) -> Model | Plugin:
+    """A named model with these switches; a plugin as it is."""
+    if isinstance(model, Model) or (isinstance(model, str) and model in [m.name for m in MODELS]):
+        return named(model, **switches)
+    return model
 
 
 def _every(switches: dict[str, str]) -> list[Model]:

@@ -1,0 +1,110 @@
+"""BSDF plugins beside the named models: what they sample is compared, and of lobes they say nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import api, kernel
+from velatura.checks.probe import Probe
+from velatura.comparison.account import Light, distribution
+from velatura.comparison.result import Account
+from velatura.errors import InvalidInput
+from velatura.model import MODELS
+from velatura.optics.directions import directions
+from velatura.reference import Lobe
+from velatura.stack import Stack
+from velatura.stack.schema import unknown
+
+#: A plugin by name, with Mitsuba's defaults; the XML file of a BSDF; or its parameters as `mi.load_dict` takes them.
+Plugin: TypeAlias = str | Path | Mapping[str, Any]
+
+HOLDERS = ("blendbsdf", "bumpmap", "mask", "normalmap", "twosided")  # Mitsuba's own, that hold other BSDFs
+SAMPLES = 2**21  # for each direction, as noisy as the truth
+
+
+def name_of(plugin: Plugin) -> str:
+    """What a plugin is called among the models: its `id`, if it has one; a file's name without the ending."""
+    if isinstance(plugin, Mapping):
+        return str(plugin.get("id", plugin.get("type")))
+    return Path(plugin).stem if _is_file(plugin) else str(plugin)
+
+
+def made(plugin: Plugin, stack: Stack, microsurface: bool) -> Any:
+    """The `mi.BSDF`; Velatura's own plugins are given the stack.
+
+    Raises:
+        InvalidInput: no such plugin, none for BSDFs, or one that holds others, without which Mitsuba may crash; what
+            Mitsuba refuses; a variant that is not vectorised, or without RGB.
+        MissingTool: LLVM is missing or too old.
+    """
+    mi = kernel.mitsuba()
+    if not mi.is_rgb or mi.variant().startswith("scalar"):
+        raise InvalidInput(f"models: plugins are compared in llvm_ad_rgb or the like, not in {mi.variant()}")
+    if isinstance(plugin, str) and plugin in api.PLUGINS:
+        return api.bsdf(stack, plugin, **({"microsurface": microsurface} if plugin == "reference" else {}))
+    try:
+        bsdf = _from_file(mi, plugin) if _is_file(plugin) else _from_type(mi, plugin)
+    except RuntimeError as error:
+        said = " ".join(str(error).split())
+        if isinstance(plugin, str) and "not found!" in said:
+            known = [*(model.name for model in MODELS), *api.PLUGINS]
+            raise InvalidInput(f"{unknown('model', plugin, known)}, nor a BSDF plugin of Mitsuba's") from None
+        reason = re.sub(r".*\[[\w.:]+\] ", "", said)  # without the places in Mitsuba's sources
+        raise InvalidInput(f"models: {name_of(plugin)}: {reason}") from None
+    if not isinstance(bsdf, mi.BSDF):
+        raise InvalidInput(f"models: {name_of(plugin)} is no BSDF")
+    return bsdf
+
+
+def _from_file(mi: Any, path: Any) -> Any:
+    """What an XML file holds, refused before Mitsuba reads it unless that is a BSDF."""
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        raise InvalidInput(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if root.tag != "bsdf":
+        raise InvalidInput(f"{path}: must hold a <bsdf>, got a <{root.tag}>")
+    api.register()
+    return mi.load_file(str(path))
+
+
+def _from_type(mi: Any, plugin: Any) -> Any:
+    """A plugin with given parameters, or Mitsuba's."""
+    fields = dict(plugin) if isinstance(plugin, Mapping) else {"type": plugin}
+    name = str(fields.get("type", ""))
+    if name in HOLDERS:
+        raise InvalidInput(f"models: {name} holds other BSDFs; write it with them into an XML file, and name that")
+    kind = mi.PluginManager.instance().plugin_type(name)
+    if kind not in (mi.ObjectType.BSDF, mi.ObjectType.Unknown):  # of plugins in Python it knows no kind
+        raise InvalidInput(f"models: {name} is no BSDF")
+    api.register()
+    return kernel.load_dict(fields)
+
+
+def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
+    """Where a BSDF sends the light, by its own sampling; its lobes are not known, and NaN."""
+    probe, rng = Probe(bsdf), np.random.default_rng(0)
+    grids = []
+    for wi in directions(cos_theta):
+        drawn = probe.sample(np.broadcast_to(wi, (SAMPLES, 3)), rng.random((SAMPLES, 3)))
+        up = drawn.wo[:, 2] > 0
+        grids.append(distribution(Light(drawn.wo[up, :2].T, drawn.weight[up].T / SAMPLES)))
+    grid = np.stack(grids, axis=1)
+
+    def nothing(*shape: int) -> NDArray[np.floating]:
+        return np.full((*shape, len(grids)), np.nan)
+
+    lobe = Lobe(energy=nothing(3), alpha=nothing(2), rotation=nothing(), mean=nothing(2), covariance=nothing(3))
+    surfaces = len(stack.interfaces) + ("diffuse" in stack.kinds)
+    return Account((lobe,) * surfaces, lobe if stack.transmits else None, grid.sum(axis=(2, 3)), grid)
+
+
+def _is_file(plugin: Plugin) -> bool:
+    return isinstance(plugin, str | Path) and Path(plugin).suffix == ".xml"
