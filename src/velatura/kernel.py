@@ -18,6 +18,8 @@ import importlib.metadata
 import os
 import subprocess
 import sys
+import threading
+import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -36,6 +38,63 @@ _factories: dict[str, Factory] = {}
 _registered: set[tuple[str, str]] = set()
 
 
+# One thread at a time
+
+
+class Exclusive(contextlib.ContextDecorator):
+    """Lets one thread at a time work with Mitsuba; a block or a function that has it may ask for it again.
+
+    A rendering asks all objects of a kind what they do, those of other threads included. So none may be made while it
+    runs, or be destroyed, which happens wherever the last reference goes: in the thread that does something else, or in
+    the traceback of an error that is kept. Hence what a failure holds is let go before the lock is, and a BSDF of ours
+    that another thread drops is kept until the lock is free.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._owner: int | None = None
+        self._depth = 0
+        self._dropped: list[Any] = []
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+        self._owner = threading.get_ident()
+        self._depth += 1
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        try:
+            if self._depth == 1:
+                _let_go(error)
+                self._dropped.clear()
+        finally:
+            self._depth -= 1
+            if not self._depth:
+                self._owner = None
+            self._lock.release()
+
+    def drop(self, thing: Any) -> None:
+        """Keep a thing whose last reference has gone, unless this thread may destroy it now. It never waits."""
+        alone = self._owner is None and threading.active_count() == 1
+        if not alone and self._owner != threading.get_ident():
+            self._dropped.append(thing)
+
+
+def _let_go(error: BaseException | None) -> None:
+    """Clear the variables of the calls that an error, or what led to it, has ended."""
+    waiting, seen = [error], set()
+    while waiting:
+        each = waiting.pop()
+        if each is not None and id(each) not in seen:
+            seen.add(id(each))
+            traceback.clear_frames(each.__traceback__)
+            waiting += [each.__cause__, each.__context__]
+
+
+#: Held by whatever of Velatura works with Mitsuba. Hold it, as `with kernel.exclusive:` or as the decorator
+#: `@kernel.exclusive`, where other threads use Velatura while you load scenes, render, or let go of either.
+exclusive = Exclusive()
+
+
 # Mitsuba and its variant
 
 
@@ -44,6 +103,7 @@ def default_variant() -> str:
     return "llvm_ad_rgb"
 
 
+@exclusive
 def mitsuba(variant: str | None = None) -> ModuleType:
     """Mitsuba with a variant set: the one asked for, or else the current one, or else `default_variant()`.
 
@@ -112,7 +172,8 @@ def _compiles_minimum() -> bool:
 @functools.cache
 def _drjit() -> ModuleType:
     try:
-        with _quiet_stderr():  # Dr.Jit looks for LLVM while it is imported, and prints what our own message says better
+        # Dr.Jit looks for LLVM while it is imported, and prints what our own message says better
+        with exclusive, _quiet_stderr():
             import drjit
             import mitsuba  # noqa: F401
     except ImportError as error:
@@ -146,6 +207,7 @@ def plugin(name: str) -> Callable[[Factory], Factory]:
     return declare
 
 
+@exclusive
 def register() -> None:
     """Make every declared plugin known to the current variant (if one is set) and to all that are set later."""
     _drjit()
@@ -166,10 +228,13 @@ def _follow_variants() -> None:
 def _register_missing(mi: Any) -> None:
     for name, factory in _factories.items():
         if (name, mi.variant()) not in _registered:
-            mi.register_bsdf(name, factory(mi))
+            made: Any = factory(mi)
+            made.__del__ = lambda thing: exclusive.drop(thing)
+            mi.register_bsdf(name, made)
             _registered.add((name, mi.variant()))
 
 
+@exclusive
 def load_dict(description: dict[str, Any]) -> Any:
     """`mi.load_dict`, which hides what a plugin of ours refuses under a stack of calls.
 

@@ -115,6 +115,7 @@ class Probe:
 
     # One batch
 
+    @kernel.exclusive
     def _sample(self, wi: Array, u: Array) -> tuple[Array, ...]:
         import drjit as dr
 
@@ -125,9 +126,11 @@ class Probe:
         dr.eval(bs.wo, weight, bs.pdf, bs.eta, delta)
         return _rows(bs.wo), _rows(weight), _row(bs.pdf), _row(bs.eta), _row(delta).astype(bool)
 
+    @kernel.exclusive
     def _eval_pdf(self, wi: Array, wo: Array, offset: float) -> tuple[Array, ...]:
         return self._values(*self.bsdf.eval_pdf(self.context, self._interaction(wi, offset), self._vector(wo), True))
 
+    @kernel.exclusive
     def _eval_and_pdf(self, wi: Array, wo: Array) -> tuple[Array, ...]:
         si, direction = self._interaction(wi), self._vector(wo)
         value = self.bsdf.eval(self.context, si, direction, True)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from threading import Lock
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from velatura import kernel
 from velatura.editor import bundle
 from velatura.editor.bodies import Answer, Body, Verb, array, material_of
 from velatura.errors import InvalidInput
+from velatura.stack import Stack
 
 LARGEST = 512  # pixels along a side
 MOST = 64  # samples per pixel of one call
-
-_lock = Lock()  # Mitsuba renders one picture at a time
 
 
 def truth(body: Body) -> Answer:
@@ -24,8 +24,7 @@ def truth(body: Body) -> Answer:
     Of the body: `material`, `object`, `environment`, `rotation` (degrees about y), `camera` {origin, target, fov in
     degrees over the shorter side}, `size` [w, h], `spp`, `seed`.
     """
-    from velatura import kernel, scenes
-    from velatura.api import bsdf
+    from velatura import scenes
 
     stack = material_of(body)
     name, environment = body.get("object"), body.get("environment", "studio")
@@ -40,20 +39,35 @@ def truth(body: Body) -> Answer:
     spp, seed = _count("spp", body.get("spp", 4), MOST), _count("seed", body.get("seed", 1), 2**31)
     camera, turn = _camera(body.get("camera")), _number("rotation", body.get("rotation", 0))
 
-    with _lock:
-        mi = kernel.mitsuba()
-        lit = bundle.STATIC / "environments" / f"{environment}.exr"
-        light = str(lit) if environment in bundle.environments() else environment
-        scene = scenes.scene_dict(name, light, bsdf(stack, "reference"), (size[0], size[1]))
-        transform = mi.ScalarTransform4f()
-        scene["sensor"] |= {
-            "to_world": transform.look_at(camera["origin"], camera["target"], [0, 1, 0]),
-            "fov": camera["fov"],
-        }
-        if environment not in ("sky", "furnace"):
-            scene["light"]["to_world"] = transform.rotate([0, 1, 0], turn)
-        picture = np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed))[..., :3]
-    return {"picture": array(picture)}
+    return {"picture": array(_rendered(stack, name, environment, (size[0], size[1]), camera, turn, spp, seed))}
+
+
+@kernel.exclusive
+def _rendered(
+    stack: Stack,
+    name: str,
+    environment: str,
+    size: tuple[int, int],
+    camera: Mapping[str, Any],
+    turn: float,
+    spp: int,
+    seed: int,
+) -> NDArray[np.float32]:
+    from velatura import scenes
+    from velatura.api import bsdf
+
+    mi = kernel.mitsuba()
+    lit = bundle.STATIC / "environments" / f"{environment}.exr"
+    light = str(lit) if environment in bundle.environments() else environment
+    scene = scenes.scene_dict(name, light, bsdf(stack, "reference"), size)
+    transform = mi.ScalarTransform4f()
+    scene["sensor"] |= {
+        "to_world": transform.look_at(camera["origin"], camera["target"], [0, 1, 0]),
+        "fov": camera["fov"],
+    }
+    if environment not in ("sky", "furnace"):
+        scene["light"]["to_world"] = transform.rotate([0, 1, 0], turn)
+    return np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed))[..., :3]
 
 
 def _count(key: str, value: Any, most: int) -> int:

@@ -61,6 +61,7 @@ def trace(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) ->
         yield _part(layers, wi, min(_AT_ONCE, paths - start), _mixed(seed), start)
 
 
+@kernel.exclusive
 def _part(layers: Layers, wi: Array, count: int, seed: int, start: int) -> Ends:
     import drjit as dr
     import drjit.llvm as types
@@ -77,6 +78,7 @@ def _part(layers: Layers, wi: Array, count: int, seed: int, start: int) -> Ends:
     return Ends(w, weight.numpy(), path.deepest.numpy(), float(cut_off.numpy().mean()))
 
 
+@kernel.exclusive
 def _layers(stack: Stack, microsurface: bool) -> Layers:
     """The stack in Dr.Jit numbers, opaque to its compiler, so that stacks of one make share a kernel."""
     import drjit as dr

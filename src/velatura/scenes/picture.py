@@ -17,6 +17,7 @@ from velatura.scenes.stage import Name, scene_dict
 PASS_SAMPLES = 2**20
 
 
+@kernel.exclusive
 def render(
     bsdf: Any,
     scene: Name = "ball",

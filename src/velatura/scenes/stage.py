@@ -26,6 +26,7 @@ MAX_DEPTH = 6
 _GREY = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.18}}
 
 
+@kernel.exclusive
 def scene_dict(
     scene: Name = "ball",
     env: Name | None = None,
