@@ -47,6 +47,15 @@ TWO_SPHERES = """
 </scene>
 """
 
+ONE_SPHERE = """
+<scene version="3.0.0">
+    {}
+    <bsdf type="diffuse" id="material"/>
+    <shape type="sphere"><ref id="material"/></shape>
+</scene>
+"""
+METER = '<sensor type="irradiancemeter"><film type="hdrfilm"><rfilter type="box"/></film></sensor>'
+
 
 @pytest.fixture(autouse=True)
 def mi() -> Iterator[Any]:
@@ -175,6 +184,14 @@ def test_a_scene_file_takes_another_size_and_environment(scene_file: Path, tmp_p
     assert image[8:16, 12:20].mean() == pytest.approx(0.5, abs=0.03)
 
 
+def test_a_scene_file_may_measure_the_material_itself(scene_file: Path) -> None:
+    """Expected: the irradiance on a sphere in white surroundings is pi."""
+    meter = METER.replace("<rfilter", '<integer name="width" value="4"/><integer name="height" value="4"/><rfilter')
+    text = ONE_SPHERE.format('<integrator type="path"/><emitter type="constant"/>')
+    scene_file.write_text(text.replace('<ref id="material"/>', f'<ref id="material"/>{meter}'))
+    assert scenes.render(WHITE, scene=str(scene_file), spp=64).mean() == pytest.approx(np.pi, abs=0.05)
+
+
 def test_a_scene_file_without_light_is_shown_in_the_studio(scene_file: Path) -> None:
     scene_file.write_text(scene_file.read_text().replace('<emitter type="constant"/>', ""))
     assert scenes.render(WHITE, scene=str(scene_file), spp=16).mean() > 0.1
@@ -213,6 +230,17 @@ def test_what_cannot_be_rendered_is_refused_in_one_line(asked: dict[str, Any], s
         ("a.xml", "<scene", "a.xml"),
         ("a.xml", '<scene version="3.0.0"><shape type="nothing"/></scene>', "nothing"),
         ("a.xml", TWO_SPHERES.format(left="other"), 'id="material"'),
+        ("a.xml", '<bsdf version="3.0.0" type="diffuse"/>', "holds no <scene>"),
+        ("a.xml", ONE_SPHERE.format(""), "has no integrator"),
+        ("a.xml", ONE_SPHERE.format('<integrator type="path"/>'), "has no sensor"),
+        ("a.xml", ONE_SPHERE.format(f'<integrator type="path"/>{METER}'), "irradiancemeter must stand within"),
+        ("a.xml", ONE_SPHERE.format(f'<integrator type="ptracer"/>{METER}'), "irradiancemeter must stand within"),
+        ("a.xml", TWO_SPHERES.format(left="material").replace('value="24"', 'value="0"'), "no pixels"),
+        (
+            "a.xml",  # which Mitsuba finds only when it renders
+            ONE_SPHERE.format('<integrator type="ptracer"/><sensor type="orthographic"/><emitter type="constant"/>'),
+            "not implemented",
+        ),
         ("a.exr", "not a picture", "a.exr"),
         ("a.hdr", "not a picture", "a.hdr"),
     ],

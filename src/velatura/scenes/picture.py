@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from velatura import files, kernel
 from velatura.errors import InvalidInput
-from velatura.scenes.stage import Name, scene_dict
+from velatura.scenes.stage import Name, blamed, scene_dict
 
 #: Samples (pixels x spp) of one pass: between two of them progress is told and an interrupt is heard.
 PASS_SAMPLES = 2**20
@@ -43,13 +43,16 @@ def render(
     if spp < 1:
         raise InvalidInput(f"spp is {spp}, and must be at least 1")
     mi = kernel.mitsuba()
-    loaded = mi.load_dict(scene_dict(scene, env, bsdf, size, zoom))
+    described = scene_dict(scene, env, bsdf, size, zoom)  # kept to the end, as it owns the parts of a scene file
+    with blamed(scene):
+        loaded = mi.load_dict(described)
     passes = _passes(spp, int(np.prod(loaded.sensors()[0].film().size())))
     seeds = np.random.SeedSequence(seed).generate_state(len(passes))
 
     total, done = np.zeros(1, np.float32), 0
     for samples, pass_seed in zip(passes, seeds):
-        total = total + np.float32(samples) * _rendered(mi, loaded, samples, int(pass_seed))
+        with blamed(scene):
+            total = total + np.float32(samples) * _rendered(mi, loaded, samples, int(pass_seed))
         done += samples
         if progress:
             progress(done, spp)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -46,12 +48,13 @@ def scene_dict(
         zoom: how much larger the object appears; at 1 the ball covers half of the picture, at 1.2 three quarters.
 
     Raises:
-        InvalidInput: an unknown scene or environment, a file that cannot be read, a scene file without a "material".
+        InvalidInput: an unknown scene or environment, a file that cannot be read, a scene file without a "material",
+            without integrator, sensor or pixels, or that Mitsuba refuses.
         MissingTool: as `kernel.mitsuba`.
     """
     mi = kernel.mitsuba()
     material = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
-    if Path(scene).suffix.lower() == ".xml":
+    if is_file(scene):
         return _from_file(mi, os.fspath(scene), env, material, size)
     if scene not in OBJECTS:
         raise InvalidInput(f"unknown scene {scene!r}: give {', '.join(OBJECTS)}, or a Mitsuba scene file (.xml)")
@@ -65,6 +68,25 @@ def scene_dict(
         "object": mesh(mi, chosen.surface(), material),
         **_surroundings(mi, env or "studio"),
     }
+
+
+def is_file(scene: Name) -> bool:
+    """Whether a scene is a Mitsuba scene file."""
+    return Path(scene).suffix.lower() == ".xml"
+
+
+@contextlib.contextmanager
+def blamed(scene: Name) -> Iterator[None]:
+    """Raises InvalidInput about a scene file for what Mitsuba refuses in the block; other scenes are our own."""
+    try:
+        yield
+    except RuntimeError as error:
+        if not is_file(scene):
+            raise
+        said: BaseException = error
+        while said.__cause__:
+            said = said.__cause__
+        raise InvalidInput(f"{scene}: {' '.join(str(said).split())}") from error
 
 
 def mesh(mi: Any, surface: Surface, bsdf: Any) -> Any:
@@ -109,13 +131,22 @@ def _camera(mi: Any, view: View, size: tuple[int, int], zoom: float) -> dict[str
 
 
 def _from_file(mi: Any, path: str, env: Name | None, material: Any, size: tuple[int, int] | None) -> dict[str, Any]:
-    # Read the scene, and give the material to its shapes
-    if not Path(path).is_file():
+    # Read the scene
+    if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such scene file")
-    try:
+    with blamed(path):
         read = mi.load_file(path, optimize=False)
-    except RuntimeError as error:
-        raise InvalidInput(f"{path}: {' '.join(str(error).split())}") from error
+    if not isinstance(read, mi.Scene):
+        raise InvalidInput(f"{path}: holds no <scene>")
+    if read.integrator() is None:
+        raise InvalidInput(f'{path}: has no integrator, such as <integrator type="path"/>')
+    if not read.sensors():
+        raise InvalidInput(f'{path}: has no sensor, such as <sensor type="perspective"/>')
+    free = [sensor for sensor in read.sensors() if sensor.get_shape() is None]
+    if any(sensor.class_name() == "IrradianceMeter" for sensor in free):
+        raise InvalidInput(f"{path}: an irradiancemeter must stand within the shape that it measures")
+
+    # Give the material to its shapes
     chosen = [shape for shape in read.shapes() if shape.bsdf() is not None and shape.bsdf().id() == MATERIAL_ID]
     if not chosen:
         raise InvalidInput(f'{path}: no shape has a bsdf with id="{MATERIAL_ID}", whose place the material would take')
@@ -128,11 +159,16 @@ def _from_file(mi: Any, path: str, env: Name | None, material: Any, size: tuple[
         lights = [light for light in lights if not light.is_environment()] + [emitter(mi, env or "studio")]
 
     # Resize its pictures
-    for sensor in read.sensors() if size else ():
-        parameters = mi.traverse(sensor)
-        parameters["film.size"] = list(size or ())
-        parameters.update()
+    for sensor in read.sensors():
+        if size:
+            with blamed(path):
+                parameters = mi.traverse(sensor)
+                parameters["film.size"] = list(size)
+                parameters.update()
+        if not all(sensor.film().size()):
+            raise InvalidInput(f"{path}: the film of a sensor has no pixels")
 
-    parts = {"sensor": read.sensors(), "light": lights, "shape": read.shapes()}
+    # Keep the scene that was read, in which Mitsuba sees nothing to render, as long as its parts are used
+    parts = {"sensor": free, "light": lights, "shape": read.shapes()}
     numbered = {f"{kind}_{i}": part for kind, several in parts.items() for i, part in enumerate(several)}
-    return {"type": "scene", "integrator": read.integrator(), **numbered}
+    return {"type": "scene", "integrator": read.integrator(), "read": read, **numbered}
