@@ -291,8 +291,10 @@ def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
         read = mi.Bitmap(str(image.texture))
         read.set_srgb_gamma(image.encoding == "srgb")
         texels = np.array(read.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=False))
-    except RuntimeError:
+    except (RuntimeError, MemoryError):
         raise InvalidInput(f"{name}: the texture {image.texture} is no image that Mitsuba can read") from None
+    if not texels.size:
+        raise InvalidInput(f"{name}: the texture {image.texture} has no texels")
     if not np.isfinite(texels).all():
         raise InvalidInput(f"{name}: the texture {image.texture} has texels that are not finite")
     # Tell colours from opacity, which stands last

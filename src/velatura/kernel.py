@@ -128,7 +128,7 @@ def is_picture(path: Path) -> bool:
 
     try:
         mi.Bitmap(str(path))
-    except RuntimeError:
+    except (RuntimeError, MemoryError):
         return False
     return True
 

@@ -215,6 +215,8 @@ def test_an_environment_file_lights_the_scene(ending: str, tmp_path: Path, mi: A
         ({"scene": "nowhere.xml"}, "nowhere.xml: no such scene file"),
         ({"env": "studoi"}, "unknown environment 'studoi': give studio, sky, furnace, or"),
         ({"env": "nowhere.hdr"}, "nowhere.hdr: no such environment file"),
+        ({"env": f"{'x' * 300}.hdr"}, "no such environment file"),
+        ({"env": ""}, "unknown environment"),
         ({"spp": 0}, "spp is 0"),
     ],
 )
@@ -251,6 +253,44 @@ def test_a_file_that_cannot_be_used_is_refused_in_one_line(name: str, text: str,
     with pytest.raises(InvalidInput) as refused:
         scenes.render(BLACK, str(path)) if name == "a.xml" else scenes.render(BLACK, env=str(path))
     assert str(path) in str(refused.value) and says in str(refused.value) and "\n" not in str(refused.value)
+
+
+HALF = np.full((8, 16, 3), 0.5, np.float32)
+
+
+@pytest.mark.parametrize(
+    ("texels", "says"),
+    [
+        (np.where(np.arange(16)[:, None] == 3, np.nan, HALF), "negative, not finite"),
+        (np.where(np.arange(16)[:, None] == 3, np.inf, HALF), "negative, not finite"),
+        (-HALF, "negative, not finite"),
+        (HALF * 1e30, "above 1e[+]12"),
+        (np.full((8, 16, 5), 0.5, np.float32), "5 channels"),
+    ],
+)
+def test_a_light_that_is_none_is_refused_in_one_line(texels: Picture, says: str, tmp_path: Path, mi: Any) -> None:
+    path = tmp_path / "a.exr"
+    mi.Bitmap(texels.astype(np.float32)).write(str(path))
+    with pytest.raises(InvalidInput, match=rf"^{path}: has .*{says}.*$"):
+        scenes.render(BLACK, env=str(path))
+
+
+@pytest.mark.parametrize("channels", [1, 2, 4])
+def test_a_light_may_be_grey_or_have_opacity(channels: int, tmp_path: Path, mi: Any) -> None:
+    """Expected: the picture of .5 with an opacity of 1 lights as that of three channels of .5 does."""
+    texels = np.full((8, 16, channels), 0.5, np.float32)
+    texels[..., -1] = 1.0 if channels in (2, 4) else 0.5
+    mi.Bitmap(texels).write(str(tmp_path / "a.exr"))
+    image = scenes.render(WHITE, scene="sphere", env=str(tmp_path / "a.exr"), spp=1, size=(8, 8))
+    assert image[0, 0] == pytest.approx([0.5] * 3, rel=0.01)
+
+
+def test_a_light_without_texels_or_too_large_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.hdr"
+    for size in ("-Y 0 +X 0", "-Y 200000 +X 200000"):
+        path.write_text(f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{size}\n")
+        with pytest.raises(InvalidInput, match=rf"^{path}: .+$"):
+            scenes.render(BLACK, env=str(path))
 
 
 # Passes

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +186,17 @@ def test_a_wrong_json_file_gets_one_line(text: str, message: str) -> None:
     with pytest.raises(InvalidInput) as caught:
         loads(text, name="m.json")
     assert str(caught.value) == f"m.json: {message}"
+
+
+@pytest.mark.parametrize("name", ["loop.png", "x" * 5000 + ".png", "folder.png", "pipe.png", "a\0.png", "\ud800.png"])
+def test_a_texture_that_is_no_file_gets_one_line(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.symlink("loop.png", "loop.png")
+    os.mkfifo("pipe.png")
+    Path("folder.png").mkdir()
+    with pytest.raises(InvalidInput, match=r"^m\.json: layer 0 .*: texture: ") as caught:
+        loads(json.dumps({"layers": [{"interface": {"eta": 1.5, "alpha": {"texture": name}}}]}), name="m.json")
+    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_texture_is_named(tmp_path: Path) -> None:

@@ -41,7 +41,8 @@ def coat(
     if output:
         files.check_writable(output, "a material file", invert.ENDINGS)
 
-    coated = inverse.coat(stack, eta, alpha, keep_appearance, model=model or inverse.MODEL, **switches)
+    name = inverse.MODEL if model is None else model
+    coated = inverse.coat(stack, eta, alpha, keep_appearance, model=name, **switches)
     if output:
         save(coated.stack, output)
     if as_json:

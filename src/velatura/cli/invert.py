@@ -89,7 +89,7 @@ def read(target: str, model: str | None, settings: list[str] | None) -> tuple[Ta
         if key not in SWITCHES:
             raise InvalidInput(f"--set {key}: {unknown('switch', key, SWITCHES)}")
         switches[key] = value
-    return inverse.load_target(target), model or inverse.MODEL, switches
+    return inverse.load_target(target), inverse.MODEL if model is None else model, switches
 
 
 def say_for_which(model: Model) -> None:

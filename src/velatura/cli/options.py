@@ -61,7 +61,7 @@ def model_name(name: str | None) -> str:
     """The model that the user named, else the package's default."""
     from velatura.model import DEFAULT
 
-    return name or DEFAULT
+    return DEFAULT if name is None else name
 
 
 def cosines(text: str) -> list[float]:

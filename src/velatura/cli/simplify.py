@@ -23,5 +23,5 @@ def simplify(
     from velatura import inverse
 
     fit.check(output)
-    found = inverse.simplify(stack, interfaces, model or inverse.MODEL, **switches)
+    found = inverse.simplify(stack, interfaces, inverse.MODEL if model is None else model, **switches)
     fit.show(found, output, as_json)

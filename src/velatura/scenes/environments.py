@@ -15,6 +15,9 @@ from velatura.errors import InvalidInput
 #: What `env` may name, besides an .exr or .hdr file.
 ENVIRONMENTS = ("studio", "sky", "furnace")
 
+#: The largest radiance of a texel, so that what many of them send together is still a number.
+BRIGHTEST = 1e12
+
 
 class Softbox(NamedTuple):
     """A rectangular light that faces the origin: its centre, its size (degrees across and up) and its radiance."""
@@ -50,12 +53,21 @@ def emitter(mi: Any, env: str | os.PathLike[str]) -> dict[str, Any]:
 def _read(mi: Any, path: Path) -> Any:
     if path.suffix.lower() not in (".exr", ".hdr"):
         raise InvalidInput(f"unknown environment {str(path)!r}: give {', '.join(ENVIRONMENTS)}, or a file .exr or .hdr")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such environment file")
     try:
-        return mi.Bitmap(str(path))
-    except RuntimeError as error:
+        picture = mi.Bitmap(str(path))
+        if picture.channel_count() > 4:
+            raise InvalidInput(f"{path}: has {picture.channel_count()} channels; a light has one or three, and opacity")
+        light = picture.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
+    except (RuntimeError, MemoryError) as error:
         raise InvalidInput(f"{path}: {' '.join(str(error).split())}") from error
+    texels = np.array(light)
+    if not texels.size:
+        raise InvalidInput(f"{path}: has no texels")
+    if not np.all((texels >= 0) & (texels <= BRIGHTEST)):
+        raise InvalidInput(f"{path}: has texels that are negative, not finite, or above {BRIGHTEST:g}")
+    return light
 
 
 @functools.cache

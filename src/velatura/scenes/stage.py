@@ -59,14 +59,14 @@ def scene_dict(
     if scene not in OBJECTS:
         raise InvalidInput(f"unknown scene {scene!r}: give {', '.join(OBJECTS)}, or a Mitsuba scene file (.xml)")
 
-    chosen = OBJECTS[str(scene)]
+    chosen, chosen_env = OBJECTS[str(scene)], "studio" if env is None else env
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": MAX_DEPTH},
         "sensor": _camera(mi, chosen.view, size or (512, 512), zoom),
-        "light": emitter(mi, env or "studio"),
+        "light": emitter(mi, chosen_env),
         "object": mesh(mi, chosen.surface(), material),
-        **_surroundings(mi, env or "studio"),
+        **_surroundings(mi, chosen_env),
     }
 
 
@@ -155,8 +155,9 @@ def _from_file(mi: Any, path: str, env: Name | None, material: Any, size: tuple[
 
     # Keep its lights, those of its shapes aside, unless others are asked for
     lights = [light for light in read.emitters() if not mi.has_flag(light.flags(), mi.EmitterFlags.Surface)]
-    if env or not read.emitters():
-        lights = [light for light in lights if not light.is_environment()] + [emitter(mi, env or "studio")]
+    if env is not None or not read.emitters():
+        wanted = emitter(mi, "studio" if env is None else env)
+        lights = [*(light for light in lights if not light.is_environment()), wanted]
 
     # Resize its pictures
     for sensor in read.sensors():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,10 +73,11 @@ class File(Parameter):
     what = "the path of a file"
 
     def check(self, value: Any) -> Path:
-        if not isinstance(value, str | Path) or not str(value):
+        if not isinstance(value, str | Path) or not str(value) or not _encodable(str(value)):
             raise self.refuse(value)
-        path = Path(value).resolve()
-        if not path.is_file():
+        # Not by methods of Path, some of which raise where links form a loop or a name is too long
+        path = Path(os.path.realpath(value))
+        if not os.path.isfile(path):
             raise ValueError(f"file not found: {path}")
         return path
 
