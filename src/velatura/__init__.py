@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from velatura.comparison import compare
     from velatura.editor.widget import Editor as Editor
     from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
+    from velatura.exports import export
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Interface, Medium, Stack, Texture, load, preset, presets, save
 
@@ -33,6 +34,7 @@ _HOMES = {
     "velatura.comparison": ("compare",),
     "velatura.editor.widget": ("Editor",),
     "velatura.errors": ("InvalidInput", "LawBroken", "MissingTool", "NoSolution", "VelaturaError"),
+    "velatura.exports": ("export",),
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": ("Diffuse", "Interface", "Medium", "Stack", "Texture", "load", "preset", "presets", "save"),
 }
@@ -55,6 +57,7 @@ __all__ = [
     "bsdf",
     "check",
     "compare",
+    "export",
     "load",
     "lobes",
     "preset",

@@ -18,6 +18,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.exports import FORMATS
 from velatura.shader import shader
 
 Run = Callable[..., tuple[int, str, str]]
@@ -34,6 +35,22 @@ def test_glsl_is_the_shader_with_its_tables_beside(run: Run, tmp_path: Path) -> 
     assert path.read_text() == made.text
     found = np.frombuffer((tmp_path / "gold.tables.bin").read_bytes(), "<f4")
     np.testing.assert_array_equal(found.reshape(made.tables.shape), made.tables)
+
+
+def test_python_exports_what_the_command_writes(run: Run, tmp_path: Path) -> None:
+    """Expected: `vt.export` of a preset's name has the text of the command line, and saves the same files."""
+    for to in FORMATS:
+        made = vt.export("coated-gold", to, "belcour2018", tir="off")
+        _, out, _ = run("export", "coated-gold", "--to", to, "--model", "belcour2018", "--set", "tir=off")
+        assert made.text == out, to
+        written = made.save(tmp_path / f"gold{FORMATS[to].endings[0]}")
+        assert [path.read_bytes() for path in written] == [made.text.encode(), *made.beside.values()]
+    files = {path.name for path in tmp_path.iterdir()}
+    assert files == {"gold.glsl", "gold.json", "gold.py", "gold.tables.bin", "gold.xml"}
+    with pytest.raises(vt.InvalidInput, match="unknown format 'oslo'"):
+        vt.export("coated-gold", "oslo")
+    with pytest.raises(vt.InvalidInput, match="constant: only for glsl, not for json"):
+        vt.export("coated-gold", "json", constant=["layer0_eta"])
 
 
 def test_without_tables_there_is_one_file(run: Run, tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ MAY_IMPORT = {
     "binding": "stack",
     "plugins": "stack optics tables model ops kernel binding",
     "shader": "stack optics tables model ops",
+    "exports": "stack model shader",
     "inverse": "stack optics tables model ops",
     "reference": "stack optics ops kernel binding",
     "checks": "kernel",
@@ -39,6 +40,7 @@ IMPORTED_BY = {
     "cli": "__main__",
     "editor": "__init__ cli",
     "comparison": "__init__ figures cli",
+    "exports": "__init__ cli",
     "figures": "cli editor",
 }
 
@@ -58,6 +60,7 @@ LOADS_NO = {
     "velatura.model": "mitsuba drjit scipy matplotlib",
     "velatura.kernel": "mitsuba drjit",
     "velatura.scenes": "mitsuba drjit",
+    "velatura.exports": "mitsuba drjit numpy",
     "velatura.plugins": "mitsuba drjit",
     "velatura.comparison": "mitsuba drjit matplotlib",
     "velatura.figures": "mitsuba drjit matplotlib",

@@ -1,0 +1,22 @@
+"""The material and its model in JSON, with names and defaults worked out to numbers."""
+
+from __future__ import annotations
+
+import json
+
+from velatura.exports.formats import Export, Request
+from velatura.model import SWITCHES
+from velatura.shader import constant
+from velatura.stack import Varying, dumps
+
+
+def write(request: Request) -> Export:
+    """`material` as its file would have it, `model` with all switches, and `values` by flat name."""
+    free = {name: value for name, value in request.stack.flat().items() if not isinstance(value, Varying)}
+    numbers = {name: constant(name, value) for name, value in free.items()}
+    report = {
+        "material": json.loads(dumps(request.stack, "json")),
+        "model": {"name": request.model.name, **{switch: getattr(request.model, switch) for switch in SWITCHES}},
+        "values": {name: value if isinstance(value, float) else value.tolist() for name, value in numbers.items()},
+    }
+    return Export(json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
