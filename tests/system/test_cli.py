@@ -101,8 +101,9 @@ def test_presets_and_schema(run: Run) -> None:
     listed = {entry["name"]: entry for entry in json.loads(run("presets", "--json")[1])}
     assert set(listed) == set(vt.presets())
     assert all(entry["layers"] and entry["source"] for entry in listed.values())
-    table = run("presets")[1]
-    assert all(name in table for name in listed)
+    lines = run("presets")[1].splitlines()
+    assert [line.split()[0] for line in lines] == list(listed)
+    assert max(map(len, lines)) < 80
     assert json.loads(run("schema")[1])["required"] == ["layers"]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import signal
 import sys
 from collections.abc import Callable
@@ -21,6 +22,7 @@ import pytest
 import velatura
 from velatura.cli import options
 from velatura.errors import MissingTool, NoSolution
+from velatura.inverse.target import Fixed, Lobe, Target, load_target
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -233,6 +235,27 @@ def test_version(run: Run) -> None:
 
 def test_help_lists_the_models() -> None:
     assert options.MODELS.split(", ") == [model.name for model in velatura.MODELS]
+
+
+def test_help_fits_a_terminal_and_says_what_each_verb_does(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = run("--help")[1].splitlines()[1:]
+    assert not any("..." in line for line in lines)
+    for line in [*lines, *run("invert", "--help")[1].splitlines()]:
+        assert len(line) <= 80
+
+
+def test_help_of_invert_describes_a_target(run: Run, tmp_path: Path) -> None:
+    """Expected: every key, and an example that is a target."""
+    out = run("invert", "--help")[1]
+    lines = out.splitlines()
+    start = next(n for n, line in enumerate(lines) if "name: Hazy metal" in line)
+    example = "\n".join(line[2:] for line in lines[start : lines.index("", start)])
+    (tmp_path / "target.yaml").write_text(example)
+    target = load_target(tmp_path / "target.yaml")
+    assert len(target.lobes) == 2
+    for key in (*Target.model_fields, *Lobe.model_fields, *Fixed.model_fields):
+        assert re.search(rf"\b{key}\b", out), key
 
 
 def test_every_verb_has_help(run: Run) -> None:

@@ -28,7 +28,7 @@ def check(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Hold a material to the laws: energy, reciprocity, sampling, and more."""
+    """Hold a material to the laws of energy, reciprocity and sampling."""
     stack, switches = options.read(material, settings)
     import velatura
 

@@ -51,7 +51,7 @@ def compare(
     ] = False,
     as_json: options.Json = False,
 ) -> None:
-    """Compare models with the ground truth: lobes, albedo, distribution."""
+    """Compare models with the truth: lobes, albedo, distribution."""
     # Refuse what cannot work before anything slow begins
     cosines = options.cosines(cos)
     stack, switches = options.read(material, settings)

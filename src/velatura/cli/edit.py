@@ -14,7 +14,7 @@ def edit(
     port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Of the server; 0 for any free one.")] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> None:
-    """Edit materials in the browser; files are read from and written to the working directory."""
+    """Edit the materials of the working directory in the browser."""
     from velatura.errors import needs
 
     with needs("editor"):

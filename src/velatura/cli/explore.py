@@ -14,7 +14,9 @@ COLUMNS = 4  # of the contact sheet
 
 
 def explore(
-    target: invert.TargetFile,
+    target: Annotated[
+        str, typer.Argument(metavar="TARGET", help="A target file, as `velatura invert --help` describes it.")
+    ],
     sheet: Annotated[bool, typer.Option("--sheet", help="Render the stacks to one picture.")] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="F", help="The sheet; else TARGET with -sheet.png, here.")
@@ -29,7 +31,12 @@ def explore(
     model: invert.ModelName = None,
     settings: invert.Switches = None,
 ) -> None:
-    """List stacks that share their lobes, sorted by their difference at grazing angles."""
+    """List stacks that look alike head-on; how they differ at grazing.
+
+    Every line is a stack that gives the target's lobes, from the top: absorption above, index and roughness of each
+    interface. The number before it says how much more or less it reflects than the stack that `velatura invert` finds,
+    as a share of the incident light: the mean over colours and cosines of incidence .5, .4, .3, .2, .1.
+    """
     # Refuse what cannot work before anything slow begins
     import numpy as np
 

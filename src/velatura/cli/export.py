@@ -33,7 +33,7 @@ def export(
     ] = None,
     settings: options.Settings = None,
 ) -> None:
-    """Write a material for other programs: a shader, JSON, a scene of Mitsuba, or a Python script."""
+    """Write a material as a shader, JSON, a Mitsuba scene or a script."""
     if output is not None:
         check_writable(output, to.value)
     if constant and not FORMATS[to.value].constants:

@@ -18,7 +18,12 @@ Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="F", help
 
 def fit(
     table: Annotated[str, typer.Argument(metavar="TABLE", help="CSV: theta_i, theta_o, phi in degrees, and r, g, b.")],
-    target: Annotated[str, typer.Argument(metavar="TARGET", help="A target file: its lobes head-on, roughly.")],
+    target: Annotated[
+        str,
+        typer.Argument(
+            metavar="TARGET", help="Its lobes head-on, roughly: a file as `velatura invert --help` describes."
+        ),
+    ],
     starts: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Stacks to descend from.")] = 4,
     output: Output = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the stacks to descend from.")] = 0,
@@ -26,7 +31,7 @@ def fit(
     settings: invert.Switches = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find the stack that comes closest to a table of reflectance over angles."""
+    """Find the stack closest to a table of reflectance over angles."""
     # Refuse what cannot work before anything slow begins
     from velatura import inverse
 

@@ -40,7 +40,26 @@ def invert(
     settings: Switches = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find stacks that have given lobes at normal incidence."""
+    """Find stacks that have given lobes at normal incidence.
+
+    A target file lists lobes from the top, each by its energy and its blur:
+
+    \b
+    name: Hazy metal
+    lobes:
+      - {energy: 0.1, alpha: 0}
+      - {energy: [0.35, 0.25, 0.3], alpha: 0.1, base: conductor}
+
+    \b
+    Of a lobe:
+      energy      share of the light: a number, or [r, g, b]
+      alpha       GGX roughness, 0 to 1, 0 unless given; or variance in its place
+      interfaces  that make it: 1, or a pair, 2
+      base        dielectric or, of the last lobe, conductor
+      tint        of a conductor, 0 (strongest edge tint) to 1
+      fixed       {eta, k, alpha, tau}: what each interface keeps, or null: [1.5]
+    Of the whole: exterior (1), eta_max (4), channels (mean or separate), name.
+    """
     # Refuse what cannot work before anything slow begins
     from velatura import inverse
     from velatura.inverse import Infeasible

@@ -17,7 +17,7 @@ def simplify(
     settings: options.Settings = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find the stack with fewer interfaces that comes closest to a material, and say how close."""
+    """Find the stack of fewer interfaces closest to a material."""
     # Refuse what cannot work before anything slow begins
     stack, switches = options.read(material, settings)
     from velatura import inverse
