@@ -62,6 +62,13 @@ def test_a_coat_tells_of_a_diffuse_base(run: Run, folder: Path) -> None:
     assert "diffuse" in run(*arguments)[1]
 
 
+def test_paint_without_an_interface_is_coated(run: Run, folder: Path) -> None:
+    """Expected: nothing is said of lobes that it does not have."""
+    save(Stack([Diffuse(albedo=0.4)]), folder / "paint.yaml")
+    status, out, err = run("coat", "paint.yaml", "--keep-appearance", "-o", "coated.yaml")
+    assert (status, err, out.splitlines()[-1]) == (0, "", "coated.yaml")
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [

@@ -72,7 +72,7 @@ def _say_how_kept(stack: Stack, coated: Coated) -> None:
     import velatura
     from velatura.model import DEFAULT
 
-    if coated.model.name == DEFAULT:
+    if coated.model.name == DEFAULT or not stack.interfaces:
         return
     rendered = replace(coated, before=velatura.lobes(stack, 1.0), after=velatura.lobes(coated.stack, 1.0))
     by = {

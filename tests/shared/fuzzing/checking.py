@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+
+import velatura as vt
 from fuzzing import Failure
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
-
-import velatura as vt
 from velatura.model.models import Model
 
 

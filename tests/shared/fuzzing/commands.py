@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import os
 import signal
 import subprocess
@@ -17,10 +18,9 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
+
 from fuzzing import Failure, files
 from fuzzing.stacks import random_stack
-
-import velatura as vt
 from velatura import cli
 from velatura.stack import dumps
 
@@ -35,51 +35,65 @@ layers:
   - interface: {eta: [0.2, 0.9, 1.2], k: [3.9, 2.6, 2.2], alpha: 0.2}
 """
 TARGET = "lobes:\n  - {energy: 0.05, alpha: 0.1}\n  - {energy: [0.4, 0.3, 0.2], alpha: 0.2, base: conductor}\n"
-TABLE = "theta_i,theta_o,phi,r,g,b\n0,0,180,2.0,1.9,1.8\n0,20,180,0.4,0.4,0.4\n30,30,180,2.1,2.0,1.9\n60,50,180,0.9,0.8,0.7\n"
+TABLE = "theta_i,theta_o,phi,r,g,b\n0,0,180,2.0,1.9,1.8\n0,20,180,0.4,0.4,0.4\n30,30,180,2.1,2.0,1.9\n60,50,180,1,1,1\n"
 SCENE = """\
 <scene version="3.0.0"><integrator type="path"/><emitter type="constant"/><shape type="sphere">
 <bsdf type="diffuse" id="material"/></shape><sensor type="perspective"><film type="hdrfilm">
 <integer name="width" value="8"/><integer name="height" value="8"/></film><transform name="to_world">
 <lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform></sensor></scene>
 """
-INPUTS = {"material.yaml": MATERIAL, "target.yaml": TARGET, "table.csv": TABLE, "scene.xml": SCENE, "kept.txt": "kept\n"}
+INPUTS = {
+    "material.yaml": MATERIAL,
+    "target.yaml": TARGET,
+    "table.csv": TABLE,
+    "scene.xml": SCENE,
+    "kept.txt": "kept\n",
+}
 
-LINES = tuple(
-    line.split()
-    for line in """
-    lobes material.yaml --cos 1,0.5 --phi 30 --model belcour2018 --set layer0_alpha=0.2 --set tir=off --json
-    lobes coated-gold --cos 0.7
-    render material.yaml -o new.png --size 8 --spp 1 --scene sphere --env sky --seed 3
-    render material.yaml -o new.exr --size 8x6 --spp 1 --scene scene.xml --model bati2021
-    render material.yaml --size 8 --spp 1 --env light.exr --set layer0_alpha=0.1
-    check material.yaml --json --plots plots --set form=symmetric
-    compare material.yaml --models velatura,belcour2018 --cos 1 --paths 2000 --seed 1 --json
-    invert target.yaml -o new.yaml --seed 1 --model bati2021 --json
-    invert target.yaml -o found --count 2 --set tir=off
-    coat material.yaml --eta 1.4 --alpha 0.1 --keep-appearance -o new.yaml
-    coat material.yaml --eta 1.6 --json -o new.json
-    explore target.yaml --count 2 --seed 1
-    fit table.csv target.yaml --starts 1 -o new.yaml --seed 1 --json
-    simplify material.yaml --interfaces 1 -o new.yaml --json
-    export material.yaml --to glsl -o new.glsl --constant layer0_eta
-    export material.yaml --to json -o new.json --set layer0_alpha=0.3
-    export material.yaml --to mitsuba-xml -o new.xml --model weier2020
-    export material.yaml --to python
-    presets --json
-    schema
-    doctor
-    """.strip().splitlines()
+COMMANDS = """
+lobes material.yaml --cos 1,0.5 --phi 30 --model belcour2018 --set layer0_alpha=0.2 --set tir=off --json
+lobes coated-gold --cos 0.7
+render material.yaml -o new.png --size 8 --spp 1 --scene sphere --env sky --seed 3
+render material.yaml -o new.exr --size 8x6 --spp 1 --scene scene.xml --model bati2021
+render material.yaml --size 8 --spp 1 --env light.exr --set layer0_alpha=0.1
+check material.yaml --json --plots plots --set form=symmetric
+compare material.yaml --models velatura,belcour2018 --cos 1 --paths 2000 --seed 1 --json
+invert target.yaml -o new.yaml --seed 1 --model bati2021 --json
+invert target.yaml -o found --count 2 --set tir=off
+coat material.yaml --eta 1.4 --alpha 0.1 --keep-appearance -o new.yaml
+coat material.yaml --eta 1.6 --json -o new.json
+explore target.yaml --count 2 --seed 1
+fit table.csv target.yaml --starts 1 -o new.yaml --seed 1 --json
+simplify material.yaml --interfaces 1 -o new.yaml --json
+export material.yaml --to glsl -o new.glsl --constant layer0_eta
+export material.yaml --to json -o new.json --set layer0_alpha=0.3
+export material.yaml --to mitsuba-xml -o new.xml --model weier2020
+export material.yaml --to python
+presets --json
+schema
+doctor
+"""
+WORDS = """
+nan inf -inf -1 0 0.5 1e400 1e-400 1,2 , = a=b -- - -x --help --json --model --set --no-such --set= -o -o= {} [1,2]
+coated-gold material.yaml target.yaml table.csv scene.xml kept.txt light.exr texture.png nowhere.yaml ~ * $HOME é.yaml
+folder folder/new.png folder/new.yaml closed/new.png closed/new.yaml loop.yaml loop.png link.yaml link.png
+no/such/new.png no/such/new.yaml /dev/full /dev/null/new.png /proc/new.yaml new.png new.exr new.yaml new.txt
+layer0_alpha=nan layer0_alpha=1e39 layer9_eta=1 layer0_eta=Au exterior=0 thin=true name= model=x form=
+layer0_alpha=0.1,0.2 layer1_g=1 layer1_depth=1e39 layer2_rotation=1e9 map=power channels=separate
+"""
+ODD = (
+    "",
+    " ",
+    "\n",
+    "a\nb.yaml",
+    "a\x1bb.yaml",
+    "\udcff.yaml",
+    "\U0001f600.png",
+    "{layers: []}",
+    "9" * 400,
+    "x" * 5000,
 )
-WORDS = (
-    *"nan inf -inf -1 0 0.5 1e400 1e-400 1,2 , = a=b -- - -x --help --json --model --set --no-such --set= -o -o= １".split(),
-    *"coated-gold material.yaml target.yaml table.csv scene.xml kept.txt light.exr texture.png nowhere.yaml".split(),
-    *"folder folder/new.png folder/new.yaml closed/new.png closed/new.yaml loop.yaml loop.png link.yaml link.png".split(),
-    *"no/such/new.png no/such/new.yaml /dev/full /dev/null/new.png /proc/new.yaml new.png new.exr new.yaml new.txt".split(),
-    *"layer0_alpha=nan layer0_alpha=1e39 layer9_eta=1 layer0_eta=Au exterior=0 thin=true name= model=x form=".split(),
-    *"layer0_alpha=0.1,0.2 layer1_g=1 layer1_depth=1e39 layer2_rotation=1e9 map=power channels=separate".split(),
-    *("", " ", "\n", "a\nb.yaml", "a\x1bb.yaml", "\udcff.yaml", "\U0001f600.png", "é.yaml", "~", "*", "$HOME", "a" * 300),
-    *("a" * 245 + ".png", "a" * 245 + ".yaml", "x" * 5000, "9" * 400, "{}", "[1,2]", "{layers: []}"),
-)  # fmt: skip
+LONG = ("x" * 5000, "a" * 300, "a" * 245 + ".png", "a" * 245 + ".yaml")
 ENVIRONMENTS: tuple[dict[str, str], ...] = (
     {},
     {"LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
@@ -91,7 +105,7 @@ REDIRECTIONS = ("", "", ">/dev/full", ">&-", "2>&-", "<&-", "| head -c 10 >/dev/
 
 def trial(rng: np.random.Generator) -> list[Failure]:
     """A command line with a few words changed, or an input file."""
-    line = list(LINES[rng.integers(len(LINES))])
+    line = str(rng.choice(COMMANDS.strip().splitlines())).split()
     inputs = dict(INPUTS)
     if rng.random() < 0.3:
         inputs["material.yaml"] = dumps(random_stack(rng, rng.random() < 0.5))
@@ -109,7 +123,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
 
 def _change(line: list[str], rng: np.random.Generator) -> None:
     at = int(rng.integers(1, len(line) + 1)) if len(line) > 1 else 1
-    what, word = rng.integers(6), str(rng.choice(WORDS))
+    what, word = rng.integers(6), str(rng.choice([*WORDS.split(), *ODD, *LONG]))
     if what < 3 and at < len(line):
         line[at] = word
     elif what == 3 and at < len(line):
@@ -135,29 +149,29 @@ def tried(
             status, out, err = _run(line)
         else:
             status, out, err = _run_process(line, environment, redirection)
-        wrong = [*_ended(status, out, err), *_written(line, status, before, _contents(folder))]
+        wrong = [*_ended(status, out, err, redirection), *_written(line, status, before, _contents(folder))]
     return [Failure(kind, detail, case) for kind, detail in wrong]
 
 
 # What must hold
 
 
-def _ended(status: int, out: str, err: str) -> Iterator[tuple[str, str]]:
+def _ended(status: int, out: str, err: str, redirection: str) -> Iterator[tuple[str, str]]:
     last = (err.strip().splitlines() or [""])[-1]
     if "Traceback" in err:
         yield "traceback", last
     elif status not in (0, 1, 2, 3):
         yield f"exit status {status}", last
+    elif status in (1, 2, 3) and err == "" and "2>" in redirection:
+        return
     elif status == 2 and not (out == "" and err.count("\n") == 1 and err.startswith("velatura: ")):
         yield "refused in more than a line", repr((out + err)[:300])
     elif status in (1, 3) and err and not last.startswith("velatura: "):
         yield "failed without a word", repr(err[-300:])
 
 
-def _written(
-    line: list[str], status: int, before: dict[str, Any], after: dict[str, Any]
-) -> Iterator[tuple[str, str]]:
-    named = {word for option, word in zip(line, line[1:]) if option in ("-o", "--output", "--plots")}
+def _written(line: list[str], status: int, before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    named = {word for option, word in itertools.pairwise(line) if option in ("-o", "--output", "--plots")}
     for name, content in before.items():
         if after.get(name) != content and not (status == 0 and (name in named or name.startswith("link"))):
             yield "a file was lost or changed", name

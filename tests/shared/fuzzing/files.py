@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from fuzzing import Failure
-from fuzzing.stacks import random_stack
 
 import velatura as vt
+from fuzzing import Failure
+from fuzzing.stacks import random_stack
 from velatura.errors import InvalidInput
 from velatura.stack import dumps, loads, save
 
@@ -19,17 +19,25 @@ SLOW_S = 5.0
 ENDINGS = (".yaml", ".yml", ".json", ".YAML", ".txt", "")
 ENCODINGS = ("utf-8", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-32", "latin-1", "cp037", "utf-7")
 SPACES = ("\t", "\r", "\r\n", "\x00", "\x0b", "\x0c", "\x1b", "\x85", "\xa0", "\u2028", "\u2029", "\ufeff", "\u202e")
+NUMBERS_AND_SIGNS = """
+~ null true yes no on off .nan .inf -.inf NaN Infinity -0 0x1F 0o17 1_000 1:30 12e03 1e400 -1e400 1e39 1e-400
+2026-11-22 2026-13-45 2001-12-14t21:59:43.10-05:00 << = * & ! | > % @ ` ? - : , [] {} [[]] [{}] {{}} '' [,] {,} \"'
+eta k alpha layers interface medium diffuse conductor rotation texture brushing Au bk7 mirror films name
+"""
+TAGS = """
+!!timestamp foo; !!bool maybe; !!binary ///; !!set {1, 2}; !!omap [1]; !!pairs [1]; !!int x; !!float x; !!null x;
+!!str 1; !!map []; !!seq {}; !!merge x; !!value =; !x y; !<tag:a> 1; !!python/object/apply:os.getcwd [];
+!!python/name:os.getcwd; &a [*a]; *a; &a 1; <<: *a; <<: {}
+"""
+VALUES = """
+{texture: a.png}; {texture: .}; {texture: ''}; {texture: a.png, channel: x}; {brushing: radial, u: x}; [1, 2];
+[1, 2, 3]; [1, 2, 3, 4]; [1, [2], 3]; {1: 2}; {[1]: 2}; {null: 1}; ? a; --- {}; ...; a b
+"""
 WORDS = (
-    *"~ null true yes no on off .nan .inf -.inf NaN Infinity -0 0x1F 0o17 1_000 1:30 12e03 1e400 -1e400 1e39 1e-400".split(),
-    *"2026-11-22 2026-13-45 2001-12-14t21:59:43.10-05:00 << = * & ! | > % @ ` ? - : , [] {} [[]] [{}] {{}} '' [,] {,}".split(),
-    *"eta k alpha layers interface medium diffuse conductor rotation texture brushing Au bk7 mirror films name".split(),
-    *("9" * 5000, "1." + "0" * 400, "[" * 300, "{a: " * 200, "- " * 200, "\"'", "a b", "é", "\U0001f600", "\ud800"),
-    *("!!timestamp foo", "!!bool maybe", "!!binary ///", "!!set {1, 2}", "!!omap [1]", "!!pairs [1]", "!!int x"),
-    *("!!float x", "!!null x", "!!str 1", "!!map []", "!!seq {}", "!!merge x", "!!value =", "!x y", "!<tag:a> 1"),
-    *("!!python/object/apply:os.getcwd []", "!!python/name:os.getcwd", "&a [*a]", "*a", "&a 1", "<<: *a", "<<: {}"),
-    *("{texture: a.png}", "{texture: .}", "{texture: ''}", "{texture: a.png, channel: x}", "{brushing: radial, u: x}"),
-    *("[1, 2]", "[1, 2, 3]", "[1, 2, 3, 4]", "[1, [2], 3]", "{1: 2}", "{[1]: 2}", "{null: 1}", "? a", "--- {}", "..."),
-)  # fmt: skip
+    *NUMBERS_AND_SIGNS.split(),
+    *(word.strip() for word in (TAGS + ";" + VALUES).split(";")),
+    *("9" * 5000, "1." + "0" * 400, "[" * 300, "{a: " * 200, "- " * 200, "é", "\U0001f600", "\ud800"),
+)
 
 
 def trial(rng: np.random.Generator) -> list[Failure]:

@@ -6,11 +6,11 @@ import warnings
 from typing import Any
 
 import numpy as np
+
+import velatura as vt
 from fuzzing import Failure
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
-
-import velatura as vt
 from velatura.model.models import Model
 from velatura.model.statistics import Statistics
 
@@ -38,7 +38,8 @@ def tried(stack: vt.Stack, model: Model, rng: np.random.Generator, continuous: b
             found = vt.lobes(stack, COSINES, phi, model)
             wrong = _wrong(found)
             if continuous and not wrong and (name := _changeable(stack, rng)):
-                changed = stack.replace(**{name: stack.flat()[name] * (1 + STEP)})
+                value: Any = stack.flat()[name]
+                changed = stack.replace(**{name: value * (1 + STEP)})
                 jump = np.abs(_energies(vt.lobes(changed, COSINES, phi, model)) - _energies(found)).max(initial=0)
                 if jump > JUMP:
                     wrong.append(("energy jumps", f"by {jump:.3g} when {name} changes by {STEP:g}"))
@@ -63,7 +64,7 @@ def _wrong(found: Statistics) -> list[tuple[str, str]]:
         cosine = COSINES[int(total.max(axis=0).argmax())]
         wrong.append(("more energy than arrives", f"{total.max():.6g} at cosine {cosine:g}"))
     alphas = np.array([extreme for value in lobes["alpha"] for extreme in (value.min(), value.max())])
-    if len(alphas) and not (0 <= alphas.min() and alphas.max() <= 1):
+    if len(alphas) and not (alphas.min() >= 0 and alphas.max() <= 1):
         wrong.append(("alpha beyond 0 to 1", f"{alphas.min():.6g} to {alphas.max():.6g}"))
     return wrong
 

@@ -1,0 +1,126 @@
+"""Random inputs of every kind, and what must hold of each: stacks, laws, files, command lines.
+
+    python benchmarks/fuzz.py [lobes|plugin|check|files|commands ...] [--count N] [--seed 0] [--processes 2]
+                              [--failures FOLDER] [--index I]
+
+lobes      stacks through `vt.lobes`, all models and switches, cosines to 1e-6: finite, no energy gained, no jumps
+plugin     stacks through `vt.bsdf`, all models, either side, down to the horizon: its functions agree, see laws
+check      `vt.check` on tame stacks: no law is broken that its model does not declare
+files      mutated material files: refused in one line that names the file, or equal once written and read again
+commands   mutated command lines and input files: no traceback, a known status, nothing written or lost on refusal
+
+Without a name all run. FOLDER gets the smallest input of each kind of failure as YAML; `--index` repeats one input in
+this process. Exit status 1 if anything fails, the death of a process included. All take an hour on two quiet cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+import numpy as np
+import yaml
+from rich.progress import Progress
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
+
+from fuzzing import Failure, Trial, checking, commands, files, lobes, plugin
+
+# The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
+PROGRAMS: dict[str, tuple[Trial, int, int]] = {
+    "lobes": (lobes.trial, 100_000, 5_000),
+    "plugin": (plugin.trial, 2_000, 100),
+    "check": (checking.trial, 500, 100),
+    "files": (files.trial, 15_000, 1_500),
+    "commands": (commands.trial, 500, 100),
+}
+
+Found = list[tuple[int, Failure]]
+
+
+def tried(name: str, seed: int, indices: Sequence[int]) -> Found:
+    """The failures of some inputs of a program."""
+    trial, *_ = PROGRAMS[name]
+    return [(i, failure) for i in indices for failure in trial(np.random.default_rng((seed, *name.encode(), i)))]
+
+
+def blocks(name: str, count: int, seed: int, processes: int) -> Iterator[tuple[int, Found]]:
+    """How many inputs were tried, and their failures."""
+    for block in np.array_split(range(count), -(-count // PROGRAMS[name][2])):
+        yield len(block), _in_processes(name, seed, block.tolist(), processes)
+
+
+def _in_processes(name: str, seed: int, indices: list[int], processes: int) -> Found:
+    """As `tried`; what ends its process is found by trying again in halves."""
+    parts = [indices[k::processes] for k in range(processes)]
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        running = [pool.submit(tried, name, seed, part) for part in parts]
+        try:
+            return [found for each in running for found in each.result()]
+        except BrokenProcessPool:
+            pass
+    if len(indices) == 1:
+        return [(indices[0], Failure("the process died", f"--index {indices[0]} repeats it"))]
+    middle = len(indices) // 2
+    return [x for half in (indices[:middle], indices[middle:]) for x in _in_processes(name, seed, half, 1)]
+
+
+def report(name: str, seed: int, found: Found, folder: Path | None) -> None:
+    """Print the kinds of failures, the smallest input of each; write these to a folder."""
+    kinds: dict[str, Found] = defaultdict(list)
+    for index, failure in found:
+        kinds[failure.kind].append((index, failure))
+    for kind, each in kinds.items():
+        inputs = len({index for index, _ in each})
+        index, failure = min(each, key=lambda x: len(yaml.safe_dump(x[1].case)))
+        print(f"    {inputs} x {kind}; --index {index}: {failure.detail}")
+        if folder:
+            folder.mkdir(parents=True, exist_ok=True)
+            path = folder / f"{name}-{''.join(c if c.isalnum() else '-' for c in kind)}.yaml"
+            known = {"kind": kind, "detail": failure.detail, "seed": seed, "index": index, "inputs": inputs}
+            path.write_text(yaml.safe_dump({**known, "input": failure.case}, sort_keys=False))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("programs", nargs="*", metavar="PROGRAM", help=", ".join(PROGRAMS))
+    parser.add_argument("--count", type=int, help="inputs of each program; else the whole count of each")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--failures", type=Path, metavar="FOLDER")
+    parser.add_argument("--index", type=int, metavar="I", help="try one input alone, in this process")
+    arguments = parser.parse_args()
+    if unknown := [name for name in arguments.programs if name not in PROGRAMS]:
+        parser.error(f"no such program: {', '.join(unknown)}")
+
+    rows, failed = [], 0
+    for name in arguments.programs or PROGRAMS:
+        start = time.perf_counter()
+        found: Found = []
+        if arguments.index is not None:
+            count, found = 1, tried(name, arguments.seed, [arguments.index])
+        else:
+            count = arguments.count or PROGRAMS[name][1]
+            with Progress(disable=not sys.stderr.isatty(), transient=True) as progress:
+                task = progress.add_task(name, total=count)
+                for done, failures in blocks(name, count, arguments.seed, arguments.processes):
+                    found += failures
+                    progress.update(task, advance=done, description=f"{name}, {len({i for i, _ in found})} failed")
+        inputs = len({index for index, _ in found})
+        rows.append(f"{name:10s}{count:10d}{inputs:10d}{time.perf_counter() - start:10.0f}")
+        failed += inputs
+        print(f"{name}: {inputs} of {count} failed", flush=True)
+        report(name, arguments.seed, found, arguments.failures)
+    print(f"\n{'program':10s}{'tried':>10s}{'failed':>10s}{'seconds':>10s}", *rows, sep="\n")
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,17 @@
+"""Slices of `benchmarks/fuzz.py`: mutated material files, and mutated command lines over mutated files."""
+
+from __future__ import annotations
+
+import numpy as np
+from fuzzing import commands, files
+
+
+def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
+    rng = np.random.default_rng(5)
+    assert not [failure for _ in range(300) for failure in files.trial(rng)]
+
+
+def test_any_command_line_ends_in_one_line_and_loses_nothing() -> None:
+    """No traceback, exit status 0 to 3; nothing is written on refusal, and no file that was there is changed."""
+    rng = np.random.default_rng(1)
+    assert not [failure for _ in range(25) for failure in commands.trial(rng)]
