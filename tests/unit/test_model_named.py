@@ -300,12 +300,13 @@ def albedo(reflect: Any, cos_theta: float, phi: float, alpha: tuple[float, float
 
 
 @pytest.mark.parametrize(("what", "averaged", "stretched"), [
-    ("dielectric", 0.004, 0.04), ("copper", 0.02, 0.06), ("schlick", 0.004, 0.04)
+    ("dielectric", 0.004, 0.04), ("copper", 0.0165, 0.06), ("schlick", 0.004, 0.04)
 ])  # fmt: skip
 def test_anisotropic_averages_against_quadrature(what: str, averaged: float, stretched: float) -> None:
     """Root mean square errors over directions, for axes that differ by a factor of 3; those of the manual are finer.
 
-    The stretch of Weier & Belcour 2020 has to miss by more than ours may.
+    The stretch of Weier & Belcour 2020 has to miss by more than ours may. (Metals looked up as dielectrics are, at the
+    roughness along the azimuth, would miss by .0174.)
     """
     reflect, values, switches = FRESNEL[what]
     for fetch, errors in (("averaged", (0.0, averaged)), ("stretched", (averaged, stretched))):

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 import velatura
 
@@ -24,6 +25,11 @@ def test_every_part_that_the_page_carries_has_its_licence() -> None:
 
 def test_the_package_is_typed() -> None:
     assert (Path(velatura.__file__).with_name("py.typed")).is_file()
+
+
+def test_the_citation_names_this_version() -> None:
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert (cited["version"], cited["license"]) == (velatura.__version__, "BSD-3-Clause")
 
 
 @pytest.mark.parametrize(("missing", "extra", "command"), [("uvicorn", "editor", ["edit", "--no-browser"])])
