@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
     from velatura.exports import export
     from velatura.model import MODELS, Model
-    from velatura.stack import Diffuse, Interface, Medium, Stack, Texture, load, preset, presets, save
+    from velatura.stack import Diffuse, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
 
 __version__ = "0.1.0"
 
@@ -36,7 +36,18 @@ _HOMES = {
     "velatura.errors": ("InvalidInput", "LawBroken", "MissingTool", "NoSolution", "VelaturaError"),
     "velatura.exports": ("export",),
     "velatura.model": ("MODELS", "Model"),
-    "velatura.stack": ("Diffuse", "Interface", "Medium", "Stack", "Texture", "load", "preset", "presets", "save"),
+    "velatura.stack": (
+        "Diffuse",
+        "Interface",
+        "Medium",
+        "Spectrum",
+        "Stack",
+        "Texture",
+        "load",
+        "preset",
+        "presets",
+        "save",
+    ),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -51,6 +62,7 @@ __all__ = [
     "MissingTool",
     "Model",
     "NoSolution",
+    "Spectrum",
     "Stack",
     "Texture",
     "VelaturaError",

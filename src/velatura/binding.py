@@ -17,7 +17,7 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.stack import (
     Brushing,
-    Named,
+    Measured,
     Stack,
     Texture,
     is_colour,
@@ -27,6 +27,7 @@ from velatura.stack import (
     within,
 )
 from velatura.stack import rgb as rgb_of
+from velatura.stack.spectra import VISIBLE_NM
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
 #: quarter of the mean of the three curves that make sRGB of a spectrum under D65.
@@ -250,7 +251,7 @@ class Binding:
         elif is_colour(name) and mi.is_spectral and not isinstance(value, float):
             self.images[name] = self._spectrum(name, value)
         else:
-            value = rgb_of(value) if isinstance(value, Named) else value
+            value = rgb_of(value) if isinstance(value, Measured) else value
             if isinstance(value, tuple):
                 colour = mi.Color3f(*value)
                 self.constants[name] = mi.luminance(colour) if mi.is_monochromatic else colour
@@ -275,9 +276,12 @@ class Binding:
 
     def _spectrum(self, name: str, value: Any) -> Image:
         limits = _range(name)
-        if isinstance(value, Named):
-            nm, values = spectrum(value)
-            pairs = list(zip(nm.tolist(), values.tolist()))
+        if isinstance(value, Measured):
+            measured_nm, values = spectrum(value)
+            begin, end = VISIBLE_NM
+            inside = measured_nm[(measured_nm > begin) & (measured_nm < end)]
+            nm = np.array([begin, *inside, end])  # beyond a table Mitsuba takes it to be 0
+            pairs = list(zip(nm.tolist(), np.interp(nm, measured_nm, values).tolist()))
             return Image(self.mi.load_dict({"type": "spectrum", "value": pairs}), True, **limits)
         # Mitsuba finds spectra for colours up to 1, and smooth ones for those well below
         peak = 1.0 if limits["high"] <= 1 else 2 * max(*value, 1e-6)

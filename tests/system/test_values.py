@@ -239,6 +239,28 @@ def test_files_are_found_beside_the_scene(variant: str, folder: Path, monkeypatc
         seen(folder, '<bsdf type="layered"><string name="material" value="none.yaml"/></bsdf>')
 
 
+@pytest.mark.parametrize("plugin", ["velatura", "weidlich_wilkie"])
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+def test_a_table_of_ones_own_is_used_as_a_measured_name(plugin: str, variant: str, tmp_path: Path) -> None:
+    """Expected: gold by its name, and by tables that hold what Mitsuba's do, in a material file."""
+    for part in ("eta", "k"):
+        rows = zip(*vt.stack.Named("Au", part).table())
+        (tmp_path / f"{part}.spd").write_text("\n".join(f"{nm} {value}" for nm, value in rows))
+    index = "eta: {spectrum: eta.spd}, k: {spectrum: k.spd}"
+    (tmp_path / "own.yaml").write_text(f"layers: [{{interface: {{{index}, alpha: 0.3}}}}]")
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(*WI))
+    if mi.is_spectral:
+        si.wavelengths = type(si.wavelengths)(*RAY_NM)
+    gold = vt.Stack([vt.Interface(conductor="Au", alpha=0.3)])
+    found, expected = (
+        np.ravel(vt.bsdf(material, model=plugin).eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(*WO))))
+        for material in (tmp_path / "own.yaml", gold)
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    assert np.ptp(found) > 0.3 * found.max()
+
+
 GREY = vt.Stack([vt.Interface(eta=1.5, alpha=0.2), vt.Medium(depth=0.5), vt.Interface(eta=0.5, k=2.0, alpha=0.3)])
 
 

@@ -22,6 +22,7 @@ from velatura.stack import (
     Interface,
     Medium,
     Named,
+    Spectrum,
     Stack,
     Texture,
     dumps,
@@ -271,20 +272,21 @@ def colours(numbers: st.SearchStrategy[float]) -> st.SearchStrategy[Any]:
 
 
 @st.composite
-def stacks(draw: st.DrawFn, image: Path) -> Stack:
+def stacks(draw: st.DrawFn, image: Path, table: Path) -> Stack:
     channels = st.sampled_from("rgba")
     textures = st.builds(
         Texture, texture=st.just(image), channel=channels, scale=finite, offset=finite, encoding=st.just("srgb")
     )
+    spectra = st.builds(Spectrum, spectrum=st.just(table))
     metals, dielectrics = (st.sampled_from(group) for group in names())
     surface = {"alpha": unit | st.tuples(unit | textures, unit) | textures, "rotation": finite | textures}
-    dielectric = st.builds(Interface, eta=colours(positive) | dielectrics | textures, **surface)
+    dielectric = st.builds(Interface, eta=colours(positive) | dielectrics | spectra | textures, **surface)
     conductor = st.builds(Interface, eta=colours(positive), k=colours(not_negative) | textures, **surface)
     named = st.builds(Interface, conductor=metals | st.just("mirror"), **surface)
     medium = st.builds(
         Medium,
         depth=not_negative | textures,
-        sigma_a=colours(not_negative) | textures,
+        sigma_a=colours(not_negative) | spectra | textures,
         sigma_s=colours(not_negative),
         g=st.floats(-1, 1, exclude_min=True, exclude_max=True),
     )
@@ -306,7 +308,9 @@ def stacks(draw: st.DrawFn, image: Path) -> Stack:
 def test_files_and_flat_names_give_the_same_stack_back(data: st.DataObject, tmp_path_factory: Any) -> None:
     image = tmp_path_factory.getbasetemp() / "image.png"
     image.touch()
-    stack = data.draw(stacks(image))
+    table = image.with_name("table.spd")
+    table.write_text("400 1.5\n700 1.6\n")
+    stack = data.draw(stacks(image, table))
     assert loads(dumps(stack)) == stack
     assert loads(dumps(stack, "json"), name="m.json") == stack
     options = {"name": stack.name, "source": stack.source, "thin": stack.thin}

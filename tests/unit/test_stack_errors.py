@@ -50,7 +50,8 @@ VALUES = {
     one_layer("eta: .nan"): "layer 0 (interface): eta: must be finite, got nan",
     one_layer("eta: [1.5, .inf, 1]"): "layer 0 (interface): eta: must be finite, got inf",
     one_layer("eta: [1.5, 1]"): (
-        "layer 0 (interface): eta: must be a number, [r, g, b], a name or a texture, and be above 0, got [1.5, 1]"
+        "layer 0 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, and be above 0, "
+        "got [1.5, 1]"
     ),
     one_layer(f"eta: 0x{'f' * 5000}"): "layer 0 (interface): eta: must be finite, got inf",
     one_layer("eta: 1, k: -1"): "layer 0 (interface): k: must be at least 0, got -1",
@@ -273,7 +274,7 @@ def test_a_path_that_cannot_be_written_gets_one_line(
         ({"layer2_conductor": "Gold"}, "layer 2 (interface): conductor: unknown metal 'Gold' (did you mean gold?)"),
         (
             {"layer2_eta": Named("Au", "k")},
-            "layer 2 (interface): eta: must be a number, [r, g, b], a name or a texture, and be above 0, "
+            "layer 2 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, and be above 0, "
             "got Named(name='Au', part='k')",
         ),
         ({"thin": True}, "thin: only for a stack that ends in a dielectric interface"),

@@ -7,12 +7,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import velatura as vt
 from velatura.errors import InvalidInput, MissingTool
-from velatura.stack import Named, names, rgb, spectra, spectrum
+from velatura.stack import Named, Spectrum, dumps, load, loads, names, rgb, save, spectra, spectrum
 
 CONDUCTORS, DIELECTRICS = names()
 
@@ -130,3 +132,80 @@ def no_mitsuba(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_a_missing_wheel_is_named_with_the_command(no_mitsuba: None) -> None:
     with pytest.raises(MissingTool, match=r"pip install mitsuba$"):
         names()
+
+
+# Tables of one's own -------------------------------------------------------------------------------------------------
+
+FLAT = "# nm, eta\n400, 1.5\n\n700 1.5 # held beyond\n"
+
+
+def table(path: Path, named: Named) -> Spectrum:
+    path.write_text("\n".join(f"{nm} {value}" for nm, value in zip(*named.table())))
+    return Spectrum(spectrum=path)
+
+
+def test_a_table_is_used_as_a_name_is(tmp_path: Path) -> None:
+    """Expected: the lobes of gold, indices of a table of its own; and of an absorption that is the same everywhere."""
+    eta, k = (table(tmp_path / f"own.{part}.spd", Named("Au", part)) for part in ("eta", "k"))
+    (tmp_path / "flat.txt").write_text(FLAT)
+    flat = Spectrum(spectrum=tmp_path / "flat.txt")
+    coat = vt.Interface(eta=1.5, alpha=0.1)
+    gold = vt.Stack([coat, vt.Medium(sigma_a=1.5), vt.Interface(conductor="Au", alpha=0.2)])
+    expected = vt.lobes(gold, 0.6)
+    found = vt.lobes(vt.Stack([coat, vt.Medium(sigma_a=flat), vt.Interface(eta=eta, k=k, alpha=0.2)]), 0.6)
+    np.testing.assert_allclose(found.energy, expected.energy, rtol=1e-12)
+    (tmp_path / "red.txt").write_text("580 0\n620 0.9")
+    red, green, blue = rgb(Spectrum(spectrum=tmp_path / "red.txt"))
+    assert red > 0.7 and green < 0.1 and blue < 0.1
+
+
+def test_a_table_stays_with_its_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: named relative to the material file, in YAML and JSON; read once; unequal when it has changed."""
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables/flat.spd").write_text(FLAT)
+    (tmp_path / "m.yaml").write_text("layers: [{interface: {eta: {spectrum: tables/flat.spd}}}]")
+    monkeypatch.chdir(tmp_path / "tables")
+    stack = load("../m.yaml")
+    for name in ("again.json", "again.yaml"):
+        save(stack, tmp_path / name)
+        assert load(tmp_path / name) == stack == loads(dumps(stack)) == stack.replace(**stack.flat())
+    assert "{spectrum: tables/flat.spd}" in (tmp_path / "again.yaml").read_text()
+    (tmp_path / "tables/flat.spd").write_text(FLAT.replace("1.5", "1.6"))
+    assert load("../m.yaml") != stack
+    expected = vt.lobes(vt.Stack([vt.Interface(eta=1.5)]), 1.0)
+    np.testing.assert_allclose(vt.lobes(stack, 1.0).energy[0], expected.energy[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text, reason",
+    [
+        ("400 1.5\n700 1.5 1.6", "line 2: must be a wavelength in nanometres and a value"),
+        ("nm eta\n400 1.5", "line 1: must be a wavelength in nanometres and a value"),
+        ("700 1.5\n400 1.5", "line 2: wavelengths must ascend"),
+        ("400 1.5\n500 nan", "line 2: must be finite"),
+        ("500 1.5", "must hold values at two wavelengths or more, in nanometres, of visible light"),
+        ("0.4 1.5\n0.7 1.5", "must hold values at two wavelengths or more, in nanometres, of visible light"),
+        ("400 1.5\n700 -1", "must be above 0, got -1.0"),
+        (b"\xff\xfe\x00", "is no text that can be read"),
+        ("#" * 2**20 + "#", "is larger than a table of a spectrum"),
+    ],
+)
+def test_what_is_no_table_is_refused_in_a_line(text: str | bytes, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.spd"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    (tmp_path / "m.yaml").write_text("layers: [{interface: {eta: {spectrum: own.spd}}}]")
+    with pytest.raises(InvalidInput) as caught:
+        load(tmp_path / "m.yaml")
+    where = f"{tmp_path / 'm.yaml'}: layer 0 (interface): eta: "
+    assert str(caught.value).replace("spectrum: ", "") == f"{where}{path}: {reason}"
+
+
+def test_only_colours_have_tables(tmp_path: Path) -> None:
+    (tmp_path / "flat.spd").write_text(FLAT)
+    for text, reason in (
+        ("eta: 1.5, alpha: {spectrum: flat.spd}", r"alpha: unknown key 'spectrum' .*"),
+        ("eta: {spectrum: none.spd}", r"eta: spectrum: file not found: .*none\.spd"),
+        ("eta: {spectrum: flat.spd, scale: 2}", r"eta: unknown key 'scale' .*"),
+    ):
+        with pytest.raises(InvalidInput, match=rf"^material\.yaml: layer 0 \(interface\): {reason}$"):
+            loads(f"layers: [{{interface: {{{text}}}}}]", folder=tmp_path)

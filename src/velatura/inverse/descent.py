@@ -220,5 +220,5 @@ def _clear(layer: Layer) -> bool:
     """Whether it is a medium that does nothing."""
     if not isinstance(layer, Medium):
         return False
-    sigma = np.broadcast_arrays(np.asarray(layer.sigma_a, float), np.asarray(layer.sigma_s, float))
+    sigma = np.broadcast_arrays(number("layer0_sigma_a", layer.sigma_a), number("layer0_sigma_s", layer.sigma_s))
     return bool(np.max(sigma) * number("depth", layer.depth) < CLEAR)

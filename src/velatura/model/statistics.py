@@ -16,7 +16,7 @@ from velatura.model.prepare import prepare, variance_kind
 from velatura.model.recursion import lobes
 from velatura.model.sides import with_index_below
 from velatura.optics.directions import directions
-from velatura.stack import Named, Stack, Varying, is_colour, spectra
+from velatura.stack import Measured, Stack, Varying, is_colour, spectra
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def number(name: str, value: Any) -> Any:
         raise InvalidInput(
             f"{name}: is a {value.what}, and lobes are those of one point; replace it, as in --set {name}=0.1"
         )
-    if isinstance(value, Named):
+    if isinstance(value, Measured):
         value = spectra.rgb(value)
     if is_colour(name):
         return np.broadcast_to(np.asarray(value, float), (3,))[:, None]

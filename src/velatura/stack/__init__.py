@@ -3,9 +3,9 @@
 from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.io import Material, dumps, load, loads, preset, presets, save
 from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, is_colour, within
-from velatura.stack.spectra import Named, names, rgb, spectrum
+from velatura.stack.spectra import Measured, Named, names, rgb, spectrum
 from velatura.stack.stack import Stack
-from velatura.stack.values import RGB, Brushing, Texture, Varying
+from velatura.stack.values import RGB, Brushing, Spectrum, Texture, Varying
 
 __all__ = [
     "RGB",
@@ -15,8 +15,10 @@ __all__ = [
     "Kind",
     "Layer",
     "Material",
+    "Measured",
     "Medium",
     "Named",
+    "Spectrum",
     "Stack",
     "Texture",
     "Value",

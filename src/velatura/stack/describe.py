@@ -7,7 +7,7 @@ from typing import Any
 from velatura.stack.layers import LAYERS
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.stack import Stack
-from velatura.stack.values import Brushing, Texture
+from velatura.stack.values import Brushing, Spectrum, Texture
 
 
 def json_schema() -> dict[str, Any]:
@@ -21,6 +21,7 @@ def json_schema() -> dict[str, Any]:
         **material,
         "required": ["layers"],
         "$defs": {
+            "spectrum": {**_keys(Spectrum), "required": ["spectrum"]},
             "texture": {**_keys(Texture), "required": ["texture"]},
             "brushing": {**_keys(Brushing), "required": ["brushing"]},
         },
@@ -33,7 +34,13 @@ def parameter_table() -> str:
         "| where | key | value | unit | range | default | texture | gradient | meaning |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    models: dict[str, type[Record]] = {"material": Stack, **LAYERS, "texture": Texture, "brushing": Brushing}
+    models: dict[str, type[Record]] = {
+        "material": Stack,
+        **LAYERS,
+        "spectrum": Spectrum,
+        "texture": Texture,
+        "brushing": Brushing,
+    }
     for where, model in models.items():
         for key, parameter in parameters(model).items():
             lines.append(_row(where, key, parameter, model.model_fields[key].default))

@@ -22,6 +22,7 @@ from velatura.stack.stack import Stack
 _PRESETS = resources.files("velatura.stack") / "presets"
 _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 _LARGEST = 100_000  # values in a file
+_PATHS = ("texture", "spectrum")  # keys
 
 #: What names a material wherever one is asked for: a stack, a file, or the name of a preset.
 Material: TypeAlias = Stack | str | Path
@@ -33,7 +34,7 @@ Material: TypeAlias = Stack | str | Path
 def load(material: Material) -> Stack:
     """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack as it is.
 
-    A bare word without an extension is a preset. Texture paths are relative to the file.
+    A bare word without an extension is a preset. Paths in it are relative to the file.
 
     Raises:
         InvalidInput: no such file or preset, or what is in it is not a material; one line that names the file.
@@ -62,7 +63,7 @@ def loads(
     Args:
         text: YAML, or JSON where `name` ends in .json.
         name: what error messages call the text.
-        folder: what texture paths are relative to.
+        folder: what paths in it are relative to.
         find: where there is no such folder: the file that a path stands for.
 
     Raises:
@@ -71,7 +72,7 @@ def loads(
     find = find or (lambda path: str(Path(folder, path)))
     try:
         fields = _parse(text, _FORMATS.get(Path(name).suffix.lower(), "yaml"))
-        return Stack.from_dict(_with_texture_paths(fields, find))
+        return Stack.from_dict(_with_paths(fields, find))
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}") from None
     except RecursionError:
@@ -127,7 +128,7 @@ def presets() -> tuple[str, ...]:
 
 
 def save(stack: Stack, path: str | Path) -> None:
-    """Write a material file, whole or not at all; texture paths are written relative to it.
+    """Write a material file, whole or not at all; paths in it are written relative to it.
 
     Raises:
         InvalidInput: the extension is none of .yaml, .yml and .json, or the file cannot be written.
@@ -143,7 +144,7 @@ def save(stack: Stack, path: str | Path) -> None:
 def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) -> str:
     """The text of a material file, `yaml` or `json`, that `loads` reads back exactly.
 
-    Values that equal their default are left out. Texture paths are relative to `folder`, or absolute where it is None.
+    Values that equal their default are left out. Paths in it are relative to `folder`, or absolute where it is None.
 
     Raises:
         InvalidInput: an unknown format.
@@ -151,7 +152,7 @@ def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) 
     fields = stack.to_dict()
     if folder is not None:
         start = Path(folder).resolve()
-        fields = _with_texture_paths(fields, lambda path: Path(os.path.relpath(path, start)).as_posix())
+        fields = _with_paths(fields, lambda path: Path(os.path.relpath(path, start)).as_posix())
     if format == "json":
         return json.dumps(fields, indent=2, ensure_ascii=False) + "\n"
     if format == "yaml":
@@ -238,14 +239,14 @@ _Dumper.add_representer(
 )
 
 
-def _with_texture_paths(node: Any, rewrite: Callable[[str], str]) -> Any:
-    """A copy of parsed values in which every texture's path is rewritten."""
+def _with_paths(node: Any, rewrite: Callable[[str], str]) -> Any:
+    """A copy of parsed values in which the path of every texture and table is rewritten."""
     if isinstance(node, dict):
         return {
-            key: rewrite(value) if key == "texture" and isinstance(value, str) else _with_texture_paths(value, rewrite)
+            key: rewrite(value) if key in _PATHS and isinstance(value, str) else _with_paths(value, rewrite)
             for key, value in node.items()
         }
-    return [_with_texture_paths(entry, rewrite) for entry in node] if isinstance(node, list) else node
+    return [_with_paths(entry, rewrite) for entry in node] if isinstance(node, list) else node
 
 
 def _format(path: Path, what: str = "a material file") -> str:

@@ -8,10 +8,10 @@ from pydantic import model_validator
 
 from velatura.stack.schema import Record, parameters
 from velatura.stack.spectra import MIRROR, Named, names
-from velatura.stack.values import RGB, Angle, Brushing, Colour, Conductor, Index, Pair, Scalar, Texture
+from velatura.stack.values import RGB, Angle, Brushing, Colour, Conductor, Index, Pair, Scalar, Spectrum, Texture
 
 Kind: TypeAlias = Literal["dielectric", "conductor", "mirror", "medium", "diffuse"]
-Value: TypeAlias = float | RGB | Named | Texture | Brushing
+Value: TypeAlias = float | RGB | Named | Spectrum | Texture | Brushing
 
 
 class Interface(Record):
@@ -21,11 +21,11 @@ class Interface(Record):
     """
 
     eta: Annotated[
-        float | RGB | str | Texture | None,
+        float | RGB | str | Spectrum | Texture | None,
         Index("absolute index of refraction of the medium below", low=0, strict=True, part="eta"),
     ] = None
     k: Annotated[
-        float | RGB | str | Texture | None,
+        float | RGB | str | Spectrum | Texture | None,
         Index("absolute extinction of what lies below; written, even as 0, it makes it opaque", low=0, part="k"),
     ] = None
     conductor: Annotated[
@@ -80,8 +80,8 @@ class Medium(Record):
     """A homogeneous medium between two interfaces, or above the first."""
 
     depth: Annotated[float | Texture, Scalar("thickness, in the unit of length of sigma", unit="length", low=0)] = 1.0
-    sigma_a: Annotated[float | RGB | Texture, Colour("absorption coefficient", unit="1/length", low=0)] = 0.0
-    sigma_s: Annotated[float | RGB | Texture, Colour("scattering coefficient", unit="1/length", low=0)] = 0.0
+    sigma_a: Annotated[float | RGB | Spectrum | Texture, Colour("absorption coefficient", unit="1/length", low=0)] = 0.0
+    sigma_s: Annotated[float | RGB | Spectrum | Texture, Colour("scattering coefficient", unit="1/length", low=0)] = 0.0
     g: Annotated[
         float | Texture,
         Scalar("mean cosine of the scattering angle (Henyey-Greenstein)", low=-1, high=1, strict=True),
@@ -100,7 +100,7 @@ class Medium(Record):
 class Diffuse(Record):
     """An ideally diffuse base, opaque, below everything else."""
 
-    albedo: Annotated[float | RGB | Texture, Colour("fraction of light reflected", low=0, high=1)] = 0.5
+    albedo: Annotated[float | RGB | Spectrum | Texture, Colour("fraction of light reflected", low=0, high=1)] = 0.5
 
     @property
     def kind(self) -> Kind:
@@ -143,6 +143,6 @@ def entry_name(layer: Layer) -> str:
     return type(layer).__name__.lower()
 
 
-def _spectrum(value: float | RGB | str | Texture | None, part: Literal["eta", "k"]) -> Value:
+def _spectrum(value: float | RGB | str | Spectrum | Texture | None, part: Literal["eta", "k"]) -> Value:
     assert value is not None  # the validator saw to that
     return Named(value, part) if isinstance(value, str) else value

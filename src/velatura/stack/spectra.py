@@ -1,5 +1,5 @@
-"""Measured spectra by name: metals and a few crystals from the data files that Mitsuba's wheel carries, other
-dielectrics from dispersion formulas.
+"""Measured spectra: by name, metals and a few crystals from the data files that Mitsuba's wheel carries and other
+dielectrics from dispersion formulas; and from tables of one's own.
 
 Mitsuba itself is not imported, and NumPy only where a spectrum is read.
 """
@@ -7,17 +7,21 @@ Mitsuba itself is not imported, and NumPy only where a spectrum is read.
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from importlib.machinery import PathFinder
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from velatura.errors import InvalidInput, MissingTool
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+Table: TypeAlias = tuple[Sequence[float], Sequence[float]]
 
 MIRROR = "mirror"  # the conductor that reflects all light; it has no spectrum
 
@@ -26,6 +30,9 @@ _CRYSTALS = ("CsI", "MgO", "SiC", "ThF4", "TiO2", "TiO2-e", "d-C")
 
 # Files of the wheel with holes: eta is 0 below 440 nm (AlAs), nothing above 590 nm (AlSb), k is 0 throughout (SnTe).
 _BROKEN = ("AlAs", "AlSb", "SnTe")
+
+_LARGEST = 2**20  # characters of a table
+VISIBLE_NM = (360.0, 830.0)  # that Mitsuba renders
 
 _ALIASES = {
     "aluminium": "Al",
@@ -52,12 +59,23 @@ _ALIASES = {
 }
 
 
+class Measured:
+    """A value that was measured over wavelength; frozen, so that what follows from it is worked out once."""
+
+    def table(self) -> Table:
+        """Wavelengths in nanometres, ascending, and the values there."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True)
-class Named:
+class Named(Measured):
     """The spectrum of a material's index: its real part (`eta`) or its extinction (`k`)."""
 
     name: str
     part: Literal["eta", "k"]
+
+    def table(self) -> Table:
+        return _by_name(self)
 
 
 @dataclass(frozen=True)
@@ -138,13 +156,55 @@ def names() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 @functools.cache
-def spectrum(named: Named) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def spectrum(measured: Measured) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Wavelengths in nanometres and the values there, as measured; beyond the ends the last value holds.
 
     Raises:
         InvalidInput: no such material, or it has no such part.
         MissingTool: Mitsuba, whose wheel carries the data, is not installed.
     """
+    import numpy as np
+
+    wavelengths_nm, values = (np.array(column, float) for column in measured.table())
+    wavelengths_nm.flags.writeable = values.flags.writeable = False
+    return wavelengths_nm, values
+
+
+def read(path: Path) -> Table:
+    """The table in a file: lines of a wavelength in nanometres and a value; what follows # is a comment.
+
+    Raises:
+        ValueError: it is none; one line that names the file, but holds nothing of what is in it.
+    """
+    rows: list[tuple[float, float]] = []
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            lines = file.read(_LARGEST + 1)
+    except (OSError, UnicodeDecodeError):
+        raise ValueError(f"{path}: is no text that can be read") from None
+    if len(lines) > _LARGEST:
+        raise ValueError(f"{path}: is larger than a table of a spectrum")
+    for number, line in enumerate(lines.splitlines(), start=1):
+        cells = line.partition("#")[0].replace(",", " ").split()
+        if not cells:
+            continue
+        try:
+            wavelength_nm, value = map(float, cells)
+        except ValueError:
+            raise ValueError(f"{path}: line {number}: must be a wavelength in nanometres and a value") from None
+        if not (math.isfinite(wavelength_nm) and math.isfinite(value)):
+            raise ValueError(f"{path}: line {number}: must be finite")
+        if rows and wavelength_nm <= rows[-1][0]:
+            raise ValueError(f"{path}: line {number}: wavelengths must ascend")
+        rows.append((wavelength_nm, value))
+    if len(rows) < 2 or rows[-1][0] < VISIBLE_NM[0] or rows[0][0] > VISIBLE_NM[1]:
+        raise ValueError(f"{path}: must hold values at two wavelengths or more, in nanometres, of visible light")
+    wavelengths_nm, values = zip(*rows)
+    return wavelengths_nm, values
+
+
+@functools.cache
+def _by_name(named: Named) -> Table:
     import numpy as np
 
     name = _ALIASES.get(named.name, named.name)
@@ -156,12 +216,11 @@ def spectrum(named: Named) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         wavelengths_nm, values = np.loadtxt(_folder() / f"{name}.{named.part}.spd", unpack=True)
     else:
         raise InvalidInput(f"there is no spectrum of {named.part} for {named.name!r}")
-    wavelengths_nm.flags.writeable = values.flags.writeable = False
-    return wavelengths_nm, values
+    return wavelengths_nm.tolist(), values.tolist()
 
 
 @functools.cache
-def rgb(named: Named) -> tuple[float, float, float]:
+def rgb(measured: Measured) -> tuple[float, float, float]:
     """The spectrum reduced to linear sRGB: seen by the CIE 1931 observer under D65, so that a flat one stays flat.
 
     That is `mitsuba.spectrum_list_to_srgb(..., d65=True)`. Mitsuba's own conductor plugins reduce without D65, which
@@ -173,7 +232,7 @@ def rgb(named: Named) -> tuple[float, float, float]:
     import numpy as np
 
     wavelengths_nm, weights = _srgb_weights()
-    red, green, blue = (weights @ np.interp(wavelengths_nm, *spectrum(named))).tolist()
+    red, green, blue = (weights @ np.interp(wavelengths_nm, *spectrum(measured))).tolist()
     return red, green, blue
 
 

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
 
+from pydantic import PrivateAttr, model_validator
+
 from velatura.stack.schema import Parameter, Record, show, unknown
-from velatura.stack.spectra import MIRROR, Named, names
+from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read
 
 RGB: TypeAlias = tuple[float, float, float]
 
@@ -133,7 +135,7 @@ class Scalar(Parameter):
     @property
     def expects(self) -> str:
         range_clause = f", and {self._limits}" if self.bounds else ""
-        return self.what + (" or a texture" if self.texturable else "") + range_clause
+        return self.values + (" or a texture" if self.texturable else "") + range_clause
 
     @property
     def bounds(self) -> str:
@@ -205,10 +207,30 @@ class Angle(Scalar):
 
 
 class Colour(Scalar):
-    """A number for all channels, or one for each of red, green and blue."""
+    """A number for all channels, one for each of red, green and blue, or one for each wavelength of a table.
+
+    What takes no texture takes no table either.
+    """
 
     what = "a number, [r, g, b]"
     channel = "rgb"
+
+    @property
+    def values(self) -> str:
+        return self.what + (", a spectrum" if self.texturable else "")
+
+    def check(self, value: Any) -> Any:
+        if self.texturable and isinstance(value, Mapping) and "spectrum" in value:
+            value = Spectrum.from_dict(value)
+        return self._table(value) if self.texturable and isinstance(value, Spectrum) else super().check(value)
+
+    def _table(self, spectrum: Spectrum) -> Spectrum:
+        try:
+            for value in spectrum.table()[1]:
+                self._number(value, value)
+        except ValueError as error:
+            raise ValueError(f"{spectrum.spectrum}: {error}") from None
+        return spectrum
 
     def _check_value(self, value: Any) -> Any:
         if isinstance(value, list | tuple):
@@ -219,7 +241,8 @@ class Colour(Scalar):
 
     def _forms(self) -> list[dict[str, Any]]:
         (number,) = super()._forms()
-        return [number, {"type": "array", "items": number, "minItems": 3, "maxItems": 3}]
+        table = [{"$ref": "#/$defs/spectrum"}] if self.texturable else []
+        return [number, {"type": "array", "items": number, "minItems": 3, "maxItems": 3}, *table]
 
 
 @dataclass(frozen=True)
@@ -271,6 +294,28 @@ class Pair(Scalar):
         (number,) = super()._forms()
         entry = {"anyOf": [number, {"$ref": "#/$defs/texture"}]}
         return [number, {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}]
+
+
+class Spectrum(Record, Measured):
+    """A value for every wavelength, read from a table; files and the plugins use it as they do a measured name.
+
+    The table is a text of two columns, wavelength in nanometres and value (as Mitsuba's .spd files): ascending, with
+    comments after #. It is read once, when the record is made, and must lie in the range of the parameter.
+
+    Raises:
+        InvalidInput: no such file, or it holds no such table; one line that names it.
+    """
+
+    spectrum: Annotated[Path, File("table of wavelength (nm) and value, relative to the material file")]
+    _read: Table = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _read_once(self) -> Spectrum:
+        self._read = read(self.spectrum)
+        return self
+
+    def table(self) -> Table:
+        return self._read
 
 
 class Varying(Record):

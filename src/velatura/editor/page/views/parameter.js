@@ -21,6 +21,7 @@ const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fie
 const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
 
 const isTexture = (value) => value?.texture !== undefined;
+const isSpectrum = (value) => value?.spectrum !== undefined;
 const isBrushing = (value) => value?.brushing !== undefined;
 
 /** Which parameters a layer shows: an interface has those of its kind only. */
@@ -81,6 +82,7 @@ const FORMS = {
 function simple(context, control, span = SPANS[context.key]) {
   const { value } = context;
   if (isTexture(value)) return textured(context);
+  if (isSpectrum(value)) return measured(context);
   return {
     control: control({ ...context, ...(span && { span }) }),
     extras: html`${control === colour ? channelsSwitch(context) : nothing}${textureButton(context)}`,
@@ -98,6 +100,7 @@ function channelsSwitch({ label, value, edit }) {
 function index(context) {
   const { app, layer, key, label, value, edit } = context;
   if (isTexture(value)) return textured(context);
+  if (isSpectrum(value)) return measured(context);
   const { dielectrics, conductors } = app.session.names;
   const opaque = variantOf(layer.keys) === 'custom';
   const group = (title, names) => {
@@ -193,6 +196,15 @@ function textured(context) {
   return {
     control: texture({ ...context, records: records.texture }),
     extras: iconButton({ label: `${label}: remove the texture`, icon: 'remove', act }),
+  };
+}
+
+/** A table of values over wavelength, by its file. */
+function measured({ label, value, spec, edit }) {
+  const act = () => edit.set(PLAIN[spec.kind]);
+  return {
+    control: html`<span class="file" title=${value.spectrum}>${value.spectrum}</span>`,
+    extras: iconButton({ label: `${label}: remove the table`, icon: 'remove', act }),
   };
 }
 
