@@ -321,12 +321,36 @@ def test_what_cannot_be_had_is_said_beside_the_lobe(visit: Open) -> None:
     look.locator(".refused").wait_for(state="detached")
 
 
+def test_a_lobe_that_is_dragged_too_far_is_shown_where_it_is(visit: Open) -> None:
+    """Expected: the panel and the layers have one lobe, and a dashed circle is where the hand let go."""
+    page = visit()
+    open_material(page, "Bati 2021, figure 15 a")
+    look = panel(page)
+    handle = look.locator(".handle circle").first.bounding_box()
+    plot = look.locator("svg.plot").first.bounding_box()
+    mouse = page.page.mouse
+    mouse.move(handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2)
+    mouse.down()
+    mouse.move(plot["x"] + 0.58 * plot["width"], plot["y"] + 4, steps=5)
+    mouse.up()
+    answered(page)
+    look.locator(".refused", has_text="No index up to 4 reflects as much").wait_for()
+    assert look.locator("circle.ghost").count() == 1
+    read = lobes(page)
+    energy = float(np.mean(np.sum(read.energy, axis=0)))
+    assert energy < 0.6
+    assert float(look.get_by_label("Energy", exact=True).input_value()) == pytest.approx(energy, rel=0.01)
+    assert float(look.get_by_label("Blur", exact=True).input_value()) == pytest.approx(read.alpha[0][0, 0], rel=0.01)
+    check_physical(page)
+
+
 def test_a_material_that_is_no_target_says_why(visit: Open) -> None:
     page = visit()
     open_material(page, "Coated brushed aluminium")
     look = panel(page)
     assert "is brushed" in look.locator(".says").inner_text()
     assert look.locator(".lobe").count() == 2
+    assert "conductor" in look.locator(".lobe").last.inner_text()
     assert look.get_by_label("Blur, slider").is_disabled()
 
 

@@ -108,6 +108,12 @@ def test_every_preset_is_read_or_says_why_not(name: str) -> None:
         assert answer["says"].startswith(("layer ", "thin"))
 
 
+def test_lobes_that_are_only_shown_have_their_own_base() -> None:
+    for name, bases in (("coated-gold", ["dielectric", "conductor"]), ("frosted-glass", ["dielectric"] * 2)):
+        answer = appearance.appearance({"material": appearance.document(vt.preset(name))})
+        assert [lobe["base"] for lobe in answer["target"]["lobes"]] == bases
+
+
 def test_a_pair_of_one_blur_is_one_lobe() -> None:
     state = saved("bati2021-17-red-over-blue")
     answer = appearance.appearance({"material": state["material"], "model": "bati2021"})
@@ -161,6 +167,41 @@ def test_an_infeasible_wish_snaps_to_the_edge() -> None:
     assert energy[0] == pytest.approx(9 / 17, abs=0.01)  # 1 - 2 / C_max of a smooth pair up to 4
     more = Target([{"energy": energy[0] + 0.02, "alpha": 0.0, "interfaces": 2}])
     assert stacks.search(more, named("bati2021")) is None
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("model", MODELS)
+def test_what_is_answered_is_what_the_stack_has_whatever_was_asked_before(model: str) -> None:
+    """Of stacks at the edge of what can be, every wish is answered by the lobes of the stack in the answer, the same
+    again after other questions; a blur that is not asked to change stays."""
+    asked = []
+    for (eta_1, alpha_1), (eta_2, alpha_2) in (((1.0, 0.3), (3.9, 0.2)), ((1.5, 0.1), (2.0, 0.1))):
+        layers = [{"interface": {"eta": eta_1, "alpha": alpha_1}}, {"interface": {"eta": eta_2, "alpha": alpha_2}}]
+        body = {"material": {"layers": layers}, "model": model, "interfaces": [2]}
+        here = appearance.appearance(body)["target"]
+        for energy, alpha in ((0.9, None), (0.9, 0.0), (0.5, 0.0)):
+            wish = copy.deepcopy(here)
+            wish["lobes"][0] |= {"energy": [energy] * 3, **({} if alpha is None else {"alpha": alpha})}
+            answer = appearance.invert({**body, "target": wish})
+            asked.append(({**body, "target": wish}, answer))
+            has = appearance.appearance({**body, "material": answer["material"]})["target"]
+            for said, read, before in zip(answer["target"]["lobes"], has["lobes"], here["lobes"]):
+                assert said["energy"] == pytest.approx(read["energy"], abs=EXACT)
+                assert said["alpha"] == pytest.approx(read["alpha"], abs=EXACT)
+                if alpha is None:
+                    assert said["alpha"] == pytest.approx(before["alpha"], abs=1e-4)
+    for question, answer in asked:
+        assert appearance.invert(question) == answer
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_member_of_a_lobe_without_energy_is_found() -> None:
+    """Below an interface that reflects nothing, since both indices are the same, another index may be taken."""
+    material = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"eta": 1.5, "alpha": 0.1}}]}
+    body = {"material": material, "model": "bati2021", "interfaces": [1, 1]}
+    target = appearance.appearance(body)["target"]
+    answer = classes.member({**body, "target": target, "lobe": 1, "point": [1.7]})
+    check_physical(answer["material"])
 
 
 def test_a_coloured_wish_for_one_interface_snaps_to_grey() -> None:

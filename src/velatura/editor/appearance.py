@@ -1,16 +1,14 @@
 """What the Appearance panel asks: a material as lobes, and the material that has other ones.
 
-Every verb is a function of a mapping to a mapping, both of JSON's types; `service.VERBS` takes them over. What was
-answered is remembered with all that is known of it, so that the next drag starts from there.
+Every verb is a function of a mapping to a mapping, both of JSON's types; `service.VERBS` takes them over. An answer
+depends on its question alone, and its lobes are read from the stack that is answered.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 from collections.abc import Iterator
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -20,7 +18,7 @@ from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.explain import REASONS
-from velatura.inverse.nearby import Bound, Nearby, closed, plain
+from velatura.inverse.nearby import Bound, Nearby, closed, plain, seen
 from velatura.inverse.target import BLUR
 from velatura.inverse.targets import FIGURES
 from velatura.model import Model, named
@@ -29,7 +27,6 @@ from velatura.model.statistics import statistics
 from velatura.stack import Diffuse, Interface, Stack, Varying
 
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
-REMEMBERED = 32  # answers
 EFFORT = stacks.EFFORTS[:1]  # to find a stack that is not near
 HALVES = 7  # of the way to a wish that cannot be met
 STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
@@ -54,6 +51,14 @@ def lobe_of(body: Body, target: Target) -> int:
     return lobe
 
 
+def held(material: Answer, target: Target, model: Model) -> Nearby | None:
+    """A material as what can be moved, None where it does not have the form of the target."""
+    try:
+        return Nearby.of(Stack.from_dict(material), target, model)
+    except InvalidInput:
+        return None
+
+
 def described(target: Target) -> Answer:
     """A target as a body holds it, all of its lobes' keys written out."""
     rows = []
@@ -61,38 +66,6 @@ def described(target: Target) -> Answer:
         row = {"energy": list(lobe.colour), "alpha": lobe.roughness, "interfaces": lobe.interfaces, "base": lobe.base}
         rows.append({**row, "tint": lobe.tint, "fixed": lobe.fixed.to_dict()})
     return {**target.to_dict(), "lobes": rows}
-
-
-# What is remembered --------------------------------------------------------------------------------------------------
-
-_answers: dict[str, Nearby] = {}
-_lock = Lock()
-
-
-def _key(material: Answer, target: Target, model: Model) -> str:
-    """What tells answers apart: the material, the model, and of a target all but its energies and blurs."""
-    form: list[Any] = [target.exterior, target.eta_max]
-    form += [[lobe.interfaces, lobe.base, round(lobe.tint, 6), lobe.fixed.to_dict()] for lobe in target.lobes]
-    return json.dumps([material, form, repr(model)], sort_keys=True)
-
-
-def remember(found: Nearby, material: Answer) -> None:
-    with _lock:
-        _answers[_key(material, found.target, found.model)] = found
-        while len(_answers) > REMEMBERED:
-            del _answers[next(iter(_answers))]
-
-
-def held(material: Answer, target: Target, model: Model) -> Nearby | None:
-    """A material as what can be moved, None where it does not have the form of the target."""
-    with _lock:
-        known = _answers.get(_key(material, target, model))
-    if known is not None:
-        return known
-    try:
-        return Nearby.of(Stack.from_dict(material), target, model)
-    except InvalidInput:
-        return None
 
 
 # A material as lobes -------------------------------------------------------------------------------------------------
@@ -109,19 +82,13 @@ def appearance(body: Body) -> Answer:
     # Share the interfaces out among lobes
     each = Nearby.of(stack, _target(stack, parts, [1] * len(parts)), model)
     assert each is not None
-    reading = each.known.reading
-    energies, variances = reading[: 3 * len(parts)].reshape(-1, 3), reading[3 * len(parts) :]
-    counts: list[int] = body.get("interfaces") or _counts(variances)
+    counts: list[int] = body.get("interfaces") or _counts(each.known.reading[3 * len(parts) :])
     if sum(counts) != len(parts) or not set(counts) <= {1, 2}:
         raise InvalidInput(f"interfaces: must be 1 or 2 for each lobe, {len(parts)} in all, got {counts}")
-    firsts = np.cumsum([0, *counts[:-1]])
-    target = _target(stack, parts, counts)
-    for k, (n, count) in enumerate(zip(firsts, counts)):
-        alpha = float(MAPS[model.map].roughness(variances[n]))
-        target = target.with_lobe(k, energy=tuple(energies[n : n + count].sum(axis=0).tolist()), alpha=alpha)
+    target = seen(stack, _target(stack, parts, counts), model)
     return {
         "target": described(target),
-        "variances": variances[firsts].tolist(),
+        "variances": [float(MAPS[model.map].variance(lobe.roughness)) for lobe in target.lobes],
         "haze": haze(target, model),
         "layers": _layers(stack, counts),
         "says": None,
@@ -196,7 +163,9 @@ def _shown(stack: Stack, model: Model, says: str) -> Answer:
         return {"target": None, "variances": [], "haze": [], "layers": [], "says": says}
     energies = [np.clip(energy[:, 0], 0, None).tolist() for energy in read.energy]
     alphas = [float(np.sqrt(np.prod(np.reshape(alpha, (-1, 2)).mean(axis=0)))) for alpha in read.alpha]
-    lobes = [{"energy": e, "alpha": min(a, 1.0), "interfaces": 1} for e, a in zip(energies, alphas)]
+    kinds = [kind for layer, kind in zip(stack.layers, stack.kinds) if isinstance(layer, Interface)]
+    bases = ["dielectric" if kind == "dielectric" else "conductor" for kind in kinds]
+    lobes = [{"energy": e, "alpha": min(a, 1.0), "base": base} for e, a, base in zip(energies, alphas, bases)]
     target = Target(lobes) if lobes else None
     return {
         "target": described(target) if target else None,
@@ -223,8 +192,9 @@ def invert(body: Body) -> Answer:
         other = _elsewhere(possible, near)
         if other is not None:
             found, bound = other, None
-        elif near.far(possible):
-            found, bound = _approached(possible, near)
+        else:
+            found, bound = _approached(possible, near) if near.far(possible) else (found, bound)
+            found = _further(possible, found)
     says = bound.why(wish) if bound else None
     if says is None and possible is not wish:
         says = f"lobe 1: {REASONS['colour']}"
@@ -233,14 +203,17 @@ def invert(body: Body) -> Answer:
 
 def answered(found: Nearby, snapped: str | None) -> Answer:
     """A stack as an answer, what was asked for or, `snapped` for that reason, the nearest to it."""
-    stack = _under(found)
-    material = document(stack)
-    remember(found, material)
+    return _answer(_under(found), found.target, found.model, snapped)
+
+
+def _answer(stack: Stack, target: Target, model: Model, snapped: str | None) -> Answer:
+    """A stack, and the lobes of a target as the stack has them."""
+    target = seen(stack, target, model)
     return {
         "feasible": True,
-        "material": material,
-        "target": described(found.target),
-        "haze": haze(found.target, found.model),
+        "material": document(stack),
+        "target": described(target),
+        "haze": haze(target, model),
         "snapped": snapped,
     }
 
@@ -272,6 +245,16 @@ def _approached(wish: Target, near: Nearby) -> tuple[Nearby, Bound | None]:
         if other is not None:
             t, found = t + 0.5**n, other
     return found.towards(wish)
+
+
+def _further(wish: Target, found: Nearby) -> Nearby:
+    """As far towards the wished blurs as the energies that there are allow, and then the other way round."""
+    for key in ("alpha", "energy"):
+        part = found.now(wish)
+        for k, lobe in enumerate(wish.lobes):
+            part = part.with_lobe(k, **({"alpha": lobe.roughness} if key == "alpha" else {"energy": lobe.colour}))
+        found, _ = found.towards(part)
+    return found
 
 
 def _fresh(wish: Target, model: Model) -> Answer:
@@ -307,7 +290,7 @@ def _pinned(wish: Target, model: Model) -> Answer:
         if error.nearest is None:
             return {"feasible": False, "why": error.why}
         found, says = invert_stack(error.nearest, model), error.why
-    return {"feasible": True, "material": document(found.stack), "target": described(found.target), "snapped": says}
+    return _answer(found.stack, found.target, model, says)
 
 
 # Coats, and the figures ----------------------------------------------------------------------------------------------

@@ -22,7 +22,7 @@ from velatura.inverse.above import NORMAL, Above, Array, Layers, flat
 from velatura.inverse.coats import scattered
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import CONDUCTOR_MAX, CONDUCTOR_MIN, ENERGY_MIN, conductor_index, conductor_tint
-from velatura.inverse.target import Lobe, Target
+from velatura.inverse.target import Fixed, Lobe, Target
 from velatura.model import Model, lobes, prepare
 from velatura.model.maps import MAPS, VARIANCE_MAX
 from velatura.model.statistics import number
@@ -228,7 +228,7 @@ class Nearby:
             if other == bound:
                 break
             bound = other
-        return self, bound
+        return self.renamed(self.now(wish)), bound
 
     def achromatic(self, wish: Target) -> Target:
         """A wish, its first lobe without the colours that need absorption where nothing may absorb."""
@@ -309,7 +309,8 @@ class Nearby:
                     assert place.u is not None
                     root = (x - eta_1) / (x + eta_1)
                     places[n] = dataclasses.replace(place, side=-1 if root < 0 else 1)
-                    z[place.u] *= max(root * root, ENERGY_MIN) / np.max(z[place.u])
+                    most, wanted = np.max(z[place.u]), max(root * root, ENERGY_MIN)
+                    z[place.u] = wanted * (z[place.u] / most if most > 0 else 1.0)
                     share, level = place.share, Bound(k, "absorption", 1, float(np.log(x)), place=n)
             if place.kind == "dielectric":
                 eta_1 = np.exp(z[place.index]) if place.index is not None else float(part.eta[0, 0])
@@ -334,6 +335,10 @@ class Nearby:
         """A target on the way from the lobes that are to those that are wished for, in energies and variances."""
         now = self.known.reading
         return self.renamed(wish)._target_of(now + t * (self.wanted(wish) - now))
+
+    def now(self, wish: Target) -> Target:
+        """The lobes that are, in the form of a target."""
+        return self.between(wish, 0.0)
 
     def _target_of(self, reading: Array) -> Target:
         """The target with lobes as they are read."""
@@ -585,6 +590,16 @@ def retinted(tint: Array, now: float, then: float) -> Array:
 def closed(model: Model) -> Model:
     """The model, or where it has no closed form, the nearest that does."""
     return dataclasses.replace(model, calibrations=None, tir="off")
+
+
+def seen(stack: Stack, target: Target, model: Model) -> Target:
+    """A target with the energies and blurs that a stack of its form has."""
+    form = target
+    for k in range(len(target.lobes)):
+        form = form.with_lobe(k, fixed=Fixed())
+    near = Nearby.of(stack, form, model)
+    assert near is not None
+    return near.renamed(target)._target_of(near.read(near.z[:, None])[:, 0])
 
 
 def plain(stack: Stack) -> list[Layers]:
