@@ -35,10 +35,10 @@ docs: .venv/ready-docs ## build the manual into site/
 # One file for each figure that the manual takes numbers from: made when it is missing or older than the figure's module.
 figures: $(PRINTED:%=docs/figures/%.json) ## compute the numbers that the manual prints again
 
+.DELETE_ON_ERROR:
 .SECONDEXPANSION:
 docs/figures/%.json: src/velatura/figures/$$(subst -,_,$$*).py | .venv/ready
-	$(BIN)/velatura figure $* --json > $@.part
-	@mv $@.part $@
+	$(BIN)/velatura figure $* --json > $@
 
 setup: .venv/ready-dev ## install what development needs, and the pre-commit hooks
 	@$(BIN)/pre-commit install
