@@ -60,10 +60,17 @@ def openpbr(factor: Callable[[float], float]) -> Callable[[Coated, Array], Array
     return lambda c, cosine: np.sqrt(c.base**2 + factor(c.n) * c.coat**2) + 0 * cosine
 
 
+def openpbr_proposed(c: Coated, cosine: Array) -> Array:
+    # OpenPBR, pull request 261 (2026-03-31), whose 1.05 is fitted to random walks
+    blur = 1.05 * (c.n - 1) * np.sqrt(1 + c.n**2) / c.n
+    return 0.85 * np.tanh(np.hypot(c.n * c.base, blur * c.coat) / 0.85) + 0 * cosine
+
+
 BLURS: dict[str, Callable[[Coated, Array], Array]] = {
     "ours": ours,
     "ours, at normal incidence": lambda c, cosine: ours(c, np.ones_like(cosine)),
     "model velatura (fgd)": lambda c, cosine: _model(c, cosine),
+    "OpenPBR, pull request 261": openpbr_proposed,
     "OpenPBR, X = 2": openpbr(lambda n: 2.0),
     "OpenPBR, X = 1 - 1/n": openpbr(lambda n: 1 - 1 / n),
     "the larger of both": lambda c, cosine: np.maximum(c.base, c.coat) + 0 * cosine,
