@@ -7,6 +7,7 @@ material's own values.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from velatura.stack import (
     Measured,
     Stack,
     Texture,
+    declared,
     is_colour,
     load,
     loads,
@@ -101,7 +103,8 @@ class Binding:
 
     Attributes:
         stack: the material as described; textures given as objects have a number standing in.
-        constants: Dr.Jit values by flat name.
+        parameters: Dr.Jit values by flat name, as they were given or last changed.
+        constants: the same, within the ranges of their parameters.
         images: textures, spectra and fields by flat name.
         steering: colours of those that are the same everywhere, at `STEERING_NM`; in spectral variants.
 
@@ -127,6 +130,7 @@ class Binding:
             self.stack = _described(mi, str(given["material"])).replace(**numbers, **stand_ins)
         else:
             self.stack = Stack.from_flat(None, {**numbers, **stand_ins})
+        self.parameters: dict[str, Any] = {}
         self.constants: dict[str, Any] = {}
         self.images: dict[str, Image | Field] = {}
         values = {**self.stack.flat(), **objects}
@@ -137,6 +141,7 @@ class Binding:
             else:
                 self._bind(name, value)
         self.steering: dict[str, Any] = {}
+        self.clamped: set[str] = set()
         self.update()
 
     @property
@@ -153,11 +158,35 @@ class Binding:
         """Work out what steers, after any value has changed."""
         import drjit as dr
 
+        self.constants = {name: self._within_range(name, value) for name, value in self.parameters.items()}
         if self.mi.is_spectral:
             si = self._at_fixed_wavelengths(dr.zeros(self.mi.SurfaceInteraction3f))
             flat = [name for name, image in self.images.items() if image.colour and not image.varies]
             self.steering = {name: self.images[name].at(si, True) for name in flat}
             dr.make_opaque(self.steering)
+
+    def _within_range(self, name: str, value: Any) -> Any:
+        """The value itself, or the nearest one that is allowed, with one warning.
+
+        Gradients pass all the same, or an optimiser that has overshot would not come back.
+
+        Raises:
+            InvalidInput: it is not finite, so that none is near.
+        """
+        import drjit as dr
+
+        channels = np.ravel(np.array(dr.detach(value), float))
+        try:
+            for channel in channels.tolist():
+                declared(name).check(channel)
+        except ValueError as error:
+            if not np.isfinite(channels).all():
+                raise InvalidInput(f"{name}: {error}") from None
+            if name not in self.clamped:
+                self.clamped.add(name)
+                warnings.warn(f"{name}: {error}; the nearest value that is allowed stands for it", stacklevel=2)
+            return dr.replace_grad(dr.clip(value, *within(name)), value)
+        return value
 
     def at(self, si: Any, active: Any) -> dict[str, Any]:
         """All values at a surface point by flat name."""
@@ -194,7 +223,7 @@ class Binding:
 
     def traverse(self, callback: Any) -> None:
         """Offer every value under its flat name."""
-        for name, value in self.constants.items():
+        for name, value in self.parameters.items():
             callback.put(name, value, self._flags(name))
         for name, image in self.images.items():
             if isinstance(image, Image):
@@ -254,9 +283,9 @@ class Binding:
             value = rgb_of(value) if isinstance(value, Measured) else value
             if isinstance(value, tuple):
                 colour = mi.Color3f(*value)
-                self.constants[name] = mi.luminance(colour) if mi.is_monochromatic else colour
+                self.parameters[name] = mi.luminance(colour) if mi.is_monochromatic else colour
             else:
-                self.constants[name] = mi.Float(value)
+                self.parameters[name] = mi.Float(value)
 
     def _object(self, name: str, texture: Any) -> Image:
         colour, kind = is_colour(name), texture.class_name()

@@ -6,6 +6,7 @@ what a stack of one layer is, with one Fresnel term: `roughconductor` for an ind
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -287,3 +288,61 @@ def test_all_variants_give_a_grey_material_one_value(plugin: str, variant: str) 
     found = seen()
     kernel.mitsuba("llvm_ad_rgb")
     np.testing.assert_allclose(found, seen(), rtol=0.02)
+
+
+OUT_OF_RANGE = {
+    "layer0_eta": (0.0, 1e-3),
+    "layer0_alpha_u": (3.0, 1.0),
+    "layer0_alpha_v": (-1.0, 0.0),
+    "layer1_depth": (-1.0, 0.0),
+    "layer1_g": (1.0, 1 - 1e-3),
+    "layer1_sigma_a": (-2.0, 0.0),
+    "exterior": (-1.0, 1e-3),
+}
+
+
+@pytest.mark.parametrize("plugin", ["velatura", "reference", "weidlich_wilkie"])
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb"], indirect=True)
+def test_updates_are_kept_within_range(plugin: str, variant: str) -> None:
+    """Expected: the value at the end of the range, one warning for each parameter, and a NaN refused."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(*WI))
+    for name, (beyond, end) in OUT_OF_RANGE.items():
+        bsdf, expected = (vt.bsdf(GREY.replace(layer1_sigma_s=0.1), model=plugin) for _ in range(2))
+        parameters = mi.traverse(bsdf)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            for value in (beyond, 0.5, beyond):
+                parameters[name] = value
+                parameters.update()
+        ours = [str(warning.message) for warning in caught if name in str(warning.message)]
+        assert len(ours) == 1 and f"got {beyond}" in ours[0]
+        parameters = mi.traverse(expected)
+        parameters[name] = end
+        parameters.update()
+        found, expected = (
+            np.ravel(each.eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(*WO)))) for each in (bsdf, expected)
+        )
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+        assert np.isfinite(found).all()
+    parameters["layer0_eta"] = float("nan")
+    with pytest.raises(InvalidInput, match=r"^layer0_eta: must be finite, got nan$"):
+        parameters.update()
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb"], indirect=True)
+def test_an_optimiser_that_overshoots_comes_back(variant: str) -> None:
+    """Expected: the slope at the end of the range, beyond it, too."""
+    bsdf = vt.bsdf(GREY.replace(layer1_sigma_a=1.0))
+    parameters, slopes = mi.traverse(bsdf), []
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(*WI))
+    for depth in (0.0, -0.5):
+        parameters["layer1_depth"] = mi.Float(depth)
+        dr.enable_grad(parameters["layer1_depth"])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            parameters.update()
+        dr.backward(dr.sum(bsdf.eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(*WO)))))
+        slopes.append(float(dr.grad(parameters["layer1_depth"])[0]))
+    assert slopes[0] < 0 and slopes[1] == pytest.approx(slopes[0], rel=1e-4)

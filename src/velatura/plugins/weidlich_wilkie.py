@@ -52,6 +52,9 @@ def make(mi: Any) -> type:
         def traverse(self, callback: Any) -> None:
             self.binding.traverse(callback)
 
+        def parameters_changed(self, keys: list[str]) -> None:
+            self.binding.update()
+
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             bs, kinds, values = mi.BSDFSample3f(), self.binding.stack.kinds, self.binding.at(si, active)
             wo = sample(kinds, values, tuple(si.wi), sample1, sample2.x, sample2.y)

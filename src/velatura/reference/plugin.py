@@ -66,6 +66,7 @@ def make(mi: Any) -> type:
             self.binding.traverse(callback)
 
         def parameters_changed(self, keys: list[str]) -> None:
+            self.binding.update()
             self._update()
 
         def _update(self) -> None:

@@ -2,7 +2,7 @@
 
 from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.io import Material, dumps, load, loads, preset, presets, save
-from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, is_colour, within
+from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, declared, is_colour, within
 from velatura.stack.spectra import Measured, Named, names, rgb, spectrum
 from velatura.stack.stack import Stack
 from velatura.stack.values import RGB, Brushing, Spectrum, Texture, Varying
@@ -23,6 +23,7 @@ __all__ = [
     "Texture",
     "Value",
     "Varying",
+    "declared",
     "dumps",
     "is_colour",
     "json_schema",

@@ -129,11 +129,16 @@ def is_colour(name: str) -> bool:
     return name.partition("_")[2] in _COLOURS
 
 
+def declared(name: str) -> Scalar:
+    """How the value of that flat name is declared; `exterior` is an index as well."""
+    key = "eta" if name == "exterior" else name.partition("_")[2]
+    known: dict[str, Any] = {k: p for model in LAYERS.values() for k, p in parameters(model).items()}
+    return known["alpha" if key.startswith("alpha") else key]
+
+
 def within(name: str) -> tuple[float, float]:
     """Range of the value of that flat name, a little inside where its ends are excluded."""
-    key = name.partition("_")[2]
-    declared = {k: p for model in LAYERS.values() for k, p in parameters(model).items()}
-    parameter: Any = declared["alpha" if key.startswith("alpha") else key]
+    parameter = declared(name)
     margin = 1e-3 if parameter.strict else 0.0
     return parameter.low + margin, parameter.high - margin
 
