@@ -7,6 +7,7 @@ material's own values.
 
 from __future__ import annotations
 
+import textwrap
 import warnings
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from velatura.stack import (
     load,
     loads,
     spectrum,
+    srgb_weights,
     within,
 )
 from velatura.stack import rgb as rgb_of
@@ -75,6 +77,10 @@ class Image:
         value = self.texture.eval(si, active) if self.colour else self.texture.eval_1(si, active)
         return dr.clip(value * self.scale + self.offset, self.low, self.high)
 
+    def __str__(self) -> str:
+        scaled = f"{self.scale:g} * {self.texture}" if self.scale != 1 else str(self.texture)
+        return f"{scaled} + {self.offset:g}" if self.offset else scaled
+
 
 @dataclass(frozen=True)
 class Field:
@@ -92,6 +98,43 @@ class Field:
         away = si.to_local(si.dp_du * (si.uv.x - field.u) + si.dp_dv * (si.uv.y - field.v))
         across = 90.0 if field.brushing == "concentric" else 0.0
         return dr.rad2deg(dr.atan2(away.y, away.x)) + (across + field.offset)
+
+    def __str__(self) -> str:
+        turned = f", turned by {self.brushing.offset:g}" if self.brushing.offset else ""
+        return f"{self.brushing.brushing} about ({self.brushing.u:g}, {self.brushing.v:g}){turned}"
+
+
+def plugin_class(mi: Any) -> type:
+    """The base class of all layered plugins in the variant that is set: what they answer about their values.
+
+    Theirs is a `binding`, and `facts` by name, which `to_string` begins with.
+    """
+
+    class MaterialBSDF(mi.BSDF):
+        binding: Binding
+        facts: dict[str, str]
+
+        def traverse(self, callback: Any) -> None:
+            self.binding.traverse(callback)
+
+        def has_attribute(self, name: str, active: Any = True) -> Any:
+            return self.binding.has(name)
+
+        def eval_attribute(self, name: str, si: Any, active: Any = True) -> Any:
+            return self.binding.attribute(name, si, active) if self.binding.has(name) else mi.UnpolarizedSpectrum(0)
+
+        def eval_attribute_1(self, name: str, si: Any, active: Any = True) -> Any:
+            return self.binding.attribute_1(name, si, active) if self.binding.has(name) else mi.Float(0)
+
+        def eval_attribute_3(self, name: str, si: Any, active: Any = True) -> Any:
+            return self.binding.attribute_3(name, si, active) if self.binding.has(name) else mi.Color3f(0)
+
+        def to_string(self) -> str:
+            values = {**self.facts, **self.binding.described()}
+            listed = ",\n".join(f"{name} = {text}" for name, text in values.items())
+            return f"{type(self).__name__}[\n{textwrap.indent(listed, '  ')}\n]"
+
+    return MaterialBSDF
 
 
 class Binding:
@@ -233,6 +276,48 @@ class Binding:
         flags = self.mi.ParamFlags
         return flags.NonDifferentiable if name == "exterior" else flags.Differentiable
 
+    # What a plugin is asked about its values
+
+    def has(self, name: str) -> bool:
+        """Whether the material has a value of that flat name."""
+        return name in self.constants or name in self.images
+
+    def attribute(self, name: str, si: Any, active: Any) -> Any:
+        """A value at a surface point as a spectrum (a colour, or one number in monochromatic variants)."""
+        return self.mi.UnpolarizedSpectrum(self._one(name, si, active))
+
+    def attribute_1(self, name: str, si: Any, active: Any) -> Any:
+        """A value at a surface point as one number: of a colour or spectrum, its luminance."""
+        if is_colour(name):
+            return self.mi.luminance(self.attribute_3(name, si, active))
+        return self.mi.Float(self._one(name, si, active))
+
+    def attribute_3(self, name: str, si: Any, active: Any) -> Any:
+        """A value at a surface point as linear sRGB, under D65 where it is a spectrum."""
+        mi, image = self.mi, self.images.get(name)
+        if not (mi.is_spectral and image and image.colour):
+            value = self._one(name, si, active)
+            return mi.Color3f(value[0] if mi.is_monochromatic and is_colour(name) and image else value)
+        # Sum over wavelengths, as many at once as a ray carries
+        nm, weights = srgb_weights()
+        carried, rgb = len(mi.UnpolarizedSpectrum()), mi.Color3f(0)
+        at = mi.SurfaceInteraction3f(si)
+        for k in range(0, len(nm), carried):
+            nodes = [min(k + i, len(nm) - 1) for i in range(carried)]
+            at.wavelengths = type(si.wavelengths)([float(nm[node]) for node in nodes])
+            value = image.at(at, active)
+            for i, node in enumerate(range(k, min(k + carried, len(nm)))):
+                rgb += mi.Color3f(*(float(w) for w in weights[:, node])) * value[i]
+        return rgb
+
+    def _one(self, name: str, si: Any, active: Any) -> Any:
+        return self.images[name].at(si, active) if name in self.images else self.constants[name]
+
+    def described(self) -> dict[str, str]:
+        """All values by flat name as text: numbers, and what textures and spectra call themselves."""
+        texts = {name: _text(value) for name, value in self.constants.items()}
+        return texts | {name: str(image) for name, image in self.images.items()}
+
     # How a property becomes a value of the stack, and that one of Mitsuba's
 
     def _given(self, properties: Any, name: str) -> Any:
@@ -339,6 +424,12 @@ def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
     if not channels or not set(wanted) <= set(channels):
         raise InvalidInput(f"{name}: the texture {image.texture} has no channel {wanted}, only {channels or 'others'}")
     return np.ascontiguousarray(texels[..., [channels.index(c) for c in wanted]])
+
+
+def _text(value: Any) -> str:
+    """A constant as text: a number, a colour, or several of either."""
+    numbers = [f"{number:g}" for number in np.array(value, float).ravel()]
+    return numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]"
 
 
 def _described(mi: Any, material: str) -> Stack:

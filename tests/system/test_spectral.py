@@ -45,7 +45,7 @@ def towards(w) -> Any:
 
 def over_the_spectrum(bsdf, wi, wo) -> np.ndarray:
     """eval as linear sRGB under D65: every wavelength by a lane of its own."""
-    nm, weights = spectra._srgb_weights()
+    nm, weights = spectra.srgb_weights()
     lanes = mi.Float(nm)
     return weights @ np.array(bsdf.eval(mi.BSDFContext(), seen(wi, [lanes] * 4, len(nm)), towards(wo)))[0]
 

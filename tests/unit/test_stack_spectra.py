@@ -99,7 +99,7 @@ def test_reflectance_from_rgb_indices_is_near_that_of_the_whole_spectrum(name: s
     def reflectance(eta: np.ndarray, k: np.ndarray) -> np.ndarray:
         return ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
 
-    wavelengths_nm, weights = spectra._srgb_weights()
+    wavelengths_nm, weights = spectra.srgb_weights()
     eta, k = (np.interp(wavelengths_nm, *spectrum(Named(name, part))) for part in ("eta", "k"))
     whole = weights @ reflectance(eta, k)
     reduced = reflectance(np.array(rgb(Named(name, "eta"))), np.array(rgb(Named(name, "k"))))

@@ -67,11 +67,25 @@ class Scattered:
     transmitted: Lobe | None
     eta: Value
 
-    def share(self, asked: Asked, least: float = 0.0) -> Value:
-        """Of samples that are transmitted; if both are asked for, there are at least so many of each."""
-        if self.transmitted is None or not asked.transmission:
+    def only(self, asked: Asked) -> Scattered:
+        """The parts that are asked for."""
+        if asked.reflection is True and asked.transmission:
+            return self
+        base = self.base if self.base and asked.reflects(len(self.reflected)) else None
+        transmitted = self.transmitted if asked.transmission else None
+        return replace(self, reflected=asked.lobes(self.reflected), base=base, transmitted=transmitted)
+
+    @property
+    def albedo(self) -> Value:
+        """Energy of all parts, a colour."""
+        parts: list[Lobe | Base | None] = [*self.reflected, self.base, self.transmitted]
+        return sum(part.energy for part in parts if part)
+
+    def share(self, least: float = 0.0) -> Value:
+        """Of samples that are transmitted; where something is reflected too, there are at least so many of each."""
+        if self.transmitted is None:
             return 0.0
-        if not asked.reflection:
+        if not self.reflected:
             return 1.0
         through = ops.mean(self.transmitted.energy)
         share = ops.divide(through, through + sum(ops.mean(lobe.energy) for lobe in self.reflected))
@@ -80,11 +94,22 @@ class Scattered:
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked of a BSDF: reflection, transmission or both; of radiance, which the index scales, or not."""
+    """What is asked of a BSDF: reflection, transmission or both; of radiance, which the index scales, or not.
 
-    reflection: bool = True
+    `reflection` may also say for every reflected lobe, and then for the diffuse base, whether it is asked for.
+    """
+
+    reflection: bool | Sequence[bool] = True
     transmission: bool = True
     radiance: bool = True
+
+    def lobes(self, lobes: Sequence[Lobe]) -> Sequence[Lobe]:
+        """Those reflected lobes that are asked for."""
+        return [lobe for k, lobe in enumerate(lobes) if self.reflects(k)]
+
+    def reflects(self, k: int) -> bool:
+        """Whether the k-th reflected part is asked for: a lobe, from the top, or after all lobes the base."""
+        return self.reflection if isinstance(self.reflection, bool) else self.reflection[k]
 
 
 def body(
@@ -136,15 +161,19 @@ def scattered(stack: Body, wi: Direction) -> Scattered:
 
 def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; 0 from below an opaque stack."""
-    seen, i, o = scattered(stack, wi), _upright(wi, wi), _upright(wo, wi)
+    seen, i, o = scattered(stack, wi).only(asked), _upright(wi, wi), _upright(wo, wi)
     symmetric = stack.above.model.form == "symmetric"
     reflected, passed = exchangeable(stack, wi, wo) if symmetric else (seen.reflected, seen.transmitted)
+    if symmetric:
+        reflected = asked.lobes(reflected)
 
     # Reflect
     value, density = mixture.eval_pdf(seen.reflected, seen.base, i, o, reflected)
-    if seen.transmitted is None or passed is None:
-        lit = (wi[2] > 0) & asked.reflection
+    if stack.below is None:
+        lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
+    if seen.transmitted is None or passed is None:
+        return value, density
 
     # Transmit, as a reflection in the medium beyond; radiance is squeezed into the cone there
     i_beyond, o_beyond = _beyond(stack, i, seen.eta), _down(o)
@@ -158,9 +187,9 @@ def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) 
     if asked.radiance:
         through = through / (seen.eta * seen.eta)
 
-    # Choose what is asked for
-    share, passes = seen.share(asked, _least(stack)), o[2] < 0
-    value = ops.select(passes, through if asked.transmission else 0.0, value if asked.reflection else 0.0)
+    # Choose the side
+    share, passes = seen.share(_least(stack)), o[2] < 0
+    value = ops.select(passes, through, value)
     return value, ops.select(passes, share * density_through, (1 - share) * density)
 
 
@@ -171,13 +200,13 @@ def sample(
 
     Where light cannot go the way that is drawn, `eval_pdf` is 0.
     """
-    seen, i = scattered(stack, wi), _upright(wi, wi)
-    share = seen.share(asked, _least(stack))
-    if seen.transmitted is None:
+    seen, i = scattered(stack, wi).only(asked), _upright(wi, wi)
+    if stack.below is None:
         return mixture.sample(seen.reflected, seen.base, i, u, u1, u2), 1.0
-    passes = u < share
-    u = ops.divide(ops.select(passes, u, u - share), ops.select(passes, share, 1 - share))
+    passes, u = _way(seen, u, _least(stack))
     o = mixture.sample(seen.reflected, seen.base, i, u, u1, u2)
+    if seen.transmitted is None:
+        return _upright(o, wi), 1.0
     beyond = _down(mixture.sample([seen.transmitted], None, _beyond(stack, i, seen.eta), u, u1, u2))
     x, y, z = _chosen_direction(passes, beyond, o)
     # A direction that has missed its side belongs to no lobe
@@ -189,19 +218,36 @@ def sample_smooth(
     stack: Body, wi: Direction, u: Value, asked: Asked = Asked()
 ) -> tuple[Direction, Value, Value, Value]:
     """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
-    seen, i = scattered(stack, wi), _upright(wi, wi)
-    share = seen.share(asked)
-    reflected = sum((lobe.energy for lobe in seen.reflected[1:]), seen.reflected[0].energy)
+    seen, i = scattered(stack, wi).only(asked), _upright(wi, wi)
+    share = seen.share()
+    reflected = sum(lobe.energy for lobe in seen.reflected)
     if seen.transmitted is None:
-        lit = (wi[2] > 0) & asked.reflection
-        return (-i[0], -i[1], i[2]), 1.0, ops.select(lit, 1.0, 0.0), reflected
+        lit = (wi[2] > 0) | (stack.below is not None)
+        return (-wi[0], -wi[1], wi[2]), 1.0, ops.select(lit, 1.0 if seen.reflected else 0.0, 0.0), reflected
     passes = u < share
     x, y, z = _refracted(i, seen.eta)
     o = _chosen_direction(passes, (-x, -y, -z), (-i[0], -i[1], i[2]))
     through = seen.transmitted.energy / (seen.eta * seen.eta) if asked.radiance else seen.transmitted.energy
-    probability = ops.select(passes, share, (1 - share) if asked.reflection else 0.0)
+    probability = ops.select(passes, share, 1 - share)
     weight = ops.divide(ops.select(passes, through, reflected), probability)
     return _upright(o, wi), ops.select(passes, seen.eta, 1.0), probability, weight
+
+
+def component(stack: Body, wi: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
+    """Number of the part that `sample` draws from, or `sample_smooth`: of all reflected lobes, from the top, and then
+    the diffuse base or the transmitted lobe."""
+    every = scattered(stack, wi)
+    seen, count = every.only(asked), len(every.reflected)
+    passes, u = _way(seen, u, 0.0 if smooth else _least(stack))
+    numbers = [float(k) for k in range(count + (every.base is not None)) if asked.reflects(k)]
+    return ops.select(passes, float(count), mixture.picked(seen.reflected, seen.base, u, numbers))
+
+
+def _way(seen: Scattered, u: Value, least: float) -> tuple[Value, Value]:
+    """Whether a sample passes, and a uniform number for what follows."""
+    share = seen.share(least)
+    passes = u < share
+    return passes, ops.divide(ops.select(passes, u, u - share), ops.select(passes, share, 1 - share))
 
 
 # The symmetric form

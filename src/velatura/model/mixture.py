@@ -23,7 +23,7 @@ def probabilities(lobes: Sequence[Lobe], base: Base | None) -> list[Value]:
     """Of sampling each lobe, and at last the base: its share of the energy."""
     parts: list[Lobe | Base] = [*lobes, *([base] if base else [])]
     energies = [ops.mean(part.energy) + 1e-9 for part in parts]  # the offset decides where none has any
-    total = sum(energies[1:], energies[0])
+    total = sum(energies[1:], energies[0]) if energies else 0.0
     return [energy / total for energy in energies]
 
 
@@ -78,6 +78,16 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
     from_base = u > 1 - shares[-1]
     x, y, z = (ops.select(from_base, a, b) for a, b in zip(scattered, wo))
     return x, y, z
+
+
+def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence[float]) -> Value:
+    """Of numbers, one for each lobe and for the base, that of the part that `sample` draws from; 0 without parts."""
+    chosen: Value = numbers[0] if numbers else 0.0
+    begin: Value = 0.0
+    for number, before in zip(numbers[1:], probabilities(lobes, base)):
+        begin = begin + before
+        chosen = ops.select(u > begin, number, chosen)
+    return chosen
 
 
 def drawn(lobe: Lobe, wi: Direction, u1: Value, u2: Value) -> Value:

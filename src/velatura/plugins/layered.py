@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 import sys
 from typing import Any
 
 from velatura import kernel, tables
-from velatura.binding import Binding
+from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
+from velatura.model.merge import merging
 from velatura.model.models import EXCEPTIONS
+from velatura.model.variance import Isotropic
 from velatura.plugins import spectral
 
 
@@ -18,7 +22,9 @@ def make(mi: Any) -> type:
     """The class for the variant that is set."""
     import drjit as dr
 
-    class Layered(mi.BSDF):
+    flags = mi.BSDFFlags
+
+    class Layered(plugin_class(mi)):  # type: ignore[misc]
         """Layered material by statistics of light (Belcour 2018).
 
         Properties:
@@ -34,6 +40,10 @@ def make(mi: Any) -> type:
         transmits one lobe more, and is lit from both sides; the index above is `exterior`, that below is the last one,
         or `exterior` again where the material is `thin`. Wholly smooth, uniform stacks reflect as a mirror does, and
         refract as a pane.
+
+        Each lobe is a component, from the top, and so is the diffuse base or, last, the transmitted lobe. The lobes of
+        the forward form are flagged `NonSymmetric`, as what is transmitted always is. `eval_diffuse_reflectance` is the
+        albedo of all components for light from `si.wi`.
         """
 
         def __init__(self, properties: Any) -> None:
@@ -57,9 +67,6 @@ def make(mi: Any) -> type:
             return EXCEPTIONS["balanced"] if balanced else self.model.exceptions
 
         # The material, and what follows from it
-
-        def traverse(self, callback: Any) -> None:
-            self.binding.traverse(callback)
 
         def parameters_changed(self, keys: list[str]) -> None:
             self._update()
@@ -89,15 +96,20 @@ def make(mi: Any) -> type:
             clear = all(value == 0.0 for name, value in flat.items() if name.endswith("_sigma_s"))
             self.delta = smooth and clear and not binding.varies and "diffuse" not in kinds
             self.transmits = binding.stack.transmits
-            common = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.SpatiallyVarying if binding.varies else mi.BSDFFlags.Empty)
-            if self.variance.__name__ != "Isotropic":
-                common |= mi.BSDFFlags.Anisotropic
-            self.kinds = [mi.BSDFFlags.DeltaReflection if self.delta else mi.BSDFFlags.GlossyReflection]
+            common = flags.FrontSide | (flags.SpatiallyVarying if binding.varies else flags.Empty)
+            common |= flags.Empty if self.variance is Isotropic else flags.Anisotropic
+            common |= flags.BackSide if self.transmits else flags.Empty
+            one_way = flags.NonSymmetric if self.model.form == "forward" and not self.delta else flags.Empty
+            lobes = len(merging(self.model, len(binding.stack.interfaces)))
+            self.kinds = [flags.DeltaReflection if self.delta else flags.GlossyReflection] * lobes
+            self.m_components = [kind | common | one_way for kind in self.kinds]
             if self.transmits:
-                common |= mi.BSDFFlags.BackSide | mi.BSDFFlags.NonSymmetric
-                self.kinds += [mi.BSDFFlags.DeltaTransmission if self.delta else mi.BSDFFlags.GlossyTransmission]
-            self.m_components = [kind | common for kind in self.kinds]
-            self.m_flags = self.m_components[0] | self.m_components[-1]
+                self.kinds += [flags.DeltaTransmission if self.delta else flags.GlossyTransmission]
+                self.m_components += [self.kinds[-1] | common | flags.NonSymmetric]
+            if "diffuse" in kinds:
+                self.kinds += [flags.DiffuseReflection]
+                self.m_components += [self.kinds[-1] | common]
+            self.m_flags = functools.reduce(operator.or_, self.m_components)
 
         def _prepared(self, values: Any, **options: Any) -> bsdf.Body:
             stack = self.binding.stack
@@ -141,9 +153,9 @@ def make(mi: Any) -> type:
                 bs.wo = mi.Vector3f(*drawn)
                 value, bs.pdf = bsdf.eval_pdf(body, wi, drawn, asked)
                 weight = value / dr.maximum(bs.pdf, 1e-30)
-            through = si.wi.z * bs.wo.z < 0
-            bs.sampled_component = dr.select(through, mi.UInt32(1), mi.UInt32(0))
-            bs.sampled_type = dr.select(through, mi.UInt32(+self.kinds[-1]), mi.UInt32(+self.kinds[0]))
+            bs.sampled_component = mi.UInt32(bsdf.component(body, wi, sample1, asked, self.delta))
+            last = bs.sampled_component == len(self.kinds) - 1
+            bs.sampled_type = dr.select(last, mi.UInt32(+self.kinds[-1]), mi.UInt32(+self.kinds[0]))
             return bs, mi.depolarizer(dr.select(active & (bs.pdf > 0), spectral.carried(mi, weight), 0))
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
@@ -158,12 +170,23 @@ def make(mi: Any) -> type:
             value, pdf = bsdf.eval_pdf(self._body(si, active), tuple(si.wi), tuple(wo), self._asked(ctx))
             return mi.depolarizer(spectral.carried(mi, value)) & active, dr.select(active, pdf, 0)
 
-        def _asked(self, ctx: Any) -> bsdf.Asked:
-            """Whether reflection and transmission are wanted, and of what."""
-            wanted = [ctx.is_enabled(kind, component) for component, kind in enumerate(self.kinds)]
-            return bsdf.Asked(wanted[0], self.transmits and wanted[-1], ctx.mode == mi.TransportMode.Radiance)
+        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+            albedo = bsdf.scattered(self._body(si, active), tuple(si.wi)).albedo
+            lit = active & (si.wi.z != 0 if self.transmits else si.wi.z > 0)
+            return dr.clip(spectral.carried(mi, albedo), 0, 1) & lit
 
-        def to_string(self) -> str:
-            return f"Layered[model={self.model.name}, kinds={', '.join(self.binding.stack.kinds)}]"
+        def _asked(self, ctx: Any) -> bsdf.Asked:
+            """The components that are wanted, and of what."""
+            wanted = [ctx.is_enabled(kind, component) for component, kind in enumerate(self.kinds)]
+            passing = wanted.pop() if self.transmits else False
+            return bsdf.Asked(all(wanted) or wanted, passing, ctx.mode == mi.TransportMode.Radiance)
+
+        @property
+        def facts(self) -> dict[str, str]:
+            """The model, and its switches that are not its own."""
+            own = named(self.model.name)
+            changed = {name: getattr(self.model, name) for name in SWITCHES}
+            changed = {name: value for name, value in changed.items() if value != getattr(own, name)}
+            return {"model": self.model.name, **changed, "kinds": ", ".join(self.binding.stack.kinds)}
 
     return Layered

@@ -3,7 +3,7 @@
 from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.io import Material, dumps, load, loads, preset, presets, save
 from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, declared, is_colour, within
-from velatura.stack.spectra import Measured, Named, names, rgb, spectrum
+from velatura.stack.spectra import Measured, Named, names, rgb, spectrum, srgb_weights
 from velatura.stack.stack import Stack
 from velatura.stack.values import RGB, Brushing, Spectrum, Texture, Varying
 
@@ -36,5 +36,6 @@ __all__ = [
     "rgb",
     "save",
     "spectrum",
+    "srgb_weights",
     "within",
 ]

@@ -231,13 +231,13 @@ def rgb(measured: Measured) -> tuple[float, float, float]:
     """
     import numpy as np
 
-    wavelengths_nm, weights = _srgb_weights()
+    wavelengths_nm, weights = srgb_weights()
     red, green, blue = (weights @ np.interp(wavelengths_nm, *spectrum(measured))).tolist()
     return red, green, blue
 
 
 @functools.cache
-def _srgb_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def srgb_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Wavelengths (95,) and the weights (3, 95) that turn a spectrum into linear sRGB; each row sums to 1."""
     import numpy as np
 
