@@ -19,9 +19,9 @@ OF_BELCOUR_2018 = {
     "model/mixture.py": {"39-40"},
     "model/momentum.py": {"21", "28-31"},
     "model/operators.py": {"7-13", "10", "15-17, 21-24"},
+    "tables/build/quadrature.py": {"2"},
+    "tables/build/single_scattering.py": {"2"},
     "tables/fetch.py": {"2"},
-    "tables/once.py": {"2"},
-    "tables/quadrature.py": {"2"},
 }
 
 

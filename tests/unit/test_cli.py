@@ -208,7 +208,7 @@ def test_tables_are_measured(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
         "max_error": 2e-4,
         "rms_error": 5e-6,
     }
-    monkeypatch.setattr("velatura.tables.report.report", lambda **_: [row])
+    monkeypatch.setattr("velatura.tables.build.report.report", lambda **_: [row])
     status, out, _ = run("tables", "--json")
     assert (status, json.loads(out)) == (0, [{**row, "shape": [64, 64]}])
     table = run("tables")[1]

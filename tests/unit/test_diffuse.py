@@ -14,7 +14,8 @@ from velatura.model import bsdf, named, variance_kind
 from velatura.model.prepare import PreparedBase
 from velatura.model.statistics import number
 from velatura.optics import fresnel
-from velatura.tables import coordinates, exchange, parts
+from velatura.tables import coordinates, diffuse_nodes
+from velatura.tables.build import diffuse_matrices
 
 Array = NDArray[np.floating]
 
@@ -106,31 +107,33 @@ def test_the_base_is_reciprocal(model: str) -> None:
 def test_parts_of_even_light_are_its_means(n: float) -> None:
     """Of functions of the cosine, against sums over projected solid angle."""
     u = (np.arange(200_000) + 0.5) / 200_000
-    lagrange = exchange.parts(np.sqrt(1 - u), n)
-    np.testing.assert_allclose(lagrange.mean(axis=1), parts.even(n), atol=1e-4)
-    assert sum(parts.even(n)) == pytest.approx(1, abs=1e-12)
+    lagrange = diffuse_matrices.parts(np.sqrt(1 - u), n)
+    np.testing.assert_allclose(lagrange.mean(axis=1), diffuse_nodes.even(n), atol=1e-4)
+    assert sum(diffuse_nodes.even(n)) == pytest.approx(1, abs=1e-12)
 
 
 def test_tables_lose_no_light() -> None:
-    passing, staying = (t.data.reshape(*t.shape, parts.COUNT, parts.COUNT) for t in (SHIPPED.passing, SHIPPED.staying))
+    count = diffuse_nodes.COUNT
+    passing, staying = (t.data.reshape(*t.shape, count, count) for t in (SHIPPED.passing, SHIPPED.staying))
     np.testing.assert_allclose(SHIPPED.entering.data.sum(axis=-1), 1, atol=1e-5)
     np.testing.assert_allclose((passing + staying).sum(axis=-1), 1, atol=1e-2)
 
 
 def test_the_shipped_parts_are_what_the_builder_makes() -> None:
     i, k = 4, 7
-    alpha = float(coordinates.to_roughness(np.linspace(0, 1, exchange.RETURNING[0]))[i])
-    n = float(coordinates.to_index(np.linspace(0, 1, exchange.RETURNING[1]))[k])
-    made: Any = exchange.returned(alpha, n)
+    alpha = float(coordinates.to_roughness(np.linspace(0, 1, diffuse_matrices.RETURNING[0]))[i])
+    n = float(coordinates.to_index(np.linspace(0, 1, diffuse_matrices.RETURNING[1]))[k])
+    made: Any = diffuse_matrices.returned(alpha, n)
     np.testing.assert_allclose(made, SHIPPED.returning.data[i, k], atol=1e-6)
 
 
 def test_what_enters_smoothly_goes_where_snell_says() -> None:
     """The parts hold parabolas in p^2 exactly: mean of p^2 and of p^4, within errors of interpolation."""
     p2 = 1 - COSINES**2
-    found = np.array(parts.entering(SHIPPED, COSINES, 0 * COSINES, 0 * COSINES + 1.55))[: len(parts.OPEN)]
+    entered = diffuse_nodes.entering(SHIPPED, COSINES, 0 * COSINES, 0 * COSINES + 1.55)
+    found = np.array(entered)[: len(diffuse_nodes.OPEN)]
     for power in (1, 2):
-        np.testing.assert_allclose(np.array(parts.OPEN) ** power @ found, p2**power, atol=2e-3)
+        np.testing.assert_allclose(np.array(diffuse_nodes.OPEN) ** power @ found, p2**power, atol=2e-3)
 
 
 @pytest.mark.parametrize("exterior", [1.3, 1.6, 2.5])

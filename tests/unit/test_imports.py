@@ -21,17 +21,18 @@ MAY_IMPORT = {
     "kernel": "",
     "stack": "",
     "optics": "ops",
-    "tables": "optics ops",
-    "model": "stack optics tables ops",
+    "sampling": "optics ops",
+    "tables": "optics ops sampling",
+    "model": "stack optics tables ops sampling",
     "binding": "stack",
-    "plugins": "stack optics tables model ops kernel binding",
-    "shader": "stack optics tables model ops",
+    "plugins": "stack optics tables model ops kernel binding sampling",
+    "shader": "stack optics tables model ops sampling",
     "exports": "stack model shader",
     "inverse": "stack optics tables model ops",
-    "reference": "stack optics ops kernel binding",
+    "reference": "stack optics ops kernel binding sampling",
     "checks": "kernel",
     "scenes": "kernel",
-    "comparison": "stack optics model reference checks scenes api kernel",
+    "comparison": "stack optics model reference sampling checks scenes api kernel",
     "figures": "stack optics model inverse reference checks scenes comparison api kernel",
 }
 
@@ -47,7 +48,7 @@ IMPORTED_BY = {
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
 RENDERER = {
     "mitsuba": "kernel",
-    "drjit": "kernel ops tables binding plugins reference checks scenes",
+    "drjit": "kernel ops sampling tables binding plugins reference checks scenes",
 }
 
 # Modules -> what importing them must not load.

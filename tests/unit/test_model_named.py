@@ -19,7 +19,7 @@ from velatura.model.statistics import number, statistics
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics import fresnel, ggx
 from velatura.stack import Interface, Medium, Stack, Texture, preset, presets
-from velatura.tables.quadrature import average
+from velatura.tables.build.quadrature import average
 
 Matrix = NDArray[np.float64]
 

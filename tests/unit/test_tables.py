@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from velatura import kernel, tables
 from velatura.errors import InvalidInput
 from velatura.optics import fresnel
-from velatura.tables import coordinates, walks, yardstick
-from velatura.tables.build import Built, makers
-from velatura.tables.quadrature import average, ignore
-from velatura.tables.report import report
+from velatura.tables import coordinates
+from velatura.tables.build import Built, belcour_grid, makers, microsurface_walks
+from velatura.tables.build.quadrature import average, ignore
+from velatura.tables.build.report import report
 
 BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "tables.py"
 DEFAULT = {
@@ -343,7 +343,9 @@ def test_the_shipped_file_is_what_the_builder_makes(name: str) -> None:
 
 def test_walks_are_seeded() -> None:
     point = np.array([0.6]), np.array([0.4]), np.array([1 / 1.5])
-    first, again, other = (walks.reflected_later(*point, 4096, np.random.default_rng(s))[0] for s in (1, 1, 2))
+    first, again, other = (
+        microsurface_walks.reflected_later(*point, 4096, np.random.default_rng(s))[0] for s in (1, 1, 2)
+    )
     assert first == again != other
     assert first == pytest.approx(other, abs=8e-3)
 
@@ -377,9 +379,9 @@ def test_report(monkeypatch: pytest.MonkeyPatch) -> None:
         progress(1.0)
         return Built(SHIPPED, {name: 0.5 for name, _ in SHIPPED.items()})
 
-    monkeypatch.setattr("velatura.tables.report.build", build)
-    monkeypatch.setattr("velatura.tables.report.POINTS", 300)
-    monkeypatch.setattr("velatura.tables.report.WALKED", 10)
+    monkeypatch.setattr("velatura.tables.build.report.build", build)
+    monkeypatch.setattr("velatura.tables.build.report.POINTS", 300)
+    monkeypatch.setattr("velatura.tables.build.report.WALKED", 10)
     heard: list[float] = []
     rows = {row["table"]: row for row in report(heard.append)}
     assert heard == sorted(heard)
@@ -396,15 +398,15 @@ def test_report(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_yardstick_is_larger_and_worse() -> None:
-    grid = yardstick.build()
+    grid = belcour_grid.build()
     assert grid.data.nbytes == 64 * 2**20
     node = 31 / 63
-    assert yardstick.fgd(grid, node, node, 4 * node, 4 * node) == pytest.approx(
+    assert belcour_grid.fgd(grid, node, node, 4 * node, 4 * node) == pytest.approx(
         conductor(4 * node, 4 * node, node, node), abs=1e-3
     )
     cos_theta, alpha, eta, kappa = benchmark.draw(2000, seed=0)
     truth = conductor(eta, kappa, cos_theta, alpha)  # ten times better
-    error = yardstick.fgd(grid, cos_theta, alpha, eta, kappa) - truth
+    error = belcour_grid.fgd(grid, cos_theta, alpha, eta, kappa) - truth
     assert 1e-3 < np.sqrt(np.mean(error**2)) < 5e-3
 
 

@@ -17,7 +17,7 @@ def tables(
     ] = False,
 ) -> None:
     """Build the tables from nothing, and measure them."""
-    from velatura.tables.report import report
+    from velatura.tables.build.report import report
 
     with progress.bar("Building tables") as advance:
         rows = report(progress=lambda share: advance(round(1000 * share), 1000), with_yardstick=yardstick)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,6 +17,7 @@ from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import Lobe
 from velatura.reference.distribution import BINS
+from velatura.sampling.low_discrepancy import square
 from velatura.stack import Stack
 
 Array = NDArray[np.floating]
@@ -82,9 +82,9 @@ def _sampled(body: bsdf.Body, lobe: adding.Lobe, wi: Direction, place: int | Non
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
         return Light(-np.stack(wi[:2]), _colour(lobe.energy))
     if body.above.model.form == "forward" or place is None:
-        wo = mixture.sample([lobe], None, wi, 0.0, *_uniform(SAMPLES))
+        wo = mixture.sample([lobe], None, wi, 0.0, *square(SAMPLES))
         return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo))
-    wo = mixture.sample([lobe], None, wi, 0.0, *_uniform(LIT_SAMPLES))
+    wo = mixture.sample([lobe], None, wi, 0.0, *square(LIT_SAMPLES))
     lit = bsdf.exchangeable(body, wi, wo)[0][place]
     return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo, [lit]))
 
@@ -94,7 +94,7 @@ def _sampled_below(body: bsdf.Body, lobe: adding.Lobe, wi: Direction) -> Light:
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
         return Light(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
     asked = bsdf.Asked(reflection=False, radiance=False)
-    wo, _ = bsdf.sample(body, wi, 0.0, *_uniform(LIT_SAMPLES), asked)
+    wo, _ = bsdf.sample(body, wi, 0.0, *square(LIT_SAMPLES), asked)
     return _light(wo, *bsdf.eval_pdf(body, wi, wo, asked))
 
 
@@ -106,18 +106,11 @@ def _light(wo: Direction, value: Array, density: Array) -> Light:
 
 def _sampled_base(base: Base) -> Light:
     """Directions by the cosine law, uniform on the disc."""
-    u1, u2 = _uniform(BASE_SAMPLES)
+    u1, u2 = square(BASE_SAMPLES)
     radius, phi = np.sqrt(u1), 2 * np.pi * u2
     points = np.stack([radius * np.cos(phi), radius * np.sin(phi)])
     value = base.value((points[0], points[1], np.sqrt(1 - u1)))
     return Light(points, _colour(np.pi * value / BASE_SAMPLES, BASE_SAMPLES))
-
-
-@functools.cache
-def _uniform(count: int) -> tuple[Array, Array]:
-    """Pairs of numbers in [0, 1), spread evenly (Roberts 2018)."""
-    i = np.arange(count)
-    return (0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1
 
 
 def _described(lobe: adding.Lobe, light: Light) -> Lobe:

@@ -1,8 +1,8 @@
 """A diffuse base under a stack: light that enters, scatters there, and leaves, between bounces below the interfaces.
 
-Light in the stack is followed by its parts in a few directions (`velatura.tables.parts`). What a node is worth, the
-share of its light that reaches the base, follows from what the interfaces make of it, by sweeps up and down the stack.
-That is done once for a material; what a direction is worth is then the sum of its parts.
+Light in the stack is followed by its parts in a few directions (`tables.diffuse_nodes`). What a node is worth, that is
+the share of its light that reaches the base, follows from what the interfaces make of it, by sweeps up and down the
+stack. That is done once for a material; what a direction is worth is then the sum of its parts.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.ops import Value
 from velatura.optics import phase
 from velatura.optics.ggx import Direction
-from velatura.tables import parts
+from velatura.tables import diffuse_nodes
 
 Settle = Callable[[Value], Value]
 Row = Sequence[Value]  # of values at the nodes of a medium
@@ -85,8 +85,9 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     if inside.interfaces:
         with ops.block("Light leaves by the way that it comes in"):
             entered = ops.each(lambda node, n: settle(_entered(prepared, lit(node, n))), nodes, prepared.base.n)
-            leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in range(parts.COUNT)]
-            even = parts.even(inside.indices[0])
+            nodes_below = range(diffuse_nodes.COUNT)
+            leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in nodes_below]
+            even = diffuse_nodes.even(inside.indices[0])
             squared = inside.indices[0] * inside.indices[0]
             leaves = [ops.divide(x, squared * w) for x, w in zip(leaves, even)]
         worth, reflected = inside.solved(leaves, settle)
@@ -113,7 +114,7 @@ def _entered(prepared: Prepared, wi: Direction) -> Row:
     layer = next(layer for layer in prepared.layers if isinstance(layer, PreparedInterface))
     cosine, alpha = operators.fetched(prepared, layer.roughness, wi[2], wi)
     r = ops.clip(operators.reflectance(prepared, layer, wi[2], layer.roughness, wi), 0.0, 1.0)
-    return [(1 - r) * x for x in parts.entering(tables.load(), cosine, alpha, layer.n12)]
+    return [(1 - r) * x for x in diffuse_nodes.entering(tables.load(), cosine, alpha, layer.n12)]
 
 
 @dataclass(frozen=True)
@@ -144,9 +145,10 @@ class _Inside:
 
         `leaves` is what leaves the stack of the light at each of these nodes.
         """
-        kept = [[_passed(depth, c) for c in parts.node_cosines(n)] for n, depth in zip(self.indices, self.depths)]
+        media = zip(self.indices, self.depths)
+        kept = [[_passed(depth, c) for c in diffuse_nodes.node_cosines(n)] for n, depth in media]
         exchanges = [self._exchange(k, settle) for k in range(1, len(self.interfaces))]
-        back = parts.returning(tables.load(), _roughness(self.interfaces[0]), self.indices[0])
+        back = diffuse_nodes.returning(tables.load(), _roughness(self.interfaces[0]), self.indices[0])
         back = settle(_balanced(back, leaves))
 
         def up(going_down: Sequence[Row]) -> list[Row]:
@@ -159,13 +161,13 @@ class _Inside:
 
         def down(going_up: Sequence[Row]) -> list[Row]:
             """Worth of light that comes to what is below each medium."""
-            rows: list[Row] = [[1.0] * parts.COUNT]
+            rows: list[Row] = [[1.0] * diffuse_nodes.COUNT]
             for k, exchange in reversed(list(enumerate(exchanges, 1))):
                 returned = _seen(exchange.staying_above, kept[k - 1], going_up[k - 1])
                 rows.insert(0, settle(_added(returned, _seen(exchange.down, kept[k], rows[0]))))
             return rows
 
-        none: Row = [0.0] * parts.COUNT
+        none: Row = [0.0] * diffuse_nodes.COUNT
         going_down = down([none] * len(self.interfaces))
         if exchanges:
             # Sweep up and down, and go on as the last two sweeps did
@@ -185,17 +187,17 @@ class _Inside:
             before, after = rows[: len(begin)], rows[len(begin) :]
             going_down = [*_split([b + (b - a) * rest for a, b in zip(before, after)]), last]
         worth = [a * b for a, b in zip(kept[0], going_down[0])]
-        even = parts.even(self.indices[-1])
+        even = diffuse_nodes.even(self.indices[-1])
         return settle(worth), settle(_sum(w * a * b for w, a, b in zip(even, kept[-1], up(going_down)[-1])))
 
     def _exchange(self, k: int, settle: Settle) -> _Exchange:
         """What the interface between two media does."""
         alpha, above, below = _roughness(self.interfaces[k]), self.indices[k - 1], self.indices[k]
         found, ratio = tables.load(), self.interfaces[k].n12
-        down = settle(parts.between(found.passing, alpha, above, ratio))
-        up = settle(parts.between(found.passing, alpha, below, 1 / ratio))
-        staying_above = parts.between(found.staying, alpha, above, ratio)
-        staying_below = parts.between(found.staying, alpha, below, 1 / ratio)
+        down = settle(diffuse_nodes.between(found.passing, alpha, above, ratio))
+        up = settle(diffuse_nodes.between(found.passing, alpha, below, 1 / ratio))
+        staying_above = diffuse_nodes.between(found.staying, alpha, above, ratio)
+        staying_below = diffuse_nodes.between(found.staying, alpha, below, 1 / ratio)
         staying_above = settle(_balanced(staying_above, [_sum(row) for row in down]))
         staying_below = settle(_balanced(staying_below, [_sum(row) for row in up]))
         return _Exchange(down, up, staying_above, staying_below)
@@ -225,7 +227,7 @@ def _seen(rows: Sequence[Row], kept: Row, worth: Row) -> Row:
 
 def _split(values: Row) -> list[Row]:
     """The rows of several media, which follow one another."""
-    return [values[k : k + parts.COUNT] for k in range(0, len(values), parts.COUNT)]
+    return [values[k : k + diffuse_nodes.COUNT] for k in range(0, len(values), diffuse_nodes.COUNT)]
 
 
 def _added(a: Row, b: Row) -> Row:

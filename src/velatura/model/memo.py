@@ -18,7 +18,7 @@ from velatura.model.prepare import Prepared, PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.tables import curve
+from velatura.sampling import directional_grid, low_discrepancy
 
 # Reflected, and transmitted if anything is, for a direction above the surface
 Lobes = Callable[[Direction], tuple[list[Lobe], Lobe | None]]
@@ -75,14 +75,14 @@ class Memo:
 
 def sample(lobes: Lobes, prepared: Prepared, number: type, colour: type, transmits: bool) -> Memo:
     """The lobes over direction, for Dr.Jit's types of numbers and colours."""
-    shape = curve.LINE if prepared.variance is Isotropic else curve.PLANE
-    reflected, passed = lobes(curve.directions(shape, number))
+    shape = directional_grid.LINE if prepared.variance is Isotropic else directional_grid.PLANE
+    reflected, passed = lobes(directional_grid.directions(shape, number))
     seen = [*reflected, passed] if transmits and passed is not None else reflected
     facets = [lobe.facets for lobe in seen]
 
     def kept(seen: Sequence[Lobe]) -> Memo:
         held = [column for lobe in seen for column in columns(lobe, prepared, colour)]
-        return Memo(curve.curves(held, shape, number), colour, len(colour()), prepared, facets, transmits)
+        return Memo(directional_grid.curves(held, shape, number), colour, len(colour()), prepared, facets, transmits)
 
     memo = kept(seen)
     if prepared.variance is Isotropic or prepared.model.calibrations is None:
@@ -107,10 +107,10 @@ def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Va
 
 def _gains(memo: Memo, seen: Sequence[Lobe], number: type) -> list[Value]:
     """Those that give lobes their energy when they are drawn, however they are turned."""
-    x, y, z = curve.directions(memo.curves.shape, number)
-    _, u_1, u_2 = curve.evenly(len(z), NORMALS, number)
-    w = curve.repeated(x, NORMALS), curve.repeated(y, NORMALS), curve.repeated(z, NORMALS)
+    x, y, z = directional_grid.directions(memo.curves.shape, number)
+    _, u_1, u_2 = low_discrepancy.at_nodes(len(z), NORMALS, number)
+    w = low_discrepancy.repeated(x, NORMALS), low_discrepancy.repeated(y, NORMALS), low_discrepancy.repeated(z, NORMALS)
     reflected, passed = memo(w)
     drawn = [mixture.drawn(lobe, w, u_1, u_2) for lobe in [*reflected, *([passed] if passed else [])]]
-    albedos = [curve.averaged(each, NORMALS) for each in drawn]
+    albedos = [low_discrepancy.averaged(each, NORMALS) for each in drawn]
     return [ops.divide(lobe.energy if lobe.facets else 1.0, albedo) for lobe, albedo in zip(seen, albedos)]

@@ -65,7 +65,7 @@ class PreparedBase:
     """A diffuse base: albedo (a colour), index n of the medium at it over that outside, what the stack does to light.
 
     The means (colours) are those for diffuse light from below. `worth` is the share of light below the first interface
-    that reaches the base, at each node of `tables.parts`. All are known once the layers are.
+    that reaches the base, at each node of `tables.diffuse_nodes`. All are known once the layers are.
     """
 
     albedo: Value

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.tables import curve
+from velatura.sampling import directional_grid, low_discrepancy
 
 # For light from wi: a sampled direction and its weight (a colour), from three uniform numbers; the energy of all lobes
 Sampled = Callable[[Direction, Value, Value, Value], tuple[Direction, Value]]
@@ -29,7 +29,7 @@ STEPS = {False: 8, True: 24}  # more where the stack transmits: what two sides e
 class Scaling:
     """The factor, of type `colour`, over direction: above, and below where the stack transmits."""
 
-    sides: Sequence[curve.Curves]
+    sides: Sequence[directional_grid.Curves]
     colour: Callable[..., Value]
 
     def __call__(self, w: Direction) -> Value:
@@ -59,25 +59,25 @@ def balanced(
 ) -> Scaling:
     """The factors of a kernel, as constants; `number` as in `prepare`."""
     shape = LINE if isotropic else PLANE
-    x, y, z = curve.directions(shape, number)
+    x, y, z = directional_grid.directions(shape, number)
     z = ops.maximum(z, COS_MIN)
     nodes = [(x, y, z), (x, y, -z)] if transmits else [(x, y, z)]
     samples = SAMPLES if number or isotropic else SAMPLES_NUMPY
     kernels = [_kernel(sampled, energy, w, number, samples) for w in nodes]
     factors = [0 * kernel.energy + 1 for kernel in kernels]
     for _ in range(STEPS[transmits]):
-        scaling = Scaling([curve.curves(list(factor), shape, number) for factor in factors], colour)
+        scaling = Scaling([directional_grid.curves(list(factor), shape, number) for factor in factors], colour)
         factors = [_step(scaling, factor, kernel) for factor, kernel in zip(factors, kernels)]
-    return Scaling([curve.curves(list(factor), shape, number) for factor in factors], colour)
+    return Scaling([directional_grid.curves(list(factor), shape, number) for factor in factors], colour)
 
 
 def _kernel(sampled: Sampled, energy: Energy, wi: Direction, number: type | None, samples: int) -> _Kernel:
-    x, y, z = (curve.repeated(w, samples) for w in wi)
-    wo, weight = sampled((x, y, z), *curve.evenly(len(wi[2]), samples, number))
-    known, wo, weight = curve.as_constants(energy(wi), wo, weight)
+    x, y, z = (low_discrepancy.repeated(w, samples) for w in wi)
+    wo, weight = sampled((x, y, z), *low_discrepancy.at_nodes(len(wi[2]), samples, number))
+    known, wo, weight = directional_grid.as_constants(energy(wi), wo, weight)
     return _Kernel(known, wo, weight, samples)
 
 
 def _step(scaling: Scaling, factor: Value, kernel: _Kernel) -> Value:
-    leaves = factor * curve.averaged(kernel.weight * scaling(kernel.wo), kernel.samples)
+    leaves = factor * low_discrepancy.averaged(kernel.weight * scaling(kernel.wo), kernel.samples)
     return factor * ops.sqrt(ops.divide(kernel.energy, leaves))

@@ -15,7 +15,7 @@ from velatura.model.adding import Lobe
 from velatura.model.prepare import Prepared
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.tables import curve
+from velatura.sampling import directional_grid, low_discrepancy
 
 BEGIN_NM, END_NM = 360.0, 830.0  # of the wavelengths that Mitsuba renders
 NODES = 48  # over these, a multiple of those of a ray
@@ -26,7 +26,7 @@ class Side:
     """The lobes on one side: those of fixed wavelengths, and the energies of all (gains too, of lobes with facets)."""
 
     fixed: memo.Memo
-    energies: curve.Curves
+    energies: directional_grid.Curves
 
     def at(self, prepared: Prepared, mi: Any, place: Any) -> memo.Lobes:
         """The lobes at the wavelengths of a ray, by their place among all; `prepared` holds the facets there."""
@@ -57,7 +57,7 @@ class Spectra:
     fixed: bsdf.Body
     above: Side
     below: Side | None
-    means: curve.Curves | None
+    means: directional_grid.Curves | None
 
     def at(self, body: bsdf.Body, wavelengths_nm: Any) -> bsdf.Body:
         """The body for a ray, with what was sampled."""
@@ -84,7 +84,7 @@ def sample(mi: Any, fixed: bsdf.Body, body_at: Callable[[Any], bsdf.Body]) -> Sp
     base, means = body_at(_all_wavelengths(mi)).above.base, None
     if base is not None:
         columns = [_over_wavelengths(mi, x, 1) for x in base.means]
-        means = curve.curves(columns, (NODES,), mi.Float)
+        means = directional_grid.curves(columns, (NODES,), mi.Float)
     return Spectra(mi, fixed, above, below, means)
 
 
@@ -94,18 +94,18 @@ def _side(mi: Any, fixed: memo.Lobes, lobes_at: Callable[[Any], memo.Lobes]) -> 
     # See every direction at all wavelengths
     assert isinstance(fixed, memo.Memo)
     shape = fixed.curves.shape
-    w = curve.directions(shape, mi.Float)
+    w = directional_grid.directions(shape, mi.Float)
     count, none = dr.width(w[2]), dr.zeros(mi.Float, dr.width(w[2]))
     wavelengths = _all_wavelengths(mi, count)
     rays = dr.width(wavelengths) // count
-    x, y, z = (curve.repeated(c + none, rays) for c in w)
+    x, y, z = (low_discrepancy.repeated(c + none, rays) for c in w)
     reflected, passed = lobes_at(wavelengths)((x, y, z))
 
     # Keep what depends on them
     seen = [*reflected, *([passed] if fixed.transmits and passed else [])]
     columns = [c for lobe in seen for c in ([lobe.energy, lobe.gain] if lobe.facets else [lobe.energy])]
     flat = [_over_wavelengths(mi, column, count) for column in columns]
-    return Side(fixed, curve.curves(flat, (*shape, NODES), mi.Float))
+    return Side(fixed, directional_grid.curves(flat, (*shape, NODES), mi.Float))
 
 
 def _all_wavelengths(mi: Any, times: int = 1) -> Any:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.optics import ggx
+from velatura.sampling.low_discrepancy import square
 
 Array = NDArray[np.floating]
 
@@ -44,8 +45,7 @@ def medians(x: Array, weight: Array, radial: bool) -> tuple[Array, Array]:
 
 def of_reflection(wi: Array, alpha: Array, radial: bool) -> Array:
     """`medians` of a single GGX reflection (F = 1) of light from `wi`, in the frame of the roughness alpha (2,)."""
-    i = np.arange(_NORMALS)
-    u1, u2 = (0.5 + i * 0.7548776662466927) % 1, (0.5 + i * 0.5698402909980532) % 1  # Roberts 2018
+    u1, u2 = square(_NORMALS)
     (x, y, z), (alpha_u, alpha_v) = wi, alpha
     h = ggx.sample_visible((x, y, z), alpha_u, alpha_v, u1, u2)
     weight = ggx.masking(ggx.reflect((x, y, z), h), alpha_u, alpha_v)

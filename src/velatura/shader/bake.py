@@ -20,11 +20,11 @@ from velatura.model.sides import turned_over, with_index_below
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
+from velatura.sampling import directional_grid
 from velatura.shader import glsl
 from velatura.shader.symbol import Operand, Symbol, component, number, operand
 from velatura.shader.tape import Tape, tape
 from velatura.stack import Stack
-from velatura.tables import curve
 
 _OF_BASE = 6  # columns: its scale and its energy
 PLANE = (95, 49)  # nodes over the cosine, twice as dense as those of most tables, and the azimuth
@@ -113,8 +113,8 @@ def _reader(group: Group) -> str:
 
 def bake(stack: Stack, values: Mapping[str, Value], body: bsdf.Body) -> Bake:
     """The lobes of a body, recorded from values by flat name, over direction."""
-    nodes = curve.LINE if body.above.variance is Isotropic else PLANE
-    w = curve.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
+    nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
+    w = directional_grid.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
 
     # Work out what is seen of a direction
     columns, facets = _seen(stack, values, body, w)
@@ -174,7 +174,7 @@ class _Texture:
     begin: int = 0
 
     def __call__(self, w: Direction) -> Iterable[Value]:
-        at = [operand(x) for x in (*curve.places(w, len(self.shape)), 0.0, self.side)]
+        at = [operand(x) for x in (*directional_grid.places(w, len(self.shape)), 0.0, self.side)]
         texels = Symbol("baked", (at[0], at[1], at[-1]), "texels", self.group)
         channels = range(self.begin, 4 * self.group.texels)
         return [Symbol("component", (texels,), "number", channel) for channel in channels]

@@ -16,7 +16,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.tables import coordinates
-from velatura.tables.sheet import Average, sample
+from velatura.tables.material_average import Average, sample
 from velatura.tables.store import Table, Tables
 
 FEW = 256  # numbers of which NumPy takes longer to begin with than to work out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi, prod
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.tables import coordinates
+from velatura.sampling.low_discrepancy import integers
 
 LINE = (512,)  # nodes, where functions depend on the cosine alone
 SINE_MIN = 1e-6  # so that there is an azimuth at the normal
@@ -37,21 +37,21 @@ class Curves:
 
 def directions(shape: tuple[int, ...], number: type | None) -> Direction:
     """Those at the nodes, for Dr.Jit's type of numbers (None for NumPy). Shape: (cosines,) or (cosines, azimuths)."""
-    index, real = _index(prod(shape), number)
+    index, real = integers(prod(shape), number)
     turns = prod(shape[1:])
     return direction(real(index // turns) / (shape[0] - 1), real(index % turns) / max(turns - 1, 1))
 
 
 def direction(x: Value, t: Value) -> Direction:
-    """The direction at coordinates from 0 to 1, of its cosine and of its azimuth, which tells even at the normal."""
-    cosine, phi = coordinates.to_cosine(x), _to_azimuth(t)
+    """The direction at coordinates from 0 to 1: the root of its cosine, and its azimuth, defined at the normal too."""
+    cosine, phi = x * x, _to_azimuth(t)
     sine = ops.maximum(ops.sqrt(1 - cosine * cosine), SINE_MIN)
     return sine * ops.cos(phi), sine * ops.sin(phi), cosine
 
 
 def places(w: Direction, axes: int) -> list[Value]:
     """The coordinates of a direction, on one axis or two."""
-    return [coordinates.from_cosine(w[2]), *([_from_azimuth(w[0], w[1])] if axes > 1 else [])]
+    return [ops.sqrt(w[2]), *([_from_azimuth(w[0], w[1])] if axes > 1 else [])]
 
 
 def curves(columns: Sequence[Value], shape: tuple[int, ...], number: type | None) -> Curves:
@@ -77,16 +77,6 @@ def curves(columns: Sequence[Value], shape: tuple[int, ...], number: type | None
     return Curves(kind(tensor, use_accel=False, wrap_mode=dr.WrapMode.Clamp), shape)
 
 
-def _index(count: int, number: type | None) -> tuple[Value, Callable[[Value], Value]]:
-    """Integers from 0, and what makes real numbers of them."""
-    if number is None:
-        return np.arange(count, dtype=np.uint32), lambda x: x.astype(float)
-    import drjit as dr
-
-    dialect: Any = sys.modules[number.__module__]
-    return dr.arange(dialect.UInt32, count), number
-
-
 # Azimuths from 0 to pi as 0 to 1, without trigonometry: along the sides of a square instead of a circle
 
 
@@ -101,37 +91,6 @@ def _to_azimuth(t: Value) -> Value:
     p = ops.select(back, 4 * t - 3, 1 - 4 * t)
     s = 1 - ops.absolute(p)
     return 0.5 * ops.arctan2(ops.select(back, -s, s), p) + ops.select(back, pi, 0.0)
-
-
-# Means over as many samples for every node
-
-
-def evenly(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:
-    """Three uniform numbers for every sample, the same at all nodes, that fill the cube evenly, the last two the square
-    (Roberts 2018)."""
-    index, real = _index(nodes * samples, number)
-    i = index % samples
-    # Fractions of i x 0.7549 and i x 0.5698, from integers that overflow
-    u_1, u_2 = (real(i * step + 2**31) / 2**32 for step in (3242174889, 2447445414))
-    return (real(i) + 0.5) / samples, u_1, u_2
-
-
-def repeated(values: Value, samples: int) -> Value:
-    """Numbers or colours at the nodes, each as often as there are samples."""
-    if isinstance(values, (float, int, np.ndarray)):
-        return np.repeat(values, samples, axis=-1) if np.ndim(values) else values
-    import drjit as dr
-
-    return dr.repeat(values, samples)
-
-
-def averaged(values: Value, samples: int) -> Value:
-    """Means over the samples of each node."""
-    if isinstance(values, np.ndarray):
-        return values.reshape(*values.shape[:-1], -1, samples).mean(axis=-1)
-    import drjit as dr
-
-    return dr.block_sum(values, samples) / samples
 
 
 def as_constants(*values: Any) -> tuple[Any, ...]:

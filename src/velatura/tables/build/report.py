@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from velatura.optics import fresnel
-from velatura.tables import exchange, parts, stretched, walks, yardstick
+from velatura.tables import anisotropic_albedo, diffuse_nodes
+from velatura.tables.build import belcour_grid, diffuse_matrices, microsurface_walks
+from velatura.tables.build.anisotropic_albedo import albedo
 from velatura.tables.build import build
 from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, tir
-from velatura.tables.many import bin_cosines
-from velatura.tables.once import mean_transmittance_out, share_in_cone
-from velatura.tables.quadrature import Progress, Reflections, average, ignore
+from velatura.tables.build.multiple_scattering import bin_cosines
+from velatura.tables.build.single_scattering import mean_transmittance_out, share_in_cone
+from velatura.tables.build.quadrature import Progress, Reflections, average, ignore
 from velatura.tables.store import Table, Tables
 
 POINTS = 2000  # per table
@@ -54,8 +56,8 @@ def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
 
     def drawn() -> np.ndarray:
         x, y = alpha[:WALKED], 0.02 + 0.98 * eta[:WALKED]
-        truth = stretched.albedo(cos_theta[:WALKED, None], x[:, None], y[:, None], 1 << 17)
-        return stretched.drawn_albedo(tables, cos_theta[:WALKED], x, y) - truth
+        truth = albedo(cos_theta[:WALKED, None], x[:, None], y[:, None], 1 << 17)
+        return anisotropic_albedo.drawn_albedo(tables, cos_theta[:WALKED], x, y) - truth
 
     def many(row: Row, eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
         return fgd(tables, row, cos_theta, alpha)[:WALKED] - _albedo_many(eta, kappa)
@@ -94,36 +96,36 @@ def _measures_of_parts(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
 
     def left(found: np.ndarray, n: np.ndarray) -> np.ndarray:
         """Of parts, shape (nodes, points)."""
-        return np.asarray((found * np.exp(-0.5 / np.array(parts.node_cosines(n)))).sum(axis=0))
+        return np.asarray((found * np.exp(-0.5 / np.array(diffuse_nodes.node_cosines(n)))).sum(axis=0))
 
     def entering() -> np.ndarray:
         true = [
-            exchange.scattered(cos_theta[i : i + 1], alpha[i], (1.0, n[i]), PATHS, np.random.default_rng(2))[1][0]
+            diffuse_matrices.scattered(cos_theta[i : i + 1], alpha[i], (1.0, n[i]), PATHS, np.random.default_rng(2))[1][0]
             for i in range(WALKED)
         ]
-        return left(np.array([x / x.sum() for x in true]).T - parts.entering(tables, cos_theta, alpha, n), n)
+        return left(np.array([x / x.sum() for x in true]).T - diffuse_nodes.entering(tables, cos_theta, alpha, n), n)
 
     def evenly(which: int, rows: Sequence[Sequence[np.ndarray]], beyond: np.ndarray) -> np.ndarray:
-        even = np.array(parts.even(n))
-        true = [exchange.exchanged(alpha[i], (n[i], beyond[i]), PATHS // 16, [4])[which] for i in range(WALKED)]
+        even = np.array(diffuse_nodes.even(n))
+        true = [diffuse_matrices.exchanged(alpha[i], (n[i], beyond[i]), PATHS // 16, [4])[which] for i in range(WALKED)]
         error = np.moveaxis(np.array(true), 0, -1) - np.array(rows)
         return left(np.einsum("ji,jki->ki", even, error), beyond if which else n)
 
     return {
         "entering": entering,
-        "returning": lambda: evenly(0, parts.returning(tables, alpha, n), np.ones_like(n)),
-        "passing": lambda: evenly(1, parts.between(tables.passing, alpha, n, other / n), other),
-        "staying": lambda: evenly(0, parts.between(tables.staying, alpha, n, other / n), other),
+        "returning": lambda: evenly(0, diffuse_nodes.returning(tables, alpha, n), np.ones_like(n)),
+        "passing": lambda: evenly(1, diffuse_nodes.between(tables.passing, alpha, n, other / n), other),
+        "staying": lambda: evenly(0, diffuse_nodes.between(tables.staying, alpha, n, other / n), other),
     }
 
 
 def _yardstick_row() -> dict[str, Any]:
     start = perf_counter()
-    grid = yardstick.build()
+    grid = belcour_grid.build()
     seconds = perf_counter() - start
     cos_theta, alpha, eta, kappa = _points()
     eta, kappa = 0.05 + 3.95 * eta, 4 * kappa
-    return _row("yardstick", grid, seconds, yardstick.fgd(grid, cos_theta, alpha, eta, kappa) - _albedo(eta, kappa))
+    return _row("yardstick", grid, seconds, belcour_grid.fgd(grid, cos_theta, alpha, eta, kappa) - _albedo(eta, kappa))
 
 
 def _points() -> tuple[np.ndarray, ...]:
@@ -148,9 +150,9 @@ def _albedo_many(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
         point = slice(i, i + 1)
         if kappa[i] > 0:
             curve = fresnel.conductor(bin_cosines(), eta[point], kappa[point])
-            later.append(walks.reflected_by_metals(cos_theta[i], alpha[i], curve, PATHS, rng)[0])
+            later.append(microsurface_walks.reflected_by_metals(cos_theta[i], alpha[i], curve, PATHS, rng)[0])
         else:
-            later.append(walks.reflected_later(cos_theta[point], alpha[point], eta[point], PATHS, rng))
+            later.append(microsurface_walks.reflected_later(cos_theta[point], alpha[point], eta[point], PATHS, rng))
     return _albedo(eta, kappa, correlated=True)[:WALKED] + np.concatenate(later)
 
 

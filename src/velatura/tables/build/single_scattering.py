@@ -22,7 +22,7 @@ from scipy.stats import qmc
 
 from velatura.optics import fresnel
 from velatura.tables import coordinates
-from velatura.tables.quadrature import Progress, Reflections, average, ignore
+from velatura.tables.build.quadrature import Progress, Reflections, average, ignore
 from velatura.tables.store import Table
 
 PLANE = (48, 48)  # nodes over cosine and roughness

@@ -7,7 +7,7 @@ import numpy as np
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.tables.once import Progress, density_over_plane, fine_cosines
+from velatura.tables.build.single_scattering import Progress, density_over_plane, fine_cosines
 from velatura.tables.store import Table
 
 NODES = 64

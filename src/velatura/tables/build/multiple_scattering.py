@@ -22,9 +22,10 @@ from scipy.interpolate import BSpline
 from scipy.linalg import lstsq
 
 from velatura.optics import fresnel
-from velatura.tables import coordinates, once, walks
-from velatura.tables.once import ABSORBING, ABSORBING_ANGLES, ALPHA_MIN, COS_MIN, FINE, INSIDE
-from velatura.tables.quadrature import Progress, Reflections, average
+from velatura.tables import coordinates
+from velatura.tables.build import microsurface_walks, single_scattering
+from velatura.tables.build.single_scattering import ABSORBING, ABSORBING_ANGLES, ALPHA_MIN, COS_MIN, FINE, INSIDE
+from velatura.tables.build.quadrature import Progress, Reflections, average
 from velatura.tables.store import Table
 
 DIELECTRIC_POWERS = {1: 8, 2: 3, 3: 2}  # how many angles Fresnel is raised to each power at, besides grazing
@@ -44,7 +45,7 @@ BINS = 512  # of the cosine, for walks on metals
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
     """What makes each table."""
-    conductors = once.conductors()
+    conductors = single_scattering.conductors()
     some = slice(None, None, 4)
     smooth = conductors[0][some], conductors[1][some]
     later = cache(lambda: _metals(np.concatenate([smooth[0], _corner()[0]]), np.concatenate([smooth[1], _corner()[1]])))
@@ -61,7 +62,7 @@ def makers() -> dict[str, Callable[[Progress], Table]]:
 
 
 def _first(weights: np.ndarray, eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
-    return weights @ fresnel.conductor(once.fine_cosines()[:, None], eta, kappa)
+    return weights @ fresnel.conductor(single_scattering.fine_cosines()[:, None], eta, kappa)
 
 
 def _plane_nodes() -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +91,7 @@ def _walk(cos_theta: np.ndarray, alpha: np.ndarray, eta: np.ndarray, paths: int,
     def block(start: int) -> np.ndarray:
         points = slice(start, start + BLOCK)
         rng = np.random.default_rng([len(alpha), start])
-        return walks.reflected_later(cos_theta[points], alpha[points], eta[points], paths, rng)
+        return microsurface_walks.reflected_later(cos_theta[points], alpha[points], eta[points], paths, rng)
 
     results = []
     with ThreadPoolExecutor(2) as pool:
@@ -112,7 +113,7 @@ def _dielectric(progress: Progress) -> Table:
     fit = lstsq(_basis(cos_theta, alpha), later.reshape(-1, INDICES))[0]
 
     # Read the fit at the nodes of the table, for many indices
-    eta, kappa = once.dielectrics()
+    eta, kappa = single_scattering.dielectrics()
     at = chebvander(2 * coordinates.from_critical_angle(np.arcsin(1 / eta)) - 1, INDEX_DEGREE)
     fit = fit @ (at @ np.linalg.pinv(chebvander(2 * z - 1, INDEX_DEGREE))).T
     albedo = _over_plane(eta, kappa, fit)
@@ -121,19 +122,19 @@ def _dielectric(progress: Progress) -> Table:
 
 def _over_plane(eta: np.ndarray, kappa: np.ndarray, fit: np.ndarray) -> np.ndarray:
     """Albedos at the nodes of a low-rank table, shape (nodes, indices)."""
-    c, a = (axis.ravel() for axis in np.meshgrid(*once.plane(), indexing="ij"))
-    weights = once.density_over_plane("cos_d", *once.plane(), correlated=True).reshape(-1, FINE)
+    c, a = (axis.ravel() for axis in np.meshgrid(*single_scattering.plane(), indexing="ij"))
+    weights = single_scattering.density_over_plane("cos_d", *single_scattering.plane(), correlated=True).reshape(-1, FINE)
     return _first(weights, eta, kappa) + _basis(np.maximum(c, COS_MIN), np.maximum(a, ALPHA_MIN)) @ fit
 
 
 def _low_rank(albedo: np.ndarray, eta: np.ndarray, kappa: np.ndarray, counts: dict[int, int]) -> Table:
     """Angles for each power by pivoted QR, then U by least squares."""
-    curves = fresnel.conductor(once.fine_cosines()[:, None], eta, kappa)
-    chosen = [(n, i) for n, count in counts.items() for i in once.choose_angles(1 - curves**n, count)]
+    curves = fresnel.conductor(single_scattering.fine_cosines()[:, None], eta, kappa)
+    chosen = [(n, i) for n, count in counts.items() for i in single_scattering.choose_angles(1 - curves**n, count)]
     u = lstsq(np.stack([1 - curves[i] ** n for n, i in chosen], axis=1), (1 - albedo).T, cond=1e-4)[0].T
-    data = np.column_stack([1 - u.sum(axis=1), u]).reshape(*once.PLANE, -1)
-    nodes = (0.0, *(float(once.fine_cosines()[i]) for _, i in chosen))
-    return Table(once.closest_interpolant(data).astype(np.float32), nodes, (1, *(n for n, _ in chosen)))
+    data = np.column_stack([1 - u.sum(axis=1), u]).reshape(*single_scattering.PLANE, -1)
+    nodes = (0.0, *(float(single_scattering.fine_cosines()[i]) for _, i in chosen))
+    return Table(single_scattering.closest_interpolant(data).astype(np.float32), nodes, (1, *(n for n, _ in chosen)))
 
 
 # --- metals -------------------------------------------------------------------------------------------------------
@@ -155,7 +156,7 @@ def _metals(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
 
     def point(i: int) -> np.ndarray:
         rng = np.random.default_rng([len(eta), i])
-        energy, of_mirror = walks.reflected_by_metals(cos_theta[i], alpha[i], curves, PATHS_METAL, rng)
+        energy, of_mirror = microsurface_walks.reflected_by_metals(cos_theta[i], alpha[i], curves, PATHS_METAL, rng)
         return energy * (truth[i] + 0.01) / (of_mirror + 0.01)
 
     with ThreadPoolExecutor(2) as pool:
@@ -174,7 +175,7 @@ def _corner() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _absorbing_inside(fit: np.ndarray, progress: Progress) -> Table:
-    cos_theta, alpha, theta_c = (axis.reshape(ABSORBING) for axis in once.points_inside(ABSORBING))
+    cos_theta, alpha, theta_c = (axis.reshape(ABSORBING) for axis in single_scattering.points_inside(ABSORBING))
     etas, kappas, fits = (x.reshape(-1, ABSORBING[2], 16) for x in (*_corner(), fit))
     channels = [(1, x) for x in ABSORBING_ANGLES] + list(ABSORBING_POWERS)
     slices = []
@@ -183,7 +184,7 @@ def _absorbing_inside(fit: np.ndarray, progress: Progress) -> Table:
         eta, kappa = etas[0, i], kappas[0, i]
 
         def density(r: Reflections, eta: np.ndarray) -> np.ndarray:
-            return once.density(r, "cos_d")
+            return single_scattering.density(r, "cos_d")
 
         first = _first(average(density, "cos_d", c, a, np.full(c.size, eta[0]), correlated=True), eta, kappa)
         albedo = first + _basis(c, a) @ fits[:, i]
@@ -192,7 +193,7 @@ def _absorbing_inside(fit: np.ndarray, progress: Progress) -> Table:
         progress((i + 1) / len(theta_c[0, 0]))
     data = np.stack(slices, axis=1).reshape(*ABSORBING, -1)
     powers, nodes = zip(*channels)
-    return Table(once.closest_interpolant(data).astype(np.float32), nodes, powers)
+    return Table(single_scattering.closest_interpolant(data).astype(np.float32), nodes, powers)
 
 
 # --- relative indices below 1 -------------------------------------------------------------------------------------
@@ -200,7 +201,7 @@ def _absorbing_inside(fit: np.ndarray, progress: Progress) -> Table:
 
 def _inside(progress: Progress) -> Table:
     # What the first meeting reflects, at the nodes of the table
-    cos_theta, alpha, theta_c = once.points_inside(INSIDE)
+    cos_theta, alpha, theta_c = single_scattering.points_inside(INSIDE)
 
     def reflected(r: Reflections, eta: np.ndarray) -> np.ndarray:
         return (r.weight * fresnel.dielectric(r.cos_d, eta)).sum(axis=1)
@@ -229,7 +230,7 @@ def _inside(progress: Progress) -> Table:
         carry = _splines(v, count) @ np.linalg.pinv(_splines(u, count))
         later = np.moveaxis(np.tensordot(carry, later, (1, axis)), 0, axis)
     values = (first.reshape(INSIDE) + later)[..., None]
-    return Table(np.clip(once.closest_interpolant(values), 0, 1).astype(np.float32))
+    return Table(np.clip(single_scattering.closest_interpolant(values), 0, 1).astype(np.float32))
 
 
 def _towards_one(t: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Integrate the averages of Fresnel over GGX interfaces and compress them.
 
-Of single reflections (`once`):
+Of single reflections (`single_scattering`):
 
     dielectric              U at 8 angles, for relative indices above 1
     conductor               U at 12 angles, for kappa >= eta, and for eta >= 1 with any kappa
@@ -10,18 +10,18 @@ Of single reflections (`once`):
     tir_published_outside   its U at 8 angles, for relative indices above 1
     tir_clean               energy fraction reflected within the critical cone
 
-Of lobes with two roughnesses (`stretched`):
+Of lobes with two roughnesses (`anisotropic_albedo`):
 
     drawn                   the albedo of a mirror, over the cosine and both roughnesses
 
-Of light that may bounce between the facets (`many`), as U at angles where Fresnel is raised to powers:
+Of light that may bounce between the facets (`multiple_scattering`), as U at angles where Fresnel is raised to powers:
 
     dielectric_multi        14 channels, for relative indices above 1
     conductor_multi         18 channels, for the same metals as `conductor`
     absorbing_inside_multi  12 channels, for kappa < eta < 1
     inside_multi            the energy itself, of dielectrics of relative index below 1
 
-Of diffuse light, by parts in a few directions (`parts`, `exchange`):
+Of diffuse light, by parts in a few directions (`velatura.tables.diffuse_nodes`, `diffuse_matrices`):
 
     entering, returning     what the first interface lets in, and sends back from below
     passing, staying        what others let through, and send back
@@ -33,8 +33,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-from velatura.tables import exchange, many, once, stretched
-from velatura.tables.quadrature import Progress, ignore
+from velatura.tables.build import anisotropic_albedo, diffuse_matrices, multiple_scattering, single_scattering
+from velatura.tables.build.quadrature import Progress, ignore
 from velatura.tables.store import Table, Tables
 
 
@@ -65,4 +65,5 @@ def build(progress: Progress = ignore) -> Built:
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
     """What makes each table."""
-    return {**once.makers(), **stretched.makers(), **many.makers(), **exchange.makers()}
+    parts = single_scattering, anisotropic_albedo, multiple_scattering, diffuse_matrices
+    return {name: make for part in parts for name, make in part.makers().items()}

@@ -1,0 +1,1 @@
+"""Functions sampled over directions, and the numbers to sample with."""

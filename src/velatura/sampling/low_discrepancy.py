@@ -1,0 +1,63 @@
+"""Numbers that are spread evenly: for means over a unit square, alone or at each node of a grid (Roberts 2018)."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from velatura.ops import Value
+
+STEPS = (0.7548776662466927, 0.5698402909980532)  # 1/p and 1/p^2 of the plastic number p
+_OF_32_BITS = (3242174889, 2447445414)  # the same as shares of 2^32
+
+
+@functools.cache
+def square(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of numbers in [0, 1), (count,) each; not to be written to."""
+    i = np.arange(count)
+    pairs = [(0.5 + i * step) % 1 for step in STEPS]
+    for numbers in pairs:
+        numbers.flags.writeable = False
+    return pairs[0], pairs[1]
+
+
+def at_nodes(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:
+    """Three uniform numbers for every sample, the same at all nodes, that fill the cube evenly, the last two the
+    square."""
+    index, real = integers(nodes * samples, number)
+    i = index % samples
+    # Products of integers that overflow are fractions
+    u_1, u_2 = (real(i * step + 2**31) / 2**32 for step in _OF_32_BITS)
+    return (real(i) + 0.5) / samples, u_1, u_2
+
+
+def repeated(values: Value, samples: int) -> Value:
+    """Numbers or colours at the nodes, each as often as there are samples."""
+    if isinstance(values, (float, int, np.ndarray)):
+        return np.repeat(values, samples, axis=-1) if np.ndim(values) else values
+    import drjit as dr
+
+    return dr.repeat(values, samples)
+
+
+def averaged(values: Value, samples: int) -> Value:
+    """Means over the samples of each node."""
+    if isinstance(values, np.ndarray):
+        return values.reshape(*values.shape[:-1], -1, samples).mean(axis=-1)
+    import drjit as dr
+
+    return dr.block_sum(values, samples) / samples
+
+
+def integers(count: int, number: type | None) -> tuple[Value, Callable[[Value], Value]]:
+    """Integers from 0, and what makes real numbers of them; for Dr.Jit's type of numbers, or None for NumPy."""
+    if number is None:
+        return np.arange(count, dtype=np.uint32), lambda x: x.astype(float)
+    import drjit as dr
+
+    dialect: Any = sys.modules[number.__module__]
+    return dr.arange(dialect.UInt32, count), number
