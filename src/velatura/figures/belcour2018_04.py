@@ -79,6 +79,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     figure = canvas.canvas(9, 4.2)
     left, right = figure.subplots(1, 2)
     draw_curves(left, numbers, "variance", "belcour")
+    draw_key(figure, left)
     alpha = np.linspace(0, 0.95, 200)
     right.plot(alpha, MAPS["belcour"].variance(alpha), color="C0")
     right.set(title="the map of Belcour 2018", xlabel="alpha", ylabel="f", ylim=(0, 10))
@@ -93,6 +94,15 @@ def draw_curves(axes: Any, numbers: dict[str, Any], width: str, name: str, top: 
         axes.plot(numbers["second"], curve[name], color=colour, linestyle="--", linewidth=1)
     title = f"by {width} (dashed: {name}'s map)"
     axes.set(title=title, xlabel="alpha of the second surface", ylabel="equivalent alpha", xlim=(0, top), ylim=(0, top))
+
+
+def draw_key(figure: Any, axes: Any) -> None:
+    """Which colour of `draw_curves` is which first surface."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap
+
+    colours = ScalarMappable(cmap=LinearSegmentedColormap.from_list("first", ("red", "blue")))
+    figure.colorbar(colours, ax=axes, label="alpha of the first surface")
 
 
 if __name__ == "__main__":

@@ -62,7 +62,8 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     axes = figure.subplots()
     for name, colour in (("reflected", "C3"), ("refracted", "C0")):
         axes.plot(numbers["sine"], numbers[name], color=colour, label=f"{name}, width {numbers['width'][name]:.3f}")
-    axes.set(title=f"index {ETA:g}, alpha {ALPHA:g}, incidence {ANGLE:g}°", xlabel="sine of the outgoing angle")
+    axes.set(xlabel="sine of the outgoing angle", ylabel="energy per area of the disc, over its highest")
+    axes.set_title(f"index {ETA:g}, alpha {ALPHA:g}, incidence {ANGLE:g}°")
     axes.legend()
     canvas.save(figure, path)
 

@@ -77,7 +77,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             canvas.show(column[2 * n + 1], seen[form], f"{form}, variation {cell['total_variation'][form]:.2f}")
             error = canvas.error_label(cell, form)
             drawn = canvas.show_difference(column[2 * n + 2], seen[form], seen["reference"], 0.2, error)
-    figure.colorbar(drawn, ax=axes[-1, :], shrink=0.8, label="minus the reference")
+    figure.colorbar(drawn, ax=axes, shrink=0.3, label="minus the reference")
     canvas.save(figure, path)
 
 

@@ -79,7 +79,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         drawn = axes.imshow(image, origin="lower", extent=(-1, 1, -1, 1), cmap="viridis", vmin=0, vmax=0.4)
         error = numbers["error"].get(name)
         axes.set_title(f"{name}: error {error[0]:.3f}" if error else name, fontsize="medium")
-        axes.set(xticks=(), yticks=())
+        axes.set(xticks=(-1, 0, 1), yticks=(-1, 0, 1), xlabel="x of incidence", ylabel="y, along the rougher axis")
     figure.colorbar(drawn, ax=row, shrink=0.8, label="albedo")
     canvas.save(figure, path)
 

@@ -68,7 +68,7 @@ def _plain(values: Array) -> list[list[float | None]]:
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Variance, inverse and equivalent roughness, along x, and below the last what the maps say.
+    """Variance, inverse and equivalent roughness, along x, and below what the maps give for the last; grey is unknown.
 
     Raises:
         InvalidInput: the file cannot be written.
@@ -81,12 +81,13 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         (rows[0, 1], numbers["inverse"], top, "(b) alpha along x by variances"),
         (rows[0, 2], numbers["equivalent"], 1.0, "(c) equivalent alpha along x"),
         *(
-            (axes, numbers["predicted"][n], 1.0, f"{n}: error {numbers['error'][n]:.4f}")
+            (axes, numbers["predicted"][n], 1.0, f"(c) by {n}, rms {numbers['error'][n]:.4f} up to {LOW:g}")
             for axes, n in zip(rows[1], NAMES)
         ),
     )
     for axes, values, bound, title in plots:
         image = np.array(values, float).T
+        axes.set_facecolor("0.8")
         drawn = axes.pcolormesh(*[np.linspace(0, bound, len(image))] * 2, image, cmap="viridis", vmin=0)
         axes.set(title=title, xlabel="along x", ylabel="along y", aspect="equal")
         figure.colorbar(drawn, ax=axes)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from velatura.figures import canvas
-from velatura.figures.belcour2018_04 import NAMES, compute, draw_curves
+from velatura.figures.belcour2018_04 import NAMES, compute, draw_curves, draw_key
 
 __all__ = ["compute", "draw"]
 
@@ -23,9 +23,11 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         InvalidInput: the file cannot be written.
     """
     figure = canvas.canvas(15, 8)
-    for row, width in zip(figure.subplots(2, 4), ("variance", "median")):
+    rows = figure.subplots(2, 4)
+    for row, width in zip(rows, ("variance", "median")):
         for n, (top, name) in enumerate((top, name) for top in (1.0, LOW) for name in NAMES):
             draw_curves(row[n], numbers, width, name, top)
+    draw_key(figure, rows)
     canvas.save(figure, path)
 
 
