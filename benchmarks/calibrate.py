@@ -41,11 +41,10 @@ OUTLYING = 0.08  # logarithm of a ratio beyond which it counts less
 LARGEST = {"rare": 1.0, "entering": 5.0}  # of constants that have an upper bound
 
 RIVALS: dict[str, dict[str, Any]] = {
-    "velatura": {"model": "velatura"},
-    "belcour2018": {"model": "belcour2018"},
     "belcour2018, fresnel, no TIR": {"model": "belcour2018", "reflectance": "fresnel", "tir": "off"},
     "weier2020": {"model": "weier2020"},
 }
+AVERAGED = ("velatura", "belcour2018", "bati2021")  # take the reflectance that the walks have
 
 
 def random_stack(rng: np.random.Generator, number: int) -> Stack:
@@ -184,7 +183,7 @@ def main() -> None:
             print(f"{name:20s}{value:10.4f} +- {getattr(sigma, name):.4f}")
         CALIBRATIONS[options.reflectance] = best  # of which the report is
     print(f"{len(truths[1::2])} stacks held out")
-    report(truths[1::2], {**RIVALS, "velatura": {"model": "velatura", "reflectance": options.reflectance}})
+    report(truths[1::2], {name: {"model": name, "reflectance": options.reflectance} for name in AVERAGED} | RIVALS)
 
 
 if __name__ == "__main__":
