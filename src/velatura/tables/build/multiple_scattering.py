@@ -24,8 +24,8 @@ from scipy.linalg import lstsq
 from velatura.optics import fresnel
 from velatura.tables import coordinates
 from velatura.tables.build import microsurface_walks, single_scattering
-from velatura.tables.build.single_scattering import ABSORBING, ABSORBING_ANGLES, ALPHA_MIN, COS_MIN, FINE, INSIDE
 from velatura.tables.build.quadrature import Progress, Reflections, average
+from velatura.tables.build.single_scattering import ABSORBING, ABSORBING_ANGLES, ALPHA_MIN, COS_MIN, FINE, INSIDE
 from velatura.tables.store import Table
 
 DIELECTRIC_POWERS = {1: 8, 2: 3, 3: 2}  # how many angles Fresnel is raised to each power at, besides grazing
@@ -123,7 +123,9 @@ def _dielectric(progress: Progress) -> Table:
 def _over_plane(eta: np.ndarray, kappa: np.ndarray, fit: np.ndarray) -> np.ndarray:
     """Albedos at the nodes of a low-rank table, shape (nodes, indices)."""
     c, a = (axis.ravel() for axis in np.meshgrid(*single_scattering.plane(), indexing="ij"))
-    weights = single_scattering.density_over_plane("cos_d", *single_scattering.plane(), correlated=True).reshape(-1, FINE)
+    weights = single_scattering.density_over_plane("cos_d", *single_scattering.plane(), correlated=True).reshape(
+        -1, FINE
+    )
     return _first(weights, eta, kappa) + _basis(np.maximum(c, COS_MIN), np.maximum(a, ALPHA_MIN)) @ fit
 
 

@@ -10,13 +10,12 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.tables import anisotropic_albedo, diffuse_nodes
-from velatura.tables.build import belcour_grid, diffuse_matrices, microsurface_walks
+from velatura.tables.build import belcour_grid, build, diffuse_matrices, microsurface_walks
 from velatura.tables.build.anisotropic_albedo import albedo
-from velatura.tables.build import build
-from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, tir
 from velatura.tables.build.multiple_scattering import bin_cosines
-from velatura.tables.build.single_scattering import mean_transmittance_out, share_in_cone
 from velatura.tables.build.quadrature import Progress, Reflections, average, ignore
+from velatura.tables.build.single_scattering import mean_transmittance_out, share_in_cone
+from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, tir
 from velatura.tables.store import Table, Tables
 
 POINTS = 2000  # per table
@@ -100,7 +99,9 @@ def _measures_of_parts(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
 
     def entering() -> np.ndarray:
         true = [
-            diffuse_matrices.scattered(cos_theta[i : i + 1], alpha[i], (1.0, n[i]), PATHS, np.random.default_rng(2))[1][0]
+            diffuse_matrices.scattered(cos_theta[i : i + 1], alpha[i], (1.0, n[i]), PATHS, np.random.default_rng(2))[1][
+                0
+            ]
             for i in range(WALKED)
         ]
         return left(np.array([x / x.sum() for x in true]).T - diffuse_nodes.entering(tables, cos_theta, alpha, n), n)
