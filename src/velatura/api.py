@@ -144,8 +144,10 @@ def check(
     def made(thing: Any) -> Any:
         return bsdf(thing, model, **switches) if isinstance(thing, Material) else thing
 
+    subject = "BSDF"
     if isinstance(material, Material):
         material = load(material)
+        subject = f"{material.name or 'material'} ({model if isinstance(model, str) else model.name})"
         lossless = lossless or _lossless(material)
     return checks.check(
         made(material),
@@ -153,6 +155,7 @@ def check(
         lossless=lossless,
         expected=made(expected),
         plots=plots,
+        subject=subject,
         progress=progress,
     )
 

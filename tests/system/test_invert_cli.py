@@ -153,7 +153,7 @@ def test_the_model_is_named_where_it_is_not_the_one_that_renders(run: Run, folde
     for arguments in (
         ["invert", "pair.yaml"],
         ["coat", "coated-gold"],
-        ["simplify", "coated-gold", "--interfaces", "1"],
+        ["simplify", "frosted-metal", "--interfaces", "1"],
     ):
         assert line in run(*arguments)[1].splitlines()
         assert json.loads(run(*arguments, "--json")[1])["model"] == "bati2021"

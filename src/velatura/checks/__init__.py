@@ -29,6 +29,7 @@ def check(
     uv: tuple[float, float] = (0.5, 0.5),
     seed: int = 0,
     plots: str | Path | None = None,
+    subject: str = "BSDF",
     progress: Callable[[int, int], None] | None = None,
 ) -> Report:
     """Hold a BSDF to the laws.
@@ -42,6 +43,7 @@ def check(
         uv: where on its textures it is looked at.
         seed: of the random numbers; the same seed gives the same report, but for rounding.
         plots: a folder; every law that is broken leaves `LAW.png` there.
+        subject: what these call the BSDF.
         progress: called with (steps done, all steps) now and then.
 
     Raises:
@@ -63,5 +65,5 @@ def check(
     # Show what is broken
     if folder is not None:
         for law in report.broken:
-            save(report[law], folder)
+            save(report[law], folder, subject)
     return report

@@ -21,15 +21,15 @@ def check_folder(folder: str | Path) -> Path:
     return path
 
 
-def save(finding: Finding, folder: Path) -> Path:
-    """Draw a finding into a PNG in a folder; the file is written whole or not at all."""
+def save(finding: Finding, folder: Path, subject: str) -> Path:
+    """Draw a finding about a subject into a PNG in a folder; the file is written whole or not at all."""
     from matplotlib.figure import Figure
 
     # Pictures side by side, or curves over the first array
     pictures = all(values.ndim == 2 for values in finding.data.values())
     figure = Figure(figsize=(4 * len(finding.data), 4) if pictures else (6, 4), layout="constrained")
     (_pictures if pictures else _curves)(figure, finding)
-    figure.suptitle(f"{finding.law}: {finding.value:.4g}, allowed {finding.bound:.4g}")
+    figure.suptitle(f"{subject}\n{finding.law}: {finding.value:.4g}, allowed {finding.bound:.4g}", wrap=True)
 
     # Write it in one go
     path = folder / f"{finding.law.replace(' ', '-')}.png"
@@ -41,7 +41,7 @@ def save(finding: Finding, folder: Path) -> Path:
 def _pictures(figure: Any, finding: Finding) -> None:
     for axes, (name, values) in zip(figure.subplots(1, len(finding.data), squeeze=False)[0], finding.data.items()):
         figure.colorbar(axes.imshow(values, aspect="auto"), ax=axes, shrink=0.7)
-        axes.set_title(name)
+        axes.set(title=name, xlabel="cells of height, from the pole", ylabel="cells of azimuth")
 
 
 def _curves(figure: Any, finding: Finding) -> None:
@@ -49,5 +49,7 @@ def _curves(figure: Any, finding: Finding) -> None:
     axes = figure.subplots()
     for name, y in curves:
         axes.plot(x, y, ".", label=name)
-    axes.set_xlabel(abscissa)
-    axes.legend()
+    axes.ticklabel_format(useOffset=False)
+    axes.set(xlabel=abscissa, ylabel=curves[0][0] if len(curves) == 1 else finding.law)
+    if len(curves) > 1:
+        axes.legend()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -56,8 +57,12 @@ def explore(
         print(f"{apart[n]:.4f}  {_told(found[n])}")
     invert.say_for_which(found[0].model)
     if path:
-        labels = [f"difference {apart[n]:.3f}" for n in order]
-        _render([found[n].stack for n in order], labels, path, found[0].model, env, spp, size, seed)
+        title = (
+            f"{wanted.name or Path(target).stem}: stacks with the same lobes head-on, by {found[0].model.name}. "
+            "Difference from the first in what is reflected at cosines .5 to .1, as a share of the light"
+        )
+        labels = [f"{_indices(found[n])}\ndifference {apart[n]:.3f}" for n in order]
+        _render([found[n].stack for n in order], title, labels, path, found[0].model, env, spp, size, seed)
         print(path)
 
 
@@ -84,8 +89,19 @@ def _told(solution: Any) -> str:
     return " | ".join(parts)
 
 
+def _indices(solution: Any) -> str:
+    """The indices of a stack from the top, the mean of the colours."""
+    import numpy as np
+
+    each = [
+        f"{np.mean(layers.eta):.2f}" + ("" if layers.kappa is None else f" + {np.mean(layers.kappa):.2f}i")
+        for layers in solution.layers
+    ]
+    return f"eta {', '.join(each)}"
+
+
 def _render(
-    stacks: list[Any], labels: list[str], path: Path, model: Any, env: str, spp: int, size: int, seed: int
+    stacks: list[Any], title: str, labels: list[str], path: Path, model: Any, env: str, spp: int, size: int, seed: int
 ) -> None:
     import velatura
     from velatura import inverse
@@ -95,7 +111,8 @@ def _render(
     seen = model.with_switches(channels="mean")
     rows = -(-len(stacks) // COLUMNS)
     columns = min(len(stacks), COLUMNS)
-    figure = canvas.canvas(2.4 * columns, 2.7 * rows)
+    figure = canvas.canvas(2.4 * columns, 2.9 * rows + 0.5)
+    figure.suptitle(textwrap.fill(title, 34 * columns), fontsize="medium")
     with progress.bar(f"Rendering {path.name}") as advance:
         for n, (stack, label) in enumerate(zip(stacks, labels), 1):
             image = velatura.render(inverse.on_black(stack), "sphere", env, spp, (size, size), seen, seed)

@@ -14,7 +14,7 @@ from velatura.errors import InvalidInput
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from velatura.inverse import Solution, Target
+    from velatura.inverse import Lobe, Solution, Target
     from velatura.model import Model
 
 ENDINGS = (".yaml", ".yml", ".json")
@@ -128,13 +128,18 @@ def draw_classes(solution: Solution, path: Path) -> None:
     from velatura import files
     from velatura.inverse import plots
 
-    figure = Figure(figsize=(5 * len(solution.classes), 4.5), layout="constrained")
+    figure = Figure(figsize=(5 * len(solution.classes), 4.8), layout="constrained")
+    figure.suptitle(f"{solution.target.name or path.stem}: what gives each lobe, by {solution.model.name}", wrap=True)
     layers = iter(solution.layers)
     for n, (members, lobe) in enumerate(zip(solution.classes, solution.target.lobes), 1):
-        axes = figure.add_subplot(1, len(solution.classes), n, title=f"lobe {n}")
+        axes = figure.add_subplot(1, len(solution.classes), n, title=f"lobe {n}: {_made_of(lobe)}")
         plots.draw(axes, members, tuple(next(layers) for _ in range(lobe.interfaces)))
     with files.whole(path) as unfinished:
         figure.savefig(unfinished, dpi=120)
+
+
+def _made_of(lobe: Lobe) -> str:
+    return {1: f"one {lobe.base}", 2: f"a pair that ends in a {lobe.base}"}[lobe.interfaces]
 
 
 def _folder(output: Path | None, count: int) -> Path | None:

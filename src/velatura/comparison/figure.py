@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png", ".pdf", ".svg")
 
 _TRUTH: dict[str, Any] = {"color": "black", "fmt": "o", "markersize": 4, "capsize": 3, "label": "truth"}
+_HEADROOM = 1.3  # over the bars, for their legend
 _WIDTH, _HEIGHT = 3.2, 2.7  # of one plot, inches
 
 
@@ -53,6 +54,7 @@ def _draw(comparison: Comparison) -> Figure:
     figure.suptitle(f"{comparison.name or 'Material'}: models against the truth, {comparison.paths} paths")
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
     _draw_lobes(parts[0].subplots(2, lobes, squeeze=False, sharex=True), comparison)
+    parts[0].legend(*parts[0].axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     _draw_distribution(parts[1].subplots(1, angles + 1), comparison)
     if shown:
         _draw_pictures(parts[2], shown)
@@ -79,7 +81,8 @@ def _draw_lobes(axes: NDArray[Any], comparison: Comparison) -> None:
                 lower.plot(degrees, account.lobes[k].alpha[axis], color=f"C{i}", linestyle=style)
         for plot in (upper, lower):
             plot.set_ylim(0, 1.15 * max(plot.dataLim.y1, 1e-3))
-    axes[0, 0].legend(fontsize="small")
+    axes[0, 0].set_ylabel("share of the light")
+    axes[1, 0].set_ylabel("GGX alpha (2nd axis dashed)")
 
 
 def _draw_distribution(axes: NDArray[Any], comparison: Comparison) -> None:
@@ -90,12 +93,14 @@ def _draw_distribution(axes: NDArray[Any], comparison: Comparison) -> None:
     for i, variation in enumerate(comparison.total_variation.values(), 1):
         bars.bar(places + i * width, variation, width, color=f"C{i - 1}")
     bars.set_xticks(places + 0.4 - width / 2, [f"{cosine:g}" for cosine in comparison.cos_theta])
-    bars.set(title="total variation", xlabel="cosine of incidence")
-    bars.legend(fontsize="small")
+    bars.set(title="total variation", xlabel="cosine of incidence", ylabel="misplaced share of the light")
+    bars.set_ylim(0, _HEADROOM * bars.dataLim.y1)
+    bars.legend(fontsize="small", loc="upper left")
     # The distribution in the plane of incidence
     for n, cosine in enumerate(comparison.cos_theta):
         axes[n + 1].set(title=f"plane of incidence, cos {cosine:g}", xlabel="x on the disc")
         _draw_slices(axes[n + 1], comparison, n)
+    axes[1].set_ylabel("light per area of the disc")
 
 
 def _draw_slices(axes: Axes, comparison: Comparison, n: int) -> None:
@@ -106,11 +111,12 @@ def _draw_slices(axes: Axes, comparison: Comparison, n: int) -> None:
     def row(grid: NDArray[np.floating]) -> NDArray[np.floating]:
         return grid[:, n, :, bins // 2 - 1 : bins // 2 + 1].mean(axis=(0, 2)) * (bins / 2) ** 2
 
-    axes.stairs(row(comparison.truth.distribution), edges, fill=True, color="0.8")
+    axes.stairs(row(comparison.truth.distribution), edges, fill=True, color="0.8", label="truth")
     for i, account in enumerate(comparison.models.values()):
         axes.stairs(row(account.distribution), edges, color=f"C{i}")
     axes.set_yscale("log")
     axes.set_ylim(1e-3, None)
+    axes.legend(fontsize="small", loc="upper right")
 
 
 def _draw_pictures(figure: Any, shown: Pictures) -> None:
@@ -122,7 +128,7 @@ def _draw_pictures(figure: Any, shown: Pictures) -> None:
         true.imshow(scenes.tone_map(shown.truth))
         modelled.imshow(scenes.tone_map(image))
         drawn = apart.imshow(differences[name], cmap="RdBu_r", vmin=-limit, vmax=limit)
-        figure.colorbar(drawn, ax=apart, shrink=0.8)
+        figure.colorbar(drawn, ax=apart, shrink=0.8, label=f"{name} - truth")
         true.set_title("truth")
         modelled.set_title(name)
         apart.set_title(f"RMSE {shown.rmse(name):.4f} (noise {shown.noise:.4f})")
