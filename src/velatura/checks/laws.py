@@ -21,7 +21,7 @@ OFF = 1e-2  # two numbers that should be equal are not where they differ by this
 FEW = 2e-3  # samples that may be off, where single precision is at its end
 ONE_WAY = 1e-2  # relative error of reciprocity, weighted by the light
 CHANGE = 5e-3  # of energy, between a BSDF and the one that it should equal
-BLURRED = 4e-3  # standard error of the integral of a pdf that the cells do not resolve
+BLURRED = 4e-3  # relative standard error of the integral of a pdf that the cells do not resolve
 CROWD = 10.0  # samples expected in a cell of a chi-square test, else it is pooled with others
 
 
@@ -156,19 +156,22 @@ def normalisation(evidence: Evidence, alarm: float) -> Finding:
 def chi_square(evidence: Evidence, alarm: float) -> Finding:
     """Compare samples in every cell with those that the pdf lets expect, where the cells resolve the pdf."""
     integrals, n = evidence.integrals, SAMPLES - PILOT
-    expected, variance = n * integrals.density, n * n * integrals.density_variance
-    blurred = np.sqrt(variance.sum(axis=1)) > BLURRED * n
-    tests = [_chi_square(*row) for row in zip(integrals.counts, expected, variance)]
-    statistics, freedoms = (np.where(blurred, least, column) for least, column in zip((0.0, 1.0), np.array(tests).T))
+    sides = (len(integrals.counts), integrals.shape[0], -1)
+    seen = [x.reshape(sides) for x in (integrals.counts, n * integrals.density, n * n * integrals.density_variance)]
+    # Leave out a side on which the cells do not resolve the pdf, however small its share
+    counts, expected, variance = (x.sum(axis=2) for x in seen)
+    blurred = np.sqrt(variance) > BLURRED * np.maximum(counts, expected)
+    counts, expected, variance = (np.where(blurred[..., None], 0.0, x).reshape(len(x), -1) for x in seen)
+    statistics, freedoms = np.array([_chi_square(*row) for row in zip(counts, expected, variance)]).T
     smallest = _share(alarm, len(statistics))
     critical = chdtri(freedoms, smallest)
     at = _worst(statistics / freedoms - critical / freedoms)[0]
     p_value = chdtrc(freedoms[at], statistics[at])
     detail = f"{freedoms[at]:.0f} cells, p-value {p_value:.2g}, at least {smallest:.1g} {_where(evidence, (at,))}"
     if blurred.any():
-        detail += f"; too sharp for the cells at {blurred.sum()} of {len(blurred)} directions"
-    pull = (integrals.counts[at] - expected[at]) / np.sqrt(np.maximum(expected[at] + variance[at], 1))
-    pictures = {"samples": integrals.counts[at], "expected": expected[at], "difference in standard deviations": pull}
+        detail += f"; too sharp for the cells at {blurred.any(axis=1).sum()} of {len(blurred)} directions"
+    pull = (counts[at] - expected[at]) / np.sqrt(np.maximum(expected[at] + variance[at], 1))
+    pictures = {"samples": counts[at], "expected": expected[at], "difference in standard deviations": pull}
     data = {name: picture.reshape(-1, integrals.shape[-1]) for name, picture in pictures.items()}
     value, bound = (float(x[at] / freedoms[at]) for x in (statistics, critical))
     return Finding("chi-square", _within(statistics, critical), value, bound, detail, data)

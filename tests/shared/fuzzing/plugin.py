@@ -62,13 +62,14 @@ def _found(bsdf: Any, rng: np.random.Generator) -> list[tuple[str, str]]:
 
     # Ask about other pairs: at random, the way back, the mirror direction, straight through, at and below the horizon
     flat = wi * (1, 1, 0)
-    for wo in (_directions(rng.uniform(-1, 1, len(wi)), rng), wi, wi * (-1, -1, 1), -wi, flat, -flat):
-        for i, o in ((wi, wo), (wo, wi)):
-            values = probe.eval_pdf(i, o)
-            lost = (values.pdf == 0) & (values.value.max(axis=1) > UNSEEN)
-            if lost.any():
-                at = np.flatnonzero(lost)[0]
-                found.append(("value without density", f"{values.value[at]} for {i[at]} and {o[at]}"))
+    others = (_directions(rng.uniform(-1, 1, len(wi)), rng), wi, wi * (-1, -1, 1), -wi, flat, -flat)
+    there, back = np.concatenate([wi] * len(others)), np.concatenate(others)
+    i, o = np.concatenate([there, back]), np.concatenate([back, there])
+    values = probe.eval_pdf(i, o)
+    lost = (values.pdf == 0) & (values.value.max(axis=1) > UNSEEN)
+    if lost.any():
+        at = np.flatnonzero(lost)[0]
+        found.append(("value without density", f"{values.value[at]} for {i[at]} and {o[at]}"))
     if not (probe.two_sided or not drawn.weight[cosines < 0].any()):
         found.append(("light from below", "of what is not lit from there"))
 
