@@ -32,7 +32,7 @@ TINY = 1e-15  # whose square, in gradients of quotients, single precision still 
 
 
 class Gridded(Protocol):
-    """What `interpolate` reads: values at the nodes i/(N-1) of a grid of some shape.
+    """Input of `interpolate`: values at the nodes i/(N-1) of a grid of some shape.
 
     Dr.Jit reads a texture; NumPy reads `data`, with channels on the last axis.
     """

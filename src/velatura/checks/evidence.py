@@ -1,4 +1,4 @@
-"""What the laws judge: a BSDF's answers at a few directions of incidence, gathered once for all of them."""
+"""Evidence for the laws: a BSDF's answers at a few directions of incidence, gathered once for all of them."""
 
 from __future__ import annotations
 
@@ -109,27 +109,27 @@ def gather(
 ) -> Evidence:
     """Ask a BSDF, and the one that it should equal if there is one, all that the laws need to know."""
     rng = np.random.default_rng(seed)
-    told = progress or (lambda done, total: None)
+    report = progress or (lambda done, total: None)
 
     # Sample at every direction of incidence
     cosines = [*COSINES, *(-c for c in COSINES)] if probe.two_sided else COSINES
     wi = np.array([_direction(cos, 2.4 * k + 0.4) for k, cos in enumerate(cosines)])
     u = rng.random((len(wi) * SAMPLES, 3), dtype=np.float32)
     drawn = _draw(probe, wi, u)
-    told(1, STEPS)
+    report(1, STEPS)
 
     # Integrate what it says
     integrals = _integrate(probe, drawn, rng)
-    told(2, STEPS)
+    report(2, STEPS)
 
     # Exchange directions, and go to the edges
     pairs = _pair(probe, expected, _index(drawn), rng)
     extremes = _extremes(probe, rng)
-    told(3, STEPS)
+    report(3, STEPS)
 
     # Ask the other one
     other = _draw(expected, wi, u) if expected else None
-    told(4, STEPS)
+    report(4, STEPS)
     return Evidence(
         probe.asked,
         tuple(probe.wrong),
@@ -159,7 +159,7 @@ def _draw(probe: Probe, wi: Array, u: Array) -> Drawn:
 
 
 def _index(drawn: Drawn) -> float:
-    """Index below over index above, as the samples that pass through tell."""
+    """Index below over index above, estimated from the samples that pass through."""
     wi = np.repeat(drawn.wi, SAMPLES, axis=0)
     wo, eta = drawn.samples.wo, drawn.samples.eta
     through = drawn.arrived.ravel() & (wi[:, 2] > 0) & (wo[:, 2] < 0)

@@ -188,7 +188,7 @@ def _chi_square(counts: Array, expected: Array, variance: Array) -> tuple[float,
     )
     counts, expected, variance = (np.bincount(pool, weights=x) for x in (counts, expected, variance))
     kept = (expected > 0) | (counts > 0)
-    spread = np.maximum(expected + variance, 1e-3)  # a sample where none is expected tells much, but not all
+    spread = np.maximum(expected + variance, 1e-3)  # one sample where none is expected is strong evidence, not proof
     return float((np.square(counts - expected) / spread)[kept].sum()), max(int(kept.sum()), 1)
 
 

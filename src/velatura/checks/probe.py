@@ -23,7 +23,7 @@ _WAVELENGTHS = (450.0, 530.0, 600.0, 680.0)  # nm, where the variant is spectral
 
 
 class Samples(NamedTuple):
-    """What `sample` returned: directions (n, 3), weights (n, channels), densities, indices and kinds (n,)."""
+    """Samples of a BSDF: directions (n, 3), weights (n, channels), densities, indices and kinds (n,)."""
 
     wo: Array
     weight: Array
@@ -82,7 +82,7 @@ class Probe:
         wo, weight, pdf, eta, delta = _in_batches(self._sample, wi, u)
         unit = np.abs(np.linalg.norm(wo, axis=1) - 1) < 1e-3
         wo = np.where(unit[:, None], wo, (0.0, 0.0, 1.0))
-        # What carries no light may say of itself what it will
+        # Ignore the density of samples without weight
         lit = np.asarray(weight.any(axis=1))
         weight = self._noted("weight", wi, wo, weight)
         pdf = self._noted(

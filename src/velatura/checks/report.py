@@ -1,4 +1,4 @@
-"""What became of every law: findings, and the report that holds them."""
+"""The outcome of every law: findings, and the report that holds them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from velatura.checks.probe import Array
 
 @dataclass(frozen=True)
 class Finding:
-    """What became of one law.
+    """The outcome of one law.
 
     Args:
         law: its name.
@@ -38,7 +38,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of all laws.
+    """The outcome of all laws.
 
     Args:
         findings: one for each law, in the order of LAWS.

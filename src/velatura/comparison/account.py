@@ -1,4 +1,4 @@
-"""What a model says of a material, in the truth's terms: its lobes sampled, so that lobes of any width are resolved."""
+"""A model's lobes as evaluated, in the terms of the reference: sampled, so that lobes of any width are resolved."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ SAMPLES = 256
 def pictures(
     stack: Stack, models: Mapping[str, Any], seed: int, microsurface: bool, advance: Callable[[], None]
 ) -> Pictures:
-    """Render spheres in the studio, by models and BSDFs; the truth twice, to tell its noise.
+    """Render spheres in the studio, by models and BSDFs; the reference twice, to estimate its noise.
 
     Raises:
         InvalidInput, MissingTool: as `scenes.render`.

@@ -1,4 +1,4 @@
-"""What a comparison holds, and the distances between a model and the truth that follow from it."""
+"""The result of a comparison, and the distances between models and the reference that follow from it."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def compare(
     chosen = dict(zip(names, made))
 
     # Let the models speak, then the truth, and set them side by side
-    told = {
+    modelled = {
         name: account(described, cos_theta, m) if isinstance(m, Model) else plugins.account(m, described, cos_theta)
         for name, m in chosen.items()
     }
@@ -88,7 +88,7 @@ def compare(
         truth=truth,
         standard_error=error,
         noise=noise,
-        models={name: _beside(model, truth) for name, model in told.items()},
+        models={name: _beside(model, truth) for name, model in modelled.items()},
         pictures=spheres(described, chosen, seed, microsurface, advance) if pictures else None,
     )
 

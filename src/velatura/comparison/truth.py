@@ -1,4 +1,4 @@
-"""What random walks say of a material, with the noise that it has."""
+"""The reference by random walks, with its noise."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def truth(
     Raises:
         InvalidInput, MissingTool: as `reference.statistics`.
     """
-    # One direction at a time, so that progress is told and memory is bounded
+    # One direction at a time, so that progress is reported and memory is bounded
     each, halves = [], []
     for cosine in cos_theta:
         each.append(reference.statistics(stack, cosine, 0.0, paths, seed, microsurface))

@@ -1,4 +1,4 @@
-"""What the model assumes, beside the truth: the interactive validations of Belcour 2018's supplement, as numbers.
+"""The model's assumptions beside the reference: the interactive validations of Belcour 2018's supplement, as numbers.
 
 Each answers sliders with curves: those of kind `truth` are counted from random walks or evenly spread samples, with
 standard errors, those of kind `model` are what the recursion takes in their place. Lobes are shown as densities across
@@ -194,7 +194,7 @@ def _direction(sine: float) -> tuple[float, float, float]:
 
 
 def _lobe(sine: float, alpha: float) -> Light:
-    """What a mirror of such roughness makes of light whose mirror direction has this sine."""
+    """The lobe of a mirror of this roughness, for light whose mirror direction has this sine."""
     from velatura.figures.bounces import along, bounce, uniform
 
     rough = max(alpha, SMOOTH)
@@ -202,7 +202,7 @@ def _lobe(sine: float, alpha: float) -> Light:
 
 
 def _walk(stack: Stack, sine: float) -> tuple[Light, Light]:
-    """What random walks reflect, and what they transmit, turned up."""
+    """Light that random walks reflect, and light that they transmit, turned up."""
     from velatura.reference.trace import ends
 
     found = ends(stack, np.array(_direction(-sine)), PATHS, 0, False)

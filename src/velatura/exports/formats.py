@@ -38,7 +38,7 @@ FORMATS: dict[str, Format] = {
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be written: a stack, the model with the switches that were changed, and the values that are worked in.
+    """A request for an export: a stack, the model with its changed switches, and the values that are worked in.
 
     Paths of textures are relative to `folder`, where the format allows that; absolute without one.
     """

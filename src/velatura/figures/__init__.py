@@ -84,7 +84,7 @@ FIGURES = (
 
 
 class Figure(Protocol):
-    """What a figure's module offers."""
+    """The interface of a figure's module."""
 
     def compute(self, *, progress: Progress | None = None) -> dict[str, Any]:
         """The numbers; `progress` is called with (steps done, all steps)."""

@@ -48,7 +48,7 @@ def compute(
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """What each point gains over the angle, and where it lies.
+    """The gain of each point over the angle, and its place.
 
     Raises:
         InvalidInput: the file cannot be written.

@@ -58,15 +58,15 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     """
     figure = canvas.canvas(10, 2.1 * len(numbers["presets"]))
     axes = figure.subplots(len(numbers["presets"]), 5, squeeze=False)
-    for row, told, seen in zip(axes, numbers["presets"], numbers["pictures"]):
+    for row, modelled, seen in zip(axes, numbers["presets"], numbers["pictures"]):
         truth = np.array(seen["reference"])
         for axis, model in zip(row, MODELS):
-            canvas.show(axis, seen[model], f"{told['name']}\n{model}")
+            canvas.show(axis, seen[model], f"{modelled['name']}\n{model}")
         canvas.show(row[2], seen["reference"], "reference")
         for axis, model in zip(row[3:], MODELS):
             difference = (np.array(seen[model]) - truth).mean(axis=-1)
             axis.imshow(difference, cmap="RdBu_r", vmin=-SCALE, vmax=SCALE)
-            axis.set_title(f"{model} - reference\n{canvas.error_label(told, model)}", fontsize=8)
+            axis.set_title(f"{model} - reference\n{canvas.error_label(modelled, model)}", fontsize=8)
             axis.set_axis_off()
     canvas.save(figure, path)
 

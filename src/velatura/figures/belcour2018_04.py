@@ -71,7 +71,7 @@ def _error(numbers: dict[str, Any], width: str, name: str, low: bool) -> float:
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """What two bounces are equivalent to by variance, with what the map says dashed, and the map itself.
+    """The single bounce equivalent to two by variance, the prediction of the map dashed, and the map itself.
 
     Raises:
         InvalidInput: the file cannot be written.

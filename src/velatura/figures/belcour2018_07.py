@@ -53,9 +53,9 @@ def _lobes(x: Any, above: float, below: float, alpha: float, angle: float) -> di
     found = {"refracted": disc.refracted(disc.incidence(angle, 180), x, zero, alpha, alpha, below / above)}
     inside = disc.incidence(np.degrees(np.arcsin(sine * above / below)), 180)
     for scale in SCALES:
-        told = lobes(stack, np.sqrt(1 - sine**2), model="belcour2018", reflectance="fgd", scale=scale).transmitted
-        assert told is not None
-        scaled = float(told.alpha[0, 0])
+        modelled = lobes(stack, np.sqrt(1 - sine**2), model="belcour2018", reflectance="fgd", scale=scale).transmitted
+        assert modelled is not None
+        scaled = float(modelled.alpha[0, 0])
         found[scale] = disc.reflected(inside, x, zero, scaled, scaled)
     return found
 

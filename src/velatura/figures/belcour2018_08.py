@@ -36,9 +36,9 @@ def compute(
     numbers: dict[str, Any] = {"g": list(asymmetries), "depth": list(depths), "model": []}
     for g in asymmetries:
         stack = Stack([Medium(sigma_s=1.0, g=g), Interface(eta=1.0)])
-        told = lobes(stack, 1.0, model="belcour2018", reflectance="fgd", medium="shipped").transmitted
-        assert told is not None
-        numbers["model"].append(float(told.alpha[0, 0]))
+        modelled = lobes(stack, 1.0, model="belcour2018", reflectance="fgd", medium="shipped").transmitted
+        assert modelled is not None
+        numbers["model"].append(float(modelled.alpha[0, 0]))
     for name in canvas.track(list(WIDTHS), progress):
         width = WIDTHS[name]
         scattered = [[width(_scattered(g, depth, *u[:2])) for g in asymmetries] for depth in depths]

@@ -55,7 +55,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     figure = canvas.canvas(16, 6)
     for row, name in zip(figure.subplots(2, 5, width_ratios=(1, 1, 1, 1, 1.4)), STACKS):
         for plot, (column, style) in zip(row, canvas.STYLES.items()):
-            # Half as bright, since white would not be told from brighter
+            # Half as bright, since white and brighter would look the same
             canvas.show(plot, 0.5 * np.array(numbers["pictures"][name][column]), f"{column}, {name}")
             row[-1].plot(numbers["angles"], numbers[name][column], marker=".", label=column, **style)
         row[-1].axhline(1, color="0.7", linewidth=1)

@@ -50,15 +50,15 @@ def compute(
         stack = Stack([Interface(eta=ETA, alpha=coat), METALS[metal]])
         true = canvas.spheres(stack, "reference", "studio", size, spp, seed)
         images = {form: canvas.spheres(stack, MODEL, "studio", size, spp, seed, form=form) for form in FORMS}
-        told: dict[str, Any] = {
+        modelled: dict[str, Any] = {
             "model": lobes(stack, 1.0, model=MODEL, **canvas.CHOICES),
             "walk": reference.statistics(stack, 1.0, 0.0, paths, seed),
         }
         cell: dict[str, Any] = {"name": f"{metal}, coat {coat:g}", "coat": float(coat), "metal": metal}
         cell["mean"] = {name: float(each.mean()) for name, each in [("reference", true), *images.items()]}
         cell |= canvas.errors(images, true)
-        cell["base_alpha"] = {side: float(found.alpha[1][0, 0]) for side, found in told.items()}
-        cell["base_energy"] = {side: found.energy[1][:, 0].tolist() for side, found in told.items()}
+        cell["base_alpha"] = {side: float(found.alpha[1][0, 0]) for side, found in modelled.items()}
+        cell["base_energy"] = {side: found.energy[1][:, 0].tolist() for side, found in modelled.items()}
         cells.append(cell)
         seen = {"reference": true, "model": images[FORMS[0]]}
         pictures.append({name: passes.mean(axis=0).tolist() for name, passes in seen.items()})

@@ -4,7 +4,7 @@ Frosted metal (figure 13) and the white furnace (figure 12) with direct light on
 all of it. Objects and sizes are chosen here: spheres, and a hollow ball for the dragon. So are the roughness of the
 furnace's dielectrics, 0.1, since wholly smooth stacks are mirrors here and cost nothing, and the depth of the medium
 over the dragon's gold. Weidlich and Wilkie know no scattering: their medium only absorbs, as much as it should scatter.
-In parentheses the paper tells its times without interpolation in the tables of FGD and TIR; here the model does without
+In parentheses the paper gives its times without interpolation in the tables of FGD and TIR; here the model does without
 tables then (`reflectance=fresnel`, `tir=off`). Seconds are those of this machine, so that ratios are compared.
 """
 

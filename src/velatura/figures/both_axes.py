@@ -28,7 +28,7 @@ _STEPS = 20  # of a fit, which ends in a long valley
 
 
 def compute(count: int) -> dict[str, Any]:
-    """What is fitted to the variances of `count` directions.
+    """The data of the fit: variances of `count` directions.
 
     `fits` for growing `top`: the `constants`, their standard errors as factors (`factor`; None where they may have any
     value), the error (root mean square) of roughness that is left (`rms`), and that of the published maps. `profile` is
@@ -64,7 +64,7 @@ def _bounces(count: int) -> tuple[Array, Array]:
 
 
 def _fit(pairs: Array, targets: Array, top: float) -> tuple[Array, dict[str, Any]]:
-    """The logarithms of the best constants, and what `compute` tells of them."""
+    """The logarithms of the best constants, and the report of `compute` on them."""
     best, misses, slope = _least(pairs, targets, _PUBLISHED)
     spread = np.sqrt(np.diag(np.linalg.pinv(slope.T @ slope)) * np.mean(misses**2))
     free = spread > 2

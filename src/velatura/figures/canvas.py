@@ -1,4 +1,4 @@
-"""What figures share: spheres rendered alike, albedos measured alike, plots saved whole or not at all."""
+"""Helpers of all figures: spheres rendered alike, albedos measured alike, plots saved whole or not at all."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ STYLES: dict[str, dict[str, Any]] = {
 
 
 def track(items: Sequence[Item], progress: Callable[[int, int], None] | None) -> Iterator[Item]:
-    """The items; `progress` is told of each one when it is done."""
+    """The items; `progress` is called when each is done."""
     for done, item in enumerate(items, 1):
         yield item
         if progress:
@@ -85,7 +85,7 @@ def timed(loaded: Mapping[str, Any], spp: int, repeats: int, seed: int) -> tuple
 
 
 def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **switches: Any) -> Samples:
-    """What a BSDF makes of light from one direction in the plane of the tangent."""
+    """Lobe of a BSDF for light from one direction in the plane of the tangent."""
     wi = np.array([np.sqrt(1 - cosine**2), 0, cosine])
     u = np.random.default_rng(seed).random((paths, 3))
     return Probe(bsdf(stack, model, **switches)).sample(np.tile(wi, (paths, 1)), u)
@@ -129,7 +129,7 @@ def canvas(width: float, height: float) -> Any:
 
 
 def error_label(numbers: Mapping[str, Any], name: str) -> str:
-    """What `errors` found for a name."""
+    """The result of `errors` for a name."""
     return f"RMSE {numbers['rmse'][name]:.4f} ± {numbers['rmse_error'][name]:.4f}"
 
 
@@ -141,7 +141,7 @@ def show(axes: Any, image: ArrayLike, title: str) -> None:
 
 
 def show_difference(axes: Any, image: ArrayLike, truth: ArrayLike, bound: float, title: str) -> Any:
-    """What a picture has too much (red) or too little (blue), up to a bound; returns what a colour bar is made of."""
+    """Draw where a picture is too bright (red) or too dark (blue); returns the mappable of a colour bar."""
     axes.set_title(title, fontsize="medium")
     axes.set_axis_off()
     difference = np.subtract(image, truth).mean(axis=-1)

@@ -99,13 +99,13 @@ def compute(
 
 def _last_lobe(stack: Stack, columns: Columns, paths: int, seed: int) -> dict[str, Any]:
     true = _last(reference.statistics(stack, COSINES, 0.0, paths, seed))
-    told = {"walk": true}
+    modelled = {"walk": true}
     for title, (model, choices) in columns.items():
-        told[title] = along(_last(lobes(stack, COSINES, 0.0, model, **choices)), true)
+        modelled[title] = along(_last(lobes(stack, COSINES, 0.0, model, **choices)), true)
     return {
-        "ratio": {title: (told[title].alpha / true.alpha).T.tolist() for title in columns},
-        "alpha": {title: lobe.alpha.T.tolist() for title, lobe in told.items()},
-        "energy": {title: lobe.energy.mean(axis=0).tolist() for title, lobe in told.items()},
+        "ratio": {title: (modelled[title].alpha / true.alpha).T.tolist() for title in columns},
+        "alpha": {title: lobe.alpha.T.tolist() for title, lobe in modelled.items()},
+        "energy": {title: lobe.energy.mean(axis=0).tolist() for title, lobe in modelled.items()},
     }
 
 

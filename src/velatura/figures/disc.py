@@ -49,12 +49,12 @@ def normals(x: Array, y: Array, alpha_u: float, alpha_v: float) -> Array:
 
 
 def reflected(wi: Direction, x: Array, y: Array, alpha_u: float, alpha_v: float) -> Array:
-    """What a rough mirror sends to the points of the disc."""
+    """Radiance that a rough mirror reflects to the points of the disc."""
     return _lobe(wi, (x, y, _height(x, y)), alpha_u, alpha_v, 1.0)
 
 
 def refracted(wi: Direction, x: Array, y: Array, alpha_u: float, alpha_v: float, eta: float) -> Array:
-    """What a rough interface to the relative index eta transmits to the points of the disc below."""
+    """Radiance that a rough interface of relative index eta transmits to the points of the disc below."""
     return _lobe(wi, (x, y, -_height(x, y)), alpha_u, alpha_v, eta)
 
 

@@ -41,8 +41,8 @@ def compute(side: int = 41, count: int = 4096, progress: Callable[[int, int], No
     albedo = {"truth": _averaged(x, y, z, count)}
     for name, (alpha, fetch) in canvas.track(list(COLUMNS.items()), progress):
         stack = Stack([Interface(eta=ETA, alpha=alpha)])
-        told = lobes(stack, z, np.arctan2(y, x), model="weier2020", reflectance="split-sum", tir="off", fetch=fetch)
-        albedo[name] = told.energy[0][0]
+        modelled = lobes(stack, z, np.arctan2(y, x), model="weier2020", reflectance="split-sum", tir="off", fetch=fetch)
+        albedo[name] = modelled.energy[0][0]
     error = {name: albedo[name] - albedo["truth"] for name in COLUMNS}
     return {
         "albedo": {name: _spread(values, lit, side) for name, values in albedo.items()},

@@ -35,15 +35,16 @@ def compute(paths: int = 10**6, seed: int = 0, progress: Callable[[int, int], No
     Raises:
         InvalidInput, MissingTool: as `reference.statistics`.
     """
-    told = lobes(STACK, 1.0, 0.0, "weier2020", **CHOICES).alpha[1][:, 0]
+    modelled = lobes(STACK, 1.0, 0.0, "weier2020", **CHOICES).alpha[1][:, 0]
     walked = reference.statistics(STACK, 1.0, 0.0, paths, seed).alpha[1][:, 0]
     found = ends(STACK, np.array(UP), paths, seed, microsurface=False)
     below = (found.deepest > 0) & (found.w[2] > 0)
     lights = {
-        "model": bounce(along(UP, paths), *np.maximum(told, 1e-3), *uniform(paths)[:2]),
+        "model": bounce(along(UP, paths), *np.maximum(modelled, 1e-3), *uniform(paths)[:2]),
         "walk": (found.w[:, below], found.weight[:, below].mean(axis=0)),
     }
-    numbers: dict[str, Any] = {"model": {"alpha": told.tolist()}, "walk": {"alpha": walked.tolist()}, "pictures": {}}
+    alphas = {"model": modelled, "walk": walked}
+    numbers: dict[str, Any] = {**{name: {"alpha": alpha.tolist()} for name, alpha in alphas.items()}, "pictures": {}}
     for side, (w, energy) in canvas.track(list(lights.items()), progress):
         bounds = (-EXTENT, EXTENT)
         grid, _, _ = np.histogram2d(w[0], w[1], BINS, (bounds, bounds), weights=energy / energy.sum())

@@ -1,4 +1,4 @@
-"""What lies above an interface that is sought: N stacks at normal incidence, summed up by the model's own adding.
+"""Partial stacks above an interface that is sought: N of them, at normal incidence, by the model's own adding.
 
 Colours are arrays of shape (C, N) or (1, N), other quantities (N,); a number is the same for all stacks.
 """

@@ -107,7 +107,7 @@ def load_table(path: str | Path) -> ReflectanceTable:
 
 
 def table_of(stack: Material, directions: Directions, model: str | Model) -> ReflectanceTable:
-    """What a model says of a material (a stack, a file, or a preset's name).
+    """Reflectance of a material by a model (a stack, a file, or a preset's name).
 
     Raises:
         InvalidInput: not a valid material, an unknown model, or a texture, which has no one value.

@@ -161,7 +161,7 @@ def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
 
 
 def _choices(stack: Stack, values: dict[str, Array], n: int, eta_max: float) -> Sequence[Choice]:
-    """What a layer may become, as it is first: the same index, one on the same side, one on the other side."""
+    """Choices for a layer, its present state first: the same index, one on the same side, one on the other side."""
     kind = stack.kinds[n]
     if kind == "mirror":
         return [Choice("mirror", tau=0.0)]

@@ -123,7 +123,7 @@ class Descent:
             gtol=None,
             max_nfev=ROUNDS,
         )
-        # What nothing is gained by stays as it was
+        # Keep the start where the descent has gained nothing
         first = self.residuals(x[None])[0]
         best, residuals = (x, first) if np.sum(first**2) <= 2 * found.cost else (found.x, found.fun)
         return float(np.sqrt(np.mean(residuals**2))), self.stack(best)

@@ -48,7 +48,7 @@ class EquivalenceClass:
         return self.interfaces - (self.choice.kind != "dielectric")
 
     def member(self, *indices: ArrayLike) -> tuple[Layers, ...]:
-        """The interfaces of given indices, (N,) each, from the top; whether they are members, they tell themselves.
+        """The interfaces of given indices, (N,) each, from the top; check `.feasible` for membership.
 
         Without the last index it is the one that needs least absorption, on the side of `choice`.
         """
@@ -195,7 +195,7 @@ class EquivalenceClass:
         return min(found, key=lambda entry: entry[0])[1] if found else None
 
     def to_dict(self) -> dict[str, Any]:
-        """What a report prints: the sets of all channels, and of each."""
+        """Sets for a report: those of all channels, and of each."""
         report: dict[str, Any] = {"interfaces": self.interfaces, "base": self.choice.kind}
         if self.free:
             report["eta_1"] = self.indices_1()
@@ -239,7 +239,7 @@ class EquivalenceClass:
         return slice(None) if channel is None else slice(channel, channel + 1)
 
     def _last(self, *eta_1: Array) -> tuple[Above, _Rest, Mask]:
-        """What is above the last interface, what that must give, and in which channels it can, (C, N).
+        """The stack above the last interface, the demands on that, and the channels that can meet them, (C, N).
 
         Below a pair's first interface of indices eta_1, and the medium under it.
         """
@@ -290,7 +290,7 @@ class EquivalenceClass:
 
 @dataclass(frozen=True)
 class _Rest:
-    """What last interfaces must give: energy of the lobe, reflectance and roughness of their own, margin of that."""
+    """Demands on last interfaces: energy of the lobe, reflectance and roughness of their own, margin of that."""
 
     energy: Array
     r: Array
@@ -299,7 +299,7 @@ class _Rest:
 
 
 def dislike(eta_0: Value, layers: Layers) -> Array:
-    """How little interfaces below an index eta_0 are preferred, (N,)."""
+    """Cost of interfaces below an index eta_0, (N,): clear media and moderate indices are preferred."""
     absorbs = np.mean(np.atleast_2d(layers.tau), axis=0)
     if layers.kind != "dielectric":
         return absorbs

@@ -35,7 +35,7 @@ MISSED = 1e-6  # what remains after them is no solution
 
 @dataclass(frozen=True)
 class Choice:
-    """What is decided about an interface: its kind, and whatever of it is free.
+    """Choices about an interface: its kind, and its free parameters.
 
     side: of the two indices that reflect the same, the denser (1) or the rarer one (-1); (N,) or a number.
     eta, kappa, tau: given values, None where they are sought; absorption that is sought is as little as can be.
@@ -220,7 +220,7 @@ def _closed_form(
 
 
 def attenuated(above: Above, energy: Array) -> Array:
-    """What an interface must reflect, seen through the medium above it, for a lobe of that energy (Eq. 18)."""
+    """Reflectance that an interface needs under the medium above it, for a lobe of that energy (Eq. 18)."""
     state = above.state
     return 1 / (state.t_0i * state.t_i0 / np.maximum(energy, ENERGY_MIN) + state.r_i0)
 

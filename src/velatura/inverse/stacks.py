@@ -294,7 +294,7 @@ def _choice(lobe: Lobe, n: int, target: Target, absorbs: bool) -> Choice:
 
 
 def _pinned(lobe: Lobe, key: str, n: int) -> Any:
-    """What is fixed of an interface as a colour, None where it is free."""
+    """A fixed parameter of an interface as a colour, None where it is free."""
     value = lobe.fixed.of(key, n)
     return value if value is None else np.reshape(np.asarray(value, float), (-1, 1))
 

@@ -1,4 +1,4 @@
-"""What is asked for: lobes from the top, each by its energy and its blur, and what the answer must keep."""
+"""Targets: lobes from the top, each by its energy and its blur, and the constraints on the answer."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _colour(doc: str, **options: Any) -> Colour:
 
 
 class Fixed(Record):
-    """What the user will not have changed: an entry for each interface of the lobe, from the top, null where free."""
+    """Parameters that are held fixed: an entry for each interface of the lobe, from the top, null where free."""
 
     eta: Annotated[tuple[Any, ...], Entries("absolute indices", entry=_colour("", strict=True))] = ()
     k: Annotated[tuple[Any, ...], Entries("absolute extinctions", entry=_colour(""))] = ()

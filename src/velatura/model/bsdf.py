@@ -28,7 +28,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 
-LEAST = 0.1  # share of samples, in the symmetric form
+MIN_BRANCH_PROBABILITY = 0.1  # of reflection and of transmission, in the symmetric form
 GRAZING = 0.05  # cosine
 
 
@@ -37,7 +37,7 @@ class Body:
     """A stack prepared from above and, where it transmits, from below (else None).
 
     `eta` is the index below over the index above, one for all colours; 1 where nothing is transmitted. `lobes_above`
-    and `lobes_below` tell the lobes on either side, for a direction turned up, and `base_above` the diffuse base; None
+    and `lobes_below` give the lobes on either side, for a direction turned up, and `base_above` the diffuse base; None
     where it is worked out from the layers. `scaling` keeps the energy of the symmetric form; None where it is as
     published.
     """
@@ -57,7 +57,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Scattered:
-    """What light from one direction becomes; `eta` is the index of the medium beyond over that on its own side.
+    """The lobes of light from one direction; `eta` is the index of the medium beyond over that on its own side.
 
     Nothing is transmitted where Snell's law has no solution.
     """
@@ -94,7 +94,7 @@ class Scattered:
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked of a BSDF: reflection, transmission or both; of radiance, which the index scales, or not.
+    """The query to a BSDF: reflection, transmission or both; of radiance, which the index scales, or not.
 
     `reflection` may also say for every reflected lobe, and then for the diffuse base, whether it is asked for.
     """
@@ -209,7 +209,7 @@ def sample(
         return _upright(o, wi), 1.0
     beyond = _down(mixture.sample([seen.transmitted], None, _beyond(stack, i, seen.eta), u, u1, u2))
     x, y, z = _chosen_direction(passes, beyond, o)
-    # A direction that has missed its side belongs to no lobe
+    # Clamp samples that end up in the wrong hemisphere
     z = ops.select(passes, ops.minimum(z, 0.0), ops.maximum(z, 0.0))
     return _upright((x, y, z), wi), ops.select(passes, seen.eta, 1.0)
 
@@ -256,7 +256,7 @@ def _way(seen: Scattered, u: Value, least: float) -> tuple[Value, Value]:
 def _least(stack: Body) -> float:
     """Share of samples that reflection and transmission get at least: the forward form, by whose lobes the symmetric
     one is sampled, may have no light where this one has some."""
-    return LEAST if stack.above.model.form == "symmetric" else 0.0
+    return MIN_BRANCH_PROBABILITY if stack.above.model.form == "symmetric" else 0.0
 
 
 def _beyond(stack: Body, i: Direction, eta: Value) -> Direction:
@@ -354,7 +354,7 @@ def _pair_below(stack: Body, wi: Direction, wo: Direction) -> tuple[Direction, D
 
 
 def _upright(w: Direction, wi: Direction) -> Direction:
-    """As seen by somebody for whom wi comes from above."""
+    """The direction flipped with wi, so that wi lies in the upper hemisphere."""
     return w[0], w[1], ops.select(wi[2] < 0, -w[2], w[2])
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Calibration:
-    """What first-order optics leaves open. All are numbers without unit.
+    """The constants that first-order optics leaves open. All are numbers without unit.
 
     Args:
         steepness_in, steepness_across: how much the roughness adds to the cosine at which light meets facets, in the

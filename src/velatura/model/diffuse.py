@@ -83,7 +83,7 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     worth: Row = ()
     reflected: Value = 0.0
     if inside.interfaces:
-        with ops.block("Light leaves by the way that it comes in"):
+        with ops.block("By reciprocity, light leaves as it enters"):
             entered = ops.each(lambda node, n: settle(_entered(prepared, lit(node, n))), nodes, prepared.base.n)
             nodes_below = range(diffuse_nodes.COUNT)
             leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in nodes_below]
@@ -141,7 +141,7 @@ class _Inside:
         return cls(depths[0], interfaces, indices[1:], depths[1:])
 
     def solved(self, leaves: Row, settle: Settle) -> tuple[Row, Value]:
-        """What the nodes below the first interface are worth, and the share of diffuse light that returns to the base.
+        """Worth of the nodes below the first interface, and the share of diffuse light that returns to the base.
 
         `leaves` is what leaves the stack of the light at each of these nodes.
         """
@@ -191,7 +191,7 @@ class _Inside:
         return settle(worth), settle(_sum(w * a * b for w, a, b in zip(even, kept[-1], up(going_down)[-1])))
 
     def _exchange(self, k: int, settle: Settle) -> _Exchange:
-        """What the interface between two media does."""
+        """Scattering matrices of the interface between two media."""
         alpha, above, below = _roughness(self.interfaces[k]), self.indices[k - 1], self.indices[k]
         found, ratio = tables.load(), self.interfaces[k].n12
         down = settle(diffuse_nodes.between(found.passing, alpha, above, ratio))
@@ -220,7 +220,7 @@ def _balanced(staying: Sequence[Row], leaving: Row) -> Sequence[Row]:
 
 
 def _seen(rows: Sequence[Row], kept: Row, worth: Row) -> Row:
-    """What the nodes are worth before an interface and a medium that keeps so much, from what they are after them."""
+    """Worth of the nodes above an interface and a medium that transmits `kept`, from their worth below."""
     after = [a * b for a, b in zip(kept, worth)]
     return [_sum(part * x for part, x in zip(row, after)) for row in rows]
 

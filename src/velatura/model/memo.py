@@ -91,7 +91,7 @@ def sample(lobes: Lobes, prepared: Prepared, number: type, colour: type, transmi
 
 
 def _kind(prepared: Prepared) -> type[Variance]:
-    """What holds the roughness of lobes: those of isotropic stacks may have axes, in the plane of incidence."""
+    """The kind of variance that holds the roughness of lobes; in isotropic stacks, along the plane of incidence."""
     if prepared.model.calibrations is None:
         return prepared.variance
     return PerAxis if prepared.variance is Isotropic else Covariance

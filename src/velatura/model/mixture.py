@@ -91,7 +91,7 @@ def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence
 
 
 def drawn(lobe: Lobe, wi: Direction, u1: Value, u2: Value) -> Value:
-    """What a sample of a lobe by itself carries, for a gain of 1: of all light, or without facets of its energy."""
+    """Weight of a sample of a lobe by itself, for a gain of 1: of all light, or without facets of its energy."""
     alpha_u, alpha_v, i = _in_frame(lobe.roughness, wi)
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     fresnel = lobe.facets.reflect(ops.clip(ggx.dot(i, h), 0.0, 1.0)) if lobe.facets else 1.0
@@ -99,7 +99,7 @@ def drawn(lobe: Lobe, wi: Direction, u1: Value, u2: Value) -> Value:
 
 
 def _colour(lobe: Lobe, wi: Direction, h: Direction) -> Value:
-    """What a GGX reflection is multiplied by to be the lobe."""
+    """The factor that makes a GGX reflection the lobe."""
     if lobe.facets is None:
         return lobe.energy * lobe.gain
     return lobe.facets.reflect(ops.clip(ggx.dot(wi, h), 0.0, 1.0)) * lobe.gain

@@ -29,7 +29,7 @@ from velatura.optics.ggx import Direction
 from velatura.tables import Average
 
 FAINT = 1e-4  # albedo that the tables' errors come close to
-DIM = 3e-4  # albedo of whose parts the tables tell little
+DIM = 3e-4  # albedo below which the tables are not precise
 LOSS_MIN = 1e-6  # of one bounce between the stack and a layer
 CONTRAST_MIN = 0.02  # of two indices, below which an interface is hardly there
 
@@ -125,7 +125,7 @@ def _at(
         back_and_forth = (s_r + above.s_ri0) * (k.bounced * m_rr) + (s_r + above.s_exit) * (k.trapped * m_trapped)
         ops.names(bounces=bounces, out=out, energy=energy, m_rr=m_rr, m_trapped=m_trapped)
 
-    with ops.block("See the sum of all widths from above"):
+    with ops.block("Convert the summed width to a GGX lobe seen from outside"):
         width = above.s_ti0 + above.s_t0i + s_r + back_and_forth
         lobe = _lobe(prepared, plane, energy, _seen(k, above, layer, width, r, cosine, cos_top), cos_top)
     if layer.opaque:
@@ -258,7 +258,7 @@ def _kept(cos_theta: Value, alpha: Value, contrast: Value, exponent: float) -> V
 
 
 def _narrowed(k: Calibration, s: Variance, n: Value, n_below: Value) -> Variance:
-    """What of a beam enters a medium of lower index."""
+    """Width of the part of a beam that enters a medium of lower index."""
     closed = ops.maximum(1 / (n_below * n_below) - 1 / (n * n), 0.0) / (k.entering * k.entering)
     return s * (1 / _f2(1 + closed * _size(s) * _size(s)))
 

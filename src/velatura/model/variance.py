@@ -40,7 +40,7 @@ class Variance(ops.Named):
     __rmul__ = __mul__
 
     def bounded(self: V) -> V:
-        """With every component within what a roughness map tells apart from infinity, so that no sum overflows."""
+        """With every component below what a roughness map takes for infinite, so that no sum overflows."""
         return type(self)(*(ops.clip(a, -VARIANCE_MAX, VARIANCE_MAX) for a in vars(self).values()))
 
     @classmethod

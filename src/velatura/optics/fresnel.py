@@ -22,7 +22,7 @@ def dielectric(cos_theta: Value, eta: Value) -> Value:
 def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
     """Reflectance of a dielectric for given cosines on both sides, which Snell's law need not join.
 
-    So can several colours share one refracted direction; the reflectance is the same from either side.
+    This lets all colour channels share one refracted direction; the reflectance is the same from either side.
     """
     r_s = 1 - 2 * ops.divide(eta * cos_t, cos_theta + eta * cos_t)
     r_p = 1 - 2 * ops.divide(cos_t, eta * cos_theta + cos_t)

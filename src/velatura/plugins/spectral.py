@@ -127,7 +127,7 @@ def _over_wavelengths(mi: Any, colour: Value, times: int) -> Any:
 
 
 def carried(mi: Any, colour: Value) -> Any:
-    """What a ray carries of a colour: of a spectrum, the second half."""
+    """The part of a colour that a ray carries: of a spectrum, the second half."""
     if isinstance(colour, mi.ArrayXf):
         colour = list(colour)[len(colour) // 2 :]
     return mi.UnpolarizedSpectrum(colour)

@@ -109,7 +109,7 @@ def _sum_reflections(crossings: list[_Crossing]) -> tuple[list[Value], list[Valu
 
 
 def _left(x: _Crossing, b: Value) -> Value:
-    """What a round trip above a surface does not bring back."""
+    """Share of light that a round trip above a surface does not return."""
     return ops.maximum(1 - x.reflected * x.above * b, _GRAZING)
 
 
@@ -120,7 +120,7 @@ def way_up(out: WayOut, j: Value, down: Value) -> Direction:
 
 
 def connect_surface(meeting: Meeting, event: Scattered, out: WayOut, path: Path, down: Value) -> Value:
-    """What a path that meets a surface sends out along the way, per unit of its weight, `event` being into `way_up`."""
+    """Contribution of a path that meets a surface, per unit of its weight, `event` being into `way_up`."""
     layers, j = meeting.layers, meeting.j
     w = _direction(out, j)
     fewer = ops.select(down, 0.0, ops.divide(event.density_back, path.density) * path.chain)
@@ -130,7 +130,7 @@ def connect_surface(meeting: Meeting, event: Scattered, out: WayOut, path: Path,
 
 
 def connect_medium(layers: Layers, out: WayOut, path: Path) -> Value:
-    """What a path that scatters in a medium sends out along the way, per unit of its weight."""
+    """Contribution of a path that scatters in a medium along the way, per unit of its weight."""
     k, slab = path.slab, layers.slab(path.slab)
     w = _direction(out, k)
     density = phase.henyey_greenstein(ggx.dot(path.w, w), slab.g)

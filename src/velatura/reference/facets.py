@@ -122,7 +122,7 @@ def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, 
 
 
 def _value(meeting: Meeting, flight: Flight, i: Direction, goal: Direction) -> Value:
-    """What a facet that light meets from i sends along `goal` and out of the interface, f |cos theta_o|."""
+    """Light that a facet met from i scatters along `goal` and out of the interface, f |cos theta_o|."""
     # Find the facet that serves
     same_side = goal[2] > 0
     eta = ops.select(same_side, 1.0, _eta(meeting, flight.outside))

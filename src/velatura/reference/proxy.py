@@ -1,6 +1,6 @@
 """A density over directions that resembles the layered BSDF, for multiple importance sampling.
 
-The walk cannot tell the density of what it samples. Any function of the two directions will do in its place as long as
+The density of what the walk samples is not known. Any function of the two directions will do in its place as long as
 all strategies use the same one: the weights still sum to 1. Widths are guessed from small tilts of the facets, to first
 order, and all roughness matrices (alpha^2, in slopes of half-vectors outside) simply add up.
 """

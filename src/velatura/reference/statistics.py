@@ -1,4 +1,4 @@
-"""What the walk says about a stack's lobes: energy, mean, covariance and roughness, with standard errors."""
+"""Statistics of a stack's lobes by random walks: energy, mean, covariance and roughness, with standard errors."""
 
 from __future__ import annotations
 

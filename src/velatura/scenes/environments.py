@@ -1,4 +1,4 @@
-"""What lights the stage: a studio of softboxes, a clear sky, a furnace, or a picture of the user's own."""
+"""The lights of the stage: a studio of softboxes, a clear sky, a furnace, or a picture of the user's own."""
 
 from __future__ import annotations
 

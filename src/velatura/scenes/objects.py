@@ -66,7 +66,7 @@ def lid() -> Surface:
 
 @functools.cache
 def plane() -> Surface:
-    """A square slab that lies flat, an image upright on its top for somebody who stands in front of it."""
+    """A square slab that lies flat, an image on its top, upright when seen from the front."""
     half, height = 1.15, 0.06
     corners = np.array([[half, height], [-half, height], [-half, 0.0], [half, 0.0], [half, height]])
     faces = [extrude(np.linspace(start, stop, 3), 2.0 * half) for start, stop in itertools.pairwise(corners)]
@@ -83,7 +83,7 @@ def teapot() -> Surface:
 
 @functools.cache
 def plinth() -> Surface:
-    """What an object stands on: a low round table, its top at y = 0."""
+    """The plinth under an object: a low round table, its top at y = 0."""
     return lathe(np.concatenate([arc((1.65, -0.06), 0.06, -90.0, 90.0, step=15.0), [[0.0, 0.0]]]))
 
 

@@ -13,7 +13,7 @@ from velatura import files, kernel
 from velatura.errors import InvalidInput
 from velatura.scenes.stage import Name, blamed, scene_dict
 
-#: Samples (pixels x spp) of one pass: between two of them progress is told and an interrupt is heard.
+#: Samples (pixels x spp) of one pass: between two of them progress is reported and an interrupt is handled.
 PASS_SAMPLES = 2**20
 
 

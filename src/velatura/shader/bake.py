@@ -41,7 +41,7 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True)
 class Bake:
-    """What is worked out for a direction, as columns of numbers, four to a texel: first what the layers above a diffuse
+    """The values for one direction, as columns of numbers, four to a texel: first what the layers above a diffuse
     base transmit, if there is one, then the lobes.
 
     `body` reads its lobes from the texture. A line of texels holds one of them for all cosines; lines go over azimuths,
@@ -64,7 +64,7 @@ class Bake:
         return tape(self.columns)
 
     def to_dict(self) -> dict[str, Any]:
-        """What runs it needs, in JSON's types: the tape, the tables that it looks up, and for which nodes and sides."""
+        """Input of the interpreter, in JSON's types: the tape, its tables, and the nodes and sides."""
         return {**vars(self.tape), "tables": self.tape.tables, "nodes": self.nodes, "sides": self.sides}
 
     def reading(self) -> str:

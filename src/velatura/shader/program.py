@@ -59,7 +59,7 @@ def shader(
         stack: a material (a stack, a file, or a preset's name). Its kinds of layers make the code; its values go into
             `vt_material`, which gives them.
         constant: flat names of values that never change, which are worked out now and are not in the struct.
-        values: plain values as `literals`, or as `uniforms` that somebody changes; then the code is the same for all
+        values: plain values as `literals`, or as `uniforms` that a user changes; then the code is the same for all
             of them, be roughnesses equal or not, and lobes are drawn once for a change, and read.
 
     Raises:
@@ -163,7 +163,7 @@ def _described(model: Model) -> str:
 
 
 def _lobes_struct(recording: Recording) -> str:
-    """What is known once wi is."""
+    """The struct of all that is known once wi is."""
     count = sum(name.startswith("reflected") and name.endswith("energy") for name in recording.kinds)
     parts = {part(name): kind for name, kind in recording.kinds.items() if "." in name}
     members = [f"VtLobe reflected[{count}];"] if count else []

@@ -29,7 +29,7 @@ SHOWN = "vt_shown"  # in the code: the weights of lobes
 
 @dataclass(frozen=True)
 class Recording:
-    """What the model does for a stack: `lobes` from material and wi, the rest from these, wo, and random numbers u.
+    """The model's computation for a stack: `lobes` from material and wi, the rest from these, wo, and random numbers u.
 
     Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ... `baked` is what the lobes
     are read from, where they are not added up; `shown` names the weights of lobes, where they have any.
@@ -118,7 +118,7 @@ def record(
 
 
 def _worth(x: Operand) -> TypeGuard[Symbol]:
-    """Whether a value is worth to be kept: neither a constant nor an input."""
+    """Whether to store a value: neither a constant nor an input."""
     return isinstance(x, Symbol) and x.op != "input"
 
 
@@ -142,7 +142,7 @@ def variance(stack: Stack) -> type[Variance]:
 
 
 def structure(stack: Stack) -> type[Variance]:
-    """The kind of variance that holds a stack whatever its plain values are: as general as its interfaces are written,
+    """The kind of variance that holds a stack for any plain values: as general as its interfaces are written,
     with a pair of roughnesses or one, with a rotation or without. (Two that are equal are read as one.)
     """
     pairs = [layer for layer in stack.interfaces if isinstance(layer.alpha, tuple)]
@@ -200,5 +200,5 @@ def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> tuple[dict[str, Val
 
 
 def part(name: str) -> str:
-    """What a field of a lobe is: `energy` for `reflected[0].energy`."""
+    """Last part of the name of a field: `energy` for `reflected[0].energy`."""
     return name.rpartition(".")[2]

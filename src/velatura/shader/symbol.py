@@ -155,7 +155,7 @@ def record(op: str, *values: Value) -> Value:
 
 
 def _known(op: str, args: tuple[Operand, ...]) -> Value | None:
-    """What neutral elements make of an operation."""
+    """The result of an operation with a neutral element, else None."""
     a, b = (*args, None)[:2]
     neutral = {
         "add": a if b == 0.0 else b if a == 0.0 else None,
@@ -169,7 +169,7 @@ def _known(op: str, args: tuple[Operand, ...]) -> Value | None:
 
 
 class Loop(NamedTuple):
-    """What is bound in it, by name, and the nodes that it runs over, or how many times it runs."""
+    """The names bound in a loop, and the nodes that it runs over, or how many times it runs."""
 
     bound: tuple[str, ...]
     nodes: tuple[float, ...]
@@ -242,7 +242,7 @@ class Recorder(Unrolled):
 
 
 def _within(function: Callable[..., Value], *args: Value) -> Value:
-    """What a function answers in a loop."""
+    """The result of a function called inside a loop."""
     outside = _depth.set(_depth.get() + 1)
     try:
         return function(*args)

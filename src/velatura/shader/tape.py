@@ -14,7 +14,7 @@ from typing import Any
 from velatura.shader.graph import COMMUTE
 from velatura.shader.symbol import Operand, Symbol, in_order
 
-#: Operations whose name alone does not tell what is done: they name a table, or tell a channel.
+#: Operations with a detail besides their name: a table, or a channel.
 _DETAILED = ("texels", "value", "component")
 
 

@@ -1,4 +1,4 @@
-"""What a material is: layers, their parameters, and the files that hold them. It does no optics and no rendering."""
+"""Materials: layers, their parameters, and the files that hold them, without optics or rendering."""
 
 from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.io import Material, dumps, load, loads, preset, presets, save

@@ -1,4 +1,4 @@
-"""What a material file may hold, for machines and for the manual, read off the declared parameters."""
+"""The format of material files, for machines and for the manual, derived from the declared parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a stack is made of: interfaces, media, and a diffuse base."""
+"""The layers of a stack: interfaces, media, and a diffuse base."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def within(name: str) -> tuple[float, float]:
 
 
 def entry_name(layer: Layer) -> str:
-    """What a file calls the layer: interface, medium or diffuse."""
+    """Name of the layer in a file: interface, medium or diffuse."""
     return type(layer).__name__.lower()
 
 

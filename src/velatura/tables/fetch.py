@@ -26,7 +26,7 @@ FEW = 256  # numbers of which NumPy takes longer to begin with than to work out
 class Row:
     """Fresnel of one relative index at the nodes of a low-rank table, raised to the powers that the table names.
 
-    `denser` and `rarer` tell whether the relative index can be above and below 1 (for metals: whether it can be
+    `denser` and `rarer` say whether the relative index can be above and below 1 (for metals: whether it can be
     anywhere but, and in, the corner kappa < eta < 1): what cannot be is not looked up. `multiple` is whether light may
     bounce between the facets before it leaves.
     """

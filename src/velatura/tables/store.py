@@ -20,7 +20,7 @@ FILE = Path(__file__).with_name("tables.npz")
 class Table:
     """Single-precision values at the nodes i/(N-1) of a two- or three-dimensional grid, channels on the last axis.
 
-    `nodes` tell the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in
+    `nodes` are the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in
     three dimensions coordinates on the angular axis; `powers` to which it is raised there, 1 where there are none.
     """
 
@@ -92,7 +92,7 @@ def save(tables: Tables, path: Path = FILE) -> None:
 
 
 def load() -> Tables:
-    """The tables shipped with the package: the same ones for all threads, since they are told apart by identity."""
+    """The tables shipped with the package: the same ones for all threads, since they are distinguished by identity."""
     with _loading:
         return _loaded()
 

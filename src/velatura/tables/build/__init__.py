@@ -64,6 +64,6 @@ def build(progress: Progress = ignore) -> Built:
 
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
-    """What makes each table."""
+    """The functions that make the tables, by name."""
     parts = single_scattering, anisotropic_albedo, multiple_scattering, diffuse_matrices
     return {name: make for part in parts for name, make in part.makers().items()}

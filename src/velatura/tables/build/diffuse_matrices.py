@@ -27,7 +27,7 @@ COS_MIN = 1e-3  # stands in for 0
 
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
-    """What makes each table."""
+    """The functions that make the tables, by name."""
     between = cache(_between)
     return {
         "entering": _entering,

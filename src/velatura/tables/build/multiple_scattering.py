@@ -44,7 +44,7 @@ BINS = 512  # of the cosine, for walks on metals
 
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
-    """What makes each table."""
+    """The functions that make the tables, by name."""
     conductors = single_scattering.conductors()
     some = slice(None, None, 4)
     smooth = conductors[0][some], conductors[1][some]
@@ -85,7 +85,7 @@ def _gauss(count: int) -> np.ndarray:
 
 
 def _walk(cos_theta: np.ndarray, alpha: np.ndarray, eta: np.ndarray, paths: int, progress: Progress) -> np.ndarray:
-    """What dielectrics reflect later; two blocks of points at a time."""
+    """Energy that dielectrics reflect after the first meeting; two blocks of points at a time."""
     starts = range(0, len(alpha), BLOCK)
 
     def block(start: int) -> np.ndarray:
@@ -150,7 +150,7 @@ def bin_cosines() -> np.ndarray:
 def _metals(eta: np.ndarray, kappa: np.ndarray) -> np.ndarray:
     """Fits to what metals reflect later, one column for each.
 
-    What the walks say of a mirror, for which the truth is known, tells how much too bright they are.
+    The walks are calibrated with a mirror, whose albedo is known.
     """
     curves = fresnel.conductor(bin_cosines(), eta, kappa)
     cos_theta, alpha = _plane_nodes()

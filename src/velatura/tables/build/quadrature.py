@@ -26,11 +26,11 @@ from velatura.optics import ggx
 NODES = 10  # on every piece of an integral: an error of 5e-5 at worst
 CHUNK = 64  # points integrated at a time: their nodes fit the cache
 
-Progress = Callable[[float], None]  # is told the share that is done
+Progress = Callable[[float], None]  # called with the share that is done
 
 
 def ignore(done: float) -> None:
-    """Progress that nobody looks at."""
+    """Does nothing: for callers without a progress bar."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def average(
     correlated: bool = False,
     progress: Progress = ignore,
 ) -> np.ndarray:
-    """What `of(reflections, *indices)` makes of every point, all of shape (points,), the results joined.
+    """`of(reflections, *indices)` at every point, all of shape (points,), the results joined.
 
     The first of the indices, if there are any, is a relative index, and what is averaged may bend where the cosine
     named by `bend` passes its critical angle. Masking is height-`correlated`, or separable.

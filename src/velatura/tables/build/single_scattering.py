@@ -36,7 +36,7 @@ FINE = 512  # nodes in the cosine for integrals against a fixed density
 
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
-    """What makes each table of single reflections."""
+    """The functions that make the tables of single reflections, by name."""
     reflected = cache(lambda: density_over_plane("cos_d", *plane()))
     return {
         "dielectric": lambda p: _low_rank(reflected(), dielectrics(), DIELECTRIC_RANK),
