@@ -92,7 +92,7 @@ def test_what_cannot_be_exits_with_3(run: Run, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("lobes:\n  - {energy: -1}\n", "bad.yaml: lobe 1: energy: must be at least 0, got -1"),
+        ("lobes:\n  - {energy: -1}\n", "bad.yaml: lobe 1: energy: must lie in 0 to 1e9, got -1"),
         ("lobes:\n  - {energy: .nan}\n", "bad.yaml: lobe 1: energy: must be finite, got nan"),
         ("lobes:\n  - {enrgy: 1}\n", "bad.yaml: lobe 1: unknown key 'enrgy' (did you mean energy?)"),
         ("lobs: []\n", "bad.yaml: unknown key 'lobs' (did you mean lobes?)"),

@@ -203,7 +203,11 @@ def test_what_is_no_value_is_refused_in_a_line(variant: str) -> None:
             mi.ScalarTransform4f(),
             "layer0_eta: must be a number, a colour, a spectrum or a texture, got .*",
         ),
-        ("layer0_eta", {"type": "spectrum", "value": 0.0}, r"layer 0 \(interface\): eta: must be above 0, got 0.0"),
+        (
+            "layer0_eta",
+            {"type": "spectrum", "value": 0.0},
+            r"layer 0 \(interface\): eta: must lie in 0.001 to 1e4, got 0.0",
+        ),
         ("exterior", image, "exterior: must be a number, .*"),
         ("layer0_conductor", image, r"layer0_conductor: layer 0 \(dielectric\) has no conductor, .*"),
         ("layer3_alpha", image, "layer3_alpha_u: the last layer is layer 1"),

@@ -71,8 +71,8 @@ def test_parameters_are_those_that_are_declared() -> None:
         True,
     )
     assert schema["interface"]["rotation"]["unit"] == "degrees"
-    assert (schema["interface"]["rotation"]["low"], schema["interface"]["eta"]["high"]) == (None, None)
-    assert schema["interface"]["eta"]["strict"] and schema["interface"]["eta"]["default"] is None
+    assert (schema["interface"]["rotation"]["low"], schema["interface"]["eta"]["high"]) == (-1e9, 1e4)
+    assert schema["medium"]["g"]["strict"] and schema["interface"]["eta"]["default"] is None
     assert "mirror" in schema["interface"]["conductor"]["options"]
 
 
@@ -183,7 +183,7 @@ def test_a_text_is_read_as_it_was_written(here: Path) -> None:
     ("verb", "body", "reason"),
     [
         ("read", {"text": "layers: ["}, "is not valid YAML"),
-        ("read", {"text": "layers: [{interface: {eta: -1}}]"}, "eta: must be above 0"),
+        ("read", {"text": "layers: [{interface: {eta: -1}}]"}, "eta: must lie in 0.001 to 1e4"),
         ("read", {}, "text: must be text, got nothing"),
         ("write", {"material": []}, "material: must be an object"),
         ("shader", {"material": {"layers": [{"diffuse": {}}]}}, "needs an interface"),

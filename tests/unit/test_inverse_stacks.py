@@ -198,7 +198,7 @@ def test_the_nearest_targets_lie_on_the_bounds() -> None:
     [
         ([], "lobes: must hold at least one lobe"),
         ([{}], "lobe 1: energy: missing"),
-        ([{"energy": -0.1}], "lobe 1: energy: must be at least 0, got -0.1"),
+        ([{"energy": -0.1}], "lobe 1: energy: must lie in 0 to 1e9, got -0.1"),
         ([{"energy": float("nan")}], "lobe 1: energy: must be finite, got nan"),
         ([{"energy": [0.1, 0.2]}], "lobe 1: energy: must be a number, [r, g, b]"),
         ([{"energy": 0.1, "alpha": 2}], "lobe 1: alpha: must lie in 0 to 1, got 2"),
@@ -210,7 +210,7 @@ def test_the_nearest_targets_lie_on_the_bounds() -> None:
         ([{"energy": 0.1, "base": "conductor"}, {"energy": 0.1}], "lobe 1: base: only the last lobe"),
         ([{"energy": 0.1, "fixed": {"eta": [1, 2]}}], "lobe 1: fixed: eta: must hold an entry for each interface"),
         ([{"energy": 0.1, "fixed": {"k": [1]}}], "lobe 1: fixed: k: only for the last interface"),
-        ([{"energy": 0.1, "fixed": {"tau": [-1]}}], "lobe 1: fixed: tau: must be at least 0, got -1"),
+        ([{"energy": 0.1, "fixed": {"tau": [-1]}}], "lobe 1: fixed: tau: must lie in 0 to 1e9, got -1"),
         ([{"energy": 0.1, "fixed": 3}], "lobe 1: fixed: must hold keys and lists, got 3"),
     ],
 )
@@ -295,5 +295,5 @@ def test_coats_that_cannot_be() -> None:
             Stack([Interface(eta=1.5, alpha=0.2), Medium(sigma_s=1.0), Interface(conductor="Au", alpha=0.2)]),
             keep_appearance=True,
         )
-    with pytest.raises(InvalidInput, match="eta: must be above 0"):
+    with pytest.raises(InvalidInput, match=r"eta: must lie in 0\.001 to 1e4"):
         coat(preset("coated-gold"), -1)

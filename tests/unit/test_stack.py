@@ -261,9 +261,10 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.M
     assert path.read_text() == "old"
 
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
-positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
-not_negative = st.floats(min_value=0, allow_infinity=False)
+finite = st.floats(-1e9, 1e9)
+indices = st.floats(1e-3, 1e4)
+extinctions = st.floats(0, 1e4)
+not_negative = st.floats(0, 1e9)
 unit = st.floats(0, 1)
 
 
@@ -280,15 +281,15 @@ def stacks(draw: st.DrawFn, image: Path, table: Path) -> Stack:
     spectra = st.builds(Spectrum, spectrum=st.just(table))
     metals, dielectrics = (st.sampled_from(group) for group in names())
     surface = {"alpha": unit | st.tuples(unit | textures, unit) | textures, "rotation": finite | textures}
-    dielectric = st.builds(Interface, eta=colours(positive) | dielectrics | spectra | textures, **surface)
-    conductor = st.builds(Interface, eta=colours(positive), k=colours(not_negative) | textures, **surface)
+    dielectric = st.builds(Interface, eta=colours(indices) | dielectrics | spectra | textures, **surface)
+    conductor = st.builds(Interface, eta=colours(indices), k=colours(extinctions) | textures, **surface)
     named = st.builds(Interface, conductor=metals | st.just("mirror"), **surface)
     medium = st.builds(
         Medium,
         depth=not_negative | textures,
         sigma_a=colours(not_negative) | spectra | textures,
         sigma_s=colours(not_negative),
-        g=st.floats(-1, 1, exclude_min=True, exclude_max=True),
+        g=st.floats(-1, 1, exclude_min=True, exclude_max=True, width=32),
     )
     diffuse = st.builds(Diffuse, albedo=colours(unit) | textures)
 
@@ -299,7 +300,7 @@ def stacks(draw: st.DrawFn, image: Path, table: Path) -> Stack:
     text = st.text(st.characters(exclude_categories=["Cs"]))
     transmits = layers[-1].kind == "dielectric"
     return Stack(
-        layers, name=draw(text), source=draw(text), exterior=draw(positive), thin=transmits and draw(st.booleans())
+        layers, name=draw(text), source=draw(text), exterior=draw(indices), thin=transmits and draw(st.booleans())
     )
 
 
@@ -382,7 +383,10 @@ def test_the_schema_knows_every_key_and_range() -> None:
     }
     assert set(schema["properties"]) == {"name", "source", "exterior", "thin", "layers"}
     assert layers["interface"]["alpha"]["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 1}
-    assert layers["interface"]["eta"]["anyOf"][0] == {"type": "number", "exclusiveMinimum": 0}
+    assert layers["interface"]["eta"]["anyOf"][0] == {"type": "number", "minimum": 1e-3, "maximum": 1e4}
+    assert layers["medium"]["g"]["anyOf"][0] == {"type": "number", "exclusiveMinimum": -1, "exclusiveMaximum": 1}
+    assert layers["medium"]["depth"]["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 1e9}
+    assert layers["interface"]["rotation"]["anyOf"][0] == {"type": "number", "minimum": -1e9, "maximum": 1e9}
     assert {"$ref": "#/$defs/texture"} in layers["medium"]["sigma_a"]["anyOf"]
     assert "mirror" in layers["interface"]["conductor"]["enum"]
     assert schema["$defs"]["texture"]["required"] == ["texture"]

@@ -43,27 +43,35 @@ VALUES = {
     ),
     one_layer(
         "eta: 1.5, rotation: left"
-    ): "layer 0 (interface): rotation: must be a number, a brushing or a texture, got 'left'",
+    ): "layer 0 (interface): rotation: must be a number, a brushing or a texture, and lie in -1e9 to 1e9, got 'left'",
     one_layer("eta: 1.5, rotation: "): "layer 0 (interface): rotation: has no value",
-    one_layer("eta: 0"): "layer 0 (interface): eta: must be above 0, got 0",
-    one_layer("eta: -1.5"): "layer 0 (interface): eta: must be above 0, got -1.5",
+    one_layer("eta: 0"): "layer 0 (interface): eta: must lie in 0.001 to 1e4, got 0",
+    one_layer("eta: -1.5"): "layer 0 (interface): eta: must lie in 0.001 to 1e4, got -1.5",
     one_layer("eta: .nan"): "layer 0 (interface): eta: must be finite, got nan",
     one_layer("eta: [1.5, .inf, 1]"): "layer 0 (interface): eta: must be finite, got inf",
     one_layer("eta: [1.5, 1]"): (
-        "layer 0 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, and be above 0, "
-        "got [1.5, 1]"
+        "layer 0 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, "
+        "and lie in 0.001 to 1e4, got [1.5, 1]"
     ),
     one_layer(f"eta: 0x{'f' * 5000}"): "layer 0 (interface): eta: must be finite, got inf",
-    one_layer("eta: 1, k: -1"): "layer 0 (interface): k: must be at least 0, got -1",
-    over_diffuse("depth: -1"): "layer 0 (medium): depth: must be at least 0, got -1",
+    one_layer("eta: 1, k: -1"): "layer 0 (interface): k: must lie in 0 to 1e4, got -1",
+    over_diffuse("depth: -1"): "layer 0 (medium): depth: must lie in 0 to 1e9, got -1",
     over_diffuse("depth: [1, 2, 3]"): (
-        "layer 0 (medium): depth: must be a number or a texture, and be at least 0, got [1, 2, 3]"
+        "layer 0 (medium): depth: must be a number or a texture, and lie in 0 to 1e9, got [1, 2, 3]"
     ),
-    over_diffuse("sigma_a: [1, -1, 2]"): "layer 0 (medium): sigma_a: must be at least 0, got -1",
+    over_diffuse("sigma_a: [1, -1, 2]"): "layer 0 (medium): sigma_a: must lie in 0 to 1e9, got -1",
     over_diffuse("g: 1"): "layer 0 (medium): g: must lie in -1 to 1, both excluded, got 1",
+    over_diffuse("g: -0.999999999"): (
+        "layer 0 (medium): g: must lie in -1 to 1, both excluded, got -0.999999999"  # in single precision it is -1
+    ),
     "layers: [{diffuse: {albedo: 1.5}}]": "layer 0 (diffuse): albedo: must lie in 0 to 1, got 1.5",
-    "exterior: 0\n" + COAT: "exterior: must be above 0, got 0",
-    "exterior: {texture: a.png}\n" + COAT: "exterior: must be a number, and be above 0, got {'texture': 'a.png'}",
+    "exterior: 0\n" + COAT: "exterior: must lie in 0.001 to 1e4, got 0",
+    "exterior: {texture: a.png}\n"
+    + COAT: "exterior: must be a number, and lie in 0.001 to 1e4, got {'texture': 'a.png'}",
+    one_layer("eta: 1.0e+39"): "layer 0 (interface): eta: must lie in 0.001 to 1e4, got 1e+39",
+    one_layer("eta: 1e-4"): "layer 0 (interface): eta: must lie in 0.001 to 1e4, got 0.0001",
+    one_layer("eta: 1.5, rotation: 2e9"): "layer 0 (interface): rotation: must lie in -1e9 to 1e9, got 2000000000.0",
+    over_diffuse("depth: 1e300"): "layer 0 (medium): depth: must lie in 0 to 1e9, got 1e+300",
     # Names
     one_layer("eta: bk8"): "layer 0 (interface): eta: unknown name 'bk8' (did you mean bk7?)",
     one_layer("eta: Au"): "layer 0 (interface): eta: Au is a metal; write conductor: Au",
@@ -149,6 +157,13 @@ VALUES = {
     "layers:\n  - interface:\n      eta: 1.5\n      eta: 1.6": "line 4: key 'eta' appears twice",
     "name: x\n---\nname: y": "line 2: is not valid YAML: but found another document",
     "name: \x00": "is not valid YAML: special characters are not allowed",
+    "source: !!timestamp foo": "line 1: a value must have no tag, got 'tag:yaml.org,2002:timestamp'",
+    "name: x\nthin: !!bool maybe": "line 2: a value must have no tag, got 'tag:yaml.org,2002:bool'",
+    "layers: !!python/object/apply:os.system [ls]": (
+        "line 1: a value must have no tag, got 'tag:yaml.org,2002:python/object/apply:os.system'"
+    ),
+    "layers: ! []": "line 1: a value must have no tag, got '!'",
+    "layers: !x {}": "line 1: a value must have no tag, got '!x'",
     "? [1]\n: x": "line 1: is not valid YAML: found unhashable key",
     "name: &a [*a]\n" + COAT: "holds more than 100000 values once its aliases are written out",
     "a0: &a0 [1]\n" + doubled(12) + COAT: "holds more than 100000 values once its aliases are written out",
@@ -274,8 +289,8 @@ def test_a_path_that_cannot_be_written_gets_one_line(
         ({"layer2_conductor": "Gold"}, "layer 2 (interface): conductor: unknown metal 'Gold' (did you mean gold?)"),
         (
             {"layer2_eta": Named("Au", "k")},
-            "layer 2 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, and be above 0, "
-            "got Named(name='Au', part='k')",
+            "layer 2 (interface): eta: must be a number, [r, g, b], a name, a spectrum or a texture, "
+            "and lie in 0.001 to 1e4, got Named(name='Au', part='k')",
         ),
         ({"thin": True}, "thin: only for a stack that ends in a dielectric interface"),
     ],

@@ -185,7 +185,7 @@ def test_a_table_stays_with_its_material(tmp_path: Path, monkeypatch: pytest.Mon
         ("400 1.5\n500 nan", "line 2: must be finite"),
         ("500 1.5", "must hold values at two wavelengths or more, in nanometres, of visible light"),
         ("0.4 1.5\n0.7 1.5", "must hold values at two wavelengths or more, in nanometres, of visible light"),
-        ("400 1.5\n700 -1", "must be above 0, got -1.0"),
+        ("400 1.5\n700 -1", "must lie in 0.001 to 1e4, got -1.0"),
         (b"\xff\xfe\x00", "is no text that can be read"),
         ("#" * 2**20 + "#", "is larger than a table of a spectrum"),
     ],

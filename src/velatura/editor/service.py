@@ -7,7 +7,6 @@ working directory. All errors that a user can make are InvalidInput.
 from __future__ import annotations
 
 import functools
-import math
 import re
 from collections.abc import Callable
 
@@ -88,12 +87,11 @@ def _keys(model: type[Record]) -> Answer:
 
 
 def _parameter(declared: Parameter, place: FieldInfo) -> Answer:
-    """One parameter as its control needs it; None stands for infinity, and for no default."""
+    """One parameter as its control needs it; None stands for no default."""
     known: Answer = {"kind": KINDS[type(declared)], "unit": declared.unit, "doc": declared.doc}
     known |= {"default": None if place.is_required() else place.default, "texturable": declared.texturable}
     if isinstance(declared, Scalar):
-        low, high = (limit if math.isfinite(limit) else None for limit in (declared.low, declared.high))
-        known |= {"low": low, "high": high, "strict": declared.strict}
+        known |= {"low": declared.low, "high": declared.high, "strict": declared.strict}
     if isinstance(declared, Choice):
         known["options"] = declared.options
     if isinstance(declared, Conductor):

@@ -13,7 +13,7 @@ from velatura.errors import InvalidInput
 from velatura.model.maps import MAPS
 from velatura.stack import RGB, io
 from velatura.stack.schema import Parameter, Record, show
-from velatura.stack.values import Choice, Colour, Scalar, Text
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Scalar, Text
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
 
@@ -61,15 +61,15 @@ def _number(doc: str, low: float = 0.0, **options: Any) -> Scalar:
     return Scalar(doc, low=low, texturable=False, differentiable=False, **options)
 
 
-def _colour(doc: str, **options: Any) -> Colour:
-    return Colour(doc, low=0.0, texturable=False, differentiable=False, **options)
+def _colour(doc: str, low: float = 0.0, **options: Any) -> Colour:
+    return Colour(doc, low=low, texturable=False, differentiable=False, **options)
 
 
 class Fixed(Record):
     """Parameters that are held fixed: an entry for each interface of the lobe, from the top, null where free."""
 
-    eta: Annotated[tuple[Any, ...], Entries("absolute indices", entry=_colour("", strict=True))] = ()
-    k: Annotated[tuple[Any, ...], Entries("absolute extinctions", entry=_colour(""))] = ()
+    eta: Annotated[tuple[Any, ...], Entries("absolute indices", entry=_colour("", INDEX_LOW, high=INDEX_HIGH))] = ()
+    k: Annotated[tuple[Any, ...], Entries("absolute extinctions", entry=_colour("", high=INDEX_HIGH))] = ()
     alpha: Annotated[tuple[Any, ...], Entries("GGX roughnesses", entry=_number("", high=1.0))] = ()
     tau: Annotated[tuple[Any, ...], Entries("optical depths of the media above", entry=_colour(""))] = ()
 
@@ -140,8 +140,8 @@ class Target(Record):
     """
 
     name: Annotated[str, Text("name of the material")] = ""
-    exterior: Annotated[float, _number("absolute index of refraction above", strict=True)] = 1.0
-    eta_max: Annotated[float, _number("largest index of a dielectric", low=1.0, strict=True)] = 4.0
+    exterior: Annotated[float, _number("absolute index of refraction above", INDEX_LOW, high=INDEX_HIGH)] = 1.0
+    eta_max: Annotated[float, _number("largest index of a dielectric", low=1.0, high=INDEX_HIGH, strict=True)] = 4.0
     channels: Annotated[
         str | None,
         Choice("one variance for all colours or the brightest one's; else the model's", ("mean", "separate")),

@@ -8,7 +8,20 @@ from pydantic import model_validator
 
 from velatura.stack.schema import Record, parameters
 from velatura.stack.spectra import MIRROR, Named, names
-from velatura.stack.values import RGB, Angle, Brushing, Colour, Conductor, Index, Pair, Scalar, Spectrum, Texture
+from velatura.stack.values import (
+    INDEX_HIGH,
+    INDEX_LOW,
+    RGB,
+    Angle,
+    Brushing,
+    Colour,
+    Conductor,
+    Index,
+    Pair,
+    Scalar,
+    Spectrum,
+    Texture,
+)
 
 Kind: TypeAlias = Literal["dielectric", "conductor", "mirror", "medium", "diffuse"]
 Value: TypeAlias = float | RGB | Named | Spectrum | Texture | Brushing
@@ -22,11 +35,16 @@ class Interface(Record):
 
     eta: Annotated[
         float | RGB | str | Spectrum | Texture | None,
-        Index("absolute index of refraction of the medium below", low=0, strict=True, part="eta"),
+        Index("absolute index of refraction of the medium below", low=INDEX_LOW, high=INDEX_HIGH, part="eta"),
     ] = None
     k: Annotated[
         float | RGB | str | Spectrum | Texture | None,
-        Index("absolute extinction of what lies below; written, even as 0, it makes it opaque", low=0, part="k"),
+        Index(
+            "absolute extinction of what lies below; written, even as 0, it makes it opaque",
+            low=0,
+            high=INDEX_HIGH,
+            part="k",
+        ),
     ] = None
     conductor: Annotated[
         str | None,

@@ -11,7 +11,7 @@ from velatura.errors import InvalidInput
 from velatura.stack import flat_names
 from velatura.stack.layers import LAYERS, Diffuse, Interface, Kind, Layer, Medium, Value, entry_name
 from velatura.stack.schema import Record, show, unknown
-from velatura.stack.values import Flag, Scalar, Text
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Flag, Scalar, Text
 
 
 class Stack(Record):
@@ -29,7 +29,9 @@ class Stack(Record):
     source: Annotated[str, Text("where the numbers come from")] = ""
     exterior: Annotated[
         float,
-        Scalar("absolute index of refraction above", low=0, strict=True, texturable=False, differentiable=False),
+        Scalar(
+            "absolute index of refraction above", low=INDEX_LOW, high=INDEX_HIGH, texturable=False, differentiable=False
+        ),
     ] = 1.0
     thin: Annotated[bool, Flag("a thin pane: light leaves it into the exterior index")] = False
     layers: tuple[Layer, ...]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import numbers
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,12 +121,19 @@ def _encodable(text: str) -> bool:
 # Numbers -------------------------------------------------------------------------------------------------------------
 
 
+#: Magnitude of a number that has no nearer bound: single precision, in which is rendered, holds products of several.
+LARGEST = 1e9
+
+#: The range of an absolute index of refraction, and the upper end of extinction's: powers of ratios fit as well.
+INDEX_LOW, INDEX_HIGH = 1e-3, 1e4
+
+
 @dataclass(frozen=True)
 class Scalar(Parameter):
-    """A number in a range, or a texture."""
+    """A number in a range, or a texture; an angle is kept within one turn."""
 
-    low: float = -math.inf
-    high: float = math.inf
+    low: float = -LARGEST
+    high: float = LARGEST
     strict: bool = False  # the ends of the range are excluded
     differentiable: bool = True
     texturable: bool = True
@@ -134,20 +143,16 @@ class Scalar(Parameter):
 
     @property
     def expects(self) -> str:
-        range_clause = f", and {self._limits}" if self.bounds else ""
-        return self.values + (" or a texture" if self.texturable else "") + range_clause
+        return f"{self.values}{' or a texture' if self.texturable else ''}, and {self._limits}"
 
     @property
     def bounds(self) -> str:
-        if math.isfinite(self.high):
-            return f"({self.low:g}, {self.high:g})" if self.strict else f"[{self.low:g}, {self.high:g}]"
-        return f"{'>' if self.strict else '>='} {self.low:g}" if math.isfinite(self.low) else ""
+        low, high = map(_short, (self.low, self.high))
+        return f"({low}, {high})" if self.strict else f"[{low}, {high}]"
 
     @property
     def _limits(self) -> str:
-        if math.isfinite(self.high):
-            return f"lie in {self.low:g} to {self.high:g}" + (", both excluded" if self.strict else "")
-        return f"be {'above' if self.strict else 'at least'} {self.low:g}"
+        return f"lie in {_short(self.low)} to {_short(self.high)}" + (", both excluded" if self.strict else "")
 
     def check(self, value: Any) -> Any:
         value = value.tolist() if hasattr(value, "tolist") else value
@@ -167,9 +172,11 @@ class Scalar(Parameter):
             number = math.inf
         if not math.isfinite(number):
             raise ValueError(f"must be finite, got {number}")
-        if not self.low <= number <= self.high or (self.strict and number in (self.low, self.high)):
+        ends = (self.low, self.high) if self.strict else ()
+        if not self.low <= number <= self.high or ctypes.c_float(number).value in ends:  # as it is rendered
             raise ValueError(f"must {self._limits}, got {show(value)}")
-        return number
+        # Single precision would lose the angle among many turns
+        return math.fmod(number, 360.0) + 0.0 if self.unit == "degrees" else number
 
     def _texture(self, value: Any) -> Texture:
         texture = value if isinstance(value, Texture) else Texture.from_dict(value)
@@ -184,12 +191,14 @@ class Scalar(Parameter):
         return forms[0] if len(forms) == 1 else {"anyOf": forms}
 
     def _forms(self) -> list[dict[str, Any]]:
-        number: dict[str, Any] = {"type": "number"}
-        if math.isfinite(self.low):
-            number["exclusiveMinimum" if self.strict else "minimum"] = self.low
-        if math.isfinite(self.high):
-            number["exclusiveMaximum" if self.strict else "maximum"] = self.high
-        return [number]
+        low, high = ("exclusiveMinimum", "exclusiveMaximum") if self.strict else ("minimum", "maximum")
+        return [{"type": "number", low: self.low, high: self.high}]
+
+
+def _short(number: float) -> str:
+    """A number as short as it can be written: 1e9, 0.5."""
+    plain, power = f"{number:g}", re.sub(r"e([-+])0?", lambda sign: "e" + sign[1].strip("+"), f"{number:.0e}")
+    return power if float(power) == number and len(power) < len(plain) else plain
 
 
 class Angle(Scalar):
@@ -201,6 +210,10 @@ class Angle(Scalar):
         if isinstance(value, Mapping) and "brushing" in value:
             return Brushing.from_dict(value)
         return value if isinstance(value, Brushing) else super().check(value)
+
+    def _texture(self, value: Any) -> Texture:
+        texture = super()._texture(value)
+        return texture.model_copy(update={"offset": math.fmod(texture.offset, 360.0)})
 
     def _forms(self) -> list[dict[str, Any]]:
         return [*super()._forms(), {"$ref": "#/$defs/brushing"}]

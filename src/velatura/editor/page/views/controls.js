@@ -6,7 +6,8 @@ import { styleMap } from 'lit-html/directives/style-map.js';
 import { icons } from './icons.js';
 
 const TICKS = 200; // of a slider
-const DECADES = [-3, 2]; // of a slider for what has no upper bound; its left end is 0
+const DECADES = [-3, 2]; // of a slider for a range that is wider than WIDE; its left end is 0
+const WIDE = 1000;
 
 /** A value as a field shows it. */
 export const shown = (value) => String(Number(value.toPrecision(6)));
@@ -30,9 +31,9 @@ function scaleOf(span, [first, last] = DECADES) {
   };
 }
 
-/** The ends of a slider: those of the range, within it where they are excluded; null: as decades. */
+/** The ends of a slider: those of the range, within it where they are excluded; null for a wide one: as decades. */
 export function spanOf({ low, high, strict }) {
-  if (low === null || high === null) return null;
+  if (high - low > WIDE) return null;
   const margin = strict ? (high - low) / TICKS : 0;
   return [low + margin, high - margin];
 }
