@@ -261,6 +261,17 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.M
     assert path.read_text() == "old"
 
 
+@pytest.mark.parametrize(("given", "kept"), [(1e9, 280.0), (-750, -30.0), (360, 0.0), (-30.5, -30.5)])
+def test_an_angle_is_kept_within_a_turn(given: float, kept: float, tmp_path: Path) -> None:
+    """Rationale: in single precision 1e9 degrees are 64 apart from the next number."""
+    (tmp_path / "a.png").touch()
+    turned = {"texture": str(tmp_path / "a.png"), "offset": given}
+    brushed = {"brushing": "radial", "offset": given}
+    stack = Stack([{"interface": {"eta": 1.5, "rotation": each}} for each in (given, turned, brushed)])
+    plain, image, field = (interface.rotation for interface in stack.interfaces)
+    assert [plain, image.offset, field.offset] == [kept] * 3  # type: ignore[union-attr]
+
+
 finite = st.floats(-1e9, 1e9)
 indices = st.floats(1e-3, 1e4)
 extinctions = st.floats(0, 1e4)

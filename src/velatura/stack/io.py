@@ -178,7 +178,9 @@ def _parse(text: str, format: str) -> Any:
         raise InvalidInput(f"{where}is not valid YAML: {reason}") from None
     except json.JSONDecodeError as error:
         raise InvalidInput(f"line {error.lineno}: is not valid JSON: {error.msg}") from None
-    except ValueError as error:  # a number of too many digits, a date that is none
+    except RecursionError:
+        raise
+    except Exception as error:  # a number of too many digits, a date that is none: PyYAML lets all sorts pass
         raise InvalidInput(f"cannot be read: {error}") from None
 
 
@@ -192,7 +194,14 @@ def _unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML that refuses duplicate keys and endless aliases, and reads 1e-3 as a number, as YAML 1.2 does."""
+    """YAML that refuses tags, duplicate keys and endless aliases, and reads 1e-3 as a number, as YAML 1.2 does."""
+
+    def get_event(self) -> yaml.Event:
+        event = super().get_event()
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            raise InvalidInput(f"line {event.start_mark.line + 1}: a value must have no tag, got {show(tag)}")
+        return event
 
     def get_single_node(self) -> yaml.Node | None:
         node = super().get_single_node()
@@ -234,6 +243,11 @@ class _Line(dict[str, Any]):
 _EXPONENT = re.compile(r"[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)[eE][-+]?\d+$")
 for _dialect in (_Loader, _Dumper):
     _dialect.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+.0123456789"))
+# PyYAML would write U+0085 as a line break, and read back a space
+_Dumper.add_representer(
+    str,
+    lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"' if "\x85" in text else None),
+)
 _Dumper.add_representer(
     _Line, lambda dumper, data: dumper.represent_mapping("tag:yaml.org,2002:map", data, flow_style=True)
 )

@@ -198,7 +198,7 @@ class Scalar(Parameter):
 def _short(number: float) -> str:
     """A number as short as it can be written: 1e9, 0.5."""
     plain, power = f"{number:g}", re.sub(r"e([-+])0?", lambda sign: "e" + sign[1].strip("+"), f"{number:.0e}")
-    return power if float(power) == number and len(power) < len(plain) else plain
+    return power if float(power) == number and len(power) + 1 < len(plain) else plain
 
 
 class Angle(Scalar):
