@@ -140,6 +140,38 @@ def test_a_masked_component_is_sampled_by_its_density(name: str, mask: Any) -> N
     assert test.run(0.01, 3)
 
 
+@pytest.mark.parametrize("plugin", ["layered_reference", "weidlich_wilkie"])
+def test_components_of_the_other_plugins_sum_to_the_whole(plugin: str) -> None:
+    """By eval, of which the reference makes an estimate from the same random numbers, and by 10^4 samples each."""
+    bsdf, n = loaded("glossy-plastic", plugin), 10_000
+    kinds = {+Flags.GlossyReflection: 0.05, +Flags.DiffuseReflection: 0.3}
+    assert [bsdf.flags(k) & +(Flags.Glossy | Flags.Diffuse) for k in range(bsdf.component_count())] == list(kinds)
+    si, wo = interactions([0.6, 0, 0.8], n), random_directions(n, 0.05)
+    u1, u2 = mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n)))
+    whole, parts = np.array(bsdf.eval(mi.BSDFContext(), si, wo)), np.zeros((3, n))
+    for k, (kind, least) in enumerate(kinds.items()):
+        asked = context(component=k)
+        value = np.array(bsdf.eval(asked, si, wo))
+        np.testing.assert_array_equal(value, bsdf.eval(context(kind), si, wo))
+        parts = parts + value
+        bs, weight = bsdf.sample(asked, si, u1, u2)
+        counts = np.array(weight).any(axis=0)
+        assert np.all(np.array(bs.sampled_type)[counts] == kind) and np.all(np.array(bs.sampled_component)[counts] == k)
+        one, other = np.array(weight)[0], value[0] * 2 * np.pi * 0.95
+        assert abs(one.mean() - other.mean()) < 5 * np.hypot(one.std(), other.std()) / np.sqrt(n) + 0.003
+        assert least < one.mean() < 2 * least
+    np.testing.assert_allclose(parts, whole, rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["furnace", "frosted-glass"])
+def test_smooth_and_rough_light_of_the_reference_are_components(name: str) -> None:
+    bsdf, n = loaded(name, "layered_reference"), 10_000
+    si, u1, u2 = interactions([0.6, 0, 0.8], n), mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n)))
+    _, whole = bsdf.sample(mi.BSDFContext(), si, u1, u2)
+    parts = [bsdf.sample(context(component=k), si, u1, u2)[1] for k in range(bsdf.component_count())]
+    np.testing.assert_allclose(np.sum([np.array(part) for part in parts], axis=0), whole, rtol=1e-6)
+
+
 def test_the_component_that_was_drawn_is_as_frequent_as_its_share_of_energy() -> None:
     bsdf, n = loaded("varnished-paint"), 50_000
     si = interactions([0.6, 0, 0.8], n)
@@ -184,7 +216,7 @@ def test_the_diffuse_part_is_that_of_plastic() -> None:
         np.testing.assert_allclose(ours.eval(asked, si, wo), theirs.eval(asked, si, wo), rtol=0.02)
 
 
-@pytest.mark.parametrize("plugin", ["layered"])
+@pytest.mark.parametrize("plugin", ["layered", "layered_reference", "weidlich_wilkie"])
 def test_what_is_not_asked_for_is_dark(plugin: str) -> None:
     bsdf, si = loaded("coated-gold", plugin), interactions([0.5, 0, 0.8])
     for asked in (context(Flags.Transmission), context(Flags.DiffuseReflection), context(component=9)):
@@ -208,7 +240,7 @@ def test_twosided_masks_either_side() -> None:
 # Albedo
 
 
-@pytest.mark.parametrize("plugin", ["layered"])
+@pytest.mark.parametrize("plugin", ["layered", "layered_reference", "weidlich_wilkie"])
 @pytest.mark.parametrize("name", ["coated-gold", "glossy-plastic", "frosted-glass", "furnace"])
 def test_albedo_for_denoisers_lies_within_0_and_1(plugin: str, name: str) -> None:
     si = interactions(random_directions(200, 0.01), 200)
@@ -250,7 +282,7 @@ def test_the_albedo_of_a_picture() -> None:
 # Attributes, and what it calls itself
 
 
-@pytest.mark.parametrize("plugin", ["layered"])
+@pytest.mark.parametrize("plugin", ["layered", "layered_reference", "weidlich_wilkie"])
 def test_every_value_is_an_attribute(plugin: str) -> None:
     texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.full((2, 2, 3), [0.2, 0.4, 0.6], np.float32)), "raw": True}
     bsdf = loaded("glossy-plastic", plugin, layer0_eta=1.5, layer1_albedo=texture, layer0_alpha_u=0.2)
@@ -286,7 +318,7 @@ def test_attributes_in_other_variants(variant: str) -> None:
         kernel.mitsuba("llvm_ad_rgb")
 
 
-@pytest.mark.parametrize("plugin", ["layered"])
+@pytest.mark.parametrize("plugin", ["layered", "layered_reference", "weidlich_wilkie"])
 def test_it_lists_its_values(plugin: str) -> None:
     texture = {"type": "checkerboard"}
     bsdf = loaded("glossy-plastic", plugin, layer0_eta=1.5, layer1_albedo=texture)

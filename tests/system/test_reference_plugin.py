@@ -62,7 +62,7 @@ def draw(bsdf: Any, wi: Any, count: int, seed: int = 3) -> tuple[np.ndarray, np.
     u = [rng.next_float32() for _ in range(3)]
     bs, weight = bsdf.sample(mi.BSDFContext(), interactions(wi, count), u[0], mi.Point2f(u[1], u[2]))
     kind = np.broadcast_to(bs.sampled_type.numpy(), count)
-    return bs.wo.numpy(), weight.numpy()[0].astype(float), (kind & int(mi.BSDFFlags.Glossy)) != 0
+    return bs.wo.numpy(), weight.numpy()[0].astype(float), (kind & int(mi.BSDFFlags.Delta)) == 0
 
 
 # Against Mitsuba

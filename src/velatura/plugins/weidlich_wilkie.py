@@ -7,12 +7,14 @@ with both directions refracted about their half-vector, and f_2 layered in turn.
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from math import pi
 from typing import Any
 
 from velatura import kernel, ops
-from velatura.binding import Binding
+from velatura.binding import Binding, plugin_class
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
@@ -28,7 +30,9 @@ def make(mi: Any) -> type:
     """The class for the variant that is set."""
     import drjit as dr
 
-    class WeidlichWilkie(mi.BSDF):
+    flags = mi.BSDFFlags
+
+    class WeidlichWilkie(plugin_class(mi)):  # type: ignore[misc]
         """Layered material after Weidlich and Wilkie 2007, the baseline of the statistical models.
 
         Properties:
@@ -37,7 +41,7 @@ def make(mi: Any) -> type:
             exterior (number, default 1): absolute index above.
 
         Light reflects once, at one of the interfaces; media absorb and do not scatter; nothing is transmitted.
-        Interfaces of roughness below 0.001 are evaluated as of that.
+        Interfaces of roughness below 0.001 are evaluated as of that. Each surface is a component, from the top.
         """
 
         exceptions = EXCEPTIONS
@@ -45,21 +49,24 @@ def make(mi: Any) -> type:
         def __init__(self, properties: Any) -> None:
             mi.BSDF.__init__(self, properties)
             self.binding = Binding(mi, properties)
-            flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.Anisotropic
-            self.m_flags = flags if self.binding.uniform else flags | mi.BSDFFlags.SpatiallyVarying
-            self.m_components = [self.m_flags]
-
-        def traverse(self, callback: Any) -> None:
-            self.binding.traverse(callback)
+            kinds = self.binding.stack.kinds
+            self.surfaces = [k for k, kind in enumerate(kinds) if kind != "medium"]
+            common = flags.FrontSide | (flags.SpatiallyVarying if self.binding.varies else flags.Empty)
+            reflection = flags.GlossyReflection | flags.Anisotropic
+            each = [flags.DiffuseReflection if kinds[k] == "diffuse" else reflection for k in self.surfaces]
+            self.m_components = [common | kind for kind in each]
+            self.m_flags = functools.reduce(operator.or_, self.m_components)
+            self.facts = {"kinds": ", ".join(kinds)}
 
         def parameters_changed(self, keys: list[str]) -> None:
             self.binding.update()
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             bs, kinds, values = mi.BSDFSample3f(), self.binding.stack.kinds, self.binding.at(si, active)
-            wo = sample(kinds, values, tuple(si.wi), sample1, sample2.x, sample2.y)
-            bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, 0
-            bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+            wo, number = sample(kinds, values, tuple(si.wi), sample1, sample2.x, sample2.y, self._asked(ctx))
+            bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, mi.UInt32(number)
+            paint = (kinds[-1] == "diffuse") & (bs.sampled_component == len(self.surfaces) - 1)
+            bs.sampled_type = dr.select(paint, mi.UInt32(+flags.DiffuseReflection), mi.UInt32(+flags.GlossyReflection))
             value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
             return bs, value / dr.maximum(bs.pdf, 1e-30) & (bs.pdf > 0)
 
@@ -70,24 +77,36 @@ def make(mi: Any) -> type:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
-                return mi.Spectrum(0), mi.Float(0)
-            kinds, values = self.binding.stack.kinds, self.binding.at(si, active)
+            kinds, values, asked = self.binding.stack.kinds, self.binding.at(si, active), self._asked(ctx)
             active = active & (si.wi.z > 0) & (wo.z > 0)
-            value = evaluate(kinds, values, tuple(si.wi), tuple(wo))
-            pdf = density(kinds, values, tuple(si.wi), tuple(wo))
+            value = evaluate(kinds, values, tuple(si.wi), tuple(wo), asked)
+            pdf = density(kinds, values, tuple(si.wi), tuple(wo), asked)
             return mi.depolarizer(mi.UnpolarizedSpectrum(value)) & active, dr.select(active, pdf, 0)
 
-        def to_string(self) -> str:
-            return f"WeidlichWilkie[kinds={', '.join(self.binding.stack.kinds)}]"
+        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+            kinds, values = self.binding.stack.kinds, self.binding.at(si, active)
+            albedo = mi.UnpolarizedSpectrum(sum(_energies(kinds, values, si.wi.z).values()))
+            return dr.clip(albedo, 0, 1) & active & (si.wi.z > 0)
+
+        def _asked(self, ctx: Any) -> list[int]:
+            """The surfaces that are wanted."""
+            paint = [self.binding.stack.kinds[k] == "diffuse" for k in self.surfaces]
+            types = [flags.DiffuseReflection if each else flags.GlossyReflection for each in paint]
+            return [k for number, k in enumerate(self.surfaces) if ctx.is_enabled(types[number], number)]
 
     return WeidlichWilkie
 
 
-def evaluate(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction) -> Value:
-    """f(wi, wo) |cos theta_o|, a colour, for two directions above; `values` by flat name (`Stack.flat`)."""
+def evaluate(
+    kinds: Sequence[str], values: Values, wi: Direction, wo: Direction, asked: Sequence[int] | None = None
+) -> Value:
+    """f(wi, wo) |cos theta_o|, a colour, for two directions above; `values` by flat name (`Stack.flat`).
+
+    `asked` are the surfaces whose light is asked for, by their place in the stack; None for all.
+    """
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
     i, o, n = wi, wo, values["exterior"]
+    asked = range(len(kinds)) if asked is None else asked
     total: Value = 0.0
     passed: Value = 1.0
     for k, kind in enumerate(kinds):
@@ -97,14 +116,14 @@ def evaluate(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction)
             passed = passed * ops.exp(-tau * (ops.divide(1.0, i[2]) + ops.divide(1.0, o[2])))
             continue
         if kind == "diffuse":
-            total = total + passed * values[f"layer{k}_albedo"] / pi
+            total = total + passed * values[f"layer{k}_albedo"] * ((k in asked) / pi)
             break
         # Reflect at an interface
         alpha_u, alpha_v, turned_i, turned_o, turned_h = _in_frame(values, k, i, o, h)
         reflectance = _reflectance(kind, values, k, n, ops.maximum(ggx.dot(i, h), 0.0))
         g = ggx.masking(turned_i, alpha_u, alpha_v) * ggx.masking(turned_o, alpha_u, alpha_v)
         lobe = ops.divide(ggx.ndf(turned_h, alpha_u, alpha_v) * g, 4 * ops.maximum(i[2] * o[2], 0.0))
-        total = total + passed * reflectance * lobe
+        total = total + passed * reflectance * lobe * float(k in asked)
         if kind != "dielectric":
             break
         # Pass it twice; what other facets shadow is not lost inside
@@ -116,11 +135,11 @@ def evaluate(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction)
     return total * wo[2]
 
 
-def density(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction) -> Value:
+def density(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction, asked: Sequence[int]) -> Value:
     """Density of `sample`, per solid angle, for two directions above."""
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
     total: Value = 0.0
-    for k, share in _shares(kinds, values):
+    for k, share in _shares(kinds, values, asked):
         if kinds[k] == "diffuse":
             total = total + share * wo[2] / pi
             continue
@@ -130,13 +149,17 @@ def density(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction) 
     return total
 
 
-def sample(kinds: Sequence[str], values: Values, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
-    """A direction: a lobe by its share, then a normal of that lobe that is visible from outside.
+def sample(
+    kinds: Sequence[str], values: Values, wi: Direction, u: Value, u1: Value, u2: Value, asked: Sequence[int]
+) -> tuple[Direction, Value]:
+    """A direction, and the number of its surface: a lobe by its share, then a normal of that lobe that is visible from
+    outside.
 
-    It may lie below the surface, where it is worth nothing.
+    The direction may lie below the surface, where it is worth nothing.
     """
-    wo, begin = None, 0.0
-    for k, share in _shares(kinds, values):
+    wo: Direction = (0.0, 0.0, 1.0)
+    number, begin = 0.0, 0.0
+    for k, share in _shares(kinds, values, asked):
         if kinds[k] == "diffuse":
             radius, phi = ops.sqrt(u1), 2 * pi * u2
             drawn = (radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1))
@@ -144,27 +167,38 @@ def sample(kinds: Sequence[str], values: Values, wi: Direction, u: Value, u1: Va
             alpha_u, alpha_v, i = _in_frame(values, k, wi)
             h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
             drawn = ggx.rotate(ggx.reflect(i, h), -_rotation(values, k))
-        wo = drawn if wo is None else tuple(ops.select(u >= begin, a, b) for a, b in zip(drawn, wo))
+        before = sum(kind != "medium" for kind in kinds[:k])
+        x, y, z = (ops.select(u >= begin, a, b) for a, b in zip(drawn, wo))
+        wo, number = (x, y, z), ops.select(u >= begin, float(before), number)
         begin = begin + share
-    assert wo is not None  # no stack is without a surface
-    return wo[0], wo[1], wo[2]
+    return wo, number
 
 
-def _shares(kinds: Sequence[str], values: Values) -> Iterator[tuple[int, Value]]:
-    """Every surface with the share of samples that it gets: about its energy at normal incidence."""
+def _shares(kinds: Sequence[str], values: Values, asked: Sequence[int]) -> Iterator[tuple[int, Value]]:
+    """Every surface that is asked for with the share of samples that it gets: about its energy at normal incidence."""
+    all_energies = _energies(kinds, values, 1.0)
+    energies = {k: ops.mean(all_energies[k]) + 0.02 for k in asked}  # at a slant it may be more
+    total = sum(energies.values())
+    for k, energy in energies.items():
+        yield k, energy / total
+
+
+def _energies(kinds: Sequence[str], values: Values, cosine: Value) -> dict[int, Value]:
+    """What every surface reflects, a colour, by its place: that of a stack of smooth ones."""
     energies: dict[int, Value] = {}
     n, left = values["exterior"], 1.0
     for k, kind in enumerate(kinds):
         if kind == "medium":
-            left = left * ops.mean(ops.exp(-2 * values[f"layer{k}_sigma_a"] * values[f"layer{k}_depth"]))
+            tau = values[f"layer{k}_sigma_a"] * values[f"layer{k}_depth"]
+            left = left * ops.exp(-2 * tau * ops.divide(1.0, cosine))
             continue
-        reflectance = values[f"layer{k}_albedo"] if kind == "diffuse" else _reflectance(kind, values, k, n, 1.0)
-        energies[k] = left * ops.mean(reflectance) + 0.02  # at a slant it may be more
+        reflectance = values[f"layer{k}_albedo"] if kind == "diffuse" else _reflectance(kind, values, k, n, cosine)
+        energies[k] = left * reflectance
         if kind == "dielectric":
-            left, n = left * (1 - ops.mean(reflectance)) * (1 - ops.mean(reflectance)), values[f"layer{k}_eta"]
-    total = sum(energies.values())
-    for k, energy in energies.items():
-        yield k, energy / total
+            eta = ops.mean(values[f"layer{k}_eta"] / n)
+            left, n = left * (1 - reflectance) * (1 - reflectance), values[f"layer{k}_eta"]
+            cosine = fresnel.cos_transmitted(cosine, eta)
+    return energies
 
 
 def _reflectance(kind: str, values: Values, k: int, n: Value, cosine: Value) -> Value:

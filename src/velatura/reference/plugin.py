@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 import struct
 from typing import Any
 
 import numpy as np
 
 from velatura import kernel
-from velatura.binding import Binding
+from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
 from velatura.reference.connection import way_out
 from velatura.reference.layers import ALPHA_MIN, Layers, from_values, relative_index
-from velatura.reference.walk import walk
+from velatura.reference.walk import Path, walk
 
 _MAX_DEPTH = 1000
 
@@ -30,7 +32,7 @@ def make(mi: Any) -> type:
 
     flags = mi.BSDFFlags
 
-    class LayeredReference(mi.BSDF):
+    class LayeredReference(plugin_class(mi)):  # type: ignore[misc]
         """Layered material by position-free random walks (Guo et al. 2018).
 
         Properties:
@@ -47,6 +49,9 @@ def make(mi: Any) -> type:
         `sample` walks, `eval` is an unbiased estimate, and `pdf` only resembles the density of `sample`: pictures
         converge to the truth, but the plugin fails a chi-square test. An interface whose roughness is below 0.001 along
         both axes is perfectly smooth. Not differentiable.
+
+        Components are light that met only smooth interfaces (delta), light that the diffuse base scattered (diffuse),
+        and all other light (glossy), by side.
         """
 
         def __init__(self, properties: Any) -> None:
@@ -61,9 +66,6 @@ def make(mi: Any) -> type:
             self._update()
 
         # The material, and what follows from it
-
-        def traverse(self, callback: Any) -> None:
-            self.binding.traverse(callback)
 
         def parameters_changed(self, keys: list[str]) -> None:
             self.binding.update()
@@ -81,22 +83,28 @@ def make(mi: Any) -> type:
             surfaces = [i for i, kind in enumerate(kinds) if kind != "medium"]
             widest = [_widest(peaks, kinds[i], i) for i in surfaces]
             scatters = any(name.endswith("_sigma_s") and name not in self.zeros for name in binding.stack.flat())
-            glossy = scatters or any(alpha is None or alpha >= ALPHA_MIN for alpha in widest)
+            rough = [alpha is None or alpha >= ALPHA_MIN for alpha in widest]
             smooth = [alpha is None or alpha < ALPHA_MIN for alpha in widest]
-            self.transmits = binding.stack.transmits
+            self.transmits, self.painted = binding.stack.transmits, "diffuse" in kinds
+            self.glossy = scatters or any(rough)
             # Declare them
             sides = flags.FrontSide | (flags.BackSide if self.transmits else flags.Empty)
             varying = flags.Empty if binding.uniform else flags.SpatiallyVarying
             common = sides | varying | flags.Anisotropic
-            empty = flags.Empty
-            reflection = (flags.GlossyReflection if glossy else empty) | (flags.DeltaReflection if smooth[0] else empty)
-            components = [reflection | common]
-            if self.transmits:
-                delta = flags.DeltaTransmission if all(smooth) else empty
-                components.append((flags.GlossyTransmission if glossy else empty) | delta | common | flags.NonSymmetric)
-            self.glossy = glossy
-            self.m_components = components
-            self.m_flags = components[0] | components[-1]
+            there = {
+                flags.GlossyReflection: scatters or any(rough[:-1] if self.painted else rough),
+                flags.DeltaReflection: smooth[0] or (self.transmits and smooth[-1]),
+                flags.DiffuseReflection: self.painted,
+                flags.GlossyTransmission: self.transmits and self.glossy,
+                flags.DeltaTransmission: self.transmits and all(smooth),
+            }
+            self.kinds = [kind for kind, is_there in there.items() if is_there]
+            passing = (flags.GlossyTransmission, flags.DeltaTransmission)
+            one_way = [flags.NonSymmetric if kind in passing else flags.Empty for kind in self.kinds]
+            self.m_components = [kind | common | extra for kind, extra in zip(self.kinds, one_way)]
+            self.m_flags = functools.reduce(operator.or_, self.m_components)
+            options = {"microsurface": str(self.microsurface).lower(), "max_depth": str(self.max_depth)}
+            self.facts = {**options, "seed": str(self.seed), "kinds": ", ".join(kinds)}
 
         def _layers(self, si: Any, active: Any, flipped: Any) -> Layers:
             """The layers at a point, seen from below where `flipped`."""
@@ -128,9 +136,8 @@ def make(mi: Any) -> type:
             bs.wo = mi.Vector3f(path.w[0], path.w[1], dr.select(flipped, -path.w[2], path.w[2]))
             bs.eta = dr.select(reflected, 1.0, mi.Float(relative_index(layers.index[0], layers.index[-1])))
             bs.pdf = dr.select(path.smooth, 1.0, proxy.density(layers, seen, path.w))
-            bs.sampled_component = dr.select(reflected, mi.UInt32(0), mi.UInt32(1))
-            bs.sampled_type = _sampled_type(path.smooth, reflected)
-            passed = active & (path.alive ^ True) & self._asked(ctx, reflected)
+            bs.sampled_component, bs.sampled_type, asked = self._drawn(ctx, reflected, path)
+            passed = active & (path.alive ^ True) & asked
             if ctx.mode == mi.TransportMode.Radiance:
                 path.weight /= bs.eta * bs.eta
             return bs, mi.depolarizer(dr.select(passed, path.weight, 0))
@@ -144,7 +151,8 @@ def make(mi: Any) -> type:
             rng = self._stream(wi.x, wi.y, wo.x, wo.y, si.p.x, si.p.y, si.p.z, si.uv.x, si.uv.y, wo.z)
             out, rng = way_out(mi, layers, (wo.x, wo.y, dr.abs(wo.z)), rng)
             seen = (wi.x, wi.y, dr.select(flipped, -wi.z, wi.z))
-            path = walk(mi, layers, seen, rng, mi.UnpolarizedSpectrum(1), active, self.max_depth, out)
+            one = mi.UnpolarizedSpectrum(1)
+            path = walk(mi, layers, seen, rng, one, active, self.max_depth, out, self._painted(ctx))
             # Turn energy into radiance
             if self.transmits and ctx.mode == mi.TransportMode.Radiance:
                 scale = dr.select(seen[2] > 0, 1.0, relative_index(layers.index[0], layers.index[-1]))
@@ -162,22 +170,43 @@ def make(mi: Any) -> type:
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
 
+        def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
+            """Albedo by one path, and so an estimate."""
+            asked = mi.BSDFContext(mi.TransportMode.Importance)
+            random = self._stream(si.p.x, si.p.y, si.p.z, si.wi.x, si.wi.y, si.wi.z)
+            u = mi.Point3f(random.next_float32(), random.next_float32(), random.next_float32())
+            _, weight = self.sample(asked, si, u.x, mi.Point2f(u.y, u.z), active)
+            return dr.clip(mi.unpolarized_spectrum(weight), 0, 1)
+
+        def _wanted(self, ctx: Any, kind: Any) -> bool:
+            return kind in self.kinds and ctx.is_enabled(kind, self.kinds.index(kind))
+
         def _asked(self, ctx: Any, reflected: Any) -> Any:
-            """Whether reflection or transmission, whichever it is, was asked for."""
-            reflection = ctx.is_enabled(flags.GlossyReflection, 0)
-            transmission = self.transmits and ctx.is_enabled(flags.GlossyTransmission, 1)
+            """Whether any scattered light of that side was asked for."""
+            reflection = self._wanted(ctx, flags.GlossyReflection) or self._wanted(ctx, flags.DiffuseReflection)
+            transmission = self._wanted(ctx, flags.GlossyTransmission)
             return (reflected & reflection) | ((reflected ^ True) & transmission)
 
-        def to_string(self) -> str:
-            return f"LayeredReference[kinds={', '.join(self.binding.stack.kinds)}]"
+        def _painted(self, ctx: Any) -> bool | None:
+            """Whether scattered light is asked for of the base alone, or of all else; None for both."""
+            diffuse = self._wanted(ctx, flags.DiffuseReflection)
+            return None if diffuse == self._wanted(ctx, flags.GlossyReflection) or not self.painted else diffuse
 
-    def _sampled_type(smooth: Any, reflected: Any) -> Any:
-        def number(flag: Any) -> Any:
-            return mi.UInt32(+flag)
-
-        delta = dr.select(reflected, number(flags.DeltaReflection), number(flags.DeltaTransmission))
-        glossy = dr.select(reflected, number(flags.GlossyReflection), number(flags.GlossyTransmission))
-        return dr.select(smooth, delta, glossy)
+        def _drawn(self, ctx: Any, reflected: Any, path: Path) -> tuple[Any, Any, Any]:
+            """Number and type of the component that a path belongs to, and whether it was asked for."""
+            passed = reflected ^ True
+            belongs = {
+                flags.GlossyReflection: reflected & ((path.smooth | path.painted) ^ True),
+                flags.DeltaReflection: reflected & path.smooth,
+                flags.DiffuseReflection: reflected & path.painted,
+                flags.GlossyTransmission: passed & (path.smooth ^ True),
+                flags.DeltaTransmission: passed & path.smooth,
+            }
+            number, kind, asked = mi.UInt32(0), mi.UInt32(+self.kinds[0]), mi.Bool(False)
+            for k, each in enumerate(self.kinds):
+                number, kind = dr.select(belongs[each], k, number), dr.select(belongs[each], +each, kind)
+                asked |= belongs[each] & ctx.is_enabled(each, k)
+            return number, kind, asked
 
     return LayeredReference
 

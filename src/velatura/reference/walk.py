@@ -28,8 +28,8 @@ class Path:
     """The state of the walk before an event: at the surface ahead, or `inside` a medium.
 
     `w` is the direction of travel in slab `slab`; `height` is measured downwards, in depths of the slab; `weight` and
-    `value` are colours. `smooth`: only smooth surfaces were met so far. `density` and `chain` weigh the strategies of
-    `connection`, where `value` comes from.
+    `value` are colours. `smooth`: only smooth surfaces were met so far; `painted`: the diffuse base was among them.
+    `density` and `chain` weigh the strategies of `connection`, where `value` comes from.
     """
 
     rng: Any
@@ -39,6 +39,7 @@ class Path:
     height: Value
     weight: Value
     smooth: Value
+    painted: Value
     deepest: Value
     events: Value
     alive: Value
@@ -56,6 +57,7 @@ def walk(
     active: Value = True,
     max_depth: int = 1000,
     out: WayOut | None = None,
+    painted: bool | None = None,
 ) -> Path:
     """Follow paths that enter along -wi until they leave, die, or have met `max_depth` events.
 
@@ -65,6 +67,7 @@ def walk(
         rng: random numbers, with `next_float32`.
         colour: what a path carries at first, all channels 1.
         out: the way out that every event is connected to; the paths then gather the BSDF's `value` for it.
+        painted: gathered is from paths that the diffuse base has scattered, from all others (False), or both (None).
 
     Returns:
         The paths as they ended. Those still `alive` were cut off; the others left along `w`, or died with weight 0.
@@ -81,6 +84,7 @@ def walk(
         height=types.Float(0),
         weight=colour,
         smooth=types.Bool(True),
+        painted=types.Bool(False),
         deepest=types.UInt32(0),
         events=types.UInt32(0),
         alive=types.Bool(active),
@@ -92,7 +96,7 @@ def walk(
 
     # Scatter on
     def step(path: Path) -> tuple[Path]:
-        _scatter(types, layers, path, out)
+        _scatter(types, layers, path, out, painted)
         _roulette(path)
         _travel(layers, path)
         path.events += 1
@@ -105,7 +109,7 @@ def walk(
     return path
 
 
-def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None) -> None:
+def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None, painted: bool | None) -> None:
     """One event, at a surface or in a medium."""
     # Meet the surface ahead, as if from above
     down = path.w[2] < 0
@@ -122,12 +126,15 @@ def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None) -> None
         onward = events.sample(meeting, path.weight, u1, u2, u3)
         towards = events.evaluate(meeting, target, down)
     rough = layers.surface(j).smooth ^ True
+    if layers.base == "diffuse":
+        path.painted |= layers.is_base(j) & (path.inside ^ True)
     # Gather what leaves from here
     if out is not None:
         gathered = connect_surface(meeting, towards, out, path, down)
         if layers.scatters:
             gathered = ops.select(path.inside, connect_medium(layers, out, path), gathered)
-        path.value += path.weight * gathered
+        kept = True if painted is None else path.painted ^ (not painted)
+        path.value += ops.select(kept, path.weight * gathered, 0.0)
     # Turn
     z = onward.wo[2]
     turned: Direction = (onward.wo[0], onward.wo[1], ops.select(down, z, -z))
