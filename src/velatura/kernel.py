@@ -16,6 +16,7 @@ import ctypes
 import functools
 import importlib.metadata
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -252,6 +253,9 @@ def load_dict(description: dict[str, Any]) -> Any:
 
 # What is installed
 
+#: Optional parts of the package, and what needs them.
+EXTRAS = {"plots": "--plot, --sheet and figures", "editor": "velatura edit", "notebook": "vt.Editor"}
+
 
 class Finding(NamedTuple):
     """One row of `doctor`: what was looked for, what was found, whether that will do, and the command that mends it."""
@@ -278,6 +282,21 @@ def _find_package(name: str) -> Finding:
         return Finding(name, importlib.metadata.version(name), True)
     except importlib.metadata.PackageNotFoundError:
         return Finding(name, "missing", False, f"{sys.executable} -m pip install mitsuba")
+
+
+def extras() -> tuple[Finding, ...]:
+    """The optional parts of Velatura, and which packages of theirs are installed; a missing one is fine."""
+    return tuple(map(_find_extra, EXTRAS))
+
+
+def _find_extra(extra: str) -> Finding:
+    wanted = re.compile(rf"([\w-]+)[^;]*; extra == ['\"]{extra}['\"]")
+    names = [found[1] for line in importlib.metadata.requires("velatura") or () if (found := wanted.fullmatch(line))]
+    try:
+        versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
+    except importlib.metadata.PackageNotFoundError:
+        return Finding(f"Extra {extra}", f'none (optional, {EXTRAS[extra]}): pip install "velatura[{extra}]"', True)
+    return Finding(f"Extra {extra}", versions, True)
 
 
 def _find_llvm() -> Finding:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import importlib.metadata
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -127,6 +128,23 @@ def test_doctor_finds_all_well_here() -> None:
     rows = kernel.doctor()
     assert [row.what for row in rows] == ["Python", "mitsuba", "drjit", "LLVM", "CUDA"]
     assert all(row.ok and row.found for row in rows)
+
+
+def test_doctor_shows_the_extras(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the versions of an extra's packages; a missing one is no fault, and has its command."""
+    rows = {row.what: row for row in kernel.extras()}
+    assert re.fullmatch(r"starlette [\d.]+, uvicorn [\d.]+, websockets [\d.]+", rows["Extra editor"].found)
+
+    known = importlib.metadata.version
+
+    def version(name: str) -> str:
+        if name == "matplotlib":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return known(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", version)
+    plots, *_ = kernel.extras()
+    assert plots.ok and plots.found.endswith('pip install "velatura[plots]"')
 
 
 def test_doctor_names_the_command_for_llvm(old_llvm: None, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,11 +7,18 @@ from typing import Any
 
 from velatura import files
 from velatura.checks.report import Finding
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, needs
 
 
 def check_folder(folder: str | Path) -> Path:
-    """The folder for plots, made where it is missing. Raises InvalidInput where it cannot be written."""
+    """The folder for plots, made where it is missing.
+
+    Raises:
+        InvalidInput: it cannot be written.
+        MissingTool: the extra `plots` is not installed.
+    """
+    with needs("plots"):
+        import matplotlib  # noqa: F401  (before what is slow)
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)

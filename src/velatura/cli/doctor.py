@@ -13,7 +13,7 @@ def doctor() -> None:
     from velatura import kernel
     from velatura.editor import bundle
 
-    findings = (*kernel.doctor(), bundle.finding())
+    findings = (*kernel.doctor(), *kernel.extras(), bundle.finding())
     table = Table(box=None, show_header=False)
     for finding in findings:
         table.add_row("[green]ok[/]" if finding.ok else "[red]mend[/]", finding.what, finding.found)

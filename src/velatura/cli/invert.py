@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from velatura.cli import options
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, needs
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -162,6 +162,8 @@ def _folder(output: Path | None, count: int) -> Path | None:
 def _picture(target: str) -> Path:
     from velatura import files
 
+    with needs("plots"):
+        import matplotlib  # noqa: F401  (before what is slow)
     return files.check_writable(Path(f"{Path(target).stem}.png"), "a picture", (".png",))
 
 

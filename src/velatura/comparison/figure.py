@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from velatura import files, scenes
 from velatura.comparison.result import Comparison, Pictures
+from velatura.errors import needs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +24,14 @@ _WIDTH, _HEIGHT = 3.2, 2.7  # of one plot, inches
 
 
 def check_figure(path: str | Path) -> Path:
-    """The path of a figure, once it is sure that it can be written there. Raises InvalidInput."""
+    """The path of a figure, once it is sure that it can be drawn and written there.
+
+    Raises:
+        InvalidInput: it cannot be written there.
+        MissingTool: the extra `plots` is not installed.
+    """
+    with needs("plots"):
+        import matplotlib  # noqa: F401  (before what is slow)
     return files.check_writable(path, "a figure", SUFFIXES)
 
 
@@ -35,7 +43,7 @@ def save_figure(comparison: Comparison, path: str | Path) -> None:
     there are pictures: the spheres, and what each model has too much (red) or too little (blue).
 
     Raises:
-        InvalidInput: the file cannot be written.
+        InvalidInput, MissingTool: as `check_figure`.
     """
     target = check_figure(path)
     figure = _draw(comparison)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from velatura import api, files, kernel, scenes
 from velatura.checks.probe import Probe, Samples
 from velatura.comparison import check_figure
+from velatura.errors import needs
 from velatura.stack import Stack, Texture
 
 Array = NDArray[np.floating]
@@ -122,8 +123,9 @@ def errors(images: Mapping[str, Array], truth: Array) -> dict[str, dict[str, flo
 
 
 def canvas(width: float, height: float) -> Any:
-    """An empty matplotlib figure of so many inches."""
-    from matplotlib.figure import Figure
+    """An empty matplotlib figure of so many inches. Raises MissingTool without the extra `plots`."""
+    with needs("plots"):
+        from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 

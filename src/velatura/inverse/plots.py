@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from velatura.errors import needs
 from velatura.inverse.above import Layers
 from velatura.inverse.equivalence import EquivalenceClass
 
@@ -20,9 +21,10 @@ STAR: dict[str, Any] = {"color": "white", "marker": "*", "markersize": 12, "mark
 
 
 def png(members: EquivalenceClass) -> bytes:
-    """A class as a picture, with the member that is preferred."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    """A class as a picture, with the member that is preferred. Raises MissingTool without the extra `plots`."""
+    with needs("plots"):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE if members.free != 1 else (SIZE[0], SIZE[1] / 3), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
