@@ -194,7 +194,7 @@ def adding(chromium: Any) -> None:
                 continue
             for foreseen, times in found.items():
                 with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder), preset) as server:
-                    page = editor.Visit(chromium.new_page(viewport={"width": 1280, "height": 720}), server.address)
+                    page = editor.Visit(chromium.new_page(viewport={"width": 1280, "height": 720}), server.entrance)
                     page.settled()
                     if foreseen:
                         page.page.evaluate("velatura.viewport.setBudget({ samples: 1 })")

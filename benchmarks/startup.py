@@ -45,7 +45,11 @@ def edit(folder: Path) -> float:
     with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
         address = next(word for word in process.stdout.readline().split() if word.startswith("http"))
-        urllib.request.urlopen(f"{address}api/session", data=b"{}").read()
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        browser.open(address).read()  # which leads to the page, and leaves the token
+        question = urllib.request.Request(f"{address.partition('?')[0]}api/session", b"{}")
+        question.add_header("Content-Type", "application/json")
+        browser.open(question).read()
         took = time.perf_counter() - start
         process.terminate()
     return took

@@ -42,7 +42,7 @@ def visit(opened: Any, served: Server) -> Iterator[Open]:
 
     def begin(*expecting: str, address: str = "") -> Visit:
         expected.extend(expecting)
-        found = Visit(context.new_page(), address or served.address)
+        found = Visit(context.new_page(), address or served.entrance)
         found.page.locator(".look > summary").click()
         visits.append(found)
         return found

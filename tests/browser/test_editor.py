@@ -42,7 +42,7 @@ def visit(opened: Any, served: Server) -> Iterator[Open]:
         if options:
             context.close()
             context = opened.new_context(**options)
-        visits.append(Visit(context.new_page(), served.address))
+        visits.append(Visit(context.new_page(), served.entrance))
         return visits[-1]
 
     yield begin

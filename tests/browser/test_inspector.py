@@ -31,7 +31,7 @@ class Look(editor.Visit):
 @pytest.fixture(scope="module")
 def look(served: editor.Server, opened: Any) -> Iterator[Look]:
     context = opened.new_context(viewport={"width": 1000, "height": 600})
-    yield Look(context.new_page(), served.address)
+    yield Look(context.new_page(), served.entrance)
     context.close()
 
 
@@ -213,7 +213,7 @@ def test_it_is_usable_in_a_narrow_window_and_in_the_dark(
 ) -> None:
     """Nothing sticks out of the panel, and words have a contrast of at least 4.5 to what is behind them."""
     context = opened.new_context(viewport={"width": width, "height": 720}, color_scheme=scheme)
-    visit = Look(context.new_page(), served.address)
+    visit = Look(context.new_page(), served.entrance)
     for name in ("Polar", "Disc", "Energy", "Blur"):
         tab(visit, name)
         visit.page.locator(".inspector").screenshot(path=tmp_path / f"{name}.png")

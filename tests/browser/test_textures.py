@@ -32,7 +32,7 @@ def test_images_lie_on_the_object_as_in_mitsuba(opened: Any, served: Server, mon
     spots = np.random.default_rng(3).integers(0, 256, (4, 8, 3))
     imsave(served.folder / "spots.png", np.kron(spots, np.ones((4, 4, 1))).astype(np.uint8))
     (served.folder / "spots.yaml").write_text(TEXTURED)
-    visit = Visit(opened.new_context(viewport={"width": 900, "height": 600}).new_page(), served.address)
+    visit = Visit(opened.new_context(viewport={"width": 900, "height": 600}).new_page(), served.entrance)
     page = visit.page
     page.get_by_label("Object", exact=True).select_option("sphere")
     page.get_by_label("Light", exact=True).select_option("studio")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,31 +15,36 @@ from typing import Any, ClassVar
 import chromium
 import numpy as np
 
-from velatura.editor import bundle
+from velatura.editor import bundle, guard
 
-_ADDRESS = re.compile(r"http://127\.0\.0\.1:\d+/")
+_ADDRESS = re.compile(r"(http://127\.0\.0\.1:\d+/)\?token=[\w-]+")
 
 
 class Server:
-    """`velatura edit` in a folder; it can be killed, and started again at the same address."""
+    """`velatura edit` in a folder; it can be killed, and started again at the same address with the same token.
+
+    It prints its `entrance`, which leads to its `address`.
+    """
 
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.folder = folder
         self.arguments = arguments
-        self.address = ""
+        self.address = self.entrance = ""
+        self.token = secrets.token_urlsafe(32)
         self.start()
 
     def start(self) -> None:
         port = self.address.rstrip("/").rpartition(":")[2] or "0"
         command = [sys.executable, "-m", "velatura", "edit", *self.arguments, "--no-browser", "--port", port]
+        environment = {**_environment(), guard.VARIABLE: self.token}
         self.process = subprocess.Popen(
-            command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=_environment()
+            command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
         )
         assert self.process.stdout
         line = self.process.stdout.readline()
         found = _ADDRESS.search(line)
         assert found, f"the editor's server says: {line}{self.process.stdout.read()}"
-        self.address = found[0]
+        self.entrance, self.address = found[0], found[1]
 
     def kill(self) -> None:
         self.process.kill()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import http.client
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -17,9 +18,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 import uvicorn
@@ -27,10 +30,11 @@ from interrupts import hear
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from velatura.editor import bundle, server, service
+from velatura.editor import bundle, guard, server, service
 from velatura.editor.folder import LARGEST
 
 Run = Callable[..., tuple[int, str, str]]
+TOKEN = "a-token-for-all-these-tests"
 
 COAT: dict[str, Any] = {
     "name": "Coat",
@@ -59,7 +63,7 @@ def served() -> Iterator[int]:
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         listening.listen()
-        running = uvicorn.Server(server.settings(server.application()))
+        running = uvicorn.Server(server.settings(server.application(None, TOKEN)))
         thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
         thread.start()
         try:
@@ -75,21 +79,34 @@ def port(here: Path) -> Iterator[int]:
         yield port
 
 
-def ask(port: int, method: str, path: str, body: Any = None, **headers: str) -> tuple[int, bytes, dict[str, str]]:
-    """Status, body and headers of an answer."""
+def cookie(port: int, token: str = TOKEN) -> str:
+    return f"{guard.cookie_name(port)}={token}"
+
+
+def ask(
+    port: int, method: str, path: str, body: Any = None, **headers: str | None
+) -> tuple[int, bytes, dict[str, str]]:
+    """Status, body and headers of an answer; headers that are None are not sent."""
+    sent = {"Cookie": cookie(port), "Content-Type": "application/json", **headers}
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
     try:
-        connection.request(method, path, body, headers)
+        connection.request(method, path, body, {key: value for key, value in sent.items() if value is not None})
         answer = connection.getresponse()
         return answer.status, answer.read(), {key.lower(): value for key, value in answer.getheaders()}
     finally:
         connection.close()
 
 
-def call(port: int, verb: str, body: Any, **headers: str) -> tuple[int, dict[str, Any]]:
+def call(port: int, verb: str, body: Any, **headers: str | None) -> tuple[int, dict[str, Any]]:
     text = body if isinstance(body, bytes) else json.dumps(body)
     status, answer, _ = ask(port, "POST", f"/api/{verb}", text, **headers)
     return status, json.loads(answer)
+
+
+def head(port: int, *lines: str) -> bytes:
+    """The head of a request to put a texture into the folder."""
+    common = ("POST /api/texture HTTP/1.1", f"Host: 127.0.0.1:{port}", f"Cookie: {cookie(port)}")
+    return "\r\n".join([*common, "Content-Type: application/json", *lines, "", ""]).encode()
 
 
 # What the page gets
@@ -185,8 +202,7 @@ def test_a_failure_of_the_editor_is_told_too(port: int, monkeypatch: pytest.Monk
 def test_a_large_body_is_refused_before_it_is_sent(port: int) -> None:
     """Expected: an answer to the head of a request of 300 MB, of which no byte of the body follows."""
     with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
-        head = f"POST /api/texture HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 300000000\r\n\r\n"
-        client.sendall(head.encode())
+        client.sendall(head(port, "Content-Length: 300000000"))
         assert client.recv(4096).startswith(b"HTTP/1.1 413 ")
 
 
@@ -194,11 +210,53 @@ def test_a_large_body_without_a_length_is_not_kept(port: int) -> None:
     """Expected: an answer as soon as more than the limit has come, while the body has no end."""
     chunk = b"100000\r\n" + bytes(2**20) + b"\r\n"
     with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
-        head = f"POST /api/texture HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nTransfer-Encoding: chunked\r\n\r\n"
-        client.sendall(head.encode())
+        client.sendall(head(port, "Transfer-Encoding: chunked"))
         for _ in range(LARGEST // 2**20 + 1):
             client.sendall(chunk)
         assert client.recv(4096).startswith(b"HTTP/1.1 413 ")
+
+
+def test_what_never_comes_is_not_waited_for(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the end of a connection without a whole head, first or later, and 408 without a whole body."""
+    monkeypatch.setattr(guard, "HEAD_TIME", 0.3)
+    monkeypatch.setattr(server, "BODY_TIME", 0.3)
+    with served() as port:
+        whole = head(port, "Content-Length: 2") + b"{}"
+        for first, then in [(b"", b""), (whole[:60], b""), (whole, whole[:60]), (whole[:-1], None)]:
+            with socket.create_connection(("127.0.0.1", port), timeout=4) as client:  # before an idle one is closed
+                client.sendall(first)
+                if then is None:
+                    assert client.recv(4096).startswith(b"HTTP/1.1 408 ")
+                    continue
+                if then:
+                    assert client.recv(4096).startswith(b"HTTP/1.1 422 ")
+                    client.sendall(then)
+                assert client.recv(4096) == b""
+
+
+def test_quick_verbs_do_not_wait_for_slow_ones(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: while inversions take all threads and places of theirs, files are listed, and one more is refused."""
+    threads, waiting = server.LANES["slow"]
+    release = threading.Event()
+    monkeypatch.setitem(service.VERBS, "invert", lambda body: {"waited": release.wait(30)})
+    with served() as port, ThreadPoolExecutor(threads + waiting + 1) as clients:
+        asked = [clients.submit(call, port, "invert", {}) for _ in range(threads + waiting + 1)]
+        try:
+            (first,) = wait(asked, 20, FIRST_COMPLETED).done
+            begun = time.perf_counter()
+            assert call(port, "list", {})[0] == 200
+            assert time.perf_counter() - begun < 1
+        finally:
+            release.set()
+        assert first.result() == (503, {"error": server.BUSY})
+        assert [each.result() for each in asked if each is not first] == [(200, {"waited": True})] * (threads + waiting)
+
+
+def test_an_answer_that_takes_too_long_is_given_up(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "ANSWER_TIME", 0.2)
+    monkeypatch.setitem(service.VERBS, "invert", lambda body: {"waited": threading.Event().wait(1)})
+    with served() as port:
+        assert call(port, "invert", {}) == (503, {"error": "invert: has no answer after 0.2 seconds"})
 
 
 # Strangers
@@ -227,12 +285,74 @@ def test_the_own_page_is_welcome(port: int) -> None:
         assert call(port, "list", {}, Host=f"{name}:{port}", Origin=f"http://{name}:{port}")[0] == 200
 
 
+def test_the_address_with_the_token_lets_a_browser_in(port: int) -> None:
+    """Expected: a cookie for this server alone that no script can read, and the address without the token."""
+    status, _, headers = ask(port, "GET", f"/?token={TOKEN}", Cookie=None)
+    assert (status, headers["location"]) == (303, "/")
+    given, *attributes = headers["set-cookie"].split("; ")
+    assert given == cookie(port) and {"HttpOnly", "SameSite=strict", "Path=/"} <= set(attributes)
+    assert ask(port, "GET", "/", Cookie=given)[0] == 200
+    for path in ("/?token=another", "/?token=", "/?token=%ff", f"/editor.js?token={TOKEN}", f"/api/list?token={TOKEN}"):
+        assert ask(port, "GET", path, Cookie=None)[0] == 403, path
+
+
+@pytest.mark.parametrize("token", ["", "another", TOKEN[:-1], TOKEN + "x", "\xe9"])
+def test_without_the_token_nothing_is_answered(here: Path, port: int, token: str) -> None:
+    """Expected: 403 for every request, of another account of this machine for one, with a line that helps."""
+    (here / "wood.png").write_bytes(b"a picture")
+    for method, path in [("GET", "/"), ("GET", "/editor.js"), ("GET", "/files/wood.png"), ("POST", "/api/list")]:
+        for wrong in (None, cookie(port, token), cookie(port + 1)):
+            status, body, _ = ask(port, method, path, b"{}" if method == "POST" else None, Cookie=wrong)
+            assert status == 403 and b"open the address that it has printed" in body
+    with pytest.raises(InvalidStatus) as refused, live(port, token=token):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+@pytest.mark.parametrize(
+    ("lines", "status"),
+    [
+        (["Sec-Fetch-Site: cross-site"], 403),
+        (["Sec-Fetch-Site: same-site"], 403),
+        (["Sec-Fetch-Site: none", "Sec-Fetch-Site: cross-site"], 403),
+        (["Origin: http://127.0.0.1:{port}", "Origin: http://evil.example"], 403),
+        (["Host: evil.example"], 400),
+        (["Sec-Fetch-Site: same-origin", "Origin: http://127.0.0.1:{port}"], 200),
+        (["Sec-Fetch-Site: none"], 200),
+    ],
+)
+def test_what_a_browser_says_of_a_page_elsewhere_is_believed(port: int, lines: list[str], status: int) -> None:
+    """Expected: a refusal of other sites, and of heads that say two things."""
+    usual = ["POST /api/list HTTP/1.1", f"Host: 127.0.0.1:{port}", f"Cookie: {cookie(port)}"]
+    usual += ["Content-Type: application/json", "Content-Length: 2"]
+    text = "\r\n".join([*usual, *lines, "", "{{}}"])
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as client:
+        client.sendall(text.format(port=port).encode())
+        assert client.recv(4096).startswith(f"HTTP/1.1 {status} ".encode())
+
+
+@pytest.mark.parametrize("kind", [None, "text/plain", "application/x-www-form-urlencoded", "application/jsonp"])
+def test_a_form_of_another_page_is_not_json(port: int, kind: str | None) -> None:
+    status, answer = call(port, "list", {}, **{"Content-Type": kind})
+    assert status == 415 and "application/json" in answer["error"]
+    assert call(port, "list", {}, **{"Content-Type": "application/json; charset=utf-8"})[0] == 200
+
+
+def test_a_token_of_ones_own_is_long(run: Run, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(guard.VARIABLE, "short")
+    status, _, err = run("edit", "--no-browser")
+    assert status == 2 and err.startswith(f"velatura: {guard.VARIABLE}: must be 16 to 128")
+
+
 # Live
 
 
 @contextmanager
-def live(port: int, origin: str | None = None) -> Iterator[ClientConnection]:
-    with connect(f"ws://127.0.0.1:{port}/api/live", origin=origin, open_timeout=10) as socket:
+def live(port: int, origin: str | None = None, token: str = TOKEN) -> Iterator[ClientConnection]:
+    headers = {"Cookie": cookie(port, token)}
+    with connect(
+        f"ws://127.0.0.1:{port}/api/live", origin=origin, open_timeout=10, additional_headers=headers
+    ) as socket:
         yield socket
 
 
@@ -278,11 +398,15 @@ def test_of_a_burst_the_first_and_the_last_are_answered(here: Path, monkeypatch:
 def running(*arguments: str, browse: bool = False) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """The command in a process of its own, and the port that it prints."""
     command = [sys.executable, "-m", "velatura", "edit", *arguments, "--browser" if browse else "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hear)
+    environment = {**os.environ, guard.VARIABLE: TOKEN}
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=hear, env=environment
+    )
     try:
         assert process.stdout
-        address = process.stdout.readline().split()[4]
-        yield process, int(address.strip("/").rpartition(":")[2])
+        address = urlsplit(process.stdout.readline().split()[4])
+        assert address.query == f"token={TOKEN}" and address.port
+        yield process, address.port
     finally:
         process.kill()
         process.communicate()
@@ -303,7 +427,7 @@ def test_it_stops_when_it_is_told_to(here: Path) -> None:
 
 
 def test_the_page_is_opened_in_the_browser(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Expected: the user's browser is told the address that is printed."""
+    """Expected: the user's browser is told an address that lets it in once, since others may read a command line."""
     browser = here / "browser.py"
     browser.write_text("import pathlib, sys; pathlib.Path('address').write_text(sys.argv[1])")
     monkeypatch.setenv("BROWSER", f"{sys.executable} {browser} %s")
@@ -312,7 +436,10 @@ def test_the_page_is_opened_in_the_browser(here: Path, monkeypatch: pytest.Monke
             if (here / "address").is_file() and (here / "address").read_text():
                 break
             time.sleep(0.05)
-        assert (here / "address").read_text() == f"http://127.0.0.1:{port}/"
+        told = (here / "address").read_text()
+        assert told.startswith(f"http://127.0.0.1:{port}/?token=") and TOKEN not in told
+        path = told.partition(str(port))[2]
+        assert [ask(port, "GET", path, Cookie=None)[0] for _ in range(2)] == [303, 403]
 
 
 def test_a_bad_material_starts_no_server(run: Run, here: Path) -> None:

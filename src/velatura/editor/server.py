@@ -3,55 +3,49 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import functools
 import json
+import logging
 import socket
+import tempfile
 import threading
 import webbrowser
-from collections.abc import Mapping
-from typing import Any
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import IO, Any
 
+import anyio
 import uvicorn
+from anyio.to_thread import run_sync
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
-from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from velatura.editor import bundle
+from velatura.editor import bundle, guard
 from velatura.editor.bodies import Answer, Body, Verb, field
 from velatura.editor.folder import LARGEST, PICTURES, Conflict, Folder
+from velatura.editor.guard import Guard, refusal
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, VelaturaError
 from velatura.stack.schema import unknown
 
-#: Names of this machine; a foreign one leads here where somebody has rebound it, to have a browser ask on his behalf.
-HOSTS = ("127.0.0.1", "localhost")
-
 BUG = "the editor has failed, which is a mistake in it; the terminal says more"
+BUSY = "the editor is busy with other calls like this one; ask again later"
 
-#: What the page may load: from here alone, and what it makes itself; attributes of style are how it moves things about.
-POLICY = {
-    "default-src": "'self' blob: data:",
-    "script-src": "'self'",
-    "worker-src": "'self' blob:",
-    "style-src-attr": "'unsafe-inline'",
-    "object-src": "'none'",
-    "base-uri": "'none'",
-    "form-action": "'none'",
-    "frame-ancestors": "'none'",
-}
+SMALL = 2**20  # bytes of a message, and of every request but that of a texture
+IN_MEMORY = 2**16  # bytes of a request; a larger one is kept in a file until all of it is there
+BODY_TIME, ANSWER_TIME = 60, 60  # seconds for the body of a request, and for its answer
 
-HEADERS = {
-    "Content-Security-Policy": "; ".join(map(" ".join, POLICY.items())),
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-cache",
+#: Threads that answer, and calls that may wait for one: none waits for those of another kind.
+LANES = {"quick": (4, 512), "picture": (2, 64), "slow": (4, 32)}
+LANE_OF = {
+    **dict.fromkeys(("shader", "appearance"), "picture"),
+    **dict.fromkeys(("invert", "class", "member", "coat", "targets", "truth", "validation"), "slow"),
 }
 
 
@@ -64,31 +58,34 @@ def serve(material: str | None = None, port: int = 0, browse: bool = True) -> No
         browse: open the page in the user's browser.
 
     Raises:
-        InvalidInput: not a valid material, or the port cannot be had.
+        InvalidInput: not a valid material or token, or the port cannot be had.
         MissingTool: the page is missing.
     """
-    app = application(material)
+    token = guard.token()
+    app = application(material, token)
     with socket.socket() as listening:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listening.bind((HOSTS[0], port))
+            listening.bind((guard.HOSTS[0], port))
         except OSError as error:
             raise InvalidInput(f"--port {port}: cannot be used ({error.strerror})") from None
         listening.listen()
-        address = f"http://{HOSTS[0]}:{listening.getsockname()[1]}/"
-        print(f"The editor is at {address} until you press Ctrl-C", flush=True)
+        address = f"http://{guard.HOSTS[0]}:{listening.getsockname()[1]}/?token="
+        print(f"The editor is at {address}{token} until you press Ctrl-C", flush=True)
         if browse:
-            threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
+            threading.Thread(target=webbrowser.open, args=[address + app.ticket()], daemon=True).start()
         uvicorn.Server(settings(app)).run(sockets=[listening])
 
 
 def settings(app: ASGIApp) -> uvicorn.Config:
     """How the application is run: quietly, and stopped within a second whatever is connected."""
-    return uvicorn.Config(app, log_level="warning", ws_max_size=LARGEST, timeout_graceful_shutdown=1)
+    return uvicorn.Config(
+        app, http=guard.Connection, log_level="warning", ws_max_size=SMALL, timeout_graceful_shutdown=1
+    )
 
 
-def application(material: str | None = None) -> ASGIApp:
-    """The server as an ASGI application. Raises InvalidInput and MissingTool as `serve`."""
+def application(material: str | None, token: str) -> Guard:
+    """The server as an ASGI application for those who have the token. Raises InvalidInput, MissingTool as `serve`."""
     folder = Folder()
     if material is not None:
         folder.first(material)  # refused now, before anything is served
@@ -101,27 +98,35 @@ def application(material: str | None = None) -> ASGIApp:
             opened = None
         return {**VERBS["session"](body), "opened": opened}
 
-    verbs = {**VERBS, **folder.verbs, "session": session}
+    desk = Desk({**VERBS, **folder.verbs, "session": session})
 
     async def call(request: Request) -> Response:
         name = request.path_params["verb"]
-        if name not in verbs:
-            return _refusal(404, f"there is no verb {name}")
-        body = await _read(request)
-        if body is None:
-            return _refusal(413, f"a request may have {LARGEST >> 20} MiB at most")
-        status, answer = await run_in_threadpool(_answer, verbs[name], body)
-        return JSONResponse(answer, status)
+        if name not in desk.verbs:
+            return refusal(404, f"there is no verb {name}")
+        if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
+            return refusal(415, "a request must say that it is application/json")
+        most = LARGEST if name == "texture" else SMALL
+        with tempfile.SpooledTemporaryFile(IN_MEMORY) as body:
+            try:
+                with anyio.fail_after(BODY_TIME):
+                    complete = await _received(request, body, most)
+            except (TimeoutError, ClientDisconnect):
+                return refusal(408, f"a request must be here within {BODY_TIME} seconds")
+            if not complete:
+                return refusal(413, f"a request of {name} may have {most >> 20} MiB at most")
+            status, text = await desk.answer(name, lambda: _parsed(_whole(body)))
+        return Response(text, status, media_type="application/json")
 
     async def live(socket: WebSocket) -> None:
         await socket.accept()
-        await Live(socket, verbs).run()
+        await Live(socket, desk).run()
 
     def picture(request: Request) -> Response:
         try:
             return FileResponse(folder.existing(request.path_params["name"], PICTURES))
         except InvalidInput as error:
-            return _refusal(404, str(error))
+            return refusal(404, str(error))
 
     routes = [
         Route("/api/{verb}", call, methods=["POST"]),
@@ -129,30 +134,70 @@ def application(material: str | None = None) -> ASGIApp:
         Route("/files/{name:path}", picture),
         Mount("/", StaticFiles(directory=bundle.require(), html=True)),
     ]
-    return Guard(Starlette(routes=routes, exception_handlers={500: lambda request, error: _refusal(500, BUG)}))
+    return Guard(Starlette(routes=routes, exception_handlers={500: lambda request, error: refusal(500, BUG)}), token)
 
 
 # Calls ---------------------------------------------------------------------------------------------------------------
 
 
-async def _read(request: Request) -> bytes | None:
-    """The body, or None where it is too large; one that says so is not read at all."""
-    if int(request.headers.get("content-length", 0)) > LARGEST:
-        return None
-    body = bytearray()
+async def _received(request: Request, body: IO[bytes], most: int) -> bool:
+    """Receive a body; False where it is too large. One that says so is not received at all."""
+    if int(request.headers.get("content-length", 0)) > most:
+        return False
     async for chunk in request.stream():
-        body += chunk
-        if len(body) > LARGEST:
-            return None
-    return bytes(body)
+        if body.tell() + len(chunk) > most:
+            return False
+        body.write(chunk)
+    return True
 
 
-def _answer(verb: Verb, text: bytes) -> tuple[int, Answer]:
-    """Status and answer of a call with the text of its body."""
+def _whole(body: IO[bytes]) -> bytes:
+    body.seek(0)
+    return body.read()
+
+
+class Desk:
+    """Has calls answered in threads, a few for each kind of verb."""
+
+    def __init__(self, verbs: Mapping[str, Verb]) -> None:
+        self.verbs = verbs
+        self.limiters: dict[str, anyio.CapacityLimiter] = {}
+        self.calls = Counter[str]()
+
+    async def answer(self, name: str, body: Callable[[], Body]) -> tuple[int, str]:
+        """Status and answer, in JSON, of a call of a verb with a body, which its thread makes."""
+        lane = LANE_OF.get(name, "quick")
+        threads, waiting = LANES[lane]
+        limiter = self.limiters.setdefault(lane, anyio.CapacityLimiter(threads))
+        if self.calls[lane] >= threads + waiting:
+            return 503, _error(BUSY)
+        self.calls[lane] += 1
+        try:
+            with anyio.fail_after(ANSWER_TIME):
+                return await run_sync(_answer, self.verbs[name], body, abandon_on_cancel=True, limiter=limiter)
+        except TimeoutError:
+            return 503, _error(f"{name}: has no answer after {ANSWER_TIME} seconds")
+        finally:
+            self.calls[lane] -= 1
+
+
+def _answer(verb: Verb, body: Callable[[], Body]) -> tuple[int, str]:
     try:
-        return 200, verb(_parsed(text))
+        return 200, _text(verb(body()))
     except VelaturaError as error:
-        return 409 if isinstance(error, Conflict) else 422, {"error": str(error)}
+        return 409 if isinstance(error, Conflict) else 422, _error(str(error))
+
+
+def _text(answer: Answer) -> str:
+    """An answer in JSON; in ASCII, since halves of surrogate pairs have no other form. Raises InvalidInput."""
+    try:
+        return json.dumps(answer, allow_nan=False)
+    except ValueError:
+        raise InvalidInput("the values are so large that some of what follows from them is no number") from None
+
+
+def _error(reason: str) -> str:
+    return json.dumps({"error": reason})
 
 
 def _parsed(text: bytes | str) -> dict[str, Any]:
@@ -160,13 +205,13 @@ def _parsed(text: bytes | str) -> dict[str, Any]:
         body = json.loads(text)
     except (ValueError, RecursionError):
         raise InvalidInput("the body is not valid JSON") from None
+    return _object(body)
+
+
+def _object(body: Any) -> dict[str, Any]:
     if not isinstance(body, dict):
         raise InvalidInput("the body must be an object")
     return body
-
-
-def _refusal(status: int, reason: str) -> Response:
-    return JSONResponse({"error": reason}, status)
 
 
 class Live:
@@ -175,34 +220,38 @@ class Live:
     A message that another of its verb overtakes while it waits is answered with an error, without being looked at.
     """
 
-    def __init__(self, socket: WebSocket, verbs: Mapping[str, Verb]) -> None:
+    def __init__(self, socket: WebSocket, desk: Desk) -> None:
         self.socket = socket
-        self.verbs = verbs
+        self.desk = desk
         self.waiting: dict[str, Answer] = {}
         self.tasks: dict[str, asyncio.Task[None]] = {}
 
     async def run(self) -> None:
         """Answer until the page goes away."""
         try:
-            while True:
-                await self.take(await self.socket.receive_text())
+            while (message := await self.socket.receive())["type"] != "websocket.disconnect":
+                await self.take(message.get("text"))
         except WebSocketDisconnect:
+            pass
+        finally:
             for task in self.tasks.values():
                 task.cancel()
 
-    async def take(self, text: str) -> None:
+    async def take(self, text: str | None) -> None:
         """Begin with a message, or let it wait in the place of the one that waits."""
         try:
+            if text is None:
+                raise InvalidInput("a message must be text")
             message = _parsed(text)
             verb = field(message, "verb", str)
-            if verb not in self.verbs:
-                raise InvalidInput(unknown("verb", verb, self.verbs))
+            if verb not in self.desk.verbs:
+                raise InvalidInput(unknown("verb", verb, self.desk.verbs))
         except InvalidInput as error:
-            return await self.refuse({}, str(error))
+            return await self.send({}, _error(str(error)))
         overtaken = self.waiting.pop(verb, None)
         self.waiting[verb] = message
         if overtaken:
-            await self.refuse(overtaken, "overtaken by a later call")
+            await self.send(overtaken, _error("overtaken by a later call"))
         if verb not in self.tasks or self.tasks[verb].done():
             self.tasks[verb] = asyncio.create_task(self.work(verb))
 
@@ -210,49 +259,13 @@ class Live:
         """Answer what waits for a verb, until nothing does."""
         while message := self.waiting.pop(verb, None):
             try:
-                body = field(message, "body", dict, {})
-                answer = await run_in_threadpool(self.verbs[verb], body)
-            except VelaturaError as error:
-                await self.refuse(message, str(error))
+                status, text = await self.desk.answer(verb, functools.partial(_object, message.get("body", {})))
             except Exception:
-                await self.refuse(message, BUG)
-                raise
-            else:
-                await self.socket.send_json({"id": message.get("id"), "answer": answer})
+                logging.getLogger("uvicorn.error").exception(BUG)
+                status, text = 500, _error(BUG)
+            await self.send(message, f'{{"answer": {text}}}' if status == 200 else text)
 
-    async def refuse(self, message: Answer, reason: str) -> None:
-        """Say why a message has no answer."""
-        await self.socket.send_json({"id": message.get("id"), "error": reason})
-
-
-# Strangers -----------------------------------------------------------------------------------------------------------
-
-
-class Guard:
-    """Refuses requests to another host and from another origin, WebSockets too, and adds headers to every response."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async def send_guarded(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(HEADERS)
-            await send(message)
-
-        app = self.app if scope["type"] == "lifespan" or _welcome(Headers(scope=scope)) else self.refuse
-        await app(scope, receive, send_guarded)
-
-    async def refuse(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a stranger; a WebSocket that is closed before it is accepted is refused with 403."""
-        if scope["type"] == "websocket":
-            await receive()
-            await send({"type": "websocket.close"})
-        else:
-            await _refusal(403, "the editor answers its own page alone")(scope, receive, send)
-
-
-def _welcome(headers: Headers) -> bool:
-    """Whether a request is to this machine by its own name, and from a page of this very server, if from any."""
-    host, origin = headers.get("host", ""), headers.get("origin")
-    return host.partition(":")[0] in HOSTS and origin in (None, f"http://{host}")
+    async def send(self, message: Answer, text: str) -> None:
+        """Send what becomes of a message, {"answer": ...} or {"error": ...}, with its id; a page may have gone."""
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await self.socket.send_text(f'{{"id": {json.dumps(message.get("id"))}, {text[1:]}')
