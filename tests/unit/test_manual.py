@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import subprocess
 from pathlib import Path
 from types import ModuleType
 
@@ -47,6 +48,19 @@ def example(hooks: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 )
 def test_a_placeholder_becomes_a_number(example: ModuleType, placeholder: str, printed: str) -> None:
     assert example.on_page_markdown(f"| {{{{{placeholder}}}}} |") == f"| {printed} |"
+
+
+def test_a_script_is_shown_with_what_it_printed(
+    hooks: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hooks, "DOCS", tmp_path)
+    (tmp_path / "some.py").write_text("import sys\nprint('found 7')\nopen(sys.argv[1], 'w').write('a picture')\n")
+    page = hooks.on_page_markdown("<!-- source of some.py -->\n<!-- output of some.py -->")
+    assert page.startswith("```python\nimport sys\n") and page.endswith("```text\nfound 7\n```")
+    assert hooks._ran("some.py") == ("found 7", b"a picture")
+    (tmp_path / "wrong.py").write_text("import sys\nsys.exit(1)\n")
+    with pytest.raises(subprocess.CalledProcessError):
+        hooks.on_page_markdown("<!-- output of wrong.py -->")
 
 
 @pytest.mark.parametrize(

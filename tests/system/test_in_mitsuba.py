@@ -1,0 +1,24 @@
+"""The manual's page on Mitsuba: its script finds what it looks for."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_the_worked_optimisation_comes_close(tmp_path: Path) -> None:
+    """In a smaller form, in a process of its own: at half the distance to each parameter or nearer, in 12 steps.
+
+    Pictures and samples are seeded; with other seeds depth came to .84, alpha to .21 or .22.
+    """
+    code = f"""
+import runpy
+script = runpy.run_path({str(DOCS / "recover.py")!r})
+found = script["recover"](size=16, spp=16, steps=12)
+for name, true in script["TRUE"].items():
+    assert abs(found[name] - true) < abs(script["START"][name] - true) / 2, found
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)
