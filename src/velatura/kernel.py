@@ -26,7 +26,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from velatura.errors import InvalidInput, MissingTool
+from velatura.errors import InvalidInput, MissingTool, VelaturaError
 
 Factory = Callable[[ModuleType], type]
 
@@ -231,8 +231,25 @@ def _register_missing(mi: Any) -> None:
         if (name, mi.variant()) not in _registered:
             made: Any = factory(mi)
             made.__del__ = lambda thing: exclusive.drop(thing)
-            mi.register_bsdf(name, made)
+            mi.register_bsdf(name, functools.partial(_built, made))
             _registered.add((name, mi.variant()))
+
+
+def _built(made: type, properties: Any) -> Any:
+    """A plugin; without the calls that led to what it refuses, since Mitsuba would list them before the reason."""
+    try:
+        return made(properties)
+    except VelaturaError as error:
+        raise error.with_traceback(None) from None
+
+
+def reason(error: BaseException) -> str:
+    """What Mitsuba says of a failure, in one line: where, and why. Calls inside a plugin of Python are left out."""
+    while error.__cause__:
+        error = error.__cause__
+    where, calls, why = str(error).partition("Traceback (most recent call last):")
+    text = where + why.strip().splitlines()[-1].removeprefix(f"{InvalidInput.__name__}: ") if calls else where
+    return " ".join(re.sub(r"\[\w+\.cpp:\d+\] ", "", text).split())  # without the places in Mitsuba's sources
 
 
 @exclusive

@@ -392,6 +392,25 @@ def test_what_the_plugin_refuses_is_one_line(tmp_path) -> None:
         vt.bsdf("coated-gold", model="belcour2018", channels="separate")
 
 
+def test_the_reason_of_a_refusal_is_not_drowned(run, tmp_path) -> None:
+    """By `mi.load_dict` it is the last line, below where it was asked; `velatura render` says it in one line."""
+    vt.register()
+    reason = "layer 0 (interface): eta: must lie in 0.001 to 1e4, got -2.0"
+    with pytest.raises(RuntimeError) as error:
+        mi.load_dict({"type": "layered", "material": "coated-gold", "layer0_eta": -2.0})
+    *others, last = str(error.value).strip().splitlines()
+    assert last == f"InvalidInput: {reason}"
+    assert not any(f"velatura/{part}" in line for line in others for part in ("stack", "plugins", "binding"))
+
+    scene = tmp_path / "scene.xml"
+    scene.write_text("""<scene version="3.0.0"><integrator type="path"/><sensor type="perspective"/>
+        <shape type="sphere"><bsdf type="layered" id="material"><string name="material" value="coated-gold"/>
+        <float name="layer0_eta" value="-2"/></bsdf></shape></scene>""")
+    status, _, message = run("render", "coated-gold", "--scene", str(scene), "-o", str(tmp_path / "o.png"))
+    assert status == 2 and len(message.splitlines()) == 1
+    assert message.startswith(f"velatura: {scene}: At ") and message.endswith(f": {reason}\n")
+
+
 def test_the_scalar_variant_agrees() -> None:
     rng = np.random.default_rng(1)
     points = [(direction(c, p), direction(d, q)) for c, p, d, q in rng.uniform(0.1, 0.95, (4, 4))]

@@ -83,10 +83,7 @@ def blamed(scene: Name) -> Iterator[None]:
     except RuntimeError as error:
         if not is_file(scene):
             raise
-        said: BaseException = error
-        while said.__cause__:
-            said = said.__cause__
-        raise InvalidInput(f"{scene}: {' '.join(str(said).split())}") from error
+        raise InvalidInput(f"{scene}: {kernel.reason(error)}") from error
 
 
 def mesh(mi: Any, surface: Surface, bsdf: Any) -> Any:
