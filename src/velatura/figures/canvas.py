@@ -70,19 +70,31 @@ def texture(path: Path, image: ArrayLike) -> Texture:
     return Texture(texture=path, channel="rgb" if pixels.ndim == 3 else "r")
 
 
-def timed(loaded: Mapping[str, Any], spp: int, repeats: int, seed: int) -> tuple[dict[str, Array], dict[str, float]]:
-    """The pictures of Mitsuba scenes, each the mean of all, and the median of their seconds; scenes take turns."""
+def timed(loaded: Mapping[str, Any], spp: int, repeats: int, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
+    """The pictures of Mitsuba scenes, each the mean of all rounds, and the processor's seconds (rounds,).
+
+    Scenes take turns, so that what else the machine does is shared by all.
+    """
     mi = kernel.mitsuba()
     images: dict[str, list[Array]] = {name: [] for name in loaded}
     times: dict[str, list[float]] = {name: [] for name in loaded}
     for i in range(repeats + 1):
         for name, scene in loaded.items():
-            start = time.perf_counter()
+            start = time.process_time()
             images[name].append(np.array(mi.render(scene, spp=spp, seed=seed + i)))
-            times[name].append(time.perf_counter() - start)
+            times[name].append(time.process_time() - start)
     # The first one compiles
-    seconds = {name: float(np.median(each[1:])) for name, each in times.items()}
+    seconds = {name: np.array(each[1:]) for name, each in times.items()}
     return {name: np.mean(each, axis=0) for name, each in images.items()}, seconds
+
+
+def ratio(seconds: Array, others: Array) -> tuple[float, float]:
+    """The median over rounds of one time over another, and its standard error by the quartiles.
+
+    The error is that of a normal sample's median, whose quartiles are 1.349 standard deviations apart.
+    """
+    lower, median, upper = np.quantile(seconds / others, (0.25, 0.5, 0.75))
+    return float(median), float(np.sqrt(np.pi / 2 / seconds.size) * (upper - lower) / 1.349)
 
 
 def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **switches: Any) -> Samples:

@@ -105,7 +105,7 @@ def draw(numbers: Mapping[str, Any], path: str | Path, exposure: float = 1.0) ->
     """
     looks = numbers["looks"]
     figure = canvas.canvas(2.6 * len(looks), 7.5)
-    rows = figure.subplots(3, len(looks), squeeze=False)
+    rows = figure.subplots(3, len(looks), squeeze=False, sharey="row")
     angles = np.degrees(np.arccos(numbers["cosines"]))
     for (picture, energy, variance), look, seen in zip(rows.T, looks, numbers["pictures"]):
         canvas.show(picture, exposure * np.array(seen), look["name"])
@@ -115,9 +115,11 @@ def draw(numbers: Mapping[str, Any], path: str | Path, exposure: float = 1.0) ->
                 energy.plot(angles, np.array(lobe)[:, channel], color=colour, linewidth=0.8, linestyle=":")
         for n, lobe in enumerate(look["variances"], 1):
             variance.plot(angles, lobe, label=f"lobe {n}")
-        energy.set(title="energy", ylim=(0, None))
-        variance.set(title="variance", xlabel="angle of incidence (°)", ylim=(0, None))
+        energy.set(title="energy")
+        variance.set(title="variance", xlabel="angle of incidence (°)")
         variance.legend(fontsize="x-small")
+    for row in rows[1:]:  # once all is plotted, since the axis is shared
+        row[0].set_ylim(0, None)
     canvas.save(figure, path)
 
 
