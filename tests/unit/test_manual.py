@@ -82,3 +82,10 @@ def test_the_page_prints_from_every_file_of_numbers() -> None:
     printed = set(re.findall(r"\{\{([a-z0-9-]+): ", page))
     assert printed <= set(FIGURES)
     assert printed == {path.stem for path in (ROOT / "docs" / "figures").glob("*.json")}
+
+
+def test_the_first_page_lists_all_pages() -> None:
+    docs = ROOT / "docs"
+    pages = {path.relative_to(docs).as_posix() for path in (*docs.glob("*.md"), *docs.glob("*.ipynb"))}
+    linked = set(re.findall(r"\]\(([^)#]+)\)", (docs / "index.md").read_text()))
+    assert pages - {"index.md"} <= linked
