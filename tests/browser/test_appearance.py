@@ -304,6 +304,32 @@ def test_small_pictures_lead_to_members(visit: Open) -> None:
     assert float(np.max(np.abs(np.sum(before, axis=0) - np.sum(after, axis=0)))) < 1e-6
 
 
+def test_a_class_that_needs_no_absorption_is_one_shade(visit: Open) -> None:
+    """Expected: rounding errors are not drawn as stripes, and what moves in such a class stays grey in few words."""
+    page = visit()
+    page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
+    open_material(page, "Bati 2021, figure 16")
+    look = panel(page)
+    shades = """() => {
+      const canvas = document.querySelector('.plane canvas');
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      const pixels = Array.from({ length: data.length / 4 }, (_, i) => data.slice(4 * i, 4 * i + 4));
+      return [...new Set(pixels.filter(([, , , a]) => a).map((pixel) => pixel.join()))];
+    }"""
+    for x in (None, 0.2):
+        if x is not None:
+            drag_member(page, x, 0.5)
+            answered(page)
+        look.get_by_text("no absorption needed").wait_for()
+        assert len(page.page.evaluate(shades)) == 1
+        assert all(isinstance(n, int | float) for layer in page.state("layers") for n in layer["keys"].values())
+
+    # Where absorption is needed, it is shaded, and said
+    open_material(page, "Bati 2021, figure 15 a")
+    look.get_by_text("absorption 0 to").wait_for()
+    assert len(page.page.evaluate(shades)) > 10
+
+
 # What cannot be ------------------------------------------------------------------------------------------------------
 
 

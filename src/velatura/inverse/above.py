@@ -27,6 +27,7 @@ Mask = NDArray[np.bool_]
 NORMAL = (0.0, 0.0, 1.0)
 MANY = 256  # interfaces that are worth sorting
 CLEAR = 1e-9  # an optical depth below this is written as no medium at all
+SAME = 1e-9  # share of a colour by which channels of a grey differ
 
 
 @dataclass(frozen=True)
@@ -237,12 +238,12 @@ def mapped(value: Any, change: Callable[[np.ndarray], np.ndarray]) -> Any:
 
 
 def _plain(value: Value | None, n: int) -> Any:
-    """The n-th colour as a number, or as three where they differ."""
+    """The n-th colour as a number, or as three where they differ by more than rounding."""
     if value is None:
         return None
     colour = np.atleast_2d(value)
     numbers = tuple(float(x) for x in colour[:, n if colour.shape[-1] > 1 else 0])
-    return numbers[0] if len(set(numbers)) == 1 else numbers
+    return numbers[0] if max(numbers) - min(numbers) <= SAME * max(map(abs, numbers)) else numbers
 
 
 def join(parts: list[Any], counts: list[int]) -> Any:

@@ -156,8 +156,9 @@ const alone = ({ kind, axes, cells }) =>
 const isPoint = ({ low, high }) => high - low < 0.001 * high;
 
 function legend({ cells }) {
+  const most = deepest(cells.feasible, cells.absorption);
   return html`<p class="legend">
-    <span class="shade"></span> absorption 0 to ${shown(deepest(cells.feasible, cells.absorption))}
+    <span class="shade ${most ? '' : 'flat'}"></span> ${most ? `absorption 0 to ${shown(most)}` : 'no absorption needed'}
     <span class="hatched"></span> none
     <span title="Where each channel, and all of them, begin to have members">
       <span class="channels"><i class="r"></i><i class="g"></i><i class="b"></i></span> limits

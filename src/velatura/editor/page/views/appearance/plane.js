@@ -7,6 +7,7 @@ import { shown, ticks } from '../plots/scale.js';
 const [WIDTH, LEFT, RIGHT, TOP, BOTTOM] = [330, 50, 14, 8, 34];
 const STEPS = 100; // of an axis, by arrow keys
 const RATIO = 3; // of the ends of an axis, from which on it is logarithmic
+const CLEAR = 1e-4; // an optical depth below this is not seen
 const ROUND = [1, 1.5, 2, 3, 4, 5, 7];
 
 /** How an axis {label, low, high} stands for pixels from `start` to `end`. */
@@ -142,9 +143,9 @@ function paint(canvas, { feasible, absorption, shape: [rows, columns] }) {
   context.putImageData(image, 0, 0);
 }
 
-/** The largest optical depth among the members. */
+/** The largest optical depth among the members; 0 where none need absorb, but for rounding. */
 export function deepest(feasible, absorption) {
   let most = 0;
   feasible.forEach((is, index) => is && (most = Math.max(most, absorption[index])));
-  return most;
+  return most < CLEAR ? 0 : most;
 }
