@@ -36,13 +36,15 @@ def visit(opened: Any, served: Server) -> Iterator[Open]:
     visits: list[Visit] = []
     expected: list[str] = []
 
-    def begin(*expecting: str, **options: Any) -> Visit:
+    def begin(*expecting: str, script: str = "", **options: Any) -> Visit:
         nonlocal context
         expected.extend(expecting)
         if options:
             context.close()
             context = opened.new_context(**options)
-        visits.append(Visit(context.new_page(), served.entrance))
+        page = context.new_page()
+        page.add_init_script(script)
+        visits.append(Visit(page, served.entrance))
         return visits[-1]
 
     yield begin
@@ -225,6 +227,117 @@ def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
     page.settled()
     assert len(page.page.evaluate("velatura.shader().lobes")) == 3
     assert page.page.evaluate(PREVIEWS) == known
+
+
+# Under the hand ------------------------------------------------------------------------------------------------------
+
+SLOW = """(() => {
+  const { fetch } = window;
+  window.fetch = async (...asked) => {
+    await new Promise((resolve) => setTimeout(resolve, 120));
+    return fetch(...asked);
+  };
+})()"""
+
+
+@pytest.mark.parametrize("pause", [0, 110])
+def test_what_is_typed_is_taken_once_though_the_server_is_slow(visit: Open, pause: int) -> None:
+    """Expected: the answer to one number comes while the next is typed, and neither is lost."""
+    page = visit(script=SLOW)
+    open_preset(page, "Paint under old varnish")
+    card = page.page.locator(".layer").last
+    before = len(page.page.evaluate("velatura.store.history().past"))
+    page.page.wait_for_timeout(300)
+    card.get_by_label("Albedo, red", exact=True).select_text()
+    for number in ("0.06502", "0.5035", "0,7141"):
+        page.page.keyboard.type(number, delay=pause)
+        field = page.page.evaluate("document.activeElement.value")
+        assert field == number
+        page.page.keyboard.press("Tab")
+        page.page.keyboard.press("Tab")
+    assert page.state("layers.2.keys.albedo") == [0.06502, 0.5035, 0.7141]
+    assert card.get_by_label("Albedo, blue", exact=True).input_value() == "0.7141"
+    assert len(page.page.evaluate("velatura.store.history().past")) == before + 3
+    page.settled()
+
+
+def test_a_field_follows_again_once_it_is_left(visit: Open) -> None:
+    page = visit()
+    open_preset(page, "Gold")
+    field = page.page.locator(".layer").first.get_by_label("Roughness", exact=True)
+    field.fill("7")
+    field.press("Enter")
+    said(page).get_by_text("Roughness: must lie in 0 to 1, got 7").wait_for()
+    assert field.input_value() == "7"  # to be mended
+    field.press("Tab")
+    assert field.input_value() == "0.15"
+    assert field.evaluate("(field) => field.validity.valid")
+
+    # What is typed and taken back leaves nothing behind; arrow keys go on from what is typed
+    field.focus()
+    field.press("End")
+    field.type("5")
+    field.press("Backspace")
+    field.press("Tab")
+    slider(page, 0, "Roughness").fill("80")
+    assert field.input_value() == "0.4"
+    field.fill("0.6")
+    field.press("ArrowUp")
+    assert field.input_value() == "0.61"
+    assert page.state("layers.0.keys.alpha") == 0.61
+    page.settled()
+
+
+def test_a_drag_of_the_colour_picker_keeps_the_largest_channel(visit: Open) -> None:
+    """Expected: 30 colours of any brightness, as the browser's picker reports them, change the hue alone."""
+    page = visit()
+    open_preset(page, "Coated brushed gold")
+    swatch = page.page.locator(".layer").nth(1).get_by_label("Absorption, swatch")
+
+    def pick(*colours: str) -> None:
+        swatch.evaluate(
+            """async (swatch, colours) => {
+              for (const colour of colours) {
+                swatch.value = colour;
+                swatch.dispatchEvent(new Event('input', { bubbles: true }));
+                if (swatch.value !== colour) throw new Error(`the picker was moved to ${swatch.value}`);
+                await new Promise(requestAnimationFrame);
+              }
+              swatch.dispatchEvent(new Event('change', { bubbles: true }));
+            }""",
+            colours,
+        )
+
+    steps = len(page.page.evaluate("velatura.store.history().past"))
+    assert page.state("layers.1.keys.sigma_a") == [0.1, 0.5, 2]
+    pick(swatch.input_value())
+    assert page.state("layers.1.keys.sigma_a") == [0.1, 0.5, 2]
+
+    pick(*(f"#{120 - n:02x}{90 - 2 * n:02x}{60 - n:02x}" for n in range(30)))
+    red, green, blue = page.state("layers.1.keys.sigma_a")
+    assert red == 2
+    assert (green, blue) == pytest.approx([2 * linear(32) / linear(91), 2 * linear(31) / linear(91)], rel=1e-3)
+    assert len(page.page.evaluate("velatura.store.history().past")) == steps + 1
+    picked = page.state("layers.1.keys.sigma_a")
+    pick(swatch.input_value())
+    assert page.state("layers.1.keys.sigma_a") == picked
+
+    # Numbers however small are read whole
+    pick("#ff0100")
+    page.page.locator(".layer").nth(1).get_by_label("Absorption, blue", exact=True).fill("1.2345678e-10")
+    page.page.keyboard.press("Enter")
+    cut = page.page.evaluate(
+        "[...document.querySelectorAll('.layer input.number')].filter((field) => field.scrollWidth > field.clientWidth)"
+        ".map((field) => `${field.ariaLabel}: ${field.value}`)"
+    )
+    assert cut == []
+    assert page.state("layers.1.keys.sigma_a.2") == 1.2345678e-10
+    page.settled()
+
+
+def linear(byte: int) -> float:
+    """A channel of a colour on a page, linear (sRGB)."""
+    return float(((byte / 255 + 0.055) / 1.055) ** 2.4)
 
 
 # Errors --------------------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ import { followTruth } from './state/truth.js';
 import { mountAppearance } from './views/appearance.js';
 import { mountInspector } from './views/inspector.js';
 import { page } from './views/page.js';
+import { followTyping, isTyping } from './views/typing.js';
 
 const SETTLED = 400; // milliseconds after which a value that is no longer moved counts as set
 const KEPT = 250; // milliseconds after a change until it is stored
@@ -317,7 +318,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   const appearance = mountAppearance(element.querySelector('.appearance-slot'), app);
 
   store.subscribe(() => {
-    for (const [about, { passing }] of problems) if (passing) problems.delete(about);
+    forgivePassing();
     note = '';
     clearTimeout(keeping);
     keeping = setTimeout(flush, KEPT);
@@ -332,6 +333,11 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     app.update();
   });
 
+  /** What was wrong with what a hand did last, once it does something else. */
+  function forgivePassing() {
+    for (const [about, { passing }] of problems) if (passing) app.forgive(about);
+  }
+
   function flush() {
     clearTimeout(keeping);
     storage.save(store.history());
@@ -339,10 +345,8 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
 
   window.addEventListener('pagehide', flush, { signal });
   root.addEventListener('keydown', (event) => onKey(app, event), { signal });
-  element.addEventListener('input', ({ target }) => target.type === 'text' && (target.dataset.typed = ''), {
-    signal,
-  });
-  element.addEventListener('change', ({ target }) => delete target.dataset.typed, { signal });
+  followTyping(element, { signal });
+  element.addEventListener('input', forgivePassing, { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
   root.addEventListener('drop', (event) => onDrop(app, event), { signal });
   signal.addEventListener('abort', () => stopListening?.());
@@ -410,13 +414,10 @@ function onKey(app, event) {
     y: app.store.redo,
     s: () => app.saveAgain(),
   }[key];
-  if (!act || (key !== 's' && isTyping(event.target))) return;
+  if (!act || (key !== 's' && isTyping(event.target))) return; // in a field its own undo is meant
   event.preventDefault();
   act();
 }
-
-/** Whether a field holds text that is not taken yet: then its own undo is meant. */
-const isTyping = (field) => 'typed' in (field.dataset ?? {});
 
 function onDrop(app, event) {
   const [file] = event.dataTransfer?.files ?? [];

@@ -4,13 +4,19 @@ import { html, nothing } from 'lit-html';
 import { live } from 'lit-html/directives/live.js';
 import { styleMap } from 'lit-html/directives/style-map.js';
 import { icons } from './icons.js';
+import { isTyping, release, text } from './typing.js';
 
+const ROOM = 8; // characters of a field
+const DIGITS = [6, 5, 4, 3, 2, 1];
 const TICKS = 200; // of a slider
 const DECADES = [-3, 2]; // of a slider for a range that is wider than WIDE; its left end is 0
 const WIDE = 1000;
 
-/** A value as a field shows it. */
-export const shown = (value) => String(Number(value.toPrecision(6)));
+/** A value as a field shows it: with the most digits, up to six, that it has room for. */
+export function shown(value) {
+  const texts = DIGITS.map((digits) => String(Number(value.toPrecision(digits))));
+  return texts.find(({ length }) => length <= ROOM) ?? texts.at(-1);
+}
 
 // Numbers --------------------------------------------------------------------------------------------
 
@@ -51,22 +57,24 @@ function objection(value, { low = null, high = null, strict = false }) {
 
 /** A field that takes a number within the range of `spec`, with steps by the arrow keys. */
 export function numberField({ label, value, spec = {}, edit, step = 0.01 }) {
-  const take = (field, use) => {
-    const number = field.value.trim() === '' ? NaN : Number(field.value.replace(',', '.'));
+  const typed = (field) => (field.value.trim() === '' ? NaN : Number(field.value.replace(',', '.')));
+  const take = (field) => {
+    const number = typed(field);
     const wrong = objection(number, spec);
     field.setCustomValidity(wrong);
-    field.toggleAttribute('aria-invalid', Boolean(wrong));
     if (wrong) edit.refuse(`${label}: ${wrong}, got ${field.value.trim() || 'nothing'}`);
-    else use(number);
+    else if (number !== value) edit.set(number);
   };
   const onKey = (event) => {
     const sign = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (!sign) return;
     event.preventDefault();
-    const moved = value + sign * step * (event.shiftKey ? 10 : 1);
+    const field = event.target;
+    const moved = (isTyping(field) ? typed(field) : value) + sign * step * (event.shiftKey ? 10 : 1);
     if (objection(moved, spec)) return;
     edit.move(Number(moved.toPrecision(6)));
     edit.settle();
+    release(field);
   };
   return html`<input
     class="number"
@@ -75,9 +83,9 @@ export function numberField({ label, value, spec = {}, edit, step = 0.01 }) {
     autocomplete="off"
     spellcheck="false"
     aria-label=${label}
-    .value=${live(shown(value))}
+    .value=${text(shown(value))}
     @keydown=${onKey}
-    @change=${({ target }) => take(target, edit.set)}
+    @change=${({ target }) => take(target)}
   />`;
 }
 
@@ -116,17 +124,27 @@ export const hex = (rgb) =>
 
 export const channelsOf = (value) => (Array.isArray(value) ? value : [value, value, value]);
 
-/** A colour to be picked; its largest channel stays `whole`. */
-function swatch({ label, rgb, whole, edit }) {
+const rounded = (number) => Number(number.toPrecision(4));
+
+/** The colour of the same hue whose largest channel is that; black has the hue of grey. */
+function withLargest(rgb, whole) {
+  const most = Math.max(...rgb);
+  return rgb.map((c) => (c === most ? whole : rounded((whole * c) / most)));
+}
+
+/** A colour to be picked: as it is, or where its largest channel stays `whole`, its hue alone. */
+function swatch({ label, rgb, whole = null, edit }) {
+  const seen = hex(rgb.map((c) => c / (whole ?? 1)));
   const picked = ({ target }) => {
-    const bytes = [1, 3, 5].map((at) => parseInt(target.value.slice(at, at + 2), 16) / 255);
-    edit.move(bytes.map((c) => Number((whole * decoded(c)).toPrecision(4))));
+    if (target.value === seen) return;
+    const light = [1, 3, 5].map((at) => decoded(parseInt(target.value.slice(at, at + 2), 16) / 255));
+    edit.move(whole === null ? light.map(rounded) : withLargest(light, whole));
   };
   return html`<input
     type="color"
     aria-label=${`${label}, swatch`}
-    title=${whole === 1 ? 'Pick a colour' : `Pick a colour; the largest channel stays ${shown(whole)}`}
-    .value=${live(hex(rgb.map((c) => c / whole)))}
+    title=${whole === null ? 'Pick a colour' : `Pick a colour; the largest channel stays ${shown(whole)}`}
+    .value=${text(seen)}
     @input=${picked}
     @change=${edit.settle}
   />`;
@@ -136,7 +154,7 @@ function swatch({ label, rgb, whole, edit }) {
 export function colour({ label, value, spec, edit, span = spanOf(spec) }) {
   const rgb = channelsOf(value);
   if (!Array.isArray(value)) return number({ label, value, spec, edit, span });
-  const whole = spec.high === 1 ? 1 : Math.max(...rgb) || 1;
+  const whole = spec.high === 1 ? null : Math.max(...rgb) || 1;
   const channel = (index) => {
     const replaced = (number) => rgb.map((old, other) => (other === index ? number : old));
     const one = {

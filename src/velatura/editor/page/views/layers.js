@@ -18,6 +18,7 @@ import { layerName, variantOf } from '../state/material.js';
 import { flag, iconButton, menu, numberField } from './controls.js';
 import { icons } from './icons.js';
 import { parameter, parametersOf } from './parameter.js';
+import { text } from './typing.js';
 
 const VARIANTS = [
   ['dielectric', 'Dielectric'],
@@ -67,7 +68,7 @@ function top(app, { name, exterior, thin }) {
       Name
       <input
         type="text"
-        .value=${live(name)}
+        .value=${text(name)}
         spellcheck="false"
         @change=${({ target }) => store.run(rename, target.value)}
       />
