@@ -229,6 +229,31 @@ def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
     assert page.page.evaluate(PREVIEWS) == known
 
 
+def test_a_material_is_not_stained_by_the_one_before(visit: Open) -> None:
+    """Expected: after paths have told where gold shadows itself, another material is previewed as in a new tab, of the
+    same kinds of layers or of others; what is kept for other values of one material has no hue."""
+    page = visit()
+    for title in ("Wet copper", "Coated rough metal"):
+        open_preset(page, "Coated brushed gold")
+        page.page.evaluate("velatura.viewport.setSize(64, 48); velatura.viewport.setBudget({ samples: 20 })")
+        page.page.wait_for_function("() => velatura.viewport.samples >= 20")
+        page.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")
+        if title == "Wet copper":
+            slider(page, 0, "Roughness").fill("20")
+            page.settled()
+            shade = "Array.from(velatura.viewport.device.read(velatura.viewport.slots.a.shades[0]))"
+            red, green, blue = np.reshape(page.page.evaluate(shade), (-1, 4))[:, :3].T
+            assert float(np.ptp(red)) > 0.1
+            assert np.array_equal(red, green)
+            assert np.array_equal(red, blue)
+        open_preset(page, title)
+        fresh = visit()
+        fresh.page.evaluate("velatura.viewport.setSize(64, 48)")
+        assert fresh.state("name") == title
+        assert difference(page.picture(), fresh.picture()) < SAME
+        fresh.page.close()
+
+
 # Under the hand ------------------------------------------------------------------------------------------------------
 
 SLOW = """(() => {
@@ -351,6 +376,7 @@ def test_a_stack_that_cannot_be_is_refused_in_words_and_undone(visit: Open) -> N
     problem = "nothing may lie below layer 1 (conductor), which is opaque"
     page.page.locator(".layer .problem").get_by_text(problem).wait_for()
     assert problem in said(page).inner_text()
+    assert page.page.get_by_label("Layer 1: Au").locator(".place").inner_text() == "1"
     assert difference(page.picture(), before) < SAME
     page.page.keyboard.press("Control+z")
     page.settled()

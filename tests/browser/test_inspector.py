@@ -23,6 +23,8 @@ PRESET = "coated-gold"
 class Look(editor.Visit):
     """A visit that does not wait for the picture, but for the plots; they need not share the machine with paths."""
 
+    begun: dict[str, list[float]] | None = None  # what the plots read at first
+
     def ready(self) -> None:
         self.page.wait_for_selector(".inspector .legend", timeout=60_000)
         self.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")
@@ -40,6 +42,8 @@ def visit(look: Look) -> Iterator[Look]:
     """The first preset, lit from 45 degrees; afterwards all is undone, and nothing was complained about."""
     tab(look, "Polar")
     aim(look, "angle", 45)
+    look.begun = look.begun or told(look)
+    until(look, lambda: told(look) == look.begun)  # the plots of what was undone may still be there
     yield look
     look.page.evaluate("() => { while (velatura.store.canUndo) velatura.store.undo(); }")
     assert look.complaints == []
@@ -110,11 +114,11 @@ def test_the_polar_plot_follows_the_angle_and_the_material(visit: Look) -> None:
     outline = visit.page.locator("svg.polar .line").first
     before, peak = outline.get_attribute("d"), told(visit)
     aim(visit, "angle", 20)
-    assert outline.get_attribute("d") != before
+    until(visit, lambda: outline.get_attribute("d") != before)
     assert "20°" in visit.page.locator(".legend thead").inner_text()
 
     aim(visit, "angle", 45)
-    assert told(visit) == peak
+    until(visit, lambda: told(visit) == peak)
     coat = visit.state("layers.0.id")
     visit.page.evaluate(
         """(id) => velatura.store.run((state) => ({ ...state, layers: state.layers.map((layer) =>
@@ -141,6 +145,58 @@ def test_a_lobe_is_shown_alone_in_plots_and_picture(visit: Look) -> None:
     painted(visit)
     assert visit.state("view.lobe") is None
     assert lines.count() == 3
+
+
+def test_names_and_numbers_change_together(visit: Look) -> None:
+    """Expected: while the server prints the shader of another material, the plots keep the names of what they show."""
+    legend = "document.querySelector('.inspector .legend').innerText"
+    before = visit.page.evaluate(legend)
+    visit.page.evaluate(
+        f"""() => {{
+          window.legends = new Set();
+          const {{ fetch }} = window;
+          window.fetch = async (...asked) => {{
+            await new Promise((resolve) => setTimeout(resolve, 300));
+            return fetch(...asked);
+          }};
+          const look = () => (legends.add({legend}), (window.looking = requestAnimationFrame(look)));
+          look();
+        }}"""
+    )
+    visit.page.get_by_role("button", name="Open", exact=True).click()
+    visit.page.get_by_role("button", name="Metallic car paint", exact=True).click()
+    layers = visit.state("layers")
+    names = [
+        f"{n} {'Al' if n == 2 else 'polyurethane'}" for n, layer in enumerate(layers) if layer["kind"] == "interface"
+    ]
+    until(visit, lambda: [name.split(",")[0] for name in list(told(visit))[:-1]] == names)
+    visit.page.evaluate("cancelAnimationFrame(looking)")
+    after = visit.page.evaluate(legend)
+    assert before != after
+    assert set(visit.page.evaluate("[...legends]")) == {before, after}
+    numbers = visit.page.locator(".layer .place").all_inner_texts()
+    assert numbers == [str(n) for n in range(len(layers))]
+
+
+def test_plots_come_back_with_the_graphics_device(visit: Look) -> None:
+    """Expected: what is dragged while the device is away is in the plots once it is back."""
+    tab(visit, "Energy")
+    visit.page.evaluate(
+        "window.away = velatura.viewport.device.gl.getExtension('WEBGL_lose_context'); away.loseContext()"
+    )
+    visit.page.wait_for_function("() => velatura.viewport.lost")
+    visit.page.locator(".layer").first.get_by_label("Roughness, slider").fill("100")
+    visit.page.wait_for_timeout(300)
+    visit.page.evaluate("away.restoreContext()")
+    stack = vt.preset(PRESET).replace(layer0_alpha=visit.state("layers.0.keys.alpha"))
+    energies = vt.lobes(stack, math.cos(math.radians(45))).energy
+    expected = [energy[:, 0].tolist() for energy in (*energies, sum(energies))]
+
+    def agrees() -> bool:
+        found = [energy if len(energy) == 3 else 3 * energy for energy in told(visit).values()]
+        return len(found) == 3 and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
+
+    until(visit, agrees)
 
 
 def test_the_disc_tells_f_cos_where_the_pointer_is(visit: Look) -> None:

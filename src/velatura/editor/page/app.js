@@ -237,6 +237,8 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     // The picture
 
     shader: (slot = 'a') => picture?.shader(slot),
+    /** The state whose values are drawn, which may be a while behind the store's. */
+    given: (slot = 'a') => picture?.given(slot),
     /** Whether Python is, or will be, asked about the picture. */
     get pending() {
       return !picture.quiet;

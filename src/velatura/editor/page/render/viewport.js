@@ -86,7 +86,9 @@ export class Viewport {
 
   /** A material in slot "a" or "b": the answer of call("shader"), and values by flat name. */
   async setMaterial(slot, shader, values = shader.values) {
+    const known = this.slots[slot].shader?.key === shader.key;
     await this.slots[slot].setMaterial(shader, values);
+    if (!known) this.forget(slot);
     this.changed();
   }
 
@@ -95,6 +97,11 @@ export class Viewport {
     const slot = (this.coming ??= new Slot(this.device, this.load));
     await slot.setMaterial(shader, shader.values);
     this.preview.warm(slot.previewed, { ...slot.textures, ...this.uniforms() });
+  }
+
+  /** What paths have told of one material holds for no other. */
+  forget(slot) {
+    this.slots[slot].forget();
   }
 
   /** Other values of the same material: nothing is compiled. */
@@ -157,6 +164,11 @@ export class Viewport {
   }
 
   // What is told
+
+  /** Whether the browser has taken the graphics device away; it comes back by itself. */
+  get lost() {
+    return this.device.gl.isContextLost();
+  }
 
   get samples() {
     return Math.min(...this.seen().map((slot) => slot.samples));

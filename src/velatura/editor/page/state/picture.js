@@ -10,6 +10,7 @@ class Slot {
   constructor(name, { viewport, call, session, onShader, onProblem, onBaked }) {
     Object.assign(this, { name, viewport, call, session, onShader, onProblem, onBaked });
     this.shader = null; // what the viewport draws now
+    this.given = null; // and the state whose values it has
     this.drawn = null; // and the pattern it was asked for
     this.wanted = null; // what Python is to be asked next
     this.asked = null; // what it was asked last
@@ -17,12 +18,13 @@ class Slot {
     this.timer = null;
   }
 
-  /** Brings the picture to a state, with the model and switches given. */
-  follow(state, { model, switches }) {
+  /** Brings the picture to a state. */
+  follow(state) {
+    const { model, switches } = state;
     const shape = JSON.stringify([pattern(state), model, switches]);
     const material = documentOf(state);
     const text = JSON.stringify([material, model, switches]);
-    if (this.asked === text && !this.failed) return;
+    if (this.asked === text && !this.failed) return this.rename(state);
     const known = shape === this.drawn;
     this.asked = text;
     this.failed = false;
@@ -35,13 +37,18 @@ class Slot {
     else this.ask();
   }
 
-  setValues() {
-    this.viewport.setValues(this.name, this.values());
-    this.onBaked(this.name);
+  /** Takes a state of the same material, opened anew maybe, for the one that was asked for. */
+  rename(state) {
+    if (this.given === this.state) this.given = state;
+    this.state = state;
   }
 
-  values() {
-    return valuesOf(this.shader, this.state, this.session);
+  setValues() {
+    const { name, state, shader, session, viewport } = this;
+    if (state.document !== this.given?.document) viewport.forget(name);
+    viewport.setValues(name, valuesOf(shader, state, session));
+    this.given = state;
+    this.onBaked(name);
   }
 
   /** Asks for the shader of what is wanted, one question at a time and the latest only. */
@@ -65,14 +72,9 @@ class Slot {
 
   async accept(shader, shape) {
     if (shader.key !== this.shader?.key) {
-      const old = this.shader;
-      this.shader = shader;
-      try {
-        await this.viewport.setMaterial(this.name, shader, this.values());
-      } catch (error) {
-        this.shader = old;
-        throw error;
-      }
+      const { state } = this;
+      await this.viewport.setMaterial(this.name, shader, valuesOf(shader, state, this.session));
+      Object.assign(this, { shader, given: state });
     }
     this.drawn = shape;
     if (shape === this.shape) this.setValues();
@@ -93,15 +95,19 @@ export function valuesOf(shader, state, session) {
 
 const isSame = (a, b) => ['origin', 'target', 'fov'].every((key) => String(a[key]) === String(b[key]));
 
-/** What the second picture is of, and by which model: a material that was pinned, or this one by another model. */
+/** The state of the second picture: of a material that was pinned, or of this one by another model. */
 function otherOf(state, session) {
   const { model = session.default_model, switches = {}, material = null } = state.view.other ?? {};
-  if (!material) return [state, { model, switches }];
+  if (!material) return { ...state, model, switches };
   const { exterior = 1, thin = false } = material;
-  return [{ ...state, name: '', source: '', exterior, thin, layers: layersOf(material) }, { model, switches }];
+  const pinned = { name: '', source: '', exterior, thin, layers: layersOf(material), document: material };
+  return { ...state, model, switches, ...pinned };
 }
 
-/** Follows a store: `{shader(slot), drawn(slot), quiet, again(), stop()}`; `again` asks anew what could not be asked. */
+/**
+ * Follows a store: `{shader(slot), drawn(slot), given(slot), quiet, again(), stop()}`; `given` is the state that is drawn,
+ * `again` asks anew what could not be asked.
+ */
 export function follow({ store, viewport, call, session, files, onProblem, onBaked, onShader }) {
   const part = { viewport, call, session, onShader, onProblem, onBaked };
   const slots = { a: new Slot('a', part), b: new Slot('b', part) };
@@ -123,8 +129,8 @@ export function follow({ store, viewport, call, session, files, onProblem, onBak
 
   function update(state) {
     const { object, environment, rotation, exposure, mode, split, lobe, other } = state.view;
-    slots.a.follow(state, state);
-    if (mode !== 'single' && !other?.truth) slots.b.follow(...otherOf(state, session));
+    slots.a.follow(state);
+    if (mode !== 'single' && !other?.truth) slots.b.follow(otherOf(state, session));
     viewport.setView({
       rotation,
       exposure,
@@ -147,6 +153,7 @@ export function follow({ store, viewport, call, session, files, onProblem, onBak
   return {
     shader: (slot) => slots[slot].shader,
     drawn: (slot) => slots[slot].drawn,
+    given: (slot) => slots[slot].given,
     get quiet() {
       return Object.values(slots).every((slot) => !slot.wanted && !slot.busy);
     },

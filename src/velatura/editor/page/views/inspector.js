@@ -25,11 +25,11 @@ const CHANNELS = ['red', 'green', 'blue'];
  * Shows the inspector in an element; it follows the store and what the viewport draws.
  *
  * @param {HTMLElement} element
- * @param {{store, viewport, session, call, onLobes, pending}} app
+ * @param {{store, viewport, call, onLobes, given, pending}} app
  * @returns {{destroy: function}}
  */
 export function mountInspector(element, app) {
-  const { store, viewport, session, call, onLobes } = app;
+  const { store, viewport, call, onLobes } = app;
   let local = { tab: 'polar', angle: 45, azimuth: 0, below: false, logarithmic: true, cursors: {} };
   const slices = {}; // by slot
   const making = {}; // whether slices are on their way, by slot
@@ -72,6 +72,7 @@ export function mountInspector(element, app) {
   function slice() {
     for (const name of Object.keys(changed)) {
       const slot = viewport.slots[name];
+      changed[name] ||= slices[name] && slices[name].slot !== slot; // of a device that was lost
       if (name === 'b' && !isCompared()) {
         replace(name, undefined);
         changed[name] = true;
@@ -83,12 +84,15 @@ export function mountInspector(element, app) {
   }
 
   /** Plots come after pictures; while something is dragged they follow. */
-  const isTime = () => viewport.held || (viewport.rested(PAUSE) && !app.pending);
+  const isTime = () => !viewport.lost && (viewport.held || (viewport.rested(PAUSE) && !app.pending));
 
   async function make(name, slot) {
     making[name] = true;
+    const state = app.given(name);
     try {
-      replace(name, await new Slices(slot, local).ready());
+      const made = await new Slices(slot, local).ready();
+      if (viewport.lost || slot !== viewport.slots[name]) changed[name] = true;
+      else replace(name, Object.assign(made, { slot, state }));
     } catch (error) {
       problem = error.message;
       paint();
@@ -98,7 +102,7 @@ export function mountInspector(element, app) {
 
   function replace(name, made) {
     if (slices[name] === made) return;
-    slices[name]?.dispose();
+    if (slices[name]?.slot === viewport.slots[name]) slices[name].dispose();
     slices[name] = made;
     problem = '';
     paint();
@@ -327,7 +331,7 @@ export function mountInspector(element, app) {
   const tagOf = (k) => {
     const { kind, layers } = slices.a.parts[k];
     if (kind !== 'reflected') return kind === 'base' ? 'base' : 'T';
-    return seenLayers(layers).map((layer) => layer + 1).join('+');
+    return seenLayers(layers).join('+');
   };
 
   /** Numbers of the layers that a lobe is of; seen from below, interfaces come the other way round. */
@@ -341,8 +345,8 @@ export function mountInspector(element, app) {
     const { kind, layers } = slices.a.parts[k];
     if (kind === 'base') return 'diffuse base';
     if (kind === 'transmitted') return 'T transmitted';
-    const all = enabled(store.get());
-    return seenLayers(layers).map((layer) => `${layer + 1} ${all[layer] ? described(all[layer]) : ''}`).join(', ');
+    const all = enabled(slices.a.state);
+    return seenLayers(layers).map((layer) => `${layer} ${described(all[layer])}`).join(', ');
   }
 
   function legend({ title, parts, all, other, swatches = true }) {
@@ -362,8 +366,8 @@ export function mountInspector(element, app) {
       <thead>
         <tr>
           <th scope="col">${title}</th>
-          <th scope="col">${other ? store.get().model : nothing}</th>
-          ${other ? html`<th scope="col">- - ${store.get().view.other?.model ?? session.default_model}</th>` : nothing}
+          <th scope="col">${other ? slices.a.state.model : nothing}</th>
+          ${other ? html`<th scope="col">- - ${slices.b.state.model}</th>` : nothing}
         </tr>
       </thead>
       <tbody>

@@ -8,6 +8,7 @@ import {
   duplicateLayer,
   enableLayer,
   moveLayer,
+  numberOf,
   removeLayer,
   rename,
   setExterior,
@@ -86,10 +87,11 @@ function card(app, layer, index) {
   const { store, session } = app;
   const name = layerName(layer);
   const problem = app.problemOf(layer.id);
+  const number = numberOf(store.get(), layer.id);
   return html`<li
     class="layer ${layer.kind} ${layer.enabled ? '' : 'off'} ${app.dropAt === index ? 'drop' : ''}"
     data-layer=${layer.id}
-    aria-label=${`Layer ${index}: ${name}`}
+    aria-label=${layer.enabled ? `Layer ${number}: ${name}` : `${name}, off`}
   >
     <div class="head">
       <button
@@ -102,6 +104,7 @@ function card(app, layer, index) {
       >
         ${icons.grip}
       </button>
+      <b class="place" title="Its number in plots and messages">${layer.enabled ? number : '–'}</b>
       ${kindOf(app, layer)}
       <span class="buttons">
         <input

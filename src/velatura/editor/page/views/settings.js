@@ -69,10 +69,10 @@ function lobes(app) {
   const { lobe } = store.get().view;
   const shader = app.shader();
   if (!shader) return nothing;
-  const all = enabled(store.get());
+  const all = enabled(app.given());
   const title = ({ kind, layers }) => {
     if (kind !== 'reflected') return capital(kind);
-    return layers.map((number) => `${number + 1} ${all[number] ? layerName(all[number]) : ''}`).join(', ');
+    return layers.map((number) => `${number} ${layerName(all[number])}`).join(', ');
   };
   const button = (value, text) =>
     html`<button

@@ -86,8 +86,8 @@ void main() {
 `;
 
 /**
- * By how much paths are darker than the preview; the object's lights may move, so that it only learns
- * shadows.
+ * By how much paths are darker than the preview, in luminance, since another colour may come next; the object's lights
+ * may move, so that it only learns shadows.
  */
 export const learning = /* glsl */ `#version 300 es
 precision highp float;
@@ -109,6 +109,8 @@ void main() {
     traced += total.rgb / max(total.a, 1e-6);
     plain += texelFetch(picture, at, 0).rgb / texelFetch(shade, at, 0).rgb;
   }
-  learnt = vec4(clamp(traced / max(plain, 1e-4), 0.02, material == 1.0 ? 1.0 : 2.0), 1.0);
+  vec3 luminance = vec3(0.2126, 0.7152, 0.0722);
+  float share = dot(luminance, traced) / max(dot(luminance, plain), 1e-4);
+  learnt = vec4(vec3(clamp(share, 0.02, material == 1.0 ? 1.0 : 2.0)), 1.0);
 }
 `;
