@@ -26,11 +26,11 @@ from velatura.stack import (
     is_colour,
     load,
     loads,
+    reduced,
     spectrum,
     srgb_weights,
     within,
 )
-from velatura.stack import rgb as rgb_of
 from velatura.stack.spectra import VISIBLE_NM
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
@@ -365,7 +365,7 @@ class Binding:
         elif is_colour(name) and mi.is_spectral and not isinstance(value, float):
             self.images[name] = self._spectrum(name, value)
         else:
-            value = rgb_of(value) if isinstance(value, Measured) else value
+            value = reduced(name, value) if isinstance(value, Measured) else value
             if isinstance(value, tuple):
                 colour = mi.Color3f(*value)
                 self.parameters[name] = mi.luminance(colour) if mi.is_monochromatic else colour

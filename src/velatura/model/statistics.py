@@ -16,7 +16,7 @@ from velatura.model.prepare import prepare, variance_kind
 from velatura.model.recursion import lobes
 from velatura.model.sides import with_index_below
 from velatura.optics.directions import directions
-from velatura.stack import Measured, Stack, Varying, is_colour, spectra
+from velatura.stack import Measured, Stack, Varying, is_colour, reduced
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def number(name: str, value: Any) -> Any:
             f"{name}: is a {value.what}, and lobes are those of one point; replace it, as in --set {name}=0.1"
         )
     if isinstance(value, Measured):
-        value = spectra.rgb(value)
+        value = reduced(name, value)
     if is_colour(name):
         return np.broadcast_to(np.asarray(value, float), (3,))[:, None]
     return float(value)

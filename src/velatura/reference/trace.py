@@ -13,7 +13,7 @@ from velatura import kernel
 from velatura.errors import InvalidInput
 from velatura.reference.layers import Layers, from_values
 from velatura.reference.walk import walk
-from velatura.stack import Measured, Stack, Varying, rgb
+from velatura.stack import Measured, Stack, Varying, reduced
 
 Array = NDArray[np.floating]
 
@@ -101,7 +101,7 @@ def _numbers(stack: Stack) -> Mapping[str, float | tuple[float, float, float]]:
             raise InvalidInput(
                 f"{name}: is a {value.what}, and statistics are those of one point; replace it by a number"
             )
-        numbers[name] = rgb(value) if isinstance(value, Measured) else value
+        numbers[name] = reduced(name, value) if isinstance(value, Measured) else value
     return numbers
 
 

@@ -2,7 +2,7 @@
 
 from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.io import Material, dumps, load, loads, preset, presets, save
-from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, declared, is_colour, within
+from velatura.stack.layers import Diffuse, Interface, Kind, Layer, Medium, Value, declared, is_colour, reduced, within
 from velatura.stack.spectra import Measured, Named, names, rgb, spectrum, srgb_weights
 from velatura.stack.stack import Stack
 from velatura.stack.values import RGB, Brushing, Spectrum, Texture, Varying
@@ -33,6 +33,7 @@ __all__ = [
     "parameter_table",
     "preset",
     "presets",
+    "reduced",
     "rgb",
     "save",
     "spectrum",

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import model_validator
 
 from velatura.stack.schema import Record, parameters
-from velatura.stack.spectra import MIRROR, Named, names
+from velatura.stack.spectra import MIRROR, Measured, Named, names, rgb
 from velatura.stack.values import (
     INDEX_HIGH,
     INDEX_LOW,
@@ -159,6 +159,13 @@ def within(name: str) -> tuple[float, float]:
     parameter = declared(name)
     margin = 1e-3 if parameter.strict else 0.0
     return parameter.low + margin, parameter.high - margin
+
+
+def reduced(name: str, measured: Measured) -> RGB:
+    """A spectrum as the colour that it gives the value of that flat name; where sRGB does not hold it, the nearest."""
+    low, high = within(name)
+    red, green, blue = (min(max(channel, low), high) for channel in rgb(measured))
+    return red, green, blue
 
 
 def entry_name(layer: Layer) -> str:
