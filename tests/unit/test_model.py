@@ -168,6 +168,40 @@ def test_many_smooth_layers_keep_all_energy(count: int) -> None:
     assert np.allclose(sum(found.energy), 1, atol=1e-6)
 
 
+@pytest.mark.parametrize("model", ["velatura", "belcour2018", "weier2020"])
+@pytest.mark.parametrize("phi", [0.0, 1.2, 2.9])
+def test_axes_keep_their_names_where_a_value_changes_by_little(model: str, phi: float) -> None:
+    """Between isotropic, straight and turned stacks, whose lobes the model holds in different ways."""
+    stacks = [
+        [Interface(eta=1.5, alpha=0.1), Interface(conductor="Au", alpha=0.3)],
+        [Interface(eta=1.5, alpha=0.1), Interface(conductor="Au", alpha=(0.1, 0.3))],
+        [Interface(eta=1.5, alpha=(0.1, 0.3), rotation=70), Interface(conductor="Au", alpha=(0.2, 0.1), rotation=80)],
+    ]
+    little = 1e-6
+    for layers in map(Stack, stacks):
+        before = statistics(layers, [1.0, 0.6, 0.2], phi, model=model)
+        flat = layers.flat()
+        for name in ("layer0_alpha_u", "layer1_alpha_v", "layer0_rotation", "layer1_rotation"):
+            after = statistics(layers.replace(**{name: flat[name] + little}), [1.0, 0.6, 0.2], phi, model=model)
+            assert np.allclose(after.alpha, before.alpha, atol=1e-4), name
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018"])
+@pytest.mark.parametrize("rotation", [0.0, 30.0, 45.0, 60.0, 100.0])
+def test_one_brushed_metal_is_reported_as_it_is_written(model: str, rotation: float) -> None:
+    for alpha in ((0.1, 0.3), (0.3, 0.1)):
+        found = statistics(Stack([Interface(conductor="Au", alpha=alpha, rotation=rotation)]), 0.6, 0.4, model=model)
+        assert np.allclose(found.alpha[0][:, 0], alpha, rtol=1e-6)
+        assert abs(np.sin(found.rotation[0][0] - np.radians(rotation))) < 1e-6
+
+
+def test_no_map_gives_a_roughness_above_1() -> None:
+    stack = Stack([Interface(eta=1.5, alpha=0.9), Medium(sigma_s=5.0, g=0.1), Interface(conductor="Au", alpha=0.9)])
+    for name in MAPS:
+        found = statistics(stack, [1.0, 0.05], model="belcour2018", map=name)
+        assert np.max(found.alpha) <= 1
+
+
 def test_many_layers_and_an_absorbing_medium_are_summed_as_by_hand() -> None:
     """The energy of a mirror below a stack and a medium of transmittance t is t^2 t_0 t_1 / (1 - r t^2)."""
     coats = [Interface(eta=1.5), Interface(eta=1.3)]

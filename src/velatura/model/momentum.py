@@ -266,7 +266,7 @@ def _narrowed(k: Calibration, s: Variance, n: Value, n_below: Value) -> Variance
 def _lobe(prepared: Prepared, plane: _Plane, energy: Value, roughness: Variance, cos_theta: Value) -> Lobe:
     """A lobe of an energy and a tensor of roughness, drawn so that it has that energy when it is evaluated."""
     alpha_u, alpha_v, rotation = roughness.roughness(prepared.f)
-    drawn = Roughness(ops.minimum(alpha_u, 1.0), ops.minimum(alpha_v, 1.0), rotation + plane.azimuth)
+    drawn = Roughness(alpha_u, alpha_v, rotation + plane.azimuth)
     with ops.block("Look at its roughness along the plane and across it"):
         u2, v2 = drawn.alpha_u * drawn.alpha_u, drawn.alpha_v * drawn.alpha_v
         c, s = (1.0, 0.0) if isinstance(rotation, float) else (ops.cos(rotation), ops.sin(rotation))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,11 @@ from velatura.model.models import DEFAULT, Model, named
 from velatura.model.prepare import prepare, variance_kind
 from velatura.model.recursion import lobes
 from velatura.model.sides import with_index_below
+from velatura.model.variance import Roughness
 from velatura.optics.directions import directions
 from velatura.stack import Measured, Stack, Varying, is_colour, reduced
+
+FAINTLY_BRUSHED = 0.01  # difference of two roughnesses, below which an interface hardly has axes
 
 
 @dataclass(frozen=True)
@@ -60,13 +63,14 @@ def statistics(
     values = with_index_below(stack.kinds, values, stack.thin)
     prepared = prepare(stack.kinds, values, chosen, variance_kind(stack.kinds, flat))
     reflected, transmitted = lobes(prepared, (x, y, z))
-    each = [_collect(lobe, chosen, len(z)) for lobe in reflected]
+    axis = _axis(stack.kinds, values, np.arctan2(y, x) if chosen.calibrations else np.zeros_like(z))
+    each = [_collect(lobe, chosen, axis) for lobe in reflected]
     return Statistics(
         energy=[lobe.energy for lobe in each],
         covariance=[lobe.covariance for lobe in each],
         alpha=[lobe.alpha for lobe in each],
         rotation=[lobe.rotation for lobe in each],
-        transmitted=_collect(transmitted, chosen, len(z)) if stack.transmits else None,
+        transmitted=_collect(transmitted, chosen, axis) if stack.transmits else None,
     )
 
 
@@ -87,13 +91,35 @@ def number(name: str, value: Any) -> Any:
     return float(value)
 
 
-def _collect(lobe: Lobe, model: Model, count: int) -> LobeStatistics:
-    lead = (3,) if model.channels == "separate" else ()
+def _axis(kinds: Sequence[str], values: Mapping[str, Any], isotropic: np.ndarray) -> np.ndarray:
+    """Azimuths (N,) to which the first axis of a lobe is the nearer one.
+
+    They are the mean axis of the interfaces, by how anisotropic each is, so that axes keep their names where a value
+    changes by little; `isotropic` where none is.
+    """
+    double = FAINTLY_BRUSHED * np.exp(2j * isotropic)
+    for k, kind in enumerate(kinds):
+        if kind not in ("medium", "diffuse"):
+            u, v, degrees = (values[f"layer{k}_{key}"] for key in ("alpha_u", "alpha_v", "rotation"))
+            double = double + abs(u - v) * np.exp(2j * np.radians(degrees))
+    return 0.5 * np.angle(double)
+
+
+def _named(roughness: Roughness, axis: np.ndarray) -> Roughness:
+    """The same roughness with the axis first that is nearer to a given one."""
+    u, v, rotation = roughness
+    other = np.cos(2 * (rotation - axis)) < 0
+    across = rotation - np.copysign(0.5 * np.pi, rotation)
+    return Roughness(np.where(other, v, u), np.where(other, u, v), np.where(other, across, rotation))
+
+
+def _collect(lobe: Lobe, model: Model, axis: np.ndarray) -> LobeStatistics:
+    lead, count = (3,) if model.channels == "separate" else (), len(axis)
 
     def shaped(values: Sequence[Any], axis: int) -> np.ndarray:
         return np.stack([np.broadcast_to(v, (*lead, count)) for v in values], axis=axis)
 
-    alpha_u, alpha_v, rotation = lobe.roughness
+    alpha_u, alpha_v, rotation = _named(lobe.roughness, axis)
     return LobeStatistics(
         energy=np.broadcast_to(lobe.energy, (3, count)).copy(),
         covariance=shaped(lobe.variance.matrix(), -2),
