@@ -120,7 +120,7 @@ class _Absurd(_Tame):
 
     def positive(self) -> float:
         """Above 0, of any size."""
-        return 10 ** self.any(lambda: self.uniform(-4, 4), lambda: self.uniform(-1, 1))
+        return 10 ** self.any(lambda: self.uniform(-4, 4), lambda: self.uniform(-1, 1), lambda: self.uniform(-40, 40))
 
     def exterior(self) -> float:
         return self.any(super().exterior, self.positive)
