@@ -30,6 +30,7 @@ from velatura.optics.ggx import Direction
 
 MIN_BRANCH_PROBABILITY = 0.1  # of reflection and of transmission, in the symmetric form
 GRAZING = 0.05  # cosine
+ROUNDING = 1e-6  # share of samples that reflection gets at least: less than that single precision takes for none
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Scattered:
             return 1.0
         through = ops.mean(self.transmitted.energy)
         share = ops.divide(through, through + sum(ops.mean(lobe.energy) for lobe in self.reflected))
-        return ops.clip(share, least, 1 - least) if least else share
+        return ops.clip(share, least, 1 - max(least, ROUNDING))
 
 
 @dataclass(frozen=True)
