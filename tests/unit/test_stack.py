@@ -399,6 +399,9 @@ def test_the_schema_knows_every_key_and_range() -> None:
     assert layers["medium"]["depth"]["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 1e9}
     assert layers["interface"]["rotation"]["anyOf"][0] == {"type": "number", "minimum": -1e9, "maximum": 1e9}
     assert {"$ref": "#/$defs/texture"} in layers["medium"]["sigma_a"]["anyOf"]
+    assert {"$ref": "#/$defs/spectrum"} in layers["medium"]["sigma_a"]["anyOf"]
+    assert {"$ref": "#/$defs/spectrum"} not in layers["medium"]["depth"]["anyOf"]
+    assert schema["$defs"]["spectrum"]["required"] == ["spectrum"]
     assert "mirror" in layers["interface"]["conductor"]["enum"]
     assert schema["$defs"]["texture"]["required"] == ["texture"]
     json.dumps(schema)
