@@ -146,6 +146,7 @@ def test_table_files(tmp_path: Path) -> None:
         ("", "line 1: must be theta_i,theta_o,phi,r,g,b"),
         ("theta,phi\n", "line 1: must be theta_i,theta_o,phi,r,g,b"),
         (HEADER, "holds no directions"),
+        (HEADER + "0,0,1e300,1,1,1\n", "line 2: phi: must lie in -360 to 360 degrees, got 1e+300"),
         (HEADER + "1,2,3\n", "line 2: must hold 6 numbers, theta_i,theta_o,phi,r,g,b, got 3"),
         (HEADER + "0,0,0,1,1,1\n90,0,0,1,1,1\n", "line 3: theta_i: must lie in 0 to 90 (excluded) degrees, got 90"),
         (HEADER + "0,-1,0,1,1,1\n", "line 2: theta_o: must lie in 0 to 90"),

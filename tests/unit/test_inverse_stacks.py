@@ -297,3 +297,10 @@ def test_coats_that_cannot_be() -> None:
         )
     with pytest.raises(InvalidInput, match=r"eta: must lie in 0\.001 to 1e4"):
         coat(preset("coated-gold"), -1)
+
+
+@pytest.mark.parametrize("channels", ["mean", "separate"])
+def test_a_target_says_whose_variance_its_lobes_have(channels: str) -> None:
+    target = Target([{"energy": 0.1}], channels=channels)
+    assert invert_stack(target, "bati2021").model.channels == channels
+    assert invert_stack(target, "bati2021", channels="mean").model.channels == "mean"

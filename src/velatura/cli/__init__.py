@@ -155,7 +155,7 @@ def _explain(error: BaseException) -> int:
         _complain(str(error))
         return error.exit_status
     if isinstance(error, typer.TyperException):  # a wrong option
-        _complain(error.format_message())
+        _complain(" ".join(error.format_message().split()))
         return error.exit_code
     if isinstance(error, BrokenPipeError):  # the reader has gone (`velatura lobes ... | head`): nothing is left to say
         return 1

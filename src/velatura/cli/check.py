@@ -24,7 +24,8 @@ def check(
     model: options.Bsdf = None,
     settings: options.Settings = None,
     plots: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="A folder for a plot of each law that is broken.")
+        Path | None,
+        typer.Option(parser=options.folder, metavar="DIR", help="A folder for a plot of each law that is broken."),
     ] = None,
     as_json: options.Json = False,
 ) -> None:

@@ -31,7 +31,13 @@ def invert(
     target: TargetFile,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="F", help="A material file, or a folder for --count of them."),
+        typer.Option(
+            "--output",
+            "-o",
+            parser=options.folder,
+            metavar="F",
+            help="A material file, or a folder for --count of them.",
+        ),
     ] = None,
     count: Annotated[int, typer.Option(min=1, max=1000, metavar="N", help="Stacks, the later ones at random.")] = 1,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random stacks.")] = 0,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -57,6 +58,13 @@ def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, An
     return stack.replace(**parameters) if parameters else stack, switches
 
 
+def folder(text: str) -> Path:
+    """The path of a folder; an empty one would stand for the working directory."""
+    if not text:
+        raise typer.BadParameter("needs a name, got nothing")
+    return Path(text)
+
+
 def model_name(name: str | None) -> str:
     """The model that the user named, else the package's default."""
     from velatura.model import DEFAULT
@@ -85,8 +93,9 @@ def _of_layer(key: str) -> bool:
 
 def _value(text: str) -> Any:
     """What a file would hold: a number, several (`.1,.2,.3`, in brackets or not), true, false, or a name."""
+    bare = text[1:-1] if text.startswith("[") and text.endswith("]") else text
     try:
-        numbers = tuple(float(part) for part in text.removeprefix("[").removesuffix("]").split(","))
+        numbers = tuple(float(part) for part in bare.split(","))
     except ValueError:
         return {"true": True, "false": False}.get(text, text)
     return numbers if len(numbers) > 1 else numbers[0]

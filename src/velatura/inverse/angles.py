@@ -159,6 +159,8 @@ def _row(where: str, line: Sequence[str]) -> list[float]:
     for name in ("theta_i", "theta_o"):
         if not 0 <= numbers[name] < GRAZING:
             raise InvalidInput(f"{where}: {name}: must lie in 0 to 90 (excluded) degrees, got {numbers[name]:g}")
+    if not -360 <= numbers["phi"] <= 360:
+        raise InvalidInput(f"{where}: phi: must lie in -360 to 360 degrees, got {numbers['phi']:g}")
     for name in "rgb":
         if not 0 <= numbers[name] <= BRIGHTEST:
             raise InvalidInput(f"{where}: {name}: must lie in 0 to {BRIGHTEST:g}, got {numbers[name]:g}")

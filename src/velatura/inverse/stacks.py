@@ -97,8 +97,8 @@ def invert_stack(
 
 
 def model_of(target: Target, model: str | Model, **switches: str) -> Model:
-    """The model that reads a target's stacks."""
-    return named(model, **({"channels": target.channels} if target.channels else {}), **switches)
+    """The model that reads a target's stacks; a switch that is asked for comes before what the target says."""
+    return named(model, **({"channels": target.channels} if target.channels else {}) | switches)
 
 
 def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Solution | None:

@@ -144,7 +144,7 @@ class Target(Record):
     eta_max: Annotated[float, _number("largest index of a dielectric", low=1.0, high=INDEX_HIGH, strict=True)] = 4.0
     channels: Annotated[
         str | None,
-        Choice("one variance for all colours or the brightest one's; else the model's", ("mean", "separate")),
+        Choice("one variance for all colours or the brightest one's; else the model's", options=("mean", "separate")),
     ] = None
     lobes: tuple[Lobe, ...]
 

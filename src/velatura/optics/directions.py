@@ -23,7 +23,7 @@ def directions(cos_theta: ArrayLike, phi: ArrayLike = 0.0) -> Array:
         raise InvalidInput(f"phi: must be one number, or {len(cosine)} as cos_theta is, got {len(azimuth)}")
     outside = ~((cosine > 0) & (cosine <= 1))
     if outside.any():
-        raise InvalidInput(f"cos_theta: must lie in 0 (excluded) to 1, got {cosine[outside][0]:g}")
+        raise InvalidInput(f"cos_theta: must lie in 0 (excluded) to 1, got {float(cosine[outside][0])}")
     if not np.isfinite(azimuth).all():
         raise InvalidInput(f"phi: must be finite, got {azimuth[~np.isfinite(azimuth)][0]:g}")
     cosine, azimuth = np.broadcast_arrays(cosine, azimuth)
