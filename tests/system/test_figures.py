@@ -64,7 +64,7 @@ SMALL: dict[str, dict[str, Any]] = {
     "belcour2018-13": {"size": 96, "spp": 32, "paths": 60_000},
     "belcour2018-14": {"names": ("depth 0.5",), "size": 24, "spp": 32, "paths": 40_000},
     "belcour2018-15": {"materials": ("two layers",), "size": 24, "spp": 32},
-    "belcour2018-16": {"size": 24, "spp": 32},
+    "belcour2018-16": {"size": 24, "spp": 64},
     "belcour2018-17": {"size": 24, "spp": 32, "paths": 60_000},
     "belcour2018-19": {"alphas": (0.1, 1.0), "size": 32, "spp": 8, "paths": 100_000},
     "belcour2018-20": {"count": 2**13},

@@ -21,6 +21,7 @@ Item = TypeVar("Item")
 
 SIZE, SAMPLES = 128, 128  # of a picture: pixels along a side, and samples of each
 PASSES = 8  # of a picture, each of its own random numbers: the noise of an error is that between them
+PASS_SAMPLES = 16  # of a pixel in a pass, where there are so many: a pass has a cost of its own
 #: Of every model: light meets one facet of an interface at a time, as in the reference that it is compared with.
 CHOICES: dict[str, Any] = {"reflectance": "fgd"}
 #: The model of Belcour 2018 in the form that the paper renders offline (its section 7), and in the other one.
@@ -57,7 +58,7 @@ def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int, 
 def pictures(scene: str, stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:
     """As `spheres`, of any object."""
     made = bsdf(stack, model, **switches)
-    count = max(min(PASSES, spp), 3)  # no fewer than a standard error takes
+    count = min(max(spp // PASS_SAMPLES, 3), PASSES)  # no fewer than a standard error takes
     numbers = np.random.default_rng([seed, *model.encode()]).integers(2**31, size=count)
     passes = [scenes.render(made, scene, env, max(spp // count, 1), (size, size), int(number)) for number in numbers]
     return np.array(passes)
