@@ -26,6 +26,7 @@ from urllib.parse import urlsplit
 
 import pytest
 import uvicorn
+from fuzzing import server as fuzzing
 from interrupts import hear
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -166,6 +167,84 @@ def test_mistakes_are_answered_in_words(port: int) -> None:
     assert call(port, "nonsense", {})[0] == 404
 
 
+CAMERA = {"origin": [0, 1, 5], "target": [0, 0, 0], "fov": 30}
+VIEW = {"material": COAT, "object": "sphere", "size": [8, 8], "spp": 1, "camera": CAMERA}
+NAN, INFINITY = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    ("verb", "body", "says"),
+    [
+        ("shader", {"material": COAT, "switches": {"model": "velatura"}}, "unknown switch 'model'"),
+        ("shader", {"material": COAT, "switches": {"self": 1}}, "unknown switch 'self'"),
+        ("shader", {"material": {"layers": COAT["layers"] * 25}}, "material: layers: may be 48 at most here, got 50"),
+        ("coat", {"material": {"layers": COAT["layers"][:1] * 20}}, "material: layers: may be 16 at most below a coat"),
+        ("coat", {"material": COAT, "eta": NAN}, "eta: numbers must be finite and at most 1e+30 in size, got nan"),
+        ("coat", {"material": COAT, "keep": 1}, "keep: must be true or false, got 1"),
+        ("invert", {"target": {"lobes": [{"energy": 0.1}] * 17}}, "target: lobes: may be 16 at most here, got 17"),
+        ("appearance", {"material": COAT, "interfaces": "x"}, "interfaces: must be a list"),
+        ("appearance", {"material": COAT, "interfaces": {"a": 1}}, "interfaces: must be a list"),
+        ("appearance", {"material": COAT, "interfaces": [None]}, "interfaces: must be a whole number from 1 to 2"),
+        ("appearance", {"material": COAT, "interfaces": [[1]]}, "interfaces: must be a whole number from 1 to 2"),
+        ("truth", {**VIEW, "object": []}, "object: must be text, got []"),
+        ("truth", {**VIEW, "environment": []}, "environment: must be text"),
+        ("truth", {**VIEW, "size": 3}, "size: must be a width and a height"),
+        ("truth", {**VIEW, "size": [512, 512], "spp": 64}, "spp: may be 8 at most for this size"),
+        ("truth", {**VIEW, "rotation": 10**400}, "rotation: numbers must be finite"),
+        ("truth", {**VIEW, "camera": {**CAMERA, "fov": 1e9}}, "camera.fov: must lie in 0 to 180, both excluded"),
+        ("truth", {**VIEW, "camera": {**CAMERA, "fov": 0}}, "camera.fov: must lie in 0 to 180, both excluded"),
+        ("truth", {**VIEW, "camera": {**CAMERA, "origin": [INFINITY, 0, 0]}}, "camera: numbers must be finite"),
+        (
+            "truth",
+            {**VIEW, "camera": {**CAMERA, "origin": [0, 0, 0]}},
+            "camera.origin: must not lie on, above or below",
+        ),
+        (
+            "truth",
+            {**VIEW, "camera": {**CAMERA, "origin": [0, 5, 0]}},
+            "camera.origin: must not lie on, above or below",
+        ),
+        ("truth", {**VIEW, "camera": []}, "camera: must be an object"),
+        ("validation", {"name": []}, "name: must be text, got []"),
+        ("validation", {"name": {}}, "name: must be text, got {}"),
+        ("validation", {"name": "tir", "parameters": 3}, "parameters: must be an object, got 3"),
+        ("validation", {"name": "tir", "parameters": [1]}, "parameters: must be an object, got [1]"),
+        ("read", {"text": "thin: !!bool maybe"}, "the text"),
+        ("read", {"text": "x" * 2**19}, "text: may have 262144 characters at most, got 524288"),
+        ("open", {"file": "x" * 300 + ".yaml"}, "file: may have 255 characters at most"),
+        ("open", {"file": "\udc80.yaml"}, "must be the plain name of a file"),
+        (
+            "write",
+            {"material": {"layers": [{"interface": {"eta": [[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]}}]}},
+            "16 deep at most",
+        ),
+    ],
+)
+def test_no_body_is_a_failure_of_the_editor(port: int, verb: str, body: dict[str, Any], says: str) -> None:
+    status, answer = call(port, verb, body)
+    assert status == 422 and says in answer["error"] and "\n" not in answer["error"]
+
+
+def test_a_large_file_is_not_opened(here: Path, port: int) -> None:
+    (here / "large.yaml").write_text("# " + "x" * 2**18)
+    assert call(port, "open", {"file": "large.yaml"})[1]["error"] == (
+        "large.yaml: a material file may have 256 KiB at most here"
+    )
+
+
+def test_hostile_requests_are_answered(here: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Expected: one line for each, never 500, no lost answer and no traceback, and a server that goes on."""
+    with served() as port:
+        for outcome in (
+            fuzzing.requests(port, TOKEN, 60, 7),
+            fuzzing.messages(port, TOKEN, 60, 8),
+            fuzzing.crowd(port, TOKEN, 8, 10),
+        ):
+            assert outcome.failures == []
+        assert call(port, "list", {})[0] == 200
+    assert "Traceback" not in capfd.readouterr().err
+
+
 def test_of_two_tabs_that_save_the_second_is_told(here: Path, port: int) -> None:
     body = {"file": "coat.yaml", "material": COAT, "version": None}
     assert call(port, "save", body)[0] == 200
@@ -229,7 +308,10 @@ def test_what_never_comes_is_not_waited_for(here: Path, monkeypatch: pytest.Monk
                     assert client.recv(4096).startswith(b"HTTP/1.1 408 ")
                     continue
                 if then:
-                    assert client.recv(4096).startswith(b"HTTP/1.1 422 ")
+                    told = client.recv(4096)
+                    while not told.endswith(b"}"):
+                        told += client.recv(4096)
+                    assert told.startswith(b"HTTP/1.1 422 ")
                     client.sendall(then)
                 assert client.recv(4096) == b""
 
@@ -365,6 +447,10 @@ def test_live_calls_are_answered(port: int) -> None:
         for wrong in ("{", "[]", "{}", '{"verb": "nonsense"}', '{"verb": "read", "body": []}'):
             socket.send(wrong)
             assert "error" in json.loads(socket.recv(10))
+        socket.send(b"{}")
+        assert json.loads(socket.recv(10)) == {"id": None, "error": "a message must be text"}
+        socket.send('{"id": "\\ud800", "verb": "list"}')
+        assert json.loads(socket.recv(10)) == {"id": "\ud800", "answer": {"files": [], "textures": []}}
 
 
 def test_of_a_burst_the_first_and_the_last_are_answered(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,6 +56,7 @@ def test_the_page_is_heard_in_its_own_words() -> None:
     assert editor.model.name == "belcour2018"
     assert editor.get_state("stack") == {"stack": fields}
     editor.set_state({"stack": {"layers": []}, "model": {"name": "belcour2018", "switches": {"tir": "no"}}})
+    editor.set_state({"stack": {"layers": [{"interface": {"eta": 1.5}}] * 49}, "model": {"switches": {"model": ""}}})
     assert editor.stack.layers[0].alpha == 0.25 and editor.model.name == "belcour2018"
 
 
@@ -90,6 +91,7 @@ def test_calls_are_answered(ask: Callable[..., Any]) -> None:
 def test_calls_are_refused_in_one_line(ask: Callable[..., Any]) -> None:
     assert ask("read", {"text": "layers: ["})[0]["status"] == 422
     assert ask("reed")[0]["error"].startswith("unknown verb 'reed'")
+    assert ask("validation", {"name": []}) == ({"error": "name: must be text, got []", "status": 422}, None)
     for address in ("/files/../secret.png", "/files/%2e%2e%2fsecret.png", "/etc/passwd", "/environments/../widget.js"):
         assert ask("file", {"address": address})[0]["status"] == 422
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura.editor.bodies import Answer, Body, Verb, document, material_of, model_of
+from velatura.editor.bodies import LOBES, Answer, Body, Verb, document, material_of, model_of
 from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
 from velatura.inverse.coats import with_albedo
@@ -46,7 +46,7 @@ def reader_of(body: Body, target: Target) -> Model:
 def lobe_of(body: Body, target: Target) -> int:
     """The index of a lobe of the target."""
     lobe = body.get("lobe")
-    if not isinstance(lobe, int) or not 0 <= lobe < len(target.lobes):
+    if lobe is None or lobe >= len(target.lobes):
         raise InvalidInput(f"lobe: must be a number from 0 to {len(target.lobes) - 1}, got {lobe!r}")
     return lobe
 
@@ -298,11 +298,11 @@ def _pinned(wish: Target, model: Model) -> Answer:
 
 def coated(body: Body) -> Answer:
     """A material under a coat, with its appearance kept or not, and its lobes before and after."""
-    values = {key: body.get(key, default) for key, default in (("eta", 1.5), ("alpha", 0.0))}
-    if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values.values()):
-        raise InvalidInput(f"eta, alpha: must be numbers, got {values['eta']!r}, {values['alpha']!r}")
+    stack, eta, alpha = material_of(body), body.get("eta", 1.5), body.get("alpha", 0.0)
+    if len(stack.layers) > LOBES:
+        raise InvalidInput(f"material: layers: may be {LOBES} at most below a coat, got {len(stack.layers)}")
     try:
-        found = coat(material_of(body), **values, keep_appearance=bool(body.get("keep")), model=model_of(body))
+        found = coat(stack, eta, alpha, keep_appearance=body.get("keep", False), model=model_of(body))
     except NoSolution as error:
         return {"error": str(error)}
     return {"material": document(found.stack), "lobes": found.change()}

@@ -1,25 +1,39 @@
-"""Bodies and answers of the page's calls, mappings of JSON's types, and what stands in many of them."""
+"""Bodies and answers of the page's calls, mappings of JSON's types, and what stands in many of them.
+
+What a key of a body may hold, and how much, is declared once for all verbs, in `KEYS`; a verb that is `admitting` is
+called with what is declared alone, and says itself what it needs and what that must be there.
+"""
 
 from __future__ import annotations
 
 import base64
+import dataclasses
+import functools
 import json
+import math
 from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT, Model, named
+from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.stack import Stack, dumps
-from velatura.stack.schema import show
+from velatura.stack.schema import Parameter, show, unknown
+from velatura.stack.values import Flag, Scalar
 
 Body: TypeAlias = Mapping[str, Any]
 Answer: TypeAlias = dict[str, Any]
 Verb: TypeAlias = Callable[[Body], Answer]
 
 _TYPES: dict[Any, str] = {str: "text", dict: "an object"}
+
+LAYERS, LOBES = 48, 16  # of a material, and of a target
+DEEPEST = 16  # lists and objects in one another
+BIGGEST = 1e30  # number, which single precision holds
+TEXT = 2**18  # characters of a material file
 
 
 def field(body: Body, key: str, kind: type, default: Any = None) -> Any:
@@ -38,6 +52,189 @@ def material_of(body: Body) -> Stack:
 def model_of(body: Body) -> Model:
     """The model under `model`, with its `switches`."""
     return named(field(body, "model", str, DEFAULT), **field(body, "switches", dict, {}))
+
+
+# What bodies may hold ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Words(Parameter):
+    """Text, up to a length."""
+
+    most: int = 255
+
+    what: ClassVar[str] = "text"
+
+    def check(self, value: Any) -> str:
+        if not isinstance(value, str):
+            raise self.refuse(value)
+        if len(value) > self.most:
+            raise ValueError(f"may have {self.most} characters at most, got {len(value)}")
+        return value
+
+
+@dataclass(frozen=True)
+class Whole(Parameter):
+    """A whole number in a range."""
+
+    low: int = 0
+    high: int = 1
+
+    @property
+    def values(self) -> str:
+        return f"a whole number from {self.low} to {self.high}"
+
+    def check(self, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not self.low <= value <= self.high:
+            raise self.refuse(value)
+        return value
+
+
+@dataclass(frozen=True)
+class Several(Parameter):
+    """A list of values."""
+
+    entry: Parameter = dataclasses.field(default_factory=lambda: Scalar("", texturable=False))
+    most: int = LAYERS
+
+    @property
+    def values(self) -> str:
+        return f"a list, each {self.entry.values}"
+
+    def check(self, value: Any) -> list[Any]:
+        if not isinstance(value, list):
+            raise self.refuse(value)
+        if len(value) > self.most:
+            raise ValueError(f"may hold {self.most} at most, got {len(value)}")
+        return [self.entry.check(entry) for entry in value]
+
+
+@dataclass(frozen=True)
+class Fields(Parameter):
+    """An object; what it holds is for its reader to check, but how many `entries` lie under one of its keys."""
+
+    entries: str = ""
+    most: int = LAYERS
+
+    what: ClassVar[str] = "an object"
+
+    def check(self, value: Any) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise self.refuse(value)
+        entries = value.get(self.entries)
+        if isinstance(entries, list) and len(entries) > self.most:
+            raise ValueError(f"{self.entries}: may be {self.most} at most here, got {len(entries)}")
+        return value
+
+
+class Switches(Fields):
+    """Switches of a model; their values are for the model to check."""
+
+    def check(self, value: Any) -> dict[str, Any]:
+        for key in super().check(value):
+            if key not in SWITCHES:
+                raise InvalidInput(unknown("switch", key, SWITCHES))
+        return dict(value)
+
+
+class Size(Parameter):
+    """A number of pixels, or of both sides."""
+
+    what = "a whole number, or two"
+
+    def check(self, value: Any) -> Any:
+        side = Whole("", low=1, high=4096)
+        return Several("", entry=side, most=2).check(value) if isinstance(value, list) else side.check(value)
+
+
+class Camera(Parameter):
+    """A view from `origin` to `target`, `fov` degrees wide; upwards is y."""
+
+    what = "an object of fov, origin and target"
+
+    def check(self, value: Any) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise self.refuse(value)
+        fov = _within("camera.fov", value.get("fov"), Scalar("", low=0, high=180, strict=True, texturable=False))
+        origin, target = (_point(f"camera.{key}", value.get(key)) for key in ("origin", "target"))
+        if math.hypot(origin[0] - target[0], origin[2] - target[2]) < 1e-4 * max(1.0, math.dist(origin, target)):
+            raise InvalidInput("camera.origin: must not lie on, above or below the target")
+        return {"fov": fov, "origin": origin, "target": target}
+
+
+def _within(name: str, value: Any, declared: Parameter) -> Any:
+    try:
+        return declared.check(value)
+    except InvalidInput:
+        raise
+    except ValueError as error:
+        raise InvalidInput(f"{name}: {error}") from None
+
+
+def _point(name: str, value: Any) -> list[float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise InvalidInput(f"{name}: must be three numbers, got {show(value)}")
+    return [_within(name, x, Scalar("", low=-1e4, high=1e4, texturable=False)) for x in value]
+
+
+#: What the keys of all bodies may hold; null is as good as nothing.
+KEYS: dict[str, Parameter] = {
+    "material": Fields("of a material", entries="layers", most=LAYERS),
+    "target": Fields("of a target", entries="lobes", most=LOBES),
+    "model": Words("of a model"),
+    "switches": Switches("of the model"),
+    "lobe": Whole("which lobe of the target", high=LOBES - 1),
+    "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
+    "point": Several("of a class", most=3),
+    "map": Words("of a class"),
+    "eta": Scalar("of a coat", texturable=False),
+    "alpha": Scalar("of a coat", texturable=False),
+    "keep": Flag("the appearance below the coat"),
+    "name": Words("of a table, an object, an environment, a validation"),
+    "parameters": Fields("of a validation"),
+    "key": Words("of tables"),
+    "text": Words("of a material file", most=TEXT),
+    "file": Words("of the folder"),
+    "version": Words("of a file"),
+    "data": Words("of a file, in base64", most=2**26),
+    "object": Words("that is seen"),
+    "environment": Words("that lights it"),
+    "rotation": Scalar("of the environment, degrees about y", low=-BIGGEST, high=BIGGEST, texturable=False),
+    "camera": Camera("that sees it"),
+    "size": Size("of a picture, a map"),
+    "spp": Whole("samples per pixel", low=1, high=64),
+    "seed": Whole("of the random numbers", low=1, high=2**31),
+}
+
+
+def admitted(body: Body) -> Body:
+    """What is declared of a body. Raises InvalidInput where a key holds what it may not."""
+    checked = {}
+    for key, declared in KEYS.items():
+        value = body.get(key)
+        if value is not None:
+            _check_plain(key, value)
+            checked[key] = _within(key, value, declared)
+    return checked
+
+
+def admitting(verb: Verb) -> Verb:
+    """The verb, called with what is admitted of a body."""
+    return functools.wraps(verb)(lambda body: verb(admitted(body)))
+
+
+def _check_plain(key: str, value: Any, depth: int = 1) -> None:
+    """Raise InvalidInput for numbers, and for lists in lists, that lead nowhere."""
+    if isinstance(value, dict | list):
+        if depth > DEEPEST:
+            raise InvalidInput(f"{key}: lists and objects may lie in one another {DEEPEST} deep at most")
+        for entry in value.values() if isinstance(value, dict) else value:
+            _check_plain(key, entry, depth + 1)
+    elif isinstance(value, int | float) and not abs(value) <= BIGGEST:
+        raise InvalidInput(f"{key}: numbers must be finite and at most {BIGGEST:g} in size, got {show(value)}")
+
+
+# What answers hold ---------------------------------------------------------------------------------------------------
 
 
 def document(stack: Stack) -> Answer:

@@ -58,9 +58,8 @@ def member(body: Body) -> Answer:
     """
     target, near, lobe = _held(body)
     point = body.get("point")
-    numbers = isinstance(point, list) and all(isinstance(x, int | float) for x in point)
     wanted = near.target.lobes[lobe]
-    if not numbers or not point:
+    if not point:
         raise InvalidInput(f"point: must be a list of numbers, got {point!r}")
     if wanted.base == "conductor" and (wanted.interfaces == 1 or body.get("map") == "conductor") and len(point) == 2:
         last = max(n for n, place in enumerate(near.places) if place.lobe == lobe)

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from velatura.editor.bodies import Answer, Body, Verb, document, field, material_of
+from velatura.editor.bodies import TEXT, Answer, Body, Verb, admitting, document, field, material_of
 from velatura.errors import InvalidInput
 from velatura.files import whole
 from velatura.stack import dumps, load
@@ -37,7 +37,8 @@ class Folder:
     @property
     def verbs(self) -> dict[str, Verb]:
         """Every verb by the name that the page calls it by."""
-        return {"list": self.listed, "open": self.opened, "save": self.saved, "texture": self.texture}
+        verbs = {"list": self.listed, "open": self.opened, "save": self.saved, "texture": self.texture}
+        return {name: admitting(verb) for name, verb in verbs.items()}
 
     def first(self, material: str) -> Answer:
         """A material that is named on the command line: a file, to be saved back if it is in the folder, or a preset.
@@ -61,6 +62,8 @@ class Folder:
     def opened(self, body: Body) -> Answer:
         """The material of a file, and the version that the file has now."""
         path = self.existing(field(body, "file", str), MATERIALS)
+        if path.stat().st_size > TEXT:
+            raise InvalidInput(f"{path.name}: a material file may have {TEXT >> 10} KiB at most here")
         version = _version(path)
         return {"material": document(load(os.path.relpath(path))), "version": version}
 

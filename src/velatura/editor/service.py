@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 
 from velatura import __version__
 from velatura.editor import appearance, bundle, classes, truth, validations
-from velatura.editor.bodies import Answer, Body, Verb, array, document, field, material_of, model_of
+from velatura.editor.bodies import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
 from velatura.editor.shading import shading
 from velatura.editor.shading import tables as kept_tables
 from velatura.errors import InvalidInput
@@ -185,8 +185,7 @@ def environment(body: Body) -> Answer:
     return {"picture": array(ENVIRONMENTS[name]())}
 
 
-#: Every verb by the name that the page calls it by.
-VERBS: dict[str, Verb] = {
+_VERBS: dict[str, Verb] = {
     "session": session,
     "shader": shader,
     "tables": tables,
@@ -200,3 +199,6 @@ VERBS: dict[str, Verb] = {
     **classes.VERBS,
     **truth.VERBS,
 }
+
+#: Every verb by the name that the page calls it by.
+VERBS: dict[str, Verb] = {name: admitting(verb) for name, verb in _VERBS.items()}

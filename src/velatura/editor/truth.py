@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,7 +16,7 @@ from velatura.errors import InvalidInput
 from velatura.stack import Stack
 
 LARGEST = 512  # pixels along a side
-MOST = 64  # samples per pixel of one call
+MOST = 2**21  # samples of one call
 
 
 def truth(body: Body) -> Answer:
@@ -33,13 +34,19 @@ def truth(body: Body) -> Answer:
     known = {*scenes.ENVIRONMENTS, *bundle.environments()}
     if environment not in known:
         raise InvalidInput(f"environment: the truth knows {', '.join(sorted(known))}, got {environment!r}")
-    size = [_count(key, value, LARGEST) for key, value in zip(("width", "height"), body.get("size") or ())]
-    if len(size) != 2:
+    size = body.get("size")
+    if not isinstance(size, list) or len(size) != 2:
         raise InvalidInput("size: must be a width and a height")
-    spp, seed = _count("spp", body.get("spp", 4), MOST), _count("seed", body.get("seed", 1), 2**31)
-    camera, turn = _camera(body.get("camera")), _number("rotation", body.get("rotation", 0))
-
-    return {"picture": array(_rendered(stack, name, environment, (size[0], size[1]), camera, turn, spp, seed))}
+    for side, length in zip(("width", "height"), size):
+        if length > LARGEST:
+            raise InvalidInput(f"{side}: must be a whole number from 1 to {LARGEST}, got {length}")
+    spp, seed, camera = body.get("spp", 4), body.get("seed", 1), body.get("camera")
+    if camera is None:
+        raise InvalidInput("camera: must be an object of fov, origin and target, got nothing")
+    if size[0] * size[1] * spp > MOST:
+        raise InvalidInput(f"spp: may be {MOST // (size[0] * size[1])} at most for this size, got {spp}")
+    rotation = math.fmod(body.get("rotation", 0), 360)
+    return {"picture": array(_rendered(stack, name, environment, (size[0], size[1]), camera, rotation, spp, seed))}
 
 
 @kernel.exclusive
@@ -49,7 +56,7 @@ def _rendered(
     environment: str,
     size: tuple[int, int],
     camera: Mapping[str, Any],
-    turn: float,
+    rotation: float,
     spp: int,
     seed: int,
 ) -> NDArray[np.float32]:
@@ -66,32 +73,8 @@ def _rendered(
         "fov": camera["fov"],
     }
     if environment not in ("sky", "furnace"):
-        scene["light"]["to_world"] = transform.rotate([0, 1, 0], turn)
+        scene["light"]["to_world"] = transform.rotate([0, 1, 0], rotation)
     return np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed))[..., :3]
-
-
-def _count(key: str, value: Any, most: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise InvalidInput(f"{key}: must be a whole number from 1 to {most}, got {value!r}")
-    return value
-
-
-def _number(key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise InvalidInput(f"{key}: must be a number, got {value!r}")
-    return float(value)
-
-
-def _camera(camera: Any) -> dict[str, Any]:
-    """Where the camera is, what it looks at, and how wide."""
-    camera = camera if isinstance(camera, Mapping) else {}
-    found: dict[str, Any] = {"fov": _number("camera.fov", camera.get("fov"))}
-    for key in ("origin", "target"):
-        point = camera.get(key)
-        if not isinstance(point, list) or len(point) != 3:
-            raise InvalidInput(f"camera.{key}: must be three numbers, got {point!r}")
-        found[key] = [_number(f"camera.{key}", x) for x in point]
-    return found
 
 
 #: What `service.VERBS` takes over.

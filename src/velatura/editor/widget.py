@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from velatura.editor import bundle
-from velatura.editor.bodies import Answer, document, field
+from velatura.editor.bodies import Answer, admitted, document, field, material_of, model_of
 from velatura.editor.folder import PICTURES, Conflict, Folder
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, VelaturaError, needs
@@ -73,7 +73,7 @@ def _written(stack: Stack, editor: Editor) -> Answer:
 def _described(fields: Answer, editor: Editor) -> Stack:
     """The page's stack; while that is not valid, which the page says itself, the last one that was."""
     try:
-        stack = Stack.from_dict(fields)
+        stack = material_of(admitted({"material": fields}))
     except InvalidInput:
         return editor.stack
     editor._described = stack, fields
@@ -91,7 +91,7 @@ def _chosen(model: Model, _: Editor) -> Answer:
 
 def _named(fields: Answer, editor: Editor) -> Model:
     try:
-        return named(fields["name"], **fields["switches"])
+        return model_of(admitted({"model": fields.get("name"), "switches": fields.get("switches")}))
     except InvalidInput:
         return editor.model
 
