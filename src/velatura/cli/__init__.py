@@ -107,7 +107,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """UTF-8 whatever the locale. Raises OSError where standard output is closed."""
+    """Make the standard streams UTF-8, whatever the locale. Raises OSError where standard output is closed."""
     for number in range(3):  # a stream that is closed would give its number to the next file that is opened
         try:
             os.fstat(number)
