@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 
 import velatura as vt
 from velatura.errors import InvalidInput, NoSolution
-from velatura.inverse import Infeasible, Target, alternatives, coat, grazing, invert_stack, load_target
+from velatura.inverse import Infeasible, Solution, Target, alternatives, coat, grazing, invert_stack, load_target
 from velatura.inverse.targets import FIGURES, INFEASIBLE
 from velatura.model import MODELS, Model, named
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, loads, preset
@@ -304,3 +305,76 @@ def test_a_target_says_whose_variance_its_lobes_have(channels: str) -> None:
     target = Target([{"energy": 0.1}], channels=channels)
     assert invert_stack(target, "bati2021").model.channels == channels
     assert invert_stack(target, "bati2021", channels="mean").model.channels == "mean"
+
+
+# Every key of a target is read
+
+ONE = {"energy": 0.05, "alpha": 0.1}
+PAIR = {"energy": 0.1, "variance": 0.03, "interfaces": 2}
+METAL = {"energy": [0.5, 0.4, 0.3], "alpha": 0.15, "base": "conductor"}
+
+
+def found(*lobes: dict[str, object], **keys: object) -> Solution:
+    return invert_stack({"lobes": list(lobes), **keys})
+
+
+@pytest.mark.parametrize(
+    ("plain", "changed"),
+    [
+        (lambda: found(ONE), lambda: found({**ONE, "energy": 0.06})),
+        (lambda: found(ONE), lambda: found({**ONE, "alpha": 0.2})),
+        (lambda: found(ONE), lambda: found({"energy": 0.05, "variance": 0.1})),
+        (lambda: found(ONE), lambda: found({**ONE, "interfaces": 2})),
+        (lambda: found(ONE), lambda: found({**ONE, "base": "conductor", "energy": 0.5})),
+        (lambda: found(METAL), lambda: found({**METAL, "tint": 0.1})),
+        (lambda: found(ONE), lambda: found(ONE, exterior=1.3)),
+        (lambda: found(ONE), lambda: found(ONE, name="a name")),
+        (lambda: found(ONE, METAL), lambda: found(ONE, METAL, channels="separate")),
+    ],
+)
+def test_a_key_of_a_target_changes_the_stack(plain: Callable[[], Solution], changed: Callable[[], Solution]) -> None:
+    assert plain().stack != changed().stack
+
+
+@pytest.mark.parametrize(
+    ("lobes", "key", "values"),
+    [
+        ([METAL], "eta", [1.2]),
+        ([ONE, METAL], "k", [4.0]),
+        ([ONE, METAL], "tau", [0.05]),
+        ([PAIR], "eta", [1.4, None]),
+        ([PAIR], "tau", [0.1, None]),
+        ([PAIR], "alpha", [None, 0.03]),
+    ],
+)
+def test_what_is_fixed_is_kept(lobes: list[dict[str, object]], key: str, values: list[float | None]) -> None:
+    *above, last = lobes
+    layers = found(*above, {**last, "fixed": {key: values}}).layers[-len(values) :]
+    kept = {"k": "kappa"}.get(key, key)
+    for part, value in zip(layers, values):
+        if value is not None:
+            np.testing.assert_allclose(getattr(part, kept), value, atol=1e-4)
+
+
+def test_the_largest_index_is_kept() -> None:
+    assert np.max(found({"energy": 0.3}, eta_max=4).layers[0].eta) > 3
+    with pytest.raises(Infeasible, match="no index up to 3 reflects as much"):
+        found({"energy": 0.3}, eta_max=3)
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ({"lobes": [ONE], "channels": "both"}, "channels: must be one of mean, separate, got 'both'"),
+        ({"lobes": [{**ONE, "tint": 0.1}]}, "lobe 1: tint: only of a lobe with base: conductor"),
+    ],
+)
+def test_a_key_that_would_be_ignored_is_refused(target: dict[str, object], message: str) -> None:
+    with pytest.raises(InvalidInput) as caught:
+        invert_stack(target)
+    assert str(caught.value) == message
+
+
+def test_a_roughness_that_no_index_gives_is_infeasible() -> None:
+    with pytest.raises(Infeasible, match="a fixed roughness is not the one that gives that blur"):
+        found({**PAIR, "energy": [0.09, 0.09, 0.15], "fixed": {"alpha": [None, 0.09]}})

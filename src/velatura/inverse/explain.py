@@ -75,6 +75,8 @@ def _binding(target: Target, model: Model) -> tuple[int, str]:
     for n, lobe in enumerate(target.lobes):
         tried = stacks.extended(paths, lobe, target, spread, first=n == 0)
         paths = stacks.pruned(tried, lobe.interfaces, keep)
+        if not len(tried.cost):
+            return n, "fixed"  # between no two interfaces is there an index that gives it
         if not len(paths.cost):
             layers = tried.layers[-lobe.interfaces :]
             names = [key for part in layers for key in part.margins]

@@ -80,7 +80,7 @@ def invert_stack(
 
     Args:
         target: a target, the mapping of a target file, its lobes alone, or a file.
-        model: that is to read the stack; its `channels` are the target's, where that says so.
+        model: that is to read the stack; its `channels` are the target's, where that says so and no switch does.
 
     Raises:
         InvalidInput: not a target, or an unknown model or switch.

@@ -188,7 +188,7 @@ def load_target(path: str | Path) -> Target:
     """
     fields = io.read(path, "a target file")
     try:
-        return Target.from_dict(fields)
+        return _asked(fields)
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from None
 
@@ -199,7 +199,16 @@ def read(target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str 
         return target
     if isinstance(target, str | Path):
         return load_target(target)
-    return Target.from_dict(target if isinstance(target, Mapping) else {"lobes": target})
+    return _asked(target if isinstance(target, Mapping) else {"lobes": target})
+
+
+def _asked(fields: Any) -> Target:
+    """The target that a user describes, refused where a key of it would be ignored."""
+    target = Target.from_dict(fields)
+    for n, lobe in enumerate(target.lobes, 1):
+        if lobe.base != "conductor" and "tint" in lobe.model_fields_set:
+            raise InvalidInput(f"lobe {n}: tint: only of a lobe with base: conductor")
+    return target
 
 
 def _lobe(number: int, entry: Any) -> Lobe:
