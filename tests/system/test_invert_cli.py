@@ -142,6 +142,8 @@ def test_a_coat_that_keeps_the_appearance(run: Run, folder: Path) -> None:
         assert lobe["energy_after"] == pytest.approx(lobe["energy_before"], abs=1e-4)
         assert lobe["alpha_after"] == pytest.approx(lobe["alpha_before"], abs=1e-4)
     assert len(vt.load("kept.yaml").interfaces) == 3
+    brushed = vt.load("kept.yaml").interfaces[-1]  # as the bare gold is, along the same axis
+    assert brushed.rotation == pytest.approx(30) and brushed.alpha[0] < brushed.alpha[1]
     report = json.loads(run("coat", "coated-gold", "--json")[1])
     assert any(lobe["energy_after"] != pytest.approx(lobe["energy_before"], abs=1e-3) for lobe in report["lobes"])
     status, _, err = run("coat", "coated-gold", "--alpha", "0.5", "--keep-appearance", "-o", "rough.yaml")

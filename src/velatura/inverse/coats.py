@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_t
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import Model, lobes, named, prepare, variance_kind
 from velatura.model.diffuse import under, with_means
-from velatura.model.statistics import Statistics, number, statistics
+from velatura.model.statistics import Statistics, number, statistics, with_axes_named
 from velatura.model.variance import Roughness
 from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, load
 
@@ -127,7 +127,10 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Laye
             if not len(paths.cost):
                 raise NoSolution(f"{where}: cannot keep its appearance under the coat: {_reason(tried, eta_max)}")
     best = paths.take(np.array([np.argmin(paths.cost)]))
-    solved = [layer for layers in best.layers for layer in layers.written(0)]
+    # The axes keep their names: brushing that is turned by 30 degrees stays so
+    axes = [np.radians(values[f"layer{n}_rotation"]) for n, x in enumerate(stack.layers) if isinstance(x, Interface)]
+    kept = [replace(x, roughness=with_axes_named(x.roughness, axis)) for x, axis in zip(best.layers, axes)]
+    solved = [layer for layers in kept for layer in layers.written(0)]
     return (*solved, *(layer for layer in stack.layers if isinstance(layer, Diffuse)))
 
 

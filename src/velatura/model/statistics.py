@@ -105,7 +105,7 @@ def _axis(kinds: Sequence[str], values: Mapping[str, Any], isotropic: np.ndarray
     return 0.5 * np.angle(double)
 
 
-def _named(roughness: Roughness, axis: np.ndarray) -> Roughness:
+def with_axes_named(roughness: Roughness, axis: ArrayLike) -> Roughness:
     """The same roughness with the axis first that is nearer to a given one."""
     u, v, rotation = roughness
     other = np.cos(2 * (rotation - axis)) < 0
@@ -119,7 +119,7 @@ def _collect(lobe: Lobe, model: Model, axis: np.ndarray) -> LobeStatistics:
     def shaped(values: Sequence[Any], axis: int) -> np.ndarray:
         return np.stack([np.broadcast_to(v, (*lead, count)) for v in values], axis=axis)
 
-    alpha_u, alpha_v, rotation = _named(lobe.roughness, axis)
+    alpha_u, alpha_v, rotation = with_axes_named(lobe.roughness, axis)
     return LobeStatistics(
         energy=np.broadcast_to(lobe.energy, (3, count)).copy(),
         covariance=shaped(lobe.variance.matrix(), -2),
