@@ -19,6 +19,7 @@ from velatura.checks.report import Finding
 GAIN = 2e-3  # of energy, which tables and single precision may err by
 OFF = 1e-2  # two numbers that should be equal are not where they differ by this share
 FEW = 2e-3  # samples that may be off, where single precision is at its end
+DARK = 1e-8  # light between two directions that rounding makes
 ONE_WAY = 1e-2  # relative error of reciprocity, weighted by the light
 CHANGE = 5e-3  # of energy, between a BSDF and the one that it should equal
 BLURRED = 4e-3  # relative standard error of the integral of a pdf that the cells do not resolve
@@ -237,7 +238,7 @@ def reciprocity(evidence: Evidence, alarm: float) -> Finding:
     light, back = pairs.there * pairs.solid_angle[:, None], pairs.back * pairs.solid_angle[:, None]
     difference, mean = light - back, (light + back) / 2
     products = difference[0] * difference[1]
-    scale = max((mean[0] * mean[1]).sum(), 1e-30)
+    scale = max((mean[0] * mean[1]).sum(), DARK * DARK * mean[0].size)
     value = float(np.sqrt(max(products.sum(), 0) / scale))
     # Say more where there is no noise
     relative = np.abs(difference[0]) / np.maximum(np.maximum(light[0], back[0]), 1e-30)

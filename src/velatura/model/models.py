@@ -24,13 +24,20 @@ SWITCHES: dict[str, tuple[str, ...]] = {
     "lobes": ("all", "three", "two"),
 }
 
-#: By form, the laws that its BSDFs do not keep: light that a lobe sends below the surface is lost, the forward form is
-#: not reciprocal, and the symmetric one gains at grazing angles, but for opaque stacks where it is balanced
-#: (`velatura.model.scaling`).
-EXCEPTIONS: dict[str, frozenset[str]] = {
-    "forward": frozenset({"lossless", "reciprocity"}),
-    "symmetric": frozenset({"lossless", "energy", "white furnace"}),
-    "balanced": frozenset({"lossless"}),
+GAIN = frozenset({"energy", "white furnace"})  # laws that a gain breaks
+
+#: By form and shape of the stack, the laws that BSDFs do not keep. Light that a lobe sends below the surface is lost.
+#: The forward form is not reciprocal; `scaled` is that whose lobes are drawn with their full energy, which gains where
+#: light meets rough glass from inside. The symmetric form gains at grazing angles, and its samples miss light that
+#: passes a pane beyond the critical angle; `balanced` is that of isotropic opaque stacks by `velatura.model.scaling`.
+EXCEPTIONS: dict[tuple[str, str], frozenset[str]] = {
+    ("forward", "opaque"): frozenset({"lossless", "reciprocity"}),
+    ("forward", "pane"): frozenset({"lossless", "reciprocity"}),
+    ("scaled", "opaque"): frozenset({"lossless", "reciprocity"}),
+    ("scaled", "pane"): frozenset({"lossless", "reciprocity"}) | GAIN,
+    ("symmetric", "opaque"): frozenset({"lossless"}) | GAIN,
+    ("symmetric", "pane"): frozenset({"lossless", "albedo"}) | GAIN,
+    ("balanced", "opaque"): frozenset({"lossless"}),
 }
 
 
@@ -78,11 +85,6 @@ class Model:
     @property
     def calibration(self) -> Calibration | None:
         return None if self.calibrations is None else self.calibrations[self.reflectance]
-
-    @property
-    def exceptions(self) -> frozenset[str]:
-        """Laws of `velatura.checks` that a BSDF of this model does not keep, and is known not to."""
-        return EXCEPTIONS[self.form]
 
     def with_switches(self, **switches: str) -> Model:
         """This model with some choices changed.

@@ -7,12 +7,14 @@ import operator
 import sys
 from typing import Any
 
+import numpy as np
+
 from velatura import kernel, tables
 from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
 from velatura.model.merge import merging
-from velatura.model.models import EXCEPTIONS
+from velatura.model.models import EXCEPTIONS, GAIN
 from velatura.model.variance import Isotropic
 from velatura.plugins import spectral
 
@@ -63,8 +65,17 @@ def make(mi: Any) -> type:
         @property
         def exceptions(self) -> frozenset[str]:
             """Laws of `velatura.checks` that it does not keep, and is known not to."""
-            balanced = self.body is not None and self.body.scaling is not None and not self.transmits
-            return EXCEPTIONS["balanced"] if balanced else self.model.exceptions
+            shape, form = "pane" if self.transmits else "opaque", self.model.form
+            if form == "forward" and self.model.calibrations:
+                form = "scaled"
+            elif self.body and self.body.scaling and shape == "opaque" and self.variance is Isotropic:
+                form = "balanced"
+            declared = EXCEPTIONS[form, shape]
+            # The albedo of a base is a sum over cosines, which hardly resolves a critical angle outside
+            indices = [np.mean(np.array(v)) for name, v in self.binding.constants.items() if name.endswith("_eta")]
+            outside = float(np.max(np.array(self.binding.constants["exterior"])))
+            based = "diffuse" in self.binding.stack.kinds
+            return declared | GAIN if based and any(index < outside for index in indices) else declared
 
         # The material, and what follows from it
 
