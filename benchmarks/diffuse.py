@@ -16,9 +16,9 @@ import numpy as np
 from rich.progress import track
 
 import velatura as vt
-from velatura.model import DEFAULT, bsdf, named, variance_kind
+from velatura.model import DEFAULT, bsdf, named
 from velatura.model.statistics import number
-from velatura.stack import Diffuse, Interface, Medium, Stack
+from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
 COSINES = (1.0, 0.6, 0.2)
 
@@ -36,9 +36,7 @@ def random_stack(rng: np.random.Generator, interfaces: int) -> Stack:
 
 def albedo(stack: Stack, cos_theta: tuple[float, ...], model: str) -> np.ndarray:
     """Of the base as a model has it, shape (3, cosines)."""
-    flat = stack.flat()
-    values = {name: number(name, value) for name, value in flat.items()}
-    body = bsdf.body(stack.kinds, values, stack.thin, named(model), variance_kind(stack.kinds, flat))
+    body = bsdf.body(Material.of(stack, number), named(model))
     cosine = np.array(cos_theta)
     base = body.base((np.sqrt(1 - cosine**2), 0 * cosine, cosine))
     assert base is not None

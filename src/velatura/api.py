@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from velatura.model.models import DEFAULT, SWITCHES, Model, named
 from velatura.model.statistics import Statistics, statistics
-from velatura.stack import Material, Stack, dumps, load
+from velatura.stack import MaterialLike, Stack, dumps, load
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -31,7 +31,7 @@ def register() -> None:
 
 
 def lobes(
-    stack: Material, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
+    stack: MaterialLike, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
 ) -> Statistics:
     """Energy, covariance and roughness of every lobe of a material (Belcour 2018, section 5), in NumPy.
 
@@ -59,7 +59,7 @@ def lobes(
     return statistics(load(stack), cos_theta, phi, model, **switches)
 
 
-def bsdf(stack: Material, model: str | Model = DEFAULT, **switches: Any) -> Any:
+def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> Any:
     """A `mi.BSDF` of a material (a stack, a file, or a preset's name), in the variant that is set (else llvm_ad_rgb).
 
     Args:
@@ -84,7 +84,7 @@ def bsdf(stack: Material, model: str | Model = DEFAULT, **switches: Any) -> Any:
 
 
 def render(
-    stack: Material,
+    stack: MaterialLike,
     scene: str = "ball",
     env: str | None = None,
     spp: int = 64,
@@ -142,10 +142,10 @@ def check(
     from velatura import checks
 
     def made(thing: Any) -> Any:
-        return bsdf(thing, model, **switches) if isinstance(thing, Material) else thing
+        return bsdf(thing, model, **switches) if isinstance(thing, MaterialLike) else thing
 
     subject = "BSDF"
-    if isinstance(material, Material):
+    if isinstance(material, MaterialLike):
         material = load(material)
         subject = f"{material.name or 'material'} ({model if isinstance(model, str) else model.name})"
         lossless = lossless or _lossless(material)

@@ -26,8 +26,10 @@ from agreement import (
 
 import velatura as vt
 from velatura.model import bsdf, named
+from velatura.model.context import at_a_point
 from velatura.model.statistics import number
 from velatura.shader import record, shader, structure
+from velatura.stack import Material
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
@@ -105,8 +107,7 @@ def test_lobes_that_are_drawn_once_are_the_lobes(layers: list, model: str, page:
     wi = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
     found = read_back(stack, made, wi, page)
 
-    values = {name: number(name, value) for name, value in stack.flat().items()}
-    body = bsdf.body(stack.kinds, values, stack.thin, named(model), structure(stack), constant=False)
+    body = bsdf.body(Material.of(stack, number), named(model), structure(stack), at_a_point())
     seen = bsdf.scattered(body, tuple(wi))
     parts: list[Any] = [*seen.reflected, *filter(None, [seen.base, seen.transmitted])]
     for part, (*energy, alpha_u, alpha_v, _) in zip(parts, found, strict=True):

@@ -14,8 +14,9 @@ from chromium import Browser
 from velatura import tables
 from velatura.editor import bodies
 from velatura.model import bsdf
+from velatura.model.context import at_a_point
 from velatura.shader import Recording, Shader, constant, record, shader, variance
-from velatura.stack import Kind, Stack, is_colour
+from velatura.stack import Kind, Material, Stack, is_colour
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
 
@@ -93,7 +94,8 @@ def random_case(pattern: Pattern, count: int, rng: np.random.Generator) -> Case:
 def in_numpy(case: Case, recording: Recording) -> Results:
     """What the model says."""
     stack = case.stack
-    body = bsdf.body(stack.kinds, case.values, stack.thin, recording.model, variance(stack), constant=False)
+    material = Material.from_flat(stack.kinds, case.values, stack.thin)
+    body = bsdf.body(material, recording.model, variance(stack), at_a_point())
     wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]

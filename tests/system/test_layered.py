@@ -11,8 +11,9 @@ import velatura as vt
 from velatura import kernel
 from velatura.comparison.account import account
 from velatura.errors import InvalidInput
-from velatura.model import bsdf, named, variance_kind
+from velatura.model import bsdf, named
 from velatura.model.statistics import number
+from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -115,9 +116,7 @@ def test_eval_pdf_and_sample_agree(name: str) -> None:
 def test_the_plugin_is_the_model_that_numpy_runs(name: str, model: str) -> None:
     """In single precision, with averages sampled once per material: within 1 % where the lobes are."""
     stack, ctx = vt.preset(name), mi.BSDFContext()
-    flat = stack.flat()
-    values = {key: number(key, value) for key, value in flat.items()}
-    body = bsdf.body(stack.kinds, values, stack.thin, named(model), variance_kind(stack.kinds, flat))
+    body = bsdf.body(Material.of(stack, number), named(model))
     rng, n = np.random.default_rng(11), 2000
     cos_theta, phi = rng.uniform(0.05, 1, n), rng.uniform(0, 2 * np.pi, n)
     sin_theta = np.sqrt(1 - cos_theta**2)

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura import tables
-from velatura.model import bsdf, named, variance_kind
+from velatura.model import bsdf, named
 from velatura.model.prepare import PreparedBase
 from velatura.model.statistics import number
 from velatura.optics import fresnel
+from velatura.stack import Material
 from velatura.tables import coordinates, diffuse_nodes
 from velatura.tables.build import diffuse_matrices
 
@@ -24,9 +25,7 @@ COSINES = np.array([1.0, 0.7, 0.4, 0.2])
 
 
 def prepared(stack: vt.Stack, model: str = "velatura", **switches: str) -> bsdf.Body:
-    flat = stack.flat()
-    values = {name: number(name, value) for name, value in flat.items()}
-    return bsdf.body(stack.kinds, values, stack.thin, named(model, **switches), variance_kind(stack.kinds, flat))
+    return bsdf.body(Material.of(stack, number), named(model, **switches))
 
 
 def seen(stack: vt.Stack, model: str = "velatura", **switches: str) -> tuple[Array, PreparedBase]:
@@ -95,9 +94,7 @@ def test_the_base_is_reciprocal(model: str) -> None:
     stack = vt.Stack(
         [vt.Interface(eta=1.9, alpha=(0.1, 0.4), rotation=20), vt.Interface(eta=1.4, alpha=0.3), vt.Diffuse()]
     )
-    flat = stack.flat()
-    values = {name: number(name, value) for name, value in flat.items()}
-    body = bsdf.body(stack.kinds, values, stack.thin, named(model), variance_kind(stack.kinds, flat))
+    body = bsdf.body(Material.of(stack, number), named(model))
     wi, wo = (0.6, 0.0, 0.8), (0.3, -0.4, np.sqrt(0.75))
     there, back = body.base(wi), body.base(wo)
     assert there is not None and back is not None

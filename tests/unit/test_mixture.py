@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 import velatura as vt
-from velatura.model import MODELS, bsdf, named, variance_kind
-from velatura.model.sides import turned_over
+from velatura.model import MODELS, bsdf, named
 from velatura.model.statistics import number
 from velatura.optics import fresnel
+from velatura.stack import Material
 
 Array = NDArray[np.floating]
 
@@ -34,10 +34,7 @@ STACKS = {
 
 
 def body_of(stack: vt.Stack, model: str = "belcour2018", **switches: str) -> bsdf.Body:
-    flat = stack.flat()
-    values = {name: number(name, value) for name, value in flat.items()}
-    variance = variance_kind(stack.kinds, flat)
-    return bsdf.body(stack.kinds, values, stack.thin, named(model, **switches), variance)
+    return bsdf.body(Material.of(stack, number), named(model, **switches))
 
 
 def directions(n: int, both: bool, seed: int) -> tuple[Array, Array, Array]:
@@ -94,13 +91,13 @@ def test_the_symmetric_form_of_velatura_keeps_the_energy_of_a_furnace() -> None:
 
 
 def test_a_stack_turned_over_twice_is_itself() -> None:
-    flat = BRUSHED_PANE.flat()
-    kinds, values = turned_over(BRUSHED_PANE.kinds, flat)
-    assert kinds == ["dielectric", "medium", "dielectric"]
+    pane = Material.of(BRUSHED_PANE)
+    turned = pane.reversed()
+    kinds, values = turned.kinds, turned.flat()
+    assert kinds == ("dielectric", "medium", "dielectric")
     assert (values["exterior"], values["layer0_eta"], values["layer2_eta"]) == (1.2, 1.5, 1.0)
     assert values["layer0_rotation"] == -50 and values["layer2_alpha_v"] == 0.3
-    again, twice = turned_over(kinds, values)
-    assert tuple(again) == BRUSHED_PANE.kinds and twice == flat
+    assert turned.reversed() == pane
 
 
 @pytest.mark.parametrize("cos_theta", [1.0, 0.7, -1.0, -0.8, -0.6])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isclose, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from velatura.model import MODELS, SWITCHES, named
 from velatura.model.maps import MAPS
 from velatura.model.statistics import statistics
 from velatura.model.variance import Covariance, Roughness
-from velatura.stack import Interface, Medium, Stack, preset
+from velatura.stack import Interface, Material, Medium, Stack, preset
 
 PAPER = {"model": "belcour2018"}  # which has all switches
 PLAIN = {**PAPER, "reflectance": "fresnel", "tir": "off"}
@@ -346,7 +347,9 @@ def test_no_stack_or_direction_gives_nan_or_negative_energy(precision) -> None:
         values = {name: value.astype(precision) for name, value in random_values(pattern, count, rng).items()}
         model = named("belcour2018", **VARIANTS[number % len(VARIANTS)])
         variance = (Isotropic, PerAxis, Covariance)[number % 3]
-        prepared = prepare([KINDS[kind] for kind in pattern], values, model, variance)
+        kinds: Any = [KINDS[kind] for kind in pattern]
+        material = Material.from_flat(kinds, values)
+        prepared = prepare(material, model, variance)
         cos_theta = np.where(rng.random(count) < 0.2, 10 ** rng.uniform(-7, -1, count), rng.uniform(0, 1, count))
         phi, sin_theta = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - cos_theta**2)
         x, y, z = sin_theta * np.cos(phi), sin_theta * np.sin(phi), cos_theta

@@ -18,7 +18,7 @@ from velatura.model.merge import merged
 from velatura.model.statistics import number, statistics
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics import fresnel, ggx
-from velatura.stack import Interface, Medium, Stack, Texture, preset, presets
+from velatura.stack import Interface, Material, Medium, Stack, Texture, preset, presets
 from velatura.tables.build.quadrature import average
 
 Matrix = NDArray[np.float64]
@@ -30,8 +30,8 @@ angles = st.floats(-180, 180)
 
 def lobes(stack: Stack, kind: type[Variance], cos_theta: float, phi: float = 0.0, **switches: str) -> list[adding.Lobe]:
     """The lobes, the transmitted one at last, by a kind of variance that may be more general than needed."""
-    values = {name: number(name, value) for name, value in stack.flat().items()}
-    prepared = prepare(stack.kinds, values, named(switches.pop("model", "yamaguchi2019"), **switches), kind)
+    chosen = named(switches.pop("model", "yamaguchi2019"), **switches)
+    prepared = prepare(Material.of(stack, number), chosen, kind)
     sine = sqrt(1 - cos_theta**2)
     directions = [np.atleast_1d(x) for x in (sine * cos(phi), sine * sin(phi), cos_theta)]
     reflected, transmitted = adding.lobes(prepared, (directions[0], directions[1], directions[2]))
@@ -239,8 +239,7 @@ def test_fg_is_fresnel_times_masking_both_ways(alpha: float, cos_theta: float) -
 
 def five(model: str, **switches: str) -> tuple[list[adding.Lobe], list[adding.Lobe]]:
     stack = Stack([Interface(eta=n, alpha=a) for n, a in zip((1.5, 2.0, 1.3, 1.8, 1.0), (0.05, 0.2, 0.1, 0.3, 0.1))])
-    values = {name: number(name, value) for name, value in stack.flat().items()}
-    prepared = prepare(stack.kinds, values, named(model, **switches), Isotropic)
+    prepared = prepare(Material.of(stack, number), named(model, **switches), Isotropic)
     reflected, _ = adding.lobes(prepared, (np.array([0.8]), np.array([0.0]), np.array([0.6])))
     return reflected, merged(prepared, reflected)
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import velatura as vt
 from velatura.comparison.account import account
 from velatura.model import named
-from velatura.stack import Interface, Medium, Stack
+from velatura.stack import Interface, Material, Medium, Stack
 
 COSINES = np.array([1.0, 0.75, 0.5, 0.3, 0.1])
 REFLECTANCES = ("fgd", "fgd-multi")
@@ -84,14 +84,12 @@ def test_smooth_stacks_reflect_by_fresnel_and_absorption(reflectance: str) -> No
 
 def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
     """What is evaluated is F D G / 4 cos, with Fresnel at the half-vector."""
-    from velatura.model import bsdf, variance_kind
+    from velatura.model import bsdf
     from velatura.model.statistics import number
     from velatura.optics import fresnel, ggx
 
     stack = Stack([Interface(alpha=(0.1, 0.3), rotation=20, **GOLD)])
-    values = {name: number(name, value) for name, value in stack.flat().items()}
-    model = named("velatura", reflectance="fgd")
-    body = bsdf.body(stack.kinds, values, False, model, variance_kind(stack.kinds, stack.flat()))
+    body = bsdf.body(Material.of(stack, number), named("velatura", reflectance="fgd"))
     rng = np.random.default_rng(0)
     wi, wo = (w / np.linalg.norm(w, axis=0) for w in abs(rng.normal(size=(2, 3, 200))))
     value, _ = bsdf.eval_pdf(body, tuple(wi), tuple(wo))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
-from velatura.model import Model, adding, bsdf, mixture, recursion, variance_kind
+from velatura.model import Model, adding, bsdf, mixture, recursion
 from velatura.model.diffuse import Base
 from velatura.model.statistics import number
 from velatura.optics.directions import directions
@@ -18,7 +18,7 @@ from velatura.optics.ggx import Direction
 from velatura.reference import Lobe
 from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import square
-from velatura.stack import Stack
+from velatura.stack import Material, Stack
 
 Array = NDArray[np.floating]
 
@@ -43,9 +43,7 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     """
     if model.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since the truth has one roughness a lobe")
-    flat = stack.flat()
-    values = {name: number(name, value) for name, value in flat.items()}
-    body = bsdf.body(stack.kinds, values, stack.thin, model, variance_kind(stack.kinds, flat))
+    body = bsdf.body(Material.of(stack, number), model)
     columns = [_column(body, wi) for wi in directions(cos_theta, 0.0)]
 
     names = [field.name for field in dataclasses.fields(Lobe)]

@@ -14,7 +14,7 @@ from velatura.comparison.result import Account, Comparison
 from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
-from velatura.stack import Diffuse, Interface, Material, Stack, load
+from velatura.stack import Diffuse, Interface, MaterialLike, Stack, load
 
 COSINES = (1.0, 0.7, 0.35)
 PATHS = 3 * 10**6
@@ -23,7 +23,7 @@ Progress = Callable[[int, int], None]
 
 
 def compare(
-    stack: Material,
+    stack: MaterialLike,
     models: Sequence[Model | Plugin] | None = None,
     cos_theta: Sequence[float] = COSINES,
     paths: int = PATHS,

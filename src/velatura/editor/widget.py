@@ -15,7 +15,7 @@ from velatura.editor.folder import PICTURES, Conflict, Folder
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, VelaturaError, needs
 from velatura.model import DEFAULT, SWITCHES, Model, named
-from velatura.stack import Material, Stack, load
+from velatura.stack import MaterialLike, Stack, load
 from velatura.stack.schema import show, unknown
 
 with needs("notebook"):
@@ -44,7 +44,7 @@ class Read(traitlets.TraitType):
 def _stack(value: Any) -> Stack:
     if isinstance(value, Mapping):
         return Stack.from_dict(value)
-    if isinstance(value, Material):
+    if isinstance(value, MaterialLike):
         return load(value)
     raise InvalidInput(f"stack: must be a Stack, its fields, a file or the name of a preset, got {show(value)}")
 

@@ -13,7 +13,7 @@ from velatura.errors import InvalidInput
 
 if TYPE_CHECKING:
     from velatura.model import Model
-    from velatura.stack import Material, Stack
+    from velatura.stack import MaterialLike, Stack
 
 
 class Format(NamedTuple):
@@ -73,7 +73,7 @@ class Export:
 
 
 def export(
-    material: Material,
+    material: MaterialLike,
     to: str,
     model: str | Model | None = None,
     *,

@@ -19,7 +19,8 @@ from velatura.model.maps import MAPS, RoughnessMap
 from velatura.model.prepare import Prepared, PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
-from velatura.stack import Interface, Layer, Medium
+from velatura.stack import Interface, InterfaceValues, Kind, Layer, LayerValues, Material, Medium, MediumValues
+from velatura.tables import Tables, load
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,7 +40,7 @@ class Layers:
     (N,), negative where it is broken.
     """
 
-    kind: str
+    kind: Kind
     eta: Value
     kappa: Value  # or None
     roughness: Roughness
@@ -94,7 +95,7 @@ class Above:
     @classmethod
     def nothing(cls, model: Model, exterior: Value = 1.0, variance: type[Variance] = Isotropic) -> Above:
         """Only the exterior medium."""
-        prepared = Prepared(model, (), variance, MAPS[model.map])
+        prepared = Prepared(model, (), variance, MAPS[model.map], load())
         return cls(model, adding.top(prepared, 1.0), exterior, None, variance, exterior)
 
     @property
@@ -112,14 +113,12 @@ class Above:
     def prepared(self, layers: Layers, reflectance: Value | None = None) -> Prepared:
         """The interfaces as the next layer of each stack; `reflectance` where that is known already."""
         model = self.adder if reflectance is None else dataclasses.replace(self.adder, reflectance="fresnel")
-        kinds: tuple[str, ...] = (layers.kind,)
-        values = {"exterior": self.eta}
+        material = Material((_interface(layers),), self.eta)
         if self.over is not None and self.adder.tir != "off":
             # The interface above is there for its indices alone, which total reflection depends on
-            kinds, values = ("dielectric", layers.kind), {"exterior": self.over, "layer0_eta": self.eta}
-            values |= {"layer0_alpha_u": 0.0, "layer0_alpha_v": 0.0, "layer0_rotation": 0.0}
-        values |= _interface(layers, len(kinds) - 1)
-        prepared = prepare(kinds, values, model, self.variance)
+            smooth = InterfaceValues("dielectric", 0.0, 0.0, 0.0, self.eta)
+            material = Material((smooth, *material.layers), self.over)
+        prepared = prepare(material, model, self.variance)
         if reflectance is None:
             return prepared
         last = prepared.layers[-1]
@@ -172,7 +171,7 @@ class Above:
 
     def _read(self, path: tuple[Layers, ...]) -> adding.Lobe:
         """The last lobe of whole stacks."""
-        lobe = lobes(prepare(*flat(path, self.exterior), self.model, self.variance), NORMAL)[0][-1]
+        lobe = lobes(prepare(whole(path, self.exterior), self.model, self.variance), NORMAL)[0][-1]
         return dataclasses.replace(lobe, variance=self.variance_of(lobe.roughness))
 
     def variance_of(self, roughness: Roughness) -> Variance:
@@ -187,33 +186,20 @@ class Above:
         return take(self, index)
 
 
-def flat(path: Sequence[Layers], exterior: Value) -> tuple[list[str], dict[str, Value]]:
-    """Whole stacks as kinds of layers and values under flat names."""
-    kinds: list[str] = []
-    values: dict[str, Value] = {"exterior": exterior}
-    for layers in path:
-        if np.any(layers.tau):
-            values |= _medium(layers.tau, len(kinds))
-            kinds.append("medium")
-        values |= _interface(layers, len(kinds))
-        kinds.append(layers.kind)
-    return kinds, values
+def whole(path: Sequence[Layers], exterior: Value) -> Material:
+    """Whole stacks of interfaces and the media above them."""
+    layers: list[LayerValues] = []
+    for part in path:
+        if np.any(part.tau):
+            layers.append(MediumValues(depth=1.0, sigma_a=part.tau, sigma_s=0.0, g=0.0))
+        layers.append(_interface(part))
+    return Material(tuple(layers), exterior)
 
 
-def _interface(layers: Layers, n: int) -> dict[str, Value]:
-    """Interfaces as flat values of layer n."""
+def _interface(layers: Layers) -> InterfaceValues:
     u, v, rotation = layers.roughness
-    own = {"alpha_u": u, "alpha_v": v, "rotation": rotation * (180 / np.pi)}
-    if layers.kind != "mirror":
-        own["eta"] = layers.eta
-    if layers.kind == "conductor":
-        own["k"] = layers.kappa
-    return {f"layer{n}_{key}": value for key, value in own.items()}
-
-
-def _medium(tau: Value, n: int) -> dict[str, Value]:
-    """Media that absorb as flat values of layer n."""
-    return {f"layer{n}_depth": 1.0, f"layer{n}_sigma_a": tau, f"layer{n}_sigma_s": 0.0, f"layer{n}_g": 0.0}
+    eta = None if layers.kind == "mirror" else layers.eta
+    return InterfaceValues(layers.kind, u, v, rotation * (180 / np.pi), eta, layers.kappa)
 
 
 def take(value: Any, index: Any) -> Any:
@@ -231,7 +217,7 @@ def mapped(value: Any, change: Callable[[np.ndarray], np.ndarray]) -> Any:
         return tuple(mapped(entry, change) for entry in value)
     if isinstance(value, dict):
         return {key: mapped(entry, change) for key, entry in value.items()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, Model | type):
+    if dataclasses.is_dataclass(value) and not isinstance(value, Model | Tables | type):
         fields = {f.name: mapped(getattr(value, f.name), change) for f in dataclasses.fields(value)}
         return dataclasses.replace(value, **fields)
     return value
@@ -260,7 +246,7 @@ def join(parts: list[Any], counts: list[int]) -> Any:
     if isinstance(first, dict):
         unbounded = np.full(1, np.inf)  # a constraint that only some parts have
         return {key: join([part.get(key, unbounded) for part in parts], counts) for key in set().union(*parts)}
-    if dataclasses.is_dataclass(first) and not isinstance(first, Model | type):
+    if dataclasses.is_dataclass(first) and not isinstance(first, Model | Tables | type):
         fields = {f.name: join([getattr(p, f.name) for p in parts], counts) for f in dataclasses.fields(first)}
         return dataclasses.replace(first, **fields)
     return first

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from velatura.errors import InvalidInput
 from velatura.inverse.above import Array, take
-from velatura.model import Model, bsdf, mixture, named, variance_kind
+from velatura.model import Model, bsdf, mixture, named
 from velatura.model.statistics import number
 from velatura.ops import Value
-from velatura.stack import Material, load
+from velatura.stack import Material, MaterialLike, load
 
 COLUMNS = ("theta_i", "theta_o", "phi", "r", "g", "b")
 GRAZING, BRIGHTEST = 90.0, 1e9  # degrees: directions must be above the surface; 1/sr: more than any lobe has
@@ -106,17 +106,14 @@ def load_table(path: str | Path) -> ReflectanceTable:
     return ReflectanceTable(Directions.of(theta_i, theta_o, phi), np.array(value))
 
 
-def table_of(stack: Material, directions: Directions, model: str | Model) -> ReflectanceTable:
+def table_of(stack: MaterialLike, directions: Directions, model: str | Model) -> ReflectanceTable:
     """Reflectance of a material by a model (a stack, a file, or a preset's name).
 
     Raises:
         InvalidInput: not a valid material, an unknown model, or a texture, which has no one value.
     """
     stack = load(stack)
-    flat = stack.flat()
-    values = {name: number(name, value) for name, value in flat.items()}
-    kind = variance_kind(stack.kinds, flat)
-    seen = bsdf.body(stack.kinds, values, stack.thin, named(model), kind)
+    seen = bsdf.body(Material.of(stack, number), named(model))
     value = radiance(seen, directions) / directions.wo[2]
     return ReflectanceTable(directions, np.broadcast_to(value, (3, len(directions.theta_i))))
 

@@ -19,7 +19,18 @@ from velatura.model import Model, lobes, named, prepare, variance_kind
 from velatura.model.diffuse import under, with_means
 from velatura.model.statistics import Statistics, number, statistics, with_axes_named
 from velatura.model.variance import Roughness
-from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, load
+from velatura.stack import (
+    Diffuse,
+    Interface,
+    InterfaceValues,
+    Layer,
+    Material,
+    MaterialLike,
+    Medium,
+    MediumValues,
+    Stack,
+    load,
+)
 
 KEEP = 64  # partial stacks that are followed
 
@@ -54,7 +65,7 @@ class Coated:
 
 
 def coat(
-    stack: Material,
+    stack: MaterialLike,
     eta: float = 1.5,
     alpha: float = 0.0,
     keep_appearance: bool = False,
@@ -100,22 +111,20 @@ def coat(
 def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
     """The layers that give below a coat the lobes that those of the stack give bare."""
     # Read the lobes of the bare stack
-    flat = stack.flat()
-    values = {key: number(key, value) for key, value in flat.items()}
-    kind = variance_kind(stack.kinds, flat)
-    prepared = prepare(stack.kinds, values, model, kind)
-    wanted, _ = lobes(prepared, NORMAL)
+    material = Material.of(stack, number)
+    kind = variance_kind(material)
+    wanted, _ = lobes(prepare(material, model, kind), NORMAL)
 
     # Solve for its interfaces, from the top
     above, _ = Above.nothing(model, stack.exterior, kind).below(top)
     paths, remaining = Partial(above, (), np.zeros(1)), iter(wanted)
-    for n, layer in enumerate(stack.layers):
+    for n, (layer, values) in enumerate(zip(stack.layers, material.layers)):
         where = f"layer {n} ({type(layer).__name__.lower()})"
-        if isinstance(layer, Medium):
-            if np.any(values[f"layer{n}_sigma_s"] > 0):
+        if isinstance(values, MediumValues):
+            if np.any(values.sigma_s > 0):
                 raise NoSolution(f"{where}: scatters light; an appearance is kept of media that only absorb")
         elif isinstance(layer, Interface):
-            lobe, own = next(remaining), _choices(stack, values, n, eta_max)
+            lobe, own = next(remaining), _choices(material, n, eta_max)
             energy, variance = np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)
             found = []
             for rank, choice in enumerate(own):
@@ -128,7 +137,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Laye
                 raise NoSolution(f"{where}: cannot keep its appearance under the coat: {_reason(tried, eta_max)}")
     best = paths.take(np.array([np.argmin(paths.cost)]))
     # The axes keep their names: brushing that is turned by 30 degrees stays so
-    axes = [np.radians(values[f"layer{n}_rotation"]) for n, x in enumerate(stack.layers) if isinstance(x, Interface)]
+    axes = [np.radians(values.rotation) for values in material.interfaces]
     kept = [replace(x, roughness=with_axes_named(x.roughness, axis)) for x, axis in zip(best.layers, axes)]
     solved = [layer for layers in kept for layer in layers.written(0)]
     return (*solved, *(layer for layer in stack.layers if isinstance(layer, Diffuse)))
@@ -141,11 +150,10 @@ def scattered(stack: Stack, model: Model) -> Array:
 
 def _scattered(stack: Stack, model: Model, *albedos: float) -> Array:
     """Energy of a diffuse base at normal incidence, its own or of N albedos, (3, N)."""
-    flat = stack.flat()
-    values = {key: number(key, value) for key, value in flat.items()}
+    material = Material.of(stack, number)
     if albedos:
-        values[f"layer{len(stack.layers) - 1}_albedo"] = np.tile(albedos, (3, 1))
-    prepared = with_means(prepare(stack.kinds, values, model, variance_kind(stack.kinds, flat)))
+        material = material.with_layer(-1, albedo=np.tile(albedos, (3, 1)))
+    prepared = with_means(prepare(material, model))
     base = under(prepared, NORMAL)
     assert base is not None
     return np.broadcast_to(base.energy, (3, max(len(albedos), 1)))
@@ -163,24 +171,24 @@ def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
     return stack.replace(**{f"layer{len(stack.layers) - 1}_albedo": written(albedo)})
 
 
-def _choices(stack: Stack, values: dict[str, Array], n: int, eta_max: float) -> Sequence[Choice]:
+def _choices(material: Material, n: int, eta_max: float) -> Sequence[Choice]:
     """Choices for a layer, its present state first: the same index, one on the same side, one on the other side."""
-    kind = stack.kinds[n]
-    if kind == "mirror":
+    layer = material.layers[n]
+    assert isinstance(layer, InterfaceValues)
+    if layer.kind == "mirror":
         return [Choice("mirror", tau=0.0)]
-    eta = values[f"layer{n}_eta"]
-    eta_1 = _index_above(stack, values, n)
-    if kind == "conductor":
-        return [Choice("conductor", tint=conductor_tint(eta / eta_1, values[f"layer{n}_k"] / eta_1))]
+    eta, eta_1 = layer.eta, _index_above(material, n)
+    if layer.kind == "conductor":
+        return [Choice("conductor", tint=conductor_tint(eta / eta_1, layer.k / eta_1))]
     sides = (DENSER, RARER) if np.mean(eta) >= np.mean(eta_1) else (RARER, DENSER)
     bounded = max(eta_max, float(np.max(eta)))
     same = Choice(eta=eta, eta_max=bounded)
     return [same, *(Choice(side=side, eta_max=bounded) for side in sides)]
 
 
-def _index_above(stack: Stack, values: dict[str, Array], n: int) -> Array:
-    above = [i for i in range(n) if stack.kinds[i] == "dielectric"]
-    return values[f"layer{above[-1]}_eta"] if above else np.full((1, 1), stack.exterior)
+def _index_above(material: Material, n: int) -> Array:
+    above = [layer.eta for layer in material.layers[:n] if isinstance(layer, InterfaceValues)]
+    return above[-1] if above else np.full((1, 1), material.exterior)
 
 
 def _reason(tried: Partial, eta_max: float) -> str:

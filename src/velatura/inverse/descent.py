@@ -19,7 +19,7 @@ from velatura.model import Model, bsdf, named, variance_kind
 from velatura.model.mixture import ALPHA_MIN
 from velatura.model.statistics import number
 from velatura.ops import Value
-from velatura.stack import RGB, Layer, Material, Medium, Stack, is_colour, load
+from velatura.stack import RGB, Layer, Material, MaterialLike, Medium, Stack, is_colour, load
 
 STEP = 1e-5  # of a value, to see how the model changes
 ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: what a round changes, as a share of what there is
@@ -66,7 +66,7 @@ class Free:
         return float(np.log(kept)) if self.logarithmic else kept
 
 
-def fit(table: ReflectanceTable, starts: Sequence[Material], model: str | Model, eta_max: float = 4.0) -> Fit:
+def fit(table: ReflectanceTable, starts: Sequence[MaterialLike], model: str | Model, eta_max: float = 4.0) -> Fit:
     """The closest of the stacks that descents from all starts (stacks, files, or presets' names) come to.
 
     Raises:
@@ -135,8 +135,8 @@ class Descent:
             for name in free.names:
                 values[name] = _changed(values[name], free, free.shown(x[:, n, None]))
         values = self._with_extinctions(values)
-        kind = variance_kind(self.start.kinds, self.start.flat())
-        seen = bsdf.body(self.start.kinds, values, self.start.thin, self.model, kind)
+        material = Material.from_flat(self.start.kinds, values, self.start.thin)
+        seen = bsdf.body(material, self.model, variance_kind(Material.of(self.start)))
         value = radiance(seen, self.table.directions)
         shape = (3, len(x), len(self.table.directions.theta_i))
         missed = np.log1p(np.broadcast_to(value, shape)) - self.wanted[:, None]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.inverse.above import NORMAL, Above, Array, Layers, flat
+from velatura.inverse.above import NORMAL, Above, Array, Layers, whole
 from velatura.inverse.coats import scattered
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import CONDUCTOR_MAX, CONDUCTOR_MIN, ENERGY_MIN, conductor_index, conductor_tint
@@ -28,7 +28,7 @@ from velatura.model.maps import MAPS, VARIANCE_MAX
 from velatura.model.statistics import number
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
-from velatura.stack import Diffuse, Interface, Layer, Medium, Stack, Varying
+from velatura.stack import Diffuse, Interface, Kind, Layer, Medium, Stack, Varying
 
 ROUNDS, ATTEMPTS = 8, 4  # of Newton's method, and bounds that are tried on the way
 ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
@@ -49,7 +49,7 @@ class Place:
     of all channels; None where the index itself is the coordinate `index`, its logarithm. s: the variance.
     """
 
-    kind: str
+    kind: Kind
     lobe: int
     side: int
     tint: Array
@@ -170,8 +170,8 @@ class Nearby:
 
     def read(self, z: Array) -> Array:
         """For N columns of coordinates energies of all lobes, then variances of all interfaces, (3 K + I, N)."""
-        kinds, values = flat(self._layers(z), self.target.exterior)
-        reflected, _ = lobes(prepare(kinds, values, self.model, Isotropic), NORMAL)
+        material = whole(self._layers(z), self.target.exterior)
+        reflected, _ = lobes(prepare(material, self.model, Isotropic), NORMAL)
         energy = np.zeros((3 * len(self.target.lobes), z.shape[1]))
         variance = np.empty((len(self.places), z.shape[1]))
         for n, (place, lobe) in enumerate(zip(self.places, reflected)):

@@ -24,7 +24,7 @@ from velatura.inverse.target import Lobe, Target, read
 from velatura.model import Model, named
 from velatura.model.statistics import statistics
 from velatura.model.variance import Isotropic
-from velatura.stack import Diffuse, Material, Stack, load
+from velatura.stack import Diffuse, MaterialLike, Stack, load
 
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
 GRAZING = (0.5, 0.4, 0.3, 0.2, 0.1)  # cosines at which members of a class may differ
@@ -160,7 +160,7 @@ def _last_redrawn(solution: Solution, rng: np.random.Generator) -> Solution | No
     return dataclasses.replace(solution, layers=(*solution.layers[: -lobe.interfaces], *layers))
 
 
-def on_black(stack: Material) -> Stack:
+def on_black(stack: MaterialLike) -> Stack:
     """A stack that ends in a dielectric, on a base that absorbs what it transmits: it shows by reflection alone.
 
     Raises:
@@ -170,7 +170,7 @@ def on_black(stack: Material) -> Stack:
     return Stack([*stack.layers, Diffuse(albedo=0.0)], exterior=stack.exterior) if stack.transmits else stack
 
 
-def grazing(stack: Material, model: str | Model = MODEL) -> Array:
+def grazing(stack: MaterialLike, model: str | Model = MODEL) -> Array:
     """Energy of all lobes together at the cosines of GRAZING, (3, len(GRAZING)).
 
     Raises:

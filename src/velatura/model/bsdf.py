@@ -8,25 +8,24 @@ takes the value from the lobes of a direction that only changes its sign when wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-
-import numpy as np
 
 from velatura import ops
 from velatura.model import memo, mixture, recursion, scaling
 from velatura.model.adding import Lobe
-from velatura.model.diffuse import Base, Settle, as_it_is, under, with_means
+from velatura.model.context import Context
+from velatura.model.diffuse import Base, under, with_means
 from velatura.model.merge import merged
 from velatura.model.models import Model
-from velatura.model.prepare import Prepared, prepare
+from velatura.model.prepare import Prepared, prepare, variance_kind
 from velatura.model.scaling import Scaling
-from velatura.model.sides import turned_over, with_index_below
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
+from velatura.stack import Material
 
 MIN_BRANCH_PROBABILITY = 0.1  # of reflection and of transmission, in the symmetric form
 GRAZING = 0.05  # cosine
@@ -114,34 +113,26 @@ class Asked:
 
 
 def body(
-    kinds: Sequence[str],
-    values: Mapping[str, Value],
-    thin: bool,
-    model: Model,
-    variance: type[Variance],
-    constant: bool = True,
-    number: type | None = None,
-    settle: Settle = as_it_is,
+    material: Material, model: Model, variance: type[Variance] | None = None, context: Context | None = None
 ) -> Body:
-    """Constants of a stack for both of its sides; arguments as `Stack`, `prepare` and `with_means`."""
+    """Constants of a stack for both of its sides; arguments as `prepare`."""
+    context = context or Context()
+    material, variance = material.solid(), variance or variance_kind(material)
 
     def lobes(prepared: Prepared) -> memo.Lobes:
         added = partial(_lobes, prepared)
-        if number is None or not interfaces:
+        if context.number is None or context.colour is None or not material.interfaces:
             return added
-        return memo.sample(added, prepared, number, type(values["exterior"]), transmits)
+        return memo.sample(added, prepared, context.number, context.colour, material.transmits)
 
-    transmits, interfaces = kinds[-1] == "dielectric", set(kinds) - {"medium", "diffuse"}
-    values = with_index_below(kinds, values, thin)
-    above = with_means(prepare(kinds, values, model, variance, constant, number), settle)
-    if not transmits:
+    above = with_means(prepare(material, model, variance, context), context.settle)
+    if not material.transmits:
         from_above = lobes(above)
         opaque = Body(above, None, 1.0, from_above, from_above)
-        return balanced(opaque, values["exterior"], number) if constant and interfaces else opaque
-    below = prepare(*turned_over(kinds, values), model, variance, constant, number)
-    eta = ops.mean(values[f"layer{len(kinds) - 1}_eta"]) / ops.mean(values["exterior"])
-    pane = Body(above, below, eta, lobes(above), lobes(below))
-    return balanced(pane, values["exterior"], number) if constant else pane
+        return balanced(opaque, context) if material.interfaces else opaque
+    below = prepare(material.reversed(), model, variance, context)
+    eta = ops.mean(material.below) / ops.mean(material.exterior)
+    return balanced(Body(above, below, eta, lobes(above), lobes(below)), context)
 
 
 def scattered(stack: Body, wi: Direction) -> Scattered:
@@ -294,15 +285,14 @@ def _scaled(stack: Body, wi: Direction, wo: Direction, lobes: Sequence[Lobe]) ->
     return [replace(lobe, gain=lobe.gain * factor) for lobe in lobes]
 
 
-def balanced(stack: Body, exterior: Value, number: type | None) -> Body:
+def balanced(stack: Body, context: Context) -> Body:
     """A uniform stack whose symmetric form keeps energy, where its model asks for that.
 
-    Published models stay as they are, and so do Mitsuba's scalar variants.
+    Published models stay as they are, and so does a stack of which nothing may be sampled.
     """
-    numpy = isinstance(exterior, (float, np.ndarray))
-    if stack.above.model.form == "forward" or stack.above.model.calibrations is None or not (number or numpy):
+    colour, model = context.colour, stack.above.model
+    if colour is None or not context.constant or model.form == "forward" or model.calibrations is None:
         return stack
-    colour = type(exterior) if number else _channels
     bare, asked = replace(stack, above=replace(stack.above, base=None)), Asked(radiance=False)
 
     def sampled(wi: Direction, u: Value, u1: Value, u2: Value) -> tuple[Direction, Value]:
@@ -318,12 +308,8 @@ def balanced(stack: Body, exterior: Value, number: type | None) -> Body:
         return colour(value + 0 * wi[2])
 
     isotropic = stack.above.variance is Isotropic
-    return replace(stack, scaling=scaling.balanced(sampled, energy, colour, number, isotropic, stack.below is not None))
-
-
-def _channels(*values: Value) -> np.ndarray:
-    """A colour of NumPy, from its channels or, the same in all or not, from one value."""
-    return np.stack(values) if len(values) > 1 else np.broadcast_to(values[0], (3, np.shape(values[0])[-1]))
+    number, transmits = context.number, stack.below is not None
+    return replace(stack, scaling=scaling.balanced(sampled, energy, colour, number, isotropic, transmits))
 
 
 def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:

@@ -14,13 +14,14 @@ from math import pi
 
 import numpy as np
 
-from velatura import ops, tables
+from velatura import ops
 from velatura.model import operators
+from velatura.model.context import as_it_is
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.ops import Value
 from velatura.optics import phase
 from velatura.optics.ggx import Direction
-from velatura.tables import diffuse_nodes
+from velatura.tables import Tables, diffuse_nodes
 
 Settle = Callable[[Value], Value]
 Row = Sequence[Value]  # of values at the nodes of a medium
@@ -50,10 +51,6 @@ class Base:
     def through(self, w: Direction) -> Value:
         """T, a colour: what gets through to the base of light from w."""
         return _through(self.prepared, w)
-
-
-def as_it_is(value: Value) -> Value:
-    return value
 
 
 def under(prepared: Prepared, wi: Direction) -> Base | None:
@@ -114,13 +111,14 @@ def _entered(prepared: Prepared, wi: Direction) -> Row:
     layer = next(layer for layer in prepared.layers if isinstance(layer, PreparedInterface))
     cosine, alpha = operators.fetched(prepared, layer.roughness, wi[2], wi)
     r = ops.clip(operators.reflectance(prepared, layer, wi[2], layer.roughness, wi), 0.0, 1.0)
-    return [(1 - r) * x for x in diffuse_nodes.entering(tables.load(), cosine, alpha, layer.n12)]
+    return [(1 - r) * x for x in diffuse_nodes.entering(prepared.tables, cosine, alpha, layer.n12)]
 
 
 @dataclass(frozen=True)
 class _Inside:
     """A stack as diffuse light sees it: its interfaces, and the media below each by index and optical depth."""
 
+    tables: Tables
     depth_above: Value
     interfaces: Sequence[PreparedInterface]
     indices: Sequence[Value]
@@ -138,7 +136,7 @@ class _Inside:
                 interfaces.append(layer)
                 indices.append(indices[-1] * layer.n12)
                 depths.append(0.0)
-        return cls(depths[0], interfaces, indices[1:], depths[1:])
+        return cls(prepared.tables, depths[0], interfaces, indices[1:], depths[1:])
 
     def solved(self, leaves: Row, settle: Settle) -> tuple[Row, Value]:
         """Worth of the nodes below the first interface, and the share of diffuse light that returns to the base.
@@ -148,7 +146,7 @@ class _Inside:
         media = zip(self.indices, self.depths)
         kept = [[_passed(depth, c) for c in diffuse_nodes.node_cosines(n)] for n, depth in media]
         exchanges = [self._exchange(k, settle) for k in range(1, len(self.interfaces))]
-        back = diffuse_nodes.returning(tables.load(), _roughness(self.interfaces[0]), self.indices[0])
+        back = diffuse_nodes.returning(self.tables, _roughness(self.interfaces[0]), self.indices[0])
         back = settle(_balanced(back, leaves))
 
         def up(going_down: Sequence[Row]) -> list[Row]:
@@ -193,7 +191,7 @@ class _Inside:
     def _exchange(self, k: int, settle: Settle) -> _Exchange:
         """Scattering matrices of the interface between two media."""
         alpha, above, below = _roughness(self.interfaces[k]), self.indices[k - 1], self.indices[k]
-        found, ratio = tables.load(), self.interfaces[k].n12
+        found, ratio = self.tables, self.interfaces[k].n12
         down = settle(diffuse_nodes.between(found.passing, alpha, above, ratio))
         up = settle(diffuse_nodes.between(found.passing, alpha, below, 1 / ratio))
         staying_above = diffuse_nodes.between(found.staying, alpha, above, ratio)

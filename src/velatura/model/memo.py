@@ -73,7 +73,7 @@ class Memo:
         return self.colour(*(next(channels) for _ in range(self.width)))
 
 
-def sample(lobes: Lobes, prepared: Prepared, number: type, colour: type, transmits: bool) -> Memo:
+def sample(lobes: Lobes, prepared: Prepared, number: type, colour: Callable[..., Value], transmits: bool) -> Memo:
     """The lobes over direction, for Dr.Jit's types of numbers and colours."""
     shape = directional_grid.LINE if prepared.variance is Isotropic else directional_grid.PLANE
     reflected, passed = lobes(directional_grid.directions(shape, number))

@@ -26,7 +26,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.ops import Value
 from velatura.optics import fresnel, phase
 from velatura.optics.ggx import Direction
-from velatura.tables import Average
+from velatura.tables import Average, Tables
 
 FAINT = 1e-4  # albedo that the tables' errors come close to
 DIM = 3e-4  # albedo below which the tables are not precise
@@ -138,8 +138,8 @@ def _at(
         moved = [0.5 * (n_below * ops.sqrt(t) - n * ops.sqrt(i)) for t, i in zip(steep_t, steep)]
         s_t = _stretched(facets, moved[0] * moved[0], moved[1] * moved[1])
         contrast = ops.absolute(n_below - n) / ops.maximum(n_below, n)
-        entering = _kept(cosine, alpha, contrast, k.lost_down)
-        leaving = _kept(cos_t, alpha, contrast, k.lost_up)
+        entering = _kept(prepared.tables, cosine, alpha, contrast, k.lost_down)
+        leaving = _kept(prepared.tables, cos_t, alpha, contrast, k.lost_up)
         t_12, t_21 = (1 - r) * entering, (1 - r) * leaving
         passed = (1 - r + r * trapped * (1 - r_again)) * entering
         ops.names(n_below=n_below, cos_t=cos_t, moved=moved, contrast=contrast, t_12=t_12, t_21=t_21, passed=passed)
@@ -249,11 +249,11 @@ def _seen(
         return _stretched(roughness, 1 / (1 + x2 * closed / (x * x)), 1 / (1 + y2 * closed / (y * y)))
 
 
-def _kept(cos_theta: Value, alpha: Value, contrast: Value, exponent: float) -> Value:
+def _kept(known: Tables, cos_theta: Value, alpha: Value, contrast: Value, exponent: float) -> Value:
     """Share of transmitted light that single scattering does not lose between the facets; all, without a contrast."""
     if exponent == 0:
         return 1.0
-    once = tables.drawn_albedo(tables.load(), ops.maximum(cos_theta, COS_MIN), alpha, alpha)
+    once = tables.drawn_albedo(known, ops.maximum(cos_theta, COS_MIN), alpha, alpha)
     return ops.power(once, exponent * contrast / (contrast + CONTRAST_MIN))
 
 
@@ -271,7 +271,7 @@ def _lobe(prepared: Prepared, plane: _Plane, energy: Value, roughness: Variance,
         u2, v2 = drawn.alpha_u * drawn.alpha_u, drawn.alpha_v * drawn.alpha_v
         c, s = (1.0, 0.0) if isinstance(rotation, float) else (ops.cos(rotation), ops.sin(rotation))
         x, y = ops.sqrt(u2 * c * c + v2 * s * s), ops.sqrt(u2 * s * s + v2 * c * c)
-    gain = 1 / tables.drawn_albedo(tables.load(), ops.maximum(cos_theta, COS_MIN), x, y)
+    gain = 1 / tables.drawn_albedo(prepared.tables, ops.maximum(cos_theta, COS_MIN), x, y)
     return Lobe(energy, plane.unseen(roughness), drawn, gain)
 
 

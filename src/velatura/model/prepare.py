@@ -1,22 +1,22 @@
 """A stack made ready for a model: all that does not depend on the direction of light.
 
-Values arrive under the flat names of a material (`layer0_eta`, ...), in any dialect; a renderer hands in constants once
-and textured values at every point.
+Values arrive as a `Material`, in any dialect; a renderer hands in constants once and textured values at every point.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 
 from velatura import ops, tables
+from velatura.model.context import Context
 from velatura.model.maps import MAPS, RoughnessMap
 from velatura.model.models import Model
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
+from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.tables import Average, Row, Tables
 
 
@@ -92,15 +92,15 @@ class Prepared:
     layers: tuple[PreparedInterface | PreparedMedium, ...]
     variance: type[Variance]
     f: RoughnessMap
+    tables: Tables
     base: PreparedBase | None = None
     once: Average | None = None
 
 
-def variance_kind(kinds: Sequence[str], values: Mapping[str, object]) -> type[Variance]:
-    """The cheapest kind of variance that holds all interfaces; `values` by flat name, only compared, never computed."""
-    interfaces = [i for i, kind in enumerate(kinds) if kind not in ("medium", "diffuse")]
-    same = [_same(values[f"layer{i}_alpha_u"], values[f"layer{i}_alpha_v"]) for i in interfaces]
-    straight = [_same(values[f"layer{i}_rotation"], 0.0) for i in interfaces]
+def variance_kind(material: Material) -> type[Variance]:
+    """The cheapest kind of variance that holds all interfaces; values are only compared, never computed."""
+    same = [_same(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
+    straight = [_same(layer.rotation, 0.0) for layer in material.interfaces]
     if all(same):
         return Isotropic
     return PerAxis if all(s or t for s, t in zip(same, straight)) else Covariance
@@ -111,69 +111,51 @@ def _same(a: object, b: object) -> bool:
 
 
 def prepare(
-    kinds: Sequence[str],
-    values: Mapping[str, Value],
-    model: Model,
-    variance: type[Variance],
-    constant: bool = True,
-    number: type | None = None,
+    material: Material, model: Model, variance: type[Variance] | None = None, context: Context | None = None
 ) -> Prepared:
-    """Constants of the whole stack.
-
-    Args:
-        kinds: of the layers from the top (`Stack.kinds`).
-        values: numbers and colours under flat names (`Stack.flat`), rotations in degrees.
-        variance: from `variance_kind`.
-        constant: whether the values may be looked at now, to leave out look-ups that they can never need.
-        number: Dr.Jit's type of numbers, to have the averages of this material sampled once; None to look them up in
-            the shared tables.
-    """
-    averages = _Averages(model, tables.load(), constant, number)
+    """Constants of the whole stack; `variance` is that of `variance_kind` unless given."""
+    context = context or Context()
+    variance = variance or variance_kind(material)
+    averages = _Averages(model, context)
     layers: list[PreparedInterface | PreparedMedium] = []
-    eta_1, n_leaving, base = values["exterior"], None, None
+    eta_1, n_leaving, base = material.exterior, None, None
     n: Value = 1.0  # index so far, and the lowest of those above, over that outside
     lowest: Value = 1.0
-    for i, kind in enumerate(kinds):
-        layer = {key.partition("_")[2]: value for key, value in values.items() if key.startswith(f"layer{i}_")}
-        if kind == "medium":
+    for layer in material.layers:
+        if isinstance(layer, MediumValues):
             layers.append(_medium(layer))
-        elif kind == "diffuse":
-            base = PreparedBase(layer["albedo"], n)
+        elif isinstance(layer, DiffuseValues):
+            base = PreparedBase(layer.albedo, n)
         else:
-            layers.append(_interface(kind, layer, eta_1, n_leaving, averages, variance))
-            if kind == "dielectric":
-                lowest, n = ops.minimum(lowest, n), n * ops.mean(layer["eta"] / eta_1)
-                n_leaving = lowest / n if model.calibrations else ops.mean(eta_1 / layer["eta"])
+            layers.append(_interface(layer, eta_1, n_leaving, averages, variance))
+            if layer.kind == "dielectric":
+                lowest, n = ops.minimum(lowest, n), n * ops.mean(layer.eta / eta_1)
+                n_leaving = lowest / n if model.calibrations else ops.mean(eta_1 / layer.eta)
                 ops.names(n_leaving=n_leaving)
-                eta_1 = layer["eta"]
-    prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], base)
+                eta_1 = layer.eta
+    prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], context.tables, base)
     if model.calibrations is None:
         return prepared
     # A pane under a medium is drawn alike from both sides, or a lobe could not be chosen by the side that light is on
-    first = layers[0] if layers and kinds[-1] != "medium" else None
+    first = layers[0] if layers and material.kinds[-1] != "medium" else None
     once = averages.once(first.eta, first.kappa) if isinstance(first, PreparedInterface) else None
     return replace(prepared, once=once)
 
 
-def _medium(layer: Mapping[str, Value]) -> PreparedMedium:
+def _medium(layer: MediumValues) -> PreparedMedium:
     with ops.block("Scattered light stays in the lobe only where it goes forwards (model of Belcour 2018, 4.4)"):
-        tau_s = layer["sigma_s"] * layer["depth"]
-    return PreparedMedium(layer["sigma_a"] * layer["depth"] + tau_s, tau_s, layer["g"])
+        tau_s = layer.sigma_s * layer.depth
+    return PreparedMedium(layer.sigma_a * layer.depth + tau_s, tau_s, layer.g)
 
 
 def _interface(
-    kind: str,
-    layer: Mapping[str, Value],
-    eta_1: Value,
-    n_leaving: Value | None,
-    averages: _Averages,
-    variance: type[Variance],
+    layer: InterfaceValues, eta_1: Value, n_leaving: Value | None, averages: _Averages, variance: type[Variance]
 ) -> PreparedInterface:
-    roughness = Roughness(layer["alpha_u"], layer["alpha_v"], layer["rotation"] * (pi / 180))
+    roughness = Roughness(layer.alpha_u, layer.alpha_v, layer.rotation * (pi / 180))
     s_r = variance.of(roughness, MAPS[averages.model.map])
-    eta = layer["eta"] / eta_1 if kind != "mirror" else None
-    kappa = layer["k"] / eta_1 if kind == "conductor" else None
-    n12 = ops.mean(eta) if kind == "dielectric" else 1.0
+    eta = layer.eta / eta_1 if layer.kind != "mirror" else None
+    kappa = layer.k / eta_1 if layer.kind == "conductor" else None
+    n12 = ops.mean(eta) if layer.kind == "dielectric" else 1.0
     reflectance, leaving = averages.reflectance(eta, kappa), averages.leaving(n_leaving)
     return PreparedInterface(eta, kappa, n12, roughness, s_r, reflectance, leaving)
 
@@ -183,9 +165,7 @@ class _Averages:
     """How a model looks up averages over rough interfaces."""
 
     model: Model
-    tables: Tables
-    constant: bool
-    number: type | None
+    context: Context
 
     def reflectance(self, eta: Value | None, kappa: Value | None) -> Average | None:
         if self.model.reflectance in ("fresnel", "fg"):
@@ -193,15 +173,15 @@ class _Averages:
         multiple = self.model.reflectance == "fgd-multi"
         if self.model.reflectance == "split-sum":
             r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
-            row = tables.schlick_row(self.tables, r_0)
+            row = tables.schlick_row(self.context.tables, r_0)
         elif eta is None:
             if multiple:
                 return None  # light that bounces between the facets of a mirror is not lost
-            row = tables.mirror_row(self.tables)
+            row = tables.mirror_row(self.context.tables)
         elif kappa is None:
-            row = tables.dielectric_row(self.tables, eta, self.constant, multiple)
+            row = tables.dielectric_row(self.context.tables, eta, self.context.constant, multiple)
         else:
-            row = tables.conductor_row(self.tables, eta, kappa, self.constant, multiple)
+            row = tables.conductor_row(self.context.tables, eta, kappa, self.context.constant, multiple)
         return self._of(row)
 
     def once(self, eta: Value | None, kappa: Value | None) -> Average:
@@ -211,13 +191,13 @@ class _Averages:
         return average
 
     def _of(self, row: Row) -> Average:
-        if self.number:
-            return tables.fgd_sheet(self.tables, row, self.number)
-        return partial(tables.fgd, self.tables, row)
+        if self.context.number:
+            return tables.fgd_sheet(self.context.tables, row, self.context.number)
+        return partial(tables.fgd, self.context.tables, row)
 
     def leaving(self, n: Value | None) -> Average | None:
         if n is None or self.model.tir == "off":
             return None
-        if self.number:
-            return tables.tir_sheet(self.tables, self.model.tir, n, self.number)
-        return partial(tables.tir, self.tables, self.model.tir, n)
+        if self.context.number:
+            return tables.tir_sheet(self.context.tables, self.model.tir, n, self.context.number)
+        return partial(tables.tir, self.context.tables, self.model.tir, n)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike
 from velatura.errors import InvalidInput
 from velatura.model.adding import Lobe
 from velatura.model.models import DEFAULT, Model, named
-from velatura.model.prepare import prepare, variance_kind
+from velatura.model.prepare import prepare
 from velatura.model.recursion import lobes
-from velatura.model.sides import with_index_below
 from velatura.model.variance import Roughness
 from velatura.optics.directions import directions
-from velatura.stack import Measured, Stack, Varying, is_colour, reduced
+from velatura.stack import Material, Measured, Stack, Varying, is_colour, reduced
 
 FAINTLY_BRUSHED = 0.01  # difference of two roughnesses, below which an interface hardly has axes
 
@@ -58,12 +57,10 @@ def statistics(
     """The lobes of a stack, as `velatura.lobes` says."""
     chosen = named(model, **switches)
     x, y, z = directions(cos_theta, phi).T
-    flat = stack.flat()
-    values = {name: number(name, value) for name, value in flat.items()}
-    values = with_index_below(stack.kinds, values, stack.thin)
-    prepared = prepare(stack.kinds, values, chosen, variance_kind(stack.kinds, flat))
+    material = Material.of(stack, number)
+    prepared = prepare(material.solid(), chosen)
     reflected, transmitted = lobes(prepared, (x, y, z))
-    axis = _axis(stack.kinds, values, np.arctan2(y, x) if chosen.calibrations else np.zeros_like(z))
+    axis = _axis(material, np.arctan2(y, x) if chosen.calibrations else np.zeros_like(z))
     each = [_collect(lobe, chosen, axis) for lobe in reflected]
     return Statistics(
         energy=[lobe.energy for lobe in each],
@@ -91,17 +88,15 @@ def number(name: str, value: Any) -> Any:
     return float(value)
 
 
-def _axis(kinds: Sequence[str], values: Mapping[str, Any], isotropic: np.ndarray) -> np.ndarray:
+def _axis(material: Material, isotropic: np.ndarray) -> np.ndarray:
     """Azimuths (N,) to which the first axis of a lobe is the nearer one.
 
     They are the mean axis of the interfaces, by how anisotropic each is, so that axes keep their names where a value
     changes by little; `isotropic` where none is.
     """
     double = FAINTLY_BRUSHED * np.exp(2j * isotropic)
-    for k, kind in enumerate(kinds):
-        if kind not in ("medium", "diffuse"):
-            u, v, degrees = (values[f"layer{k}_{key}"] for key in ("alpha_u", "alpha_v", "rotation"))
-            double = double + abs(u - v) * np.exp(2j * np.radians(degrees))
+    for layer in material.interfaces:
+        double = double + abs(layer.alpha_u - layer.alpha_v) * np.exp(2j * np.radians(layer.rotation))
     return 0.5 * np.angle(double)
 
 

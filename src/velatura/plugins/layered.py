@@ -13,10 +13,12 @@ from velatura import kernel, tables
 from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
+from velatura.model.context import Context, at_a_point
 from velatura.model.merge import merging
 from velatura.model.models import EXCEPTIONS, GAIN
 from velatura.model.variance import Isotropic
 from velatura.plugins import spectral
+from velatura.stack import Material
 
 
 @kernel.plugin("layered")
@@ -88,17 +90,16 @@ def make(mi: Any) -> type:
             binding, kinds = self.binding, self.binding.stack.kinds
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
             flat = {**binding.stack.flat(), **self._looked_at()}
-            self.variance = variance_kind(kinds, {**flat, **binding.images})
+            self.variance = variance_kind(Material.from_flat(kinds, {**flat, **binding.images}))
             self.body: bsdf.Body | None = None
             if binding.uniform:
-                number = mi.Float if dr.is_jit_v(mi.Float) else None
-                self.body = self._prepared(binding.values(), number=number, settle=self._settled)
+                self.body = self._prepared(binding.values(), self._sampled())
                 dr.eval(self.body)
             self.spectra: spectral.Spectra | None = None
             sampled = binding.stack.interfaces and not binding.uniform and not binding.varies
             if sampled and dr.is_jit_v(mi.Float):
                 steering = {**binding.values(), **binding.steering}
-                fixed = self._prepared(steering, number=mi.Float, settle=self._settled)
+                fixed = self._prepared(steering, self._sampled())
                 dr.eval(fixed)
                 self.spectra = spectral.sample(mi, fixed, self._at_wavelengths)
                 dr.eval(self.spectra.above, self.spectra.below, self.spectra.means)
@@ -122,9 +123,16 @@ def make(mi: Any) -> type:
                 self.m_components += [self.kinds[-1] | common]
             self.m_flags = functools.reduce(operator.or_, self.m_components)
 
-        def _prepared(self, values: Any, **options: Any) -> bsdf.Body:
+        def _prepared(self, values: Any, context: Context) -> bsdf.Body:
             stack = self.binding.stack
-            return bsdf.body(stack.kinds, values, stack.thin, self.model, self.variance, **options)
+            material = Material.from_flat(stack.kinds, values, stack.thin)
+            return bsdf.body(material, self.model, self.variance, context)
+
+        def _sampled(self) -> Context:
+            """For a uniform material; scalar variants work everything out for every direction."""
+            if not dr.is_jit_v(mi.Float):
+                return Context(colour=None, settle=self._settled)
+            return Context(number=mi.Float, colour=mi.UnpolarizedSpectrum, settle=self._settled)
 
         def _settled(self, value: Any) -> Any:
             dr.make_opaque(value)
@@ -143,12 +151,12 @@ def make(mi: Any) -> type:
         def _at_wavelengths(self, wavelengths: Any) -> bsdf.Body:
             si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wavelengths))
             si.wavelengths = wavelengths
-            return self._prepared(self.binding.steered(si, True), constant=False)
+            return self._prepared(self.binding.steered(si, True), at_a_point())
 
         def _body(self, si: Any, active: Any) -> bsdf.Body:
             if self.body:
                 return self.body
-            body = self._prepared(self.binding.steered(si, active), constant=False)
+            body = self._prepared(self.binding.steered(si, active), at_a_point())
             return self.spectra.at(body, si.wavelengths) if self.spectra else body
 
         # What a BSDF is asked

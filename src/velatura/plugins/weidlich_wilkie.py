@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import pi
 from typing import Any
 
@@ -18,11 +18,10 @@ from velatura.binding import Binding, plugin_class
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
+from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 
 ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
 EXCEPTIONS = frozenset({"lossless"})  # laws of `velatura.checks`: light that is reflected twice, or passes, is lost
-
-Values = Mapping[str, Value]
 
 
 @kernel.plugin("weidlich_wilkie")
@@ -62,10 +61,10 @@ def make(mi: Any) -> type:
             self.binding.update()
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            bs, kinds, values = mi.BSDFSample3f(), self.binding.stack.kinds, self.binding.at(si, active)
-            wo, number = sample(kinds, values, tuple(si.wi), sample1, sample2.x, sample2.y, self._asked(ctx))
+            bs, material = mi.BSDFSample3f(), self._material(si, active)
+            wo, number = sample(material, tuple(si.wi), sample1, sample2.x, sample2.y, self._asked(ctx))
             bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, mi.UInt32(number)
-            paint = (kinds[-1] == "diffuse") & (bs.sampled_component == len(self.surfaces) - 1)
+            paint = (material.kinds[-1] == "diffuse") & (bs.sampled_component == len(self.surfaces) - 1)
             bs.sampled_type = dr.select(paint, mi.UInt32(+flags.DiffuseReflection), mi.UInt32(+flags.GlossyReflection))
             value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
             return bs, value / dr.maximum(bs.pdf, 1e-30) & (bs.pdf > 0)
@@ -77,16 +76,18 @@ def make(mi: Any) -> type:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            kinds, values, asked = self.binding.stack.kinds, self.binding.at(si, active), self._asked(ctx)
+            material, asked = self._material(si, active), self._asked(ctx)
             active = active & (si.wi.z > 0) & (wo.z > 0)
-            value = evaluate(kinds, values, tuple(si.wi), tuple(wo), asked)
-            pdf = density(kinds, values, tuple(si.wi), tuple(wo), asked)
+            value = evaluate(material, tuple(si.wi), tuple(wo), asked)
+            pdf = density(material, tuple(si.wi), tuple(wo), asked)
             return mi.depolarizer(mi.UnpolarizedSpectrum(value)) & active, dr.select(active, pdf, 0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            kinds, values = self.binding.stack.kinds, self.binding.at(si, active)
-            albedo = mi.UnpolarizedSpectrum(sum(_energies(kinds, values, si.wi.z).values()))
+            albedo = mi.UnpolarizedSpectrum(sum(_energies(self._material(si, active), si.wi.z).values()))
             return dr.clip(albedo, 0, 1) & active & (si.wi.z > 0)
+
+        def _material(self, si: Any, active: Any) -> Material:
+            return Material.from_flat(self.binding.stack.kinds, self.binding.at(si, active))
 
         def _asked(self, ctx: Any) -> list[int]:
             """The surfaces that are wanted."""
@@ -97,60 +98,59 @@ def make(mi: Any) -> type:
     return WeidlichWilkie
 
 
-def evaluate(
-    kinds: Sequence[str], values: Values, wi: Direction, wo: Direction, asked: Sequence[int] | None = None
-) -> Value:
-    """f(wi, wo) |cos theta_o|, a colour, for two directions above; `values` by flat name (`Stack.flat`).
+def evaluate(material: Material, wi: Direction, wo: Direction, asked: Sequence[int] | None = None) -> Value:
+    """f(wi, wo) |cos theta_o|, a colour, for two directions above.
 
     `asked` are the surfaces whose light is asked for, by their place in the stack; None for all.
     """
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
-    i, o, n = wi, wo, values["exterior"]
-    asked = range(len(kinds)) if asked is None else asked
+    i, o, n = wi, wo, material.exterior
+    asked = range(len(material.layers)) if asked is None else asked
     total: Value = 0.0
     passed: Value = 1.0
-    for k, kind in enumerate(kinds):
+    for k, layer in enumerate(material.layers):
         # Absorb on both ways through a medium
-        if kind == "medium":
-            tau = values[f"layer{k}_sigma_a"] * values[f"layer{k}_depth"]
+        if isinstance(layer, MediumValues):
+            tau = layer.sigma_a * layer.depth
             passed = passed * ops.exp(-tau * (ops.divide(1.0, i[2]) + ops.divide(1.0, o[2])))
             continue
-        if kind == "diffuse":
-            total = total + passed * values[f"layer{k}_albedo"] * ((k in asked) / pi)
+        if isinstance(layer, DiffuseValues):
+            total = total + passed * layer.albedo * ((k in asked) / pi)
             break
         # Reflect at an interface
-        alpha_u, alpha_v, turned_i, turned_o, turned_h = _in_frame(values, k, i, o, h)
-        reflectance = _reflectance(kind, values, k, n, ops.maximum(ggx.dot(i, h), 0.0))
+        alpha_u, alpha_v, turned_i, turned_o, turned_h = _in_frame(layer, i, o, h)
+        reflectance = _reflectance(layer, n, ops.maximum(ggx.dot(i, h), 0.0))
         g = ggx.masking(turned_i, alpha_u, alpha_v) * ggx.masking(turned_o, alpha_u, alpha_v)
         lobe = ops.divide(ggx.ndf(turned_h, alpha_u, alpha_v) * g, 4 * ops.maximum(i[2] * o[2], 0.0))
         total = total + passed * reflectance * lobe * float(k in asked)
-        if kind != "dielectric":
+        if layer.kind != "dielectric":
             break
         # Pass it twice; what other facets shadow is not lost inside
         transmittance = 1 - reflectance
         passed = passed * transmittance * ((1 - g) + transmittance * g)
-        eta = ops.mean(values[f"layer{k}_eta"] / n)
-        i, o, n = _refracted(i, h, eta), _refracted(o, h, eta), values[f"layer{k}_eta"]
+        eta = ops.mean(layer.eta / n)
+        i, o, n = _refracted(i, h, eta), _refracted(o, h, eta), layer.eta
         passed = ops.select((i[2] > 0) & (o[2] > 0), passed, 0.0)
     return total * wo[2]
 
 
-def density(kinds: Sequence[str], values: Values, wi: Direction, wo: Direction, asked: Sequence[int]) -> Value:
+def density(material: Material, wi: Direction, wo: Direction, asked: Sequence[int]) -> Value:
     """Density of `sample`, per solid angle, for two directions above."""
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
     total: Value = 0.0
-    for k, share in _shares(kinds, values, asked):
-        if kinds[k] == "diffuse":
+    for k, share in _shares(material, asked):
+        layer = material.layers[k]
+        if not isinstance(layer, InterfaceValues):
             total = total + share * wo[2] / pi
             continue
-        alpha_u, alpha_v, i, m = _in_frame(values, k, wi, h)
+        alpha_u, alpha_v, i, m = _in_frame(layer, wi, h)
         visible = ggx.ndf(m, alpha_u, alpha_v) * ggx.masking(i, alpha_u, alpha_v)
         total = total + share * visible * ops.divide(0.25, ops.maximum(wi[2], 0.0))
     return total
 
 
 def sample(
-    kinds: Sequence[str], values: Values, wi: Direction, u: Value, u1: Value, u2: Value, asked: Sequence[int]
+    material: Material, wi: Direction, u: Value, u1: Value, u2: Value, asked: Sequence[int]
 ) -> tuple[Direction, Value]:
     """A direction, and the number of its surface: a lobe by its share, then a normal of that lobe that is visible from
     outside.
@@ -159,55 +159,58 @@ def sample(
     """
     wo: Direction = (0.0, 0.0, 1.0)
     number, begin = 0.0, 0.0
-    for k, share in _shares(kinds, values, asked):
-        if kinds[k] == "diffuse":
+    for k, share in _shares(material, asked):
+        layer = material.layers[k]
+        if not isinstance(layer, InterfaceValues):
             radius, phi = ops.sqrt(u1), 2 * pi * u2
             drawn = (radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1))
         else:
-            alpha_u, alpha_v, i = _in_frame(values, k, wi)
+            alpha_u, alpha_v, i = _in_frame(layer, wi)
             h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
-            drawn = ggx.rotate(ggx.reflect(i, h), -_rotation(values, k))
-        before = sum(kind != "medium" for kind in kinds[:k])
+            drawn = ggx.rotate(ggx.reflect(i, h), -_rotation(layer))
+        before = sum(kind != "medium" for kind in material.kinds[:k])
         x, y, z = (ops.select(u >= begin, a, b) for a, b in zip(drawn, wo))
         wo, number = (x, y, z), ops.select(u >= begin, float(before), number)
         begin = begin + share
     return wo, number
 
 
-def _shares(kinds: Sequence[str], values: Values, asked: Sequence[int]) -> Iterator[tuple[int, Value]]:
+def _shares(material: Material, asked: Sequence[int]) -> Iterator[tuple[int, Value]]:
     """Every surface that is asked for with the share of samples that it gets: about its energy at normal incidence."""
-    all_energies = _energies(kinds, values, 1.0)
+    all_energies = _energies(material, 1.0)
     energies = {k: ops.mean(all_energies[k]) + 0.02 for k in asked}  # at a slant it may be more
     total = sum(energies.values())
     for k, energy in energies.items():
         yield k, energy / total
 
 
-def _energies(kinds: Sequence[str], values: Values, cosine: Value) -> dict[int, Value]:
+def _energies(material: Material, cosine: Value) -> dict[int, Value]:
     """What every surface reflects, a colour, by its place: that of a stack of smooth ones."""
     energies: dict[int, Value] = {}
-    n, left = values["exterior"], 1.0
-    for k, kind in enumerate(kinds):
-        if kind == "medium":
-            tau = values[f"layer{k}_sigma_a"] * values[f"layer{k}_depth"]
+    n, left = material.exterior, 1.0
+    for k, layer in enumerate(material.layers):
+        if isinstance(layer, MediumValues):
+            tau = layer.sigma_a * layer.depth
             left = left * ops.exp(-2 * tau * ops.divide(1.0, cosine))
             continue
-        reflectance = values[f"layer{k}_albedo"] if kind == "diffuse" else _reflectance(kind, values, k, n, cosine)
+        if isinstance(layer, DiffuseValues):
+            energies[k] = left * layer.albedo
+            break
+        reflectance = _reflectance(layer, n, cosine)
         energies[k] = left * reflectance
-        if kind == "dielectric":
-            eta = ops.mean(values[f"layer{k}_eta"] / n)
-            left, n = left * (1 - reflectance) * (1 - reflectance), values[f"layer{k}_eta"]
+        if layer.kind == "dielectric":
+            eta = ops.mean(layer.eta / n)
+            left, n = left * (1 - reflectance) * (1 - reflectance), layer.eta
             cosine = fresnel.cos_transmitted(cosine, eta)
     return energies
 
 
-def _reflectance(kind: str, values: Values, k: int, n: Value, cosine: Value) -> Value:
-    if kind == "mirror":
+def _reflectance(layer: InterfaceValues, n: Value, cosine: Value) -> Value:
+    if layer.kind == "mirror":
         return 1.0
-    eta = values[f"layer{k}_eta"] / n
-    if kind == "conductor":
-        return fresnel.conductor(cosine, eta, values[f"layer{k}_k"] / n)
-    return fresnel.dielectric(cosine, eta)
+    if layer.kind == "conductor":
+        return fresnel.conductor(cosine, layer.eta / n, layer.k / n)
+    return fresnel.dielectric(cosine, layer.eta / n)
 
 
 def _refracted(w: Direction, h: Direction, eta: Value) -> Direction:
@@ -216,11 +219,11 @@ def _refracted(w: Direction, h: Direction, eta: Value) -> Direction:
     return -t[0], -t[1], -t[2]
 
 
-def _rotation(values: Values, k: int) -> Value:
-    return values[f"layer{k}_rotation"] * (pi / 180)
+def _rotation(layer: InterfaceValues) -> Value:
+    return layer.rotation * (pi / 180)
 
 
-def _in_frame(values: Values, k: int, *directions: Direction) -> tuple[Any, ...]:
+def _in_frame(layer: InterfaceValues, *directions: Direction) -> tuple[Any, ...]:
     """Both roughnesses of an interface, and directions in its frame."""
-    alpha_u, alpha_v = (ops.maximum(values[f"layer{k}_alpha_{axis}"], ALPHA_MIN) for axis in "uv")
-    return alpha_u, alpha_v, *(ggx.rotate(w, _rotation(values, k)) for w in directions)
+    alpha_u, alpha_v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
+    return alpha_u, alpha_v, *(ggx.rotate(w, _rotation(layer)) for w in directions)

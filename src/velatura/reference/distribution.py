@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from velatura.optics.directions import directions
 from velatura.reference.trace import trace
-from velatura.stack import Material, Stack, load
+from velatura.stack import MaterialLike, Stack, load
 
 BINS = 40
 
@@ -29,7 +29,7 @@ class Distribution:
 
 
 def distribution(
-    stack: Material,
+    stack: MaterialLike,
     cos_theta: ArrayLike,
     phi: ArrayLike = 0.0,
     paths: int = 3 * 10**6,

@@ -7,7 +7,7 @@ chooses.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -15,6 +15,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
+from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 
 ALPHA_MIN = 1e-3  # an interface smoother than this along both axes is perfectly smooth
 _MATCHED = 1e-3  # and so is one between indices this close, which bends no light
@@ -144,32 +145,33 @@ class Layers:
         return dielectric if base is None else ops.select(self.is_base(j), base, dielectric)
 
 
-def from_values(kinds: Sequence[str], values: Mapping[str, Value], thin: bool, microsurface: bool) -> Layers:
-    """The layers from values by flat name (`Stack.flat`), numbers and colours of any dialect."""
+def from_material(material: Material, microsurface: bool) -> Layers:
+    """The layers of a material, in numbers and colours of any dialect."""
     surfaces: list[Surface] = []
     slabs: list[Slab] = []
-    index: list[Value] = [values["exterior"]]
-    medium, last = Slab(), len(kinds) - 1
-    for i, kind in enumerate(kinds):
-        if kind == "medium":
-            depth, sigma_a, sigma_s, g = (values[f"layer{i}_{key}"] for key in ("depth", "sigma_a", "sigma_s", "g"))
-            medium = Slab(_product(sigma_a, depth), _product(sigma_s, depth), g)
+    index: list[Value] = [material.exterior]
+    medium, last = Slab(), material.layers[-1]
+    for layer in material.solid().layers:
+        if isinstance(layer, MediumValues):
+            medium = Slab(_product(layer.sigma_a, layer.depth), _product(layer.sigma_s, layer.depth), layer.g)
             continue
         slabs.append(medium)
         medium = Slab()
-        index.append(index[0] if thin and i == last else values.get(f"layer{i}_eta", 1.0))
-        if kind == "diffuse":
+        if isinstance(layer, DiffuseValues):
+            index.append(1.0)
             surfaces.append(Surface(1.0, 1.0, 0.0, False))
         else:
-            matched = kind == "dielectric" and ops.absolute(relative_index(*index[-2:]) - 1) < _MATCHED
-            surfaces.append(_surface(values, i, matched))
+            index.append(1.0 if layer.eta is None else layer.eta)
+            matched = layer.kind == "dielectric" and ops.absolute(relative_index(*index[-2:]) - 1) < _MATCHED
+            surfaces.append(_surface(layer, matched))
+    extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
     return Layers(
-        kinds[-1],
+        material.kinds[-1],
         tuple(surfaces),
         (*slabs, Slab()),
         tuple(index),
-        values.get(f"layer{last}_k", 0.0),
-        values.get(f"layer{last}_albedo", 0.0),
+        extinction,
+        last.albedo if isinstance(last, DiffuseValues) else 0.0,
         microsurface,
     )
 
@@ -187,8 +189,8 @@ def relative_index(n_in: Value, n_out: Value) -> Value:
     return ops.mean(n_out) / ops.mean(n_in)
 
 
-def _surface(values: Mapping[str, Value], i: int, matched: Value) -> Surface:
-    u, v, rotation = (values[f"layer{i}_{key}"] for key in ("alpha_u", "alpha_v", "rotation"))
+def _surface(layer: InterfaceValues, matched: Value) -> Surface:
+    u, v, rotation = layer.alpha_u, layer.alpha_v, layer.rotation
     smooth = (ops.maximum(u, v) < ALPHA_MIN) | matched
     turn = 0.0 if _is_zero(rotation) else rotation * (pi / 180)
     return Surface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)

@@ -14,8 +14,9 @@ from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
 from velatura.reference.connection import way_out
-from velatura.reference.layers import ALPHA_MIN, Layers, from_values, relative_index
+from velatura.reference.layers import ALPHA_MIN, Layers, from_material, relative_index
 from velatura.reference.walk import Path, walk
+from velatura.stack import Material
 
 _MAX_DEPTH = 1000
 
@@ -109,7 +110,8 @@ def make(mi: Any) -> type:
         def _layers(self, si: Any, active: Any, flipped: Any) -> Layers:
             """The layers at a point, seen from below where `flipped`."""
             values = {**self.binding.at(si, active), **self.zeros}
-            layers = from_values(self.binding.stack.kinds, values, self.binding.stack.thin, self.microsurface)
+            material = Material.from_flat(self.binding.stack.kinds, values, self.binding.stack.thin)
+            layers = from_material(material, self.microsurface)
             return layers.reversed(flipped) if self.transmits else layers
 
         def _stream(self, *numbers: Any) -> Any:

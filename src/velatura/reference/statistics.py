@@ -12,7 +12,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.directions import directions
 from velatura.reference import roughness
 from velatura.reference.trace import ends, relative_index
-from velatura.stack import Diffuse, Interface, Material, Stack, load
+from velatura.stack import Diffuse, Interface, MaterialLike, Stack, load
 
 Array = NDArray[np.floating]
 
@@ -52,7 +52,7 @@ class Statistics:
 
 
 def statistics(
-    stack: Material,
+    stack: MaterialLike,
     cos_theta: ArrayLike,
     phi: ArrayLike = 0.0,
     paths: int = 10**6,

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.errors import InvalidInput
-from velatura.reference.layers import Layers, from_values
+from velatura.reference.layers import Layers, from_material
 from velatura.reference.walk import walk
-from velatura.stack import Measured, Stack, Varying, reduced
+from velatura.stack import Material, Measured, Stack, Varying, reduced
 
 Array = NDArray[np.floating]
 
@@ -91,7 +91,7 @@ def _layers(stack: Stack, microsurface: bool) -> Layers:
         else:
             values[name] = types.Array3f(*value) if isinstance(value, tuple) else types.Float(value)
             dr.make_opaque(values[name])
-    return from_values(stack.kinds, values, stack.thin, microsurface)
+    return from_material(Material.from_flat(stack.kinds, values, stack.thin), microsurface)
 
 
 def _numbers(stack: Stack) -> Mapping[str, float | tuple[float, float, float]]:

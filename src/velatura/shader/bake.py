@@ -7,16 +7,16 @@ the azimuth where an interface is anisotropic.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 from velatura import ops
 from velatura.model import bsdf, memo
+from velatura.model.context import at_a_point
 from velatura.model.diffuse import Base
 from velatura.model.prepare import Prepared, PreparedInterface
-from velatura.model.sides import turned_over, with_index_below
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -24,7 +24,7 @@ from velatura.sampling import directional_grid
 from velatura.shader import glsl
 from velatura.shader.symbol import Operand, Symbol, component, number, operand
 from velatura.shader.tape import Tape, tape
-from velatura.stack import Stack
+from velatura.stack import Material
 
 _OF_BASE = 6  # columns: its scale and its energy
 PLANE = (95, 49)  # nodes over the cosine, twice as dense as those of most tables, and the azimuth
@@ -111,13 +111,13 @@ def _reader(group: Group) -> str:
     return "\n" + glsl.block(f"vec4[{group.texels}] vt_baked_{group.name}(vec3 place)", lines)
 
 
-def bake(stack: Stack, values: Mapping[str, Value], body: bsdf.Body) -> Bake:
-    """The lobes of a body, recorded from values by flat name, over direction."""
+def bake(material: Material, body: bsdf.Body) -> Bake:
+    """The lobes of a body, recorded from the values of a material, over direction."""
     nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
     w = directional_grid.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
 
     # Work out what is seen of a direction
-    columns, facets = _seen(stack, values, body, w)
+    columns, facets = _seen(material, body, w)
     base, groups = body.base(w), []
     if base:
         groups, through = [Group("through", 0, 1)], _apart(base.through(w))
@@ -129,16 +129,15 @@ def bake(stack: Stack, values: Mapping[str, Value], body: bsdf.Body) -> Bake:
     return Bake([operand(x) for x in columns], _read(body, nodes, groups, facets), nodes, groups)
 
 
-def _seen(stack: Stack, values: Mapping[str, Value], body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
+def _seen(material: Material, body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
     """The columns of all lobes at an upright direction, and whether each is drawn with facets."""
     above = number(f"{PLACE}.z") < 0.5
-    if body.below is not None and stack.kinds == stack.kinds[::-1]:
+    if body.below is not None and material.kinds == material.kinds[::-1]:
         # Layers that are of the same kinds from both sides are added up once, for either
-        values = with_index_below(stack.kinds, values, stack.thin)
-        _, turned = turned_over(stack.kinds, values)
-        chosen = {name: ops.select(above, value, turned[name]) for name, value in values.items()}
+        turned = material.reversed().flat()
+        chosen = {name: ops.select(above, value, turned[name]) for name, value in material.solid().flat().items()}
         model, variance = body.above.model, body.above.variance
-        body = bsdf.body(stack.kinds, chosen, False, model, variance, constant=False)
+        body = bsdf.body(Material.from_flat(material.kinds, chosen), model, variance, at_a_point())
         return _columns(body.lobes_above, body, w)
     columns, facets = _columns(body.lobes_above, body, w)
     if body.below is None:

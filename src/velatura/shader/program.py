@@ -16,7 +16,7 @@ from velatura.shader import atlas, glsl, material
 from velatura.shader.bake import Bake
 from velatura.shader.recording import SHOWN, Recording, part, record
 from velatura.shader.symbol import Kind, Operand, Symbol
-from velatura.stack import Material, Texture, load
+from velatura.stack import MaterialLike, Texture, load
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Shader:
 
 
 def shader(
-    stack: Material,
+    stack: MaterialLike,
     model: str | Model = DEFAULT,
     constant: Collection[str] = (),
     values: Literal["literals", "uniforms"] = "literals",

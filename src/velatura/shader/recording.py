@@ -11,6 +11,7 @@ from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, bsdf, memo, named, variance_kind
 from velatura.model.adding import Lobe
+from velatura.model.context import at_a_point
 from velatura.model.diffuse import Base
 from velatura.model.merge import merging
 from velatura.model.prepare import PreparedInterface
@@ -21,7 +22,7 @@ from velatura.shader import material, symbol
 from velatura.shader.bake import Bake, bake
 from velatura.shader.graph import Graph
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Stack, Varying, is_colour
+from velatura.stack import Material, Stack, Varying, is_colour
 from velatura.stack.schema import unknown
 
 SHOWN = "vt_shown"  # in the code: the weights of lobes
@@ -95,9 +96,10 @@ def record(
 
     # Run the model
     kind = structure(stack) if parameters else variance(stack)
-    prepared = partial(bsdf.body, stack.kinds, values, stack.thin, chosen, kind, constant=False)
+    recorded = Material.from_flat(stack.kinds, values, stack.thin)
+    prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     uniform = not any(isinstance(value, Varying) for value in flat.values())
-    baked = bake(stack, values, prepared()) if parameters and uniform else None
+    baked = bake(recorded, prepared()) if parameters and uniform else None
     shown: list[str] = []
     with ops.readable():
         body = baked.body if baked else prepared()
@@ -138,7 +140,7 @@ def _input(name: str) -> Symbol:
 
 def variance(stack: Stack) -> type[Variance]:
     """The kind of variance that the shader of a stack computes with."""
-    return variance_kind(stack.kinds, stack.flat())
+    return variance_kind(Material.of(stack))
 
 
 def structure(stack: Stack) -> type[Variance]:

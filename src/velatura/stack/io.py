@@ -25,13 +25,13 @@ _LARGEST = 100_000  # values in a file
 _PATHS = ("texture", "spectrum")  # keys
 
 #: What names a material wherever one is asked for: a stack, a file, or the name of a preset.
-Material: TypeAlias = Stack | str | Path
+MaterialLike: TypeAlias = Stack | str | Path
 
 
 # In ------------------------------------------------------------------------------------------------------------------
 
 
-def load(material: Material) -> Stack:
+def load(material: MaterialLike) -> Stack:
     """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack as it is.
 
     A bare word without an extension is a preset. Paths in it are relative to the file.

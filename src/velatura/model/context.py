@@ -1,0 +1,46 @@
+"""What a renderer says to the model, once: its types, what may be sampled, and the tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from velatura import tables
+from velatura.ops import Value
+from velatura.tables import Tables
+
+
+def as_it_is(value: Value) -> Value:
+    return value
+
+
+def channels(*values: Value) -> np.ndarray:
+    """A colour of NumPy, from its channels or, the same in all or not, from one value."""
+    return np.stack(values) if len(values) > 1 else np.broadcast_to(values[0], (3, np.shape(values[0])[-1]))
+
+
+@dataclass(frozen=True)
+class Context:
+    """Where the numbers of a material come from; by default they are NumPy's, of one material.
+
+    Args:
+        constant: whether the values hold for all points, and may be looked at now.
+        number: Dr.Jit's type of numbers, to have what depends on direction alone sampled once; None to work it out for
+            every direction.
+        colour: makes a colour of its channels, in what is sampled; None where nothing is.
+        settle: applied to intermediate values; a renderer evaluates them, so that one kernel serves all.
+        tables: the averages over rough interfaces.
+    """
+
+    constant: bool = True
+    number: type | None = None
+    colour: Callable[..., Value] | None = channels
+    settle: Callable[[Value], Value] = as_it_is
+    tables: Tables = field(default_factory=tables.load)
+
+
+def at_a_point() -> Context:
+    """For values that may differ from point to point, or that are recorded."""
+    return Context(constant=False)
