@@ -26,6 +26,7 @@ SAME = 0.5  # of 255: mean difference of pictures of one material
 OTHER = 1.0  # of 255: what a change of the material makes at least
 REFUSED = "the server responded with a status of 4"
 AWAY = "ERR_CONNECTION_REFUSED"
+CUT = "ERR_CONNECTION_RESET"
 PREVIEWS = "[...velatura.viewport.device.programs.keys()].filter((text) => text.includes('PARTS =')).length"
 
 
@@ -166,7 +167,7 @@ def test_reloading_loses_nothing(visit: Open) -> None:
 
 
 def test_a_server_that_goes_away_and_comes_back(visit: Open, served: Server) -> None:
-    page = visit(AWAY)
+    page = visit(AWAY, CUT)
     open_preset(page, "Wet copper")
     served.kill()
     page.page.get_by_text("Offline, trying again").wait_for()
@@ -180,6 +181,9 @@ def test_a_server_that_goes_away_and_comes_back(visit: Open, served: Server) -> 
     # What needs the server is said, and done when it is back
     page.page.get_by_role("button", name="Interface", exact=True).click()
     said(page).get_by_text("The server is away").wait_for()
+    page.page.get_by_role("button", name="Open", exact=True).click()
+    said(page).get_by_text("The server does not answer.").wait_for()
+    page.page.get_by_role("button", name="Cancel").first.click()
     served.start()
     page.page.get_by_text("Offline, trying again").wait_for(state="detached", timeout=20_000)
     page.settled()
@@ -416,14 +420,24 @@ def test_broken_files_are_refused_in_words(visit: Open, served: Server) -> None:
     page = visit(REFUSED)
     before = page.state("layers")
     drop(page, "canvas", "broken.yaml", "layers: [")
-    said(page).get_by_text("is not valid YAML").wait_for()
+    said(page).get_by_text("broken.yaml: line 1: is not valid YAML").wait_for()
     drop(page, "canvas", "light.hdr", "no picture")
     said(page).get_by_text("light.hdr: not a readable picture").wait_for()
     drop(page, "canvas", "letter.txt", "Dear")
     said(page).get_by_text("letter.txt: drop a material").wait_for()
     drop(page, ".parameter .control", "scratches.png", "no picture")
-    said(page).get_by_text("this is no picture that can be read").wait_for()
+    said(page).get_by_text("scratches.png: is no picture that can be read").wait_for()
     assert page.state("layers") == before
+
+    # At most three are there, clear of the picture's edges, and they go with the next change
+    problems = said(page).locator(".problem")
+    assert problems.count() == 3
+    assert "broken.yaml" not in said(page).inner_text()
+    picture, note = page.page.locator("canvas").first.bounding_box(), problems.last.bounding_box()
+    assert note["x"] > picture["x"]
+    assert note["y"] + note["height"] < picture["y"] + picture["height"]
+    slider(page, 0, "Roughness").fill("40")
+    assert problems.count() == 0
     assert not list(served.folder.glob("*.png"))
 
 

@@ -88,7 +88,7 @@ class Folder:
         with self.writing:
             free = _free(path, data)
             if not free.exists():
-                _write(free, data, check=_check_picture)
+                _write(free, data, check=lambda written: _check_picture(written, name))
         return {"file": free.name}
 
     # Names -----------------------------------------------------------------------------------------------------------
@@ -152,12 +152,12 @@ def _write(path: Path, data: bytes, check: Callable[[Path], None] = lambda path:
         check(unfinished)
 
 
-def _check_picture(path: Path) -> None:
-    """Raise InvalidInput unless the renderer can read a file as a picture."""
+def _check_picture(path: Path, name: str) -> None:
+    """Raise InvalidInput, which gives the name of the picture, unless the renderer can read a file as one."""
     from velatura import kernel
 
     if not kernel.is_picture(path):
-        raise InvalidInput("this is no picture that can be read")
+        raise InvalidInput(f"{name}: is no picture that can be read")
 
 
 def _free(path: Path, data: bytes) -> Path:

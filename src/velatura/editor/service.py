@@ -149,8 +149,9 @@ def table(body: Body) -> Answer:
 
 
 def read(body: Body) -> Answer:
-    """The material in a text, YAML or JSON."""
-    return {"material": document(loads(field(body, "text", str), "the text"))}
+    """The material in a text, YAML or JSON; what is wrong with it is said of the file that it was in."""
+    name = field(body, "file", str, "the text")
+    return {"material": document(loads(field(body, "text", str), name if name.isprintable() else repr(name)))}
 
 
 def write(body: Body) -> Answer:

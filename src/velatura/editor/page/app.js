@@ -79,9 +79,16 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
 
     // Words
 
-    complain(about, text, { layer = null, actions = [], passing = false } = {}) {
-      problems.set(about, { text, layer, actions, passing });
+    /** Says what is wrong: until it is forgiven, what is `passing` until anything is done, and `away` until the server is back. */
+    complain(about, text, { layer = null, actions = [], passing = false, away = false } = {}) {
+      problems.delete(about); // the latest comes last
+      problems.set(about, { text, layer, actions, passing, away });
       app.update();
+    },
+    /** The same of an act that has failed. */
+    fail(about, error) {
+      const away = error instanceof Offline;
+      app.complain(about, error.message, { away, passing: !away });
     },
     forgive(about) {
       if (problems.delete(about)) app.update();
@@ -103,7 +110,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
         await act();
         app.forgive(about);
       } catch (error) {
-        app.complain(about, error.message);
+        app.fail(about, error);
       }
     },
 
@@ -145,19 +152,21 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
         app.open(material, { file, version });
       }),
     readFile: (file) =>
-      app.attempt('open', async () => app.open((await call('read', { text: await file.text() })).material)),
+      app.attempt('open', async () => app.open((await call('read', { text: await file.text(), file: file.name })).material)),
     async save(file, version) {
       const material = documentOf(store.get());
       const off = store.get().layers.length - enabled(store.get()).length;
       try {
         const answer = await call('save', { file, material, version });
         store.aside(commands.saved, material, answer.file, answer.version);
+        flush(); // another tab may begin from it
         app.forgive('save');
         app.say(
           `Saved ${answer.file}${off ? `, without what is turned off (layers: ${off})` : ''}.`,
         );
       } catch (error) {
-        app.complain('save', error.message, { actions: error.status === 409 ? conflict(app, file) : [] });
+        if (error.status === 409) app.complain('save', error.message, { actions: conflict(app, file) });
+        else app.fail('save', error);
       }
     },
     async download() {
@@ -202,6 +211,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
         'drop',
         `${file.name}: drop a material (.yaml, .json), light (.hdr, .exr) or an object (.glb, .gltf, .obj) here,` +
           ' a texture on its value',
+        { passing: true },
       );
     },
 
@@ -320,7 +330,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   const appearance = mountAppearance(element.querySelector('.appearance-slot'), app);
 
   store.subscribe(() => {
-    forgivePassing();
+    forgiveAll('passing');
     note = '';
     clearTimeout(keeping);
     keeping = setTimeout(flush, KEPT);
@@ -329,15 +339,16 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   app.viewport.onCamera((camera) => store.aside(commands.setCamera, camera));
   const stopListening = live?.onChange((online) => {
     if (online) {
+      forgiveAll('away');
       picture.again();
       truth.again();
     }
     app.update();
   });
 
-  /** What was wrong with what a hand did last, once it does something else. */
-  function forgivePassing() {
-    for (const [about, { passing }] of problems) if (passing) app.forgive(about);
+  /** What is no longer wrong: of all that is `passing`, or `away`. */
+  function forgiveAll(kind) {
+    for (const [about, problem] of problems) if (problem[kind]) app.forgive(about);
   }
 
   function flush() {
@@ -348,7 +359,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   window.addEventListener('pagehide', flush, { signal });
   root.addEventListener('keydown', (event) => onKey(app, event), { signal });
   followTyping(element, { signal });
-  element.addEventListener('input', forgivePassing, { signal });
+  element.addEventListener('input', () => forgiveAll('passing'), { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
   root.addEventListener('drop', (event) => onDrop(app, event), { signal });
   signal.addEventListener('abort', () => stopListening?.());

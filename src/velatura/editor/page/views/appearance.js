@@ -98,7 +98,7 @@ export function mountAppearance(element, app) {
       accept(answer, command);
       app.forgive('appearance');
     } catch (error) {
-      app.complain('appearance', error.message);
+      app.fail('appearance', error);
     }
   }, () => held || settle());
 

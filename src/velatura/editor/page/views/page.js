@@ -86,10 +86,12 @@ function section(title, content) {
   </details>`;
 }
 
-/** What is wrong, or was done last, in words. */
+const MESSAGES = 3; // at once
+
+/** What is wrong, the latest last, or was done last, in words. */
 function messages(app) {
   const isNew = ({ text }, at, all) => all.findIndex((problem) => problem.text === text) === at;
-  const problems = app.problems.filter(isNew);
+  const problems = app.problems.filter(isNew).slice(-MESSAGES);
   return html`<div class="messages" role="status" aria-live="polite">
     ${problems.map(
       ({ about, text, actions }) =>

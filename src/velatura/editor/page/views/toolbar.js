@@ -53,9 +53,9 @@ async function openDialog(app) {
   app.files = null;
   app.update();
   app.dialogs.open.value.showModal();
-  await app.attempt('open', async () => (app.files = (await app.call('list', {})).files));
+  await app.attempt('list', async () => (app.files = (await app.call('list', {})).files));
   app.update();
-  await app.attempt('open', async () => (app.targets ??= (await app.call('targets', {})).targets));
+  await app.attempt('targets', async () => (app.targets ??= (await app.call('targets', {})).targets));
   app.update();
 }
 
