@@ -177,6 +177,10 @@ NAN, INFINITY = float("nan"), float("inf")
     [
         ("shader", {"material": COAT, "switches": {"model": "velatura"}}, "unknown switch 'model'"),
         ("shader", {"material": COAT, "switches": {"self": 1}}, "unknown switch 'self'"),
+        ("shader", {"material": {"self": 1}}, "unknown key 'self'"),
+        ("write", {"material": {"layers": [{"interface": {"self": 1}}]}}, "layer 0 (interface): unknown key 'self'"),
+        ("invert", {"target": {"self": 1, "lobes": []}}, "unknown key 'self'"),
+        ("invert", {"target": {"lobes": [{"self": 1}]}}, "lobe 1: unknown key 'self'"),
         ("shader", {"material": {"layers": COAT["layers"] * 25}}, "material: layers: may be 48 at most here, got 50"),
         ("coat", {"material": {"layers": COAT["layers"][:1] * 20}}, "material: layers: may be 16 at most below a coat"),
         ("coat", {"material": COAT, "eta": NAN}, "eta: numbers must be finite and at most 1e+30 in size, got nan"),

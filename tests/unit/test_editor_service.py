@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from velatura import tables
-from velatura.editor import bundle
+from velatura.editor import bundle, shading
 from velatura.editor.folder import Conflict, Folder
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, MissingTool
@@ -151,6 +151,10 @@ def test_tables_are_those_that_are_read(here: Path) -> None:
     assert np.isfinite(texture).all()
     with pytest.raises(InvalidInput, match="no tables"):
         VERBS["tables"]({"key": "nonsense"})
+
+    shading._made.cache_clear()  # as when other shaders have taken its place
+    with pytest.raises(InvalidInput, match="ask for the shader first"):
+        VERBS["tables"]({"key": textured["tables"]})
 
 
 # Objects, light, texts

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT, SWITCHES, Model, named
+from velatura.model import DEFAULT, Model, named
 from velatura.stack import Stack, dumps
-from velatura.stack.schema import Parameter, show, unknown
+from velatura.stack.schema import Parameter, show
 from velatura.stack.values import Flag, Scalar
 
 Body: TypeAlias = Mapping[str, Any]
@@ -127,16 +127,6 @@ class Fields(Parameter):
         return value
 
 
-class Switches(Fields):
-    """Switches of a model; their values are for the model to check."""
-
-    def check(self, value: Any) -> dict[str, Any]:
-        for key in super().check(value):
-            if key not in SWITCHES:
-                raise InvalidInput(unknown("switch", key, SWITCHES))
-        return dict(value)
-
-
 class Size(Parameter):
     """A number of pixels, or of both sides."""
 
@@ -182,7 +172,7 @@ KEYS: dict[str, Parameter] = {
     "material": Fields("of a material", entries="layers", most=LAYERS),
     "target": Fields("of a target", entries="lobes", most=LOBES),
     "model": Words("of a model"),
-    "switches": Switches("of the model"),
+    "switches": Fields("of the model"),
     "lobe": Whole("which lobe of the target", high=LOBES - 1),
     "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
     "point": Several("of a class", most=3),

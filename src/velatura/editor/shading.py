@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import weakref
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
     Raises:
         InvalidInput: a stack without an interface, or a model, that there is no shader for.
     """
-    made, kept = _made(pattern(stack, stretched), model)
+    made, key, _ = _made(pattern(stack, stretched), model)
     values = {name: value for name, value in stack.flat().items() if name in made.uniforms}
     free = {name: value for name, value in values.items() if not isinstance(value, Varying)}
     return {
@@ -37,7 +38,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         "text": made.text,
         "baked": made.baked and made.baked.to_dict(),
         "uniforms": {name: made.uniforms[name] for name in free},
-        "tables": kept,
+        "tables": key,
         "maps": [
             {"sampler": sampler, "texture": os.path.relpath(image.texture), "encoding": image.encoding}
             for sampler, image in made.maps.items()
@@ -69,20 +70,20 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
 
 
 @functools.lru_cache(64)
-def _made(stack: Stack, model: Model) -> tuple[Shader, str | None]:
-    """The code, and the key of its tables; those of a tape are known by their names."""
+def _made(stack: Stack, model: Model) -> tuple[Shader, str | None, np.ndarray | None]:
+    """The code, and its tables with their key; those of a tape are known by their names."""
     made = shader(stack, model, values="uniforms")
-    return made, None if made.baked else _kept(made.tables)
+    return (made, None, None) if made.baked else (made, *_kept(made.tables))
 
 
-# Tables are kept by what they hold, so that the page fetches those that several shaders read only once
-_tables: dict[str, np.ndarray] = {}
+# Tables are known by what they hold, so that the page fetches those that several shaders read only once, for as long as
+# one of these shaders is remembered
+_tables: weakref.WeakValueDictionary[str, np.ndarray] = weakref.WeakValueDictionary()
 
 
-def _kept(texture: np.ndarray) -> str:
+def _kept(texture: np.ndarray) -> tuple[str, np.ndarray]:
     key = hashlib.sha256(texture.tobytes()).hexdigest()[:16]
-    _tables[key] = texture
-    return key
+    return key, _tables.setdefault(key, texture)
 
 
 def tables(key: str) -> np.ndarray:
@@ -91,9 +92,10 @@ def tables(key: str) -> np.ndarray:
     Raises:
         InvalidInput: no shader that was made here has it.
     """
-    if key not in _tables:
+    found = _tables.get(key)
+    if found is None:
         raise InvalidInput(f"there are no tables {key}: ask for the shader first")
-    return _tables[key]
+    return found
 
 
 def _plain(name: str, value: Any) -> float | list[float]:

@@ -92,7 +92,7 @@ class Lobe(Record):
     ] = 0.5
     fixed: Fixed = Fixed()
 
-    def __init__(self, **fields: Any) -> None:
+    def __init__(self, /, **fields: Any) -> None:
         kept = fields.get("fixed")
         if kept is not None and not isinstance(kept, Fixed):
             if not isinstance(kept, Mapping):
@@ -148,7 +148,7 @@ class Target(Record):
     ] = None
     lobes: tuple[Lobe, ...]
 
-    def __init__(self, lobes: Iterable[Lobe | Mapping[str, Any]] = (), **options: Any) -> None:
+    def __init__(self, /, lobes: Iterable[Lobe | Mapping[str, Any]] = (), **options: Any) -> None:
         if isinstance(lobes, str | Mapping) or not isinstance(lobes, Iterable):
             raise InvalidInput(f"lobes: must be a list of lobes, got {show(lobes)}")
         super().__init__(lobes=tuple(_lobe(n, entry) for n, entry in enumerate(lobes, 1)), **options)

@@ -86,7 +86,7 @@ class Model:
     def calibration(self) -> Calibration | None:
         return None if self.calibrations is None else self.calibrations[self.reflectance]
 
-    def with_switches(self, **switches: str) -> Model:
+    def with_switches(self, /, **switches: str) -> Model:
         """This model with some choices changed.
 
         Raises:
@@ -177,7 +177,7 @@ MODELS: tuple[Model, ...] = (
 DEFAULT = "velatura"
 
 
-def named(model: str | Model, **switches: str) -> Model:
+def named(model: str | Model, /, **switches: str) -> Model:
     """The model of that name, with switches changed.
 
     Raises:

@@ -87,7 +87,7 @@ class Record(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    def __init__(self, **fields: Any) -> None:
+    def __init__(self, /, **fields: Any) -> None:
         for key in fields:
             if key not in type(self).model_fields:
                 raise InvalidInput(unknown("key", key, type(self).model_fields))

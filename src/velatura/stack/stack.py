@@ -36,7 +36,7 @@ class Stack(Record):
     thin: Annotated[bool, Flag("a thin pane: light leaves it into the exterior index")] = False
     layers: tuple[Layer, ...]
 
-    def __init__(self, layers: Iterable[Layer | Mapping[str, Any]] = (), **options: Any) -> None:
+    def __init__(self, /, layers: Iterable[Layer | Mapping[str, Any]] = (), **options: Any) -> None:
         super().__init__(layers=_layers(layers), **options)
 
     @model_validator(mode="after")
@@ -120,7 +120,7 @@ class Stack(Record):
                 raise InvalidInput(f"layer {index}: the values are those of a {got}, not of a {wanted}")
         return stack
 
-    def replace(self, **values: Any) -> Stack:
+    def replace(self, /, **values: Any) -> Stack:
         """This stack with some flat values changed: `stack.replace(layer0_alpha=0.2, layer1_sigma_a=(0.1, 0.2, 0.3))`.
 
         Takes the names of `flat`, `layer0_alpha` for both axes, `layer2_conductor` for another metal, and `name`,

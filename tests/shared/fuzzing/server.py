@@ -83,7 +83,7 @@ WRONG: list[Any] = [
 
 def _deep(rng: random.Random) -> Any:
     value: Any = 1
-    for _ in range(rng.choice([20, 300, 900])):
+    for _ in range(rng.choice([20, 200])):
         value = [value] if rng.random() < 0.5 else {"a": value}
     return value
 
@@ -101,7 +101,9 @@ def mutated(rng: random.Random, body: dict[str, Any]) -> Any:
     for _ in range(rng.choice([1, 1, 2, 3])):
         places = list(_places(body))
         if not places or rng.random() < 0.05:
-            body[rng.choice(["size", "camera", "switches", "interfaces", "name", "material"])] = rng.choice(WRONG)
+            body[rng.choice(["size", "camera", "switches", "interfaces", "name", "material"])] = copy.deepcopy(
+                rng.choice(WRONG)
+            )
             continue
         holder, key = rng.choice(places)
         what = rng.random()
@@ -210,12 +212,14 @@ def requests(port: int, token: str, count: int, seed: int) -> Outcome:
 
 
 def messages(port: int, token: str, count: int, seed: int) -> Outcome:
-    """Send hostile messages over one WebSocket, one after the other; each must be answered."""
+    """Send hostile messages of up to 1 MiB over one WebSocket, one after the other; each must be answered."""
     rng, outcome = random.Random(seed), Outcome()
     headers = {"Cookie": f"{guard.cookie_name(port)}={token}"}
     with connect(f"ws://127.0.0.1:{port}/api/live", additional_headers=headers, max_size=None) as socket:
         for n in range(count):
             sent = message(rng)
+            while len(sent) > 2**20:
+                sent = message(rng)
             told = f"message {n}: {sent[:300]!r}"
             try:
                 socket.send(sent)
