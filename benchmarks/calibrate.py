@@ -27,6 +27,7 @@ import velatura as vt
 from velatura.comparison.account import along
 from velatura.model.calibration import CALIBRATIONS, Calibration
 from velatura.model.models import Model, named
+from velatura.model.recursion import Momentum
 from velatura.reference import Lobe
 from velatura.stack import Interface, Medium, Stack
 
@@ -111,7 +112,7 @@ def errors(stack: Stack, truth: Any, model: Model) -> tuple[Array, Array, Array,
         clear = (truth.standard_error.alpha[k] < NOISY * true.alpha) & (energy.mean(axis=0) > FAINT) & (alpha > 0)
         clear &= true.alpha > FAINT
         width = np.where(clear, np.log(np.where(clear, alpha, 1) / np.where(clear, widest, 1)), np.nan)
-        widths.append(0 * width if k == 0 and model.calibrations else width)
+        widths.append(0 * width if k == 0 and model.recursion.has_gain else width)
         seen = energy > FAINT
         energies.append(np.where(seen, np.log(np.maximum(mine.energy, 1e-9) / np.where(seen, energy, 1)), np.nan))
     total = sum(truth.energy)
@@ -126,7 +127,7 @@ def fitted(truths: list[tuple[Stack, Any]], model: Model, start: Calibration) ->
 
     def residuals(x: Array) -> Array:
         calibration = dataclasses.replace(start, **dict(zip(names, x.tolist())))
-        tried = dataclasses.replace(model, calibrations={model.reflectance: calibration})
+        tried = dataclasses.replace(model, recursion=Momentum({model.reflectance: calibration}))
         rows = []
         for stack, truth in truths:
             width, energy, albedo, share = errors(stack, truth, tried)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
-from velatura.model import Model, adding, bsdf, mixture, recursion
+from velatura.model import Model, adding, bsdf, mixture
 from velatura.model.diffuse import Base
 from velatura.model.statistics import number
 from velatura.optics.directions import directions
@@ -58,7 +58,7 @@ def _column(body: bsdf.Body, incident: Array) -> tuple[list[Lobe], Array]:
     """The lobes of one direction, and the distribution (3, bins, bins) of what is reflected."""
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
-    each, _ = recursion.lobes(body.above, wi)
+    each, _ = body.above.model.recursion.lobes(body.above, wi)
     seen = bsdf.scattered(body, wi)
     lights = [_sampled(body, lobe, wi, k) for k, lobe in enumerate(seen.reflected)]
     # A model that merges lobes still has one for each interface

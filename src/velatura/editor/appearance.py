@@ -18,7 +18,7 @@ from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.explain import REASONS
-from velatura.inverse.nearby import Bound, Nearby, closed, plain, seen
+from velatura.inverse.nearby import Bound, Nearby, plain, seen
 from velatura.inverse.target import BLUR
 from velatura.inverse.targets import FIGURES
 from velatura.model import Model, named
@@ -228,7 +228,7 @@ def _under(found: Nearby) -> Stack:
 
 def _elsewhere(wish: Target, near: Nearby) -> Nearby | None:
     """The stack that has the lobes, found without regard to what there is."""
-    found = stacks.search(wish, closed(near.model), EFFORT)
+    found = stacks.search(wish, near.model.in_closed_form, EFFORT)
     fresh = Nearby.of(found.stack, wish, near.model) if found else None
     if fresh is None:
         return None
@@ -260,7 +260,7 @@ def _further(wish: Target, found: Nearby) -> Nearby:
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
     for start in _starts(wish):
-        found = stacks.search(start, closed(model), EFFORT)
+        found = stacks.search(start, model.in_closed_form, EFFORT)
         fresh = Nearby.of(found.stack, start, model) if found else None
         if fresh is not None:
             moved, bound = fresh.towards(fresh.achromatic(wish))

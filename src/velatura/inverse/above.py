@@ -105,10 +105,8 @@ class Above:
 
     @property
     def adder(self) -> Model:
-        """The model, or where its recursion is not that of the papers, one of theirs for solutions to start from."""
-        if self.model.calibrations is None:
-            return self.model
-        return dataclasses.replace(self.model, calibrations=None, tir="off")
+        """The model, or where it has no closed form, the nearest that has one, for solutions to start from."""
+        return self.model if self.model.recursion.closed_form else self.model.in_closed_form
 
     def prepared(self, layers: Layers, reflectance: Value | None = None) -> Prepared:
         """The interfaces as the next layer of each stack; `reflectance` where that is known already."""
@@ -164,7 +162,7 @@ class Above:
         state, lobe = adding.add(prepared, above.state, prepared.layers[-1], NORMAL)
         assert lobe is not None
         below = dataclasses.replace(above, state=state, eta=layers.eta, over=self.eta)
-        if self.model.calibrations is None:
+        if self.model.recursion.closed_form:
             return below, lobe
         path = (*self.path, layers)
         return dataclasses.replace(below, path=path), self._read(path)

@@ -190,7 +190,7 @@ class Nearby:
 
     def in_closed_form(self) -> Nearby:
         """The same stack, and its lobes, as the model reads them that has a closed form."""
-        model = closed(self.model)
+        model = self.model.in_closed_form
         if model == self.model:
             return self
         seen = dataclasses.replace(self, model=model, start=None)
@@ -585,11 +585,6 @@ def retinted(tint: Array, now: float, then: float) -> Array:
     if abs(now - then) < SAME:
         return tint
     return tint * (then / now) if then < now else 1 - (1 - tint) * ((1 - then) / (1 - now))
-
-
-def closed(model: Model) -> Model:
-    """The model, or where it has no closed form, the nearest that does."""
-    return dataclasses.replace(model, calibrations=None, tir="off")
 
 
 def seen(stack: Stack, target: Target, model: Model) -> Target:

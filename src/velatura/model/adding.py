@@ -61,11 +61,6 @@ def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
     return reflected, Lobe(state.t_0i, state.s_t0i, state.s_t0i.roughness(prepared.f))
 
 
-def below(prepared: Prepared, wi: Direction) -> State:
-    """The stack with all of its layers, for light from wi."""
-    return _down(prepared, wi)[0]
-
-
 def _down(prepared: Prepared, wi: Direction) -> tuple[State, list[Lobe]]:
     state, reflected = top(prepared, wi[2]), []
     for layer in prepared.layers:

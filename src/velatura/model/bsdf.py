@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from velatura import ops
-from velatura.model import memo, mixture, recursion, scaling
+from velatura.model import memo, mixture, scaling
 from velatura.model.adding import Lobe
 from velatura.model.context import Context
 from velatura.model.diffuse import Base, under, with_means
@@ -291,7 +291,7 @@ def balanced(stack: Body, context: Context) -> Body:
     Published models stay as they are, and so does a stack of which nothing may be sampled.
     """
     colour, model = context.colour, stack.above.model
-    if colour is None or not context.constant or model.form == "forward" or model.calibrations is None:
+    if colour is None or not context.constant or model.form == "forward" or not model.recursion.has_gain:
         return stack
     bare, asked = replace(stack, above=replace(stack.above, base=None)), Asked(radiance=False)
 
@@ -314,7 +314,7 @@ def balanced(stack: Body, context: Context) -> Body:
 
 def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:
     """The reflected lobes that the model evaluates, and the transmitted one."""
-    reflected, passed = recursion.lobes(prepared, w)
+    reflected, passed = prepared.model.recursion.lobes(prepared, w)
     return merged(prepared, reflected), passed
 
 

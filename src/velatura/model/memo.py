@@ -15,7 +15,7 @@ from velatura.model import mixture
 from velatura.model.adding import Lobe
 from velatura.model.maps import RoughnessMap
 from velatura.model.prepare import Prepared, PreparedInterface
-from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
+from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid, low_discrepancy
@@ -66,7 +66,7 @@ class Memo:
         roughness = kind(*(next(channels) for _ in kind.__dataclass_fields__)).roughness(_AS_IT_IS)
         if kind is not Isotropic and self.prepared.variance is Isotropic:
             roughness = roughness._replace(rotation=ops.arctan2(w[1], w[0]))
-        gain = next(channels) if self.prepared.model.calibrations else 1.0
+        gain = next(channels) if self.prepared.model.recursion.has_gain else 1.0
         return Lobe(energy, kind.of(roughness, self.prepared.f), roughness, gain)
 
     def _colour(self, channels: Iterator[Value]) -> Value:
@@ -85,16 +85,14 @@ def sample(lobes: Lobes, prepared: Prepared, number: type, colour: Callable[...,
         return Memo(directional_grid.curves(held, shape, number), colour, len(colour()), prepared, facets, transmits)
 
     memo = kept(seen)
-    if prepared.variance is Isotropic or prepared.model.calibrations is None:
+    if prepared.variance is Isotropic or not prepared.model.recursion.has_gain:
         return memo
     return kept([replace(lobe, gain=gain) for lobe, gain in zip(seen, _gains(memo, seen, number))])
 
 
 def _kind(prepared: Prepared) -> type[Variance]:
-    """The kind of variance that holds the roughness of lobes; in isotropic stacks, along the plane of incidence."""
-    if prepared.model.calibrations is None:
-        return prepared.variance
-    return PerAxis if prepared.variance is Isotropic else Covariance
+    """The kind of variance that holds the roughness of lobes."""
+    return prepared.model.recursion.lobe_kind(prepared.variance)
 
 
 def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Value]]) -> list[Value]:
@@ -102,7 +100,7 @@ def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Va
     if lobe.facets is not None:
         return [*apart(lobe.energy), *apart(lobe.gain)]
     roughness = vars(_kind(prepared).of(lobe.roughness, _AS_IT_IS)).values()
-    return [*apart(lobe.energy), *roughness, *([lobe.gain] if prepared.model.calibrations else [])]
+    return [*apart(lobe.energy), *roughness, *([lobe.gain] if prepared.model.recursion.has_gain else [])]
 
 
 def _gains(memo: Memo, seen: Sequence[Lobe], number: type) -> list[Value]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from velatura.errors import InvalidInput
-from velatura.model.calibration import CALIBRATIONS, Calibration
+from velatura.model.calibration import CALIBRATIONS
+from velatura.model.recursion import ADDING, Momentum, Recursion
 from velatura.stack.schema import unknown
 
 #: Every switch with its values; `Model` says what each one means.
@@ -66,25 +66,25 @@ class Model:
             Belcour 2020, Listing 1).
         lobes: reflected lobes that are evaluated: `all`, one for each interface, or at most `three` or `two`, inner
             ones merged.
-        calibrations: numbers of the recursion in momentum (`velatura.model.momentum`), by reflectance; None for the
-            recursion of the papers.
+        recursion: how the layers are summed up.
     """
 
     name: str
     reflectance: str
     tir: str
-    map: str
-    scale: str
-    channels: str
-    medium: str
+    map: str = "belcour"
+    scale: str = "shipped"
+    channels: str = "mean"
+    medium: str = "shipped"
     form: str = "forward"
     fetch: str = "averaged"
     lobes: str = "all"
-    calibrations: Mapping[str, Calibration] | None = field(default=None, hash=False)
+    recursion: Recursion = ADDING
 
     @property
-    def calibration(self) -> Calibration | None:
-        return None if self.calibrations is None else self.calibrations[self.reflectance]
+    def in_closed_form(self) -> Model:
+        """The nearest model by the recursion of the papers, without total internal reflection."""
+        return dataclasses.replace(self, recursion=ADDING, tir="off")
 
     def with_switches(self, /, **switches: str) -> Model:
         """This model with some choices changed.
@@ -109,9 +109,10 @@ class Model:
         """Values that a switch may have: all, where the model is of the papers; else those that it is calibrated for,
         and every form.
         """
-        if self.calibrations is None or key == "form":
+        reflectances = self.recursion.reflectances()
+        if reflectances is None or key == "form":
             return SWITCHES[key]
-        return tuple(self.calibrations) if key == "reflectance" else (getattr(self, key),)
+        return reflectances if key == "reflectance" else (getattr(self, key),)
 
 
 MODELS: tuple[Model, ...] = (
@@ -119,19 +120,11 @@ MODELS: tuple[Model, ...] = (
         "belcour2018",
         reflectance="fgd-multi",
         tir="published",
-        map="belcour",
-        scale="shipped",
-        channels="mean",
-        medium="shipped",
     ),
     Model(
         "yamaguchi2019",
         reflectance="fresnel",  # as its shader has it; `fg` in print
         tir="off",
-        map="belcour",
-        scale="shipped",
-        channels="mean",
-        medium="shipped",
     ),
     Model(
         "weier2020",
@@ -139,26 +132,17 @@ MODELS: tuple[Model, ...] = (
         tir="off",
         map="weier",
         scale="angles",
-        channels="mean",
-        medium="shipped",
         fetch="stretched",
     ),
     Model(
         "bati2021",  # of the inverse
         reflectance="fgd",
         tir="off",
-        map="belcour",
-        scale="shipped",
-        channels="mean",
-        medium="shipped",
     ),
     Model(
         "realtime",
         reflectance="split-sum",
         tir="off",
-        map="belcour",
-        scale="shipped",
-        channels="mean",
         medium="weighted",
         lobes="three",
     ),
@@ -168,9 +152,8 @@ MODELS: tuple[Model, ...] = (
         tir="published",
         map="power",
         scale="angles",
-        channels="mean",
         medium="doubled",
-        calibrations=CALIBRATIONS,
+        recursion=Momentum(CALIBRATIONS),
     ),
 )
 

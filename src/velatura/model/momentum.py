@@ -57,25 +57,15 @@ class State(ops.Named):
     shadow: Value
 
 
-def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
+def lobes(prepared: Prepared, k: Calibration, wi: Direction) -> tuple[list[Lobe], Lobe]:
     """The reflected lobes, one per interface from the top, and the lobe transmitted below the last layer."""
     plane = _Plane.of(wi)
-    state, reflected = _down(prepared, wi, plane)
-    passed = _roughness(_calibration(prepared), state.s_t0i, state.n, state.cos_theta)
+    state, reflected = _down(prepared, k, wi, plane)
+    passed = _roughness(k, state.s_t0i, state.n, state.cos_theta)
     return reflected, _lobe(prepared, plane, state.t_0i, passed, state.cos_theta)
 
 
-def below(prepared: Prepared, wi: Direction) -> State:
-    """The stack with all of its layers, for light from wi."""
-    return _down(prepared, wi, _Plane.of(wi))[0]
-
-
-def _calibration(prepared: Prepared) -> Calibration:
-    assert prepared.model.calibration is not None
-    return prepared.model.calibration
-
-
-def _down(prepared: Prepared, wi: Direction, plane: _Plane) -> tuple[State, list[Lobe]]:
+def _down(prepared: Prepared, k: Calibration, wi: Direction, plane: _Plane) -> tuple[State, list[Lobe]]:
     none = (PerAxis if prepared.variance is Isotropic else Covariance).uniform(0.0)
     state = State(wi[2], 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, none, none, none, none, 1.0)
     reflected: list[Lobe] = []
@@ -83,7 +73,7 @@ def _down(prepared: Prepared, wi: Direction, plane: _Plane) -> tuple[State, list
         if isinstance(layer, PreparedMedium):
             state = _through(state, layer)
         else:
-            state, lobe = _at(prepared, state, layer, plane, wi[2])
+            state, lobe = _at(prepared, k, state, layer, plane, wi[2])
             reflected.append(lobe)
     # What the first interface reflects is known exactly
     if prepared.once:
@@ -92,10 +82,9 @@ def _down(prepared: Prepared, wi: Direction, plane: _Plane) -> tuple[State, list
 
 
 def _at(
-    prepared: Prepared, above: State, layer: PreparedInterface, plane: _Plane, cos_top: Value
+    prepared: Prepared, k: Calibration, above: State, layer: PreparedInterface, plane: _Plane, cos_top: Value
 ) -> tuple[State, Lobe]:
     """The state below one more interface, and the lobe that it reflects."""
-    k = _calibration(prepared)
     cosine, n = ops.maximum(above.cos_theta, COS_MIN), above.n
     facets = plane.seen(layer.s_r)
     alpha = ops.minimum(_size(facets), 1.0)

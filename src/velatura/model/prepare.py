@@ -130,11 +130,11 @@ def prepare(
             layers.append(_interface(layer, eta_1, n_leaving, averages, variance))
             if layer.kind == "dielectric":
                 lowest, n = ops.minimum(lowest, n), n * ops.mean(layer.eta / eta_1)
-                n_leaving = lowest / n if model.calibrations else ops.mean(eta_1 / layer.eta)
+                n_leaving = lowest / n if model.recursion.from_lowest else ops.mean(eta_1 / layer.eta)
                 ops.names(n_leaving=n_leaving)
                 eta_1 = layer.eta
     prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], context.tables, base)
-    if model.calibrations is None:
+    if not model.recursion.has_gain:
         return prepared
     # A pane under a medium is drawn alike from both sides, or a lobe could not be chosen by the side that light is on
     first = layers[0] if layers and material.kinds[-1] != "medium" else None

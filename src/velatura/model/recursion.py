@@ -1,21 +1,89 @@
-"""The lobes of a stack, by the recursion of its model."""
+"""How the layers of a stack are summed up, and all that follows from that. A named model names its recursion."""
 
 from __future__ import annotations
 
-from velatura.model import adding, momentum
-from velatura.model.adding import Lobe, State
-from velatura.model.prepare import Prepared
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+from velatura.model.calibration import Calibration
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics.ggx import Direction
 
+if TYPE_CHECKING:  # recursions are made of what is prepared for them
+    from velatura.model.adding import Lobe
+    from velatura.model.prepare import Prepared
 
-def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
-    """The reflected lobes, one per interface from the top, and the lobe transmitted below the last layer.
 
-    `wi` points away from the surface. Where nothing passes, the transmitted lobe has energy 0.
+class Recursion(ABC):
+    """A recursion over the layers.
+
+    Attributes:
+        has_gain: lobes are drawn by a factor with which they have their energy, the first one as the reflection by
+            facets that it is; so forward lobes are lossless, and the symmetric form is balanced.
+        from_lowest: total internal reflection depends on the lowest index above, else on that of the medium above.
+        closed_form: an interface that has a given lobe follows in closed form (Bati et al. 2021).
     """
-    return (momentum if prepared.model.calibrations else adding).lobes(prepared, wi)
+
+    has_gain: ClassVar[bool]
+    from_lowest: ClassVar[bool]
+    closed_form: ClassVar[bool]
+
+    @abstractmethod
+    def lobes(self, prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
+        """The reflected lobes, one per interface from the top, and the lobe transmitted below the last layer.
+
+        `wi` points away from the surface. Where nothing passes, the transmitted lobe has energy 0.
+        """
+
+    @abstractmethod
+    def lobe_kind(self, variance: type[Variance]) -> type[Variance]:
+        """The kind of variance that lobes need, where interfaces have this one."""
+
+    def reflectances(self) -> tuple[str, ...] | None:
+        """Reflectances that it is calibrated for; None for any choice of all switches."""
+        return None
 
 
-def below(prepared: Prepared, wi: Direction) -> State | momentum.State:
-    """The stack with all of its layers, for light from wi."""
-    return (momentum if prepared.model.calibrations else adding).below(prepared, wi)
+@dataclass(frozen=True)
+class Adding(Recursion):
+    """That of the papers (Belcour 2018, section 5; Weier & Belcour 2020; Yamaguchi et al. 2019)."""
+
+    has_gain = False
+    from_lowest = False
+    closed_form = True
+
+    def lobes(self, prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
+        from velatura.model import adding
+
+        return adding.lobes(prepared, wi)
+
+    def lobe_kind(self, variance: type[Variance]) -> type[Variance]:
+        return variance
+
+
+ADDING = Adding()
+
+
+@dataclass(frozen=True)
+class Momentum(Recursion):
+    """Widths in tangential momentum, with constants by reflectance (`velatura.model.momentum`)."""
+
+    calibrations: Mapping[str, Calibration] = field(hash=False)
+
+    has_gain = True
+    from_lowest = True
+    closed_form = False
+
+    def lobes(self, prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
+        from velatura.model import momentum
+
+        return momentum.lobes(prepared, self.calibrations[prepared.model.reflectance], wi)
+
+    def lobe_kind(self, variance: type[Variance]) -> type[Variance]:
+        # Those of isotropic interfaces have axes in the plane of incidence
+        return PerAxis if variance is Isotropic else Covariance
+
+    def reflectances(self) -> tuple[str, ...]:
+        return tuple(self.calibrations)

@@ -13,8 +13,7 @@ from velatura.errors import InvalidInput
 from velatura.model.adding import Lobe
 from velatura.model.models import DEFAULT, Model, named
 from velatura.model.prepare import prepare
-from velatura.model.recursion import lobes
-from velatura.model.variance import Roughness
+from velatura.model.variance import Isotropic, Roughness
 from velatura.optics.directions import directions
 from velatura.stack import Material, Measured, Stack, Varying, is_colour, reduced
 
@@ -59,8 +58,9 @@ def statistics(
     x, y, z = directions(cos_theta, phi).T
     material = Material.of(stack, number)
     prepared = prepare(material.solid(), chosen)
-    reflected, transmitted = lobes(prepared, (x, y, z))
-    axis = _axis(material, np.arctan2(y, x) if chosen.calibrations else np.zeros_like(z))
+    reflected, transmitted = chosen.recursion.lobes(prepared, (x, y, z))
+    in_plane = chosen.recursion.lobe_kind(Isotropic) is not Isotropic
+    axis = _axis(material, np.arctan2(y, x) if in_plane else np.zeros_like(z))
     each = [_collect(lobe, chosen, axis) for lobe in reflected]
     return Statistics(
         energy=[lobe.energy for lobe in each],

@@ -68,7 +68,7 @@ def make(mi: Any) -> type:
         def exceptions(self) -> frozenset[str]:
             """Laws of `velatura.checks` that it does not keep, and is known not to."""
             shape, form = "pane" if self.transmits else "opaque", self.model.form
-            if form == "forward" and self.model.calibrations:
+            if form == "forward" and self.model.recursion.has_gain:
                 form = "scaled"
             elif self.body and self.body.scaling and shape == "opaque" and self.variance is Isotropic:
                 form = "balanced"
