@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 import velatura as vt
-from velatura.editor import appearance, classes
-from velatura.editor.bodies import document
+from velatura.editor import appearance, class_maps
+from velatura.editor.messages import document
 
 BOUND = 20e-3  # seconds of a call, at the median
 
@@ -51,11 +51,11 @@ def visit(state: dict[str, Any], model: str, drags: int, rng: np.random.Generato
         times["snapped" if here["snapped"] else "invert"] += seconds
     for k in range(len(here["target"]["lobes"])):
         body = {"target": here["target"], "lobe": k, "model": model}
-        card = timed(classes.class_, {**body, "material": here["material"]}, times["class"])
+        card = timed(class_maps.class_, {**body, "material": here["material"]}, times["class"])
         for _ in range(max(drags // 10, 1)):
             point = [x * float(np.exp(0.01 * rng.normal())) for x in card["member"]]
             body |= {"target": here["target"], "material": here["material"], "point": point}
-            here = timed(classes.member, body, times["member"])
+            here = timed(class_maps.member, body, times["member"])
     return times
 
 
@@ -77,10 +77,10 @@ def session(model: str, drags: int) -> dict[str, list[float]]:
     body["target"]["lobes"][0]["interfaces"] = 2
     here = timed(appearance.invert, body, times["form"])
     body |= {"target": here["target"], "material": here["material"], "lobe": 0}
-    start = timed(classes.class_, {**body, "size": 64}, times["class"])["member"]
+    start = timed(class_maps.class_, {**body, "size": 64}, times["class"])["member"]
     for t in np.linspace(0, 1, drags):
         body["point"] = [(1 - t) * a + t * b for a, b in zip(start, (1.2, 2.36))]
-        here = timed(classes.member, body, times["member"])
+        here = timed(class_maps.member, body, times["member"])
         body |= {"target": here["target"], "material": here["material"]}
 
     # Coat it

@@ -24,11 +24,11 @@ from rich.progress import track
 from scipy.optimize import least_squares
 
 import velatura as vt
-from velatura.comparison.account import along
+from velatura.comparison.evaluated_lobes import along
 from velatura.model.calibration import CALIBRATIONS, Calibration
 from velatura.model.models import Model, named
 from velatura.model.recursion import Momentum
-from velatura.reference import Lobe
+from velatura.reference import WalkedLobe
 from velatura.stack import Interface, Medium, Stack
 
 Array = NDArray[np.floating]
@@ -105,9 +105,9 @@ def errors(stack: Stack, truth: Any, model: Model) -> tuple[Array, Array, Array,
     found = vt.lobes(stack, COSINES, model=model)
     widths, energies = [], []
     for k, energy in enumerate(truth.energy):
-        names = {f.name: getattr(truth, f.name)[k] for f in dataclasses.fields(Lobe)}
-        true, nothing = Lobe(**names), np.full_like(names["mean"], np.nan)
-        mine = Lobe(found.energy[k], found.alpha[k], found.rotation[k], nothing, nothing)
+        names = {f.name: getattr(truth, f.name)[k] for f in dataclasses.fields(WalkedLobe)}
+        true, nothing = WalkedLobe(**names), np.full_like(names["mean"], np.nan)
+        mine = WalkedLobe(found.energy[k], found.alpha[k], found.rotation[k], nothing, nothing)
         alpha, widest = along(mine, true).alpha, np.minimum(true.alpha, 1.0)  # a GGX lobe gets no wider
         clear = (truth.standard_error.alpha[k] < NOISY * true.alpha) & (energy.mean(axis=0) > FAINT) & (alpha > 0)
         clear &= true.alpha > FAINT

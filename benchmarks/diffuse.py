@@ -17,7 +17,7 @@ from rich.progress import track
 
 import velatura as vt
 from velatura.model import DEFAULT, bsdf, named
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
 COSINES = (1.0, 0.6, 0.2)

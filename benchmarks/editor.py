@@ -23,7 +23,7 @@ import editor
 import viewport
 
 import velatura as vt
-from velatura.editor import bodies
+from velatura.editor import messages
 
 STILLS = (  # and how many pixels along either axis become one of as many more samples, where light is noisy
     ("coated-gold", "ball", 1),
@@ -174,7 +174,7 @@ def times() -> None:
     with viewport.stage(640, 360, THREE) as opened:
         page = opened.page
         page.evaluate("viewport.setBudget({ samples: 0 })")
-        two = bodies.document(vt.preset("coated-gold"))
+        two = messages.document(vt.preset("coated-gold"))
         print(f"first picture {page.evaluate(FIRST, two) / 1e3:.2f} s")
         print(f"dragging a roughness at 640 x 360: {page.evaluate(DRAG, 'layer0_alpha_u'):.1f} frames/s")
         print(f"a sample at 640 x 360: {page.evaluate(SAMPLE) / 1e3:.2f} s")

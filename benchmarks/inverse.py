@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from velatura.inverse import Above, Choice, EquivalenceClass, interface, invert_stack, pair
-from velatura.inverse.above import Layers
+from velatura.inverse.partial_stack import Layers
 from velatura.model import MODELS, Model, named
-from velatura.model.statistics import statistics
+from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic
 from velatura.stack import Stack
 
@@ -99,7 +99,7 @@ def deviations(found: Inverted, model: Model) -> tuple[float, float]:
     """The largest differences of energy and of variance between what was asked for and the material's lobes."""
     energy, variance = 0.0, 0.0
     for n in range(len(found)):
-        read = statistics(Stack([layer for part in found.layers for layer in part.written(n)]), 1.0, model=model)
+        read = stack_lobes(Stack([layer for part in found.layers for layer in part.written(n)]), 1.0, model=model)
         first = 0
         for k, kind in enumerate(found.kinds):
             own = slice(first, first := first + (2 if "pair" in kind else 1))

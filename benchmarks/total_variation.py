@@ -21,7 +21,7 @@ from rich.progress import track
 from scipy.optimize import minimize, nnls
 
 import velatura as vt
-from velatura.comparison.account import account
+from velatura.comparison.evaluated_lobes import account
 from velatura.model.models import named
 from velatura.optics import ggx
 from velatura.reference.distribution import BINS

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from velatura.model.models import DEFAULT, SWITCHES, Model, named
-from velatura.model.statistics import Statistics, statistics
+from velatura.model.stack_lobes import StackLobes, stack_lobes
 from velatura.stack import MaterialLike, Stack, dumps, load
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def register() -> None:
 
 def lobes(
     stack: MaterialLike, cos_theta: ArrayLike, phi: ArrayLike = 0.0, model: str | Model = DEFAULT, **switches: str
-) -> Statistics:
+) -> StackLobes:
     """Energy, covariance and roughness of every lobe of a material (Belcour 2018, section 5), in NumPy.
 
     Args:
@@ -56,7 +56,7 @@ def lobes(
         InvalidInput: not a valid material, a cosine outside its range, lists of different lengths, an unknown model or
             switch, or a texture, since lobes are those of one point.
     """
-    return statistics(load(stack), cos_theta, phi, model, **switches)
+    return stack_lobes(load(stack), cos_theta, phi, model, **switches)
 
 
 def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> Any:

@@ -27,7 +27,7 @@ from agreement import (
 import velatura as vt
 from velatura.model import bsdf, named
 from velatura.model.context import at_a_point
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.shader import record, shader, structure
 from velatura.stack import Material
 

@@ -12,7 +12,7 @@ import viewport
 from chromium import Browser
 
 from velatura import tables
-from velatura.editor import bodies
+from velatura.editor import messages
 from velatura.model import bsdf
 from velatura.model.context import at_a_point
 from velatura.shader import Recording, Shader, constant, record, shader, variance
@@ -233,7 +233,7 @@ def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Brow
     baked, known = made.baked.to_dict(), dict(tables.load().items())
     job = {
         "baked": baked,
-        "tables": {name: bodies.array(known[name].data) for name in baked["tables"]},
+        "tables": {name: messages.array(known[name].data) for name in baked["tables"]},
         "values": {place: value[0] if len(value) == 1 else value for place, value in values.items()},
         "quick": quick,
     }

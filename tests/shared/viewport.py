@@ -15,7 +15,7 @@ import chromium
 import numpy as np
 
 import velatura
-from velatura.editor import bodies, service
+from velatura.editor import messages, service
 from velatura.model import DEFAULT
 from velatura.stack import Stack
 
@@ -72,7 +72,7 @@ class Stage:
 
     def show(self, stack: Stack, scene: str | None = None, env: str | None = None, model: str = DEFAULT) -> None:
         """Set a material, and the object and the light where they are others than before."""
-        self.page.evaluate(_SHOW, [bodies.document(stack), model, scene, env])
+        self.page.evaluate(_SHOW, [messages.document(stack), model, scene, env])
 
     def resize(self, width: int, height: int) -> None:
         """Change the picture's size in pixels."""

@@ -9,10 +9,10 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
-from velatura.comparison.account import account
+from velatura.comparison.evaluated_lobes import account
 from velatura.errors import InvalidInput
 from velatura.model import bsdf, named
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")

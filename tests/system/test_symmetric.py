@@ -11,7 +11,7 @@ from scipy import stats
 import velatura as vt
 from velatura import kernel
 from velatura.model import bsdf, named
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")

@@ -22,7 +22,7 @@ import pytest
 import velatura
 from velatura.cli import options
 from velatura.errors import MissingTool, NoSolution
-from velatura.inverse.target import Fixed, Lobe, Target, load_target
+from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -256,7 +256,7 @@ def test_help_of_invert_describes_a_target(run: Run, tmp_path: Path) -> None:
     (tmp_path / "target.yaml").write_text(example)
     target = load_target(tmp_path / "target.yaml")
     assert len(target.lobes) == 2
-    for key in (*Target.model_fields, *Lobe.model_fields, *Fixed.model_fields):
+    for key in (*Target.model_fields, *TargetLobe.model_fields, *Fixed.model_fields):
         assert re.search(rf"\b{key}\b", out), key
 
 

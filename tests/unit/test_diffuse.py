@@ -12,7 +12,7 @@ import velatura as vt
 from velatura import tables
 from velatura.model import bsdf, named
 from velatura.model.prepare import PreparedBase
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.optics import fresnel
 from velatura.stack import Material
 from velatura.tables import coordinates, diffuse_nodes

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import velatura as vt
-from velatura.editor import appearance, classes
+from velatura.editor import appearance, class_maps
 from velatura.errors import InvalidInput
 from velatura.inverse import Target, stacks
 from velatura.inverse.coats import scattered
 from velatura.model import named
-from velatura.model.maps import MAPS
+from velatura.model.roughness_maps import MAPS
 from velatura.stack import Interface, Medium, Stack, presets
 
 EXACT = 1e-6  # of energies and variances, at normal incidence
@@ -200,7 +200,7 @@ def test_a_member_of_a_lobe_without_energy_is_found() -> None:
     material = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.1}}, {"interface": {"eta": 1.5, "alpha": 0.1}}]}
     body = {"material": material, "model": "bati2021", "interfaces": [1, 1]}
     target = appearance.appearance(body)["target"]
-    answer = classes.member({**body, "target": target, "lobe": 1, "point": [1.7]})
+    answer = class_maps.member({**body, "target": target, "lobe": 1, "point": [1.7]})
     check_physical(answer["material"])
 
 
@@ -256,14 +256,14 @@ def array(answer: dict[str, Any]) -> np.ndarray:
 def test_members_of_a_pair_look_the_same(model: str) -> None:
     state = appearance.invert({"target": saved("bati2021-15-b")["target"], "model": model})
     body = {"target": state["target"], "lobe": 0, "material": state["material"], "model": model}
-    card = classes.class_(body)
+    card = class_maps.class_(body)
     assert card["kind"] == "dielectric pair"
     feasible, absorption = array(card["feasible"]).astype(bool), array(card["absorption"])
     assert feasible.shape == absorption.shape == (48, 48)
     assert np.array_equal(np.isfinite(absorption), feasible)
     inside, axis = np.argwhere(feasible), card["axes"][0]["values"]
     for y, x in inside[:: len(inside) // 4]:
-        found = classes.member({**body, "point": [axis[x], axis[y]]})
+        found = class_maps.member({**body, "point": [axis[x], axis[y]]})
         assert deviation(found["material"], state["target"], model) < EXACT
         check_physical(found["material"])
         if model == "bati2021":
@@ -275,7 +275,7 @@ def test_members_of_a_pair_look_the_same(model: str) -> None:
 @pytest.mark.parametrize("model", MODELS)
 def test_the_member_lies_on_the_outline_of_all_where_nothing_absorbs_in_vain(model: str) -> None:
     state = appearance.invert({"target": saved("bati2021-15-c")["target"], "model": model})
-    card = classes.class_({"target": state["target"], "lobe": 0, "material": state["material"], "model": model})
+    card = class_maps.class_({"target": state["target"], "lobe": 0, "material": state["material"], "model": model})
     points = [point for line in card["outlines"] if line["channel"] == "all" for point in line["points"]]
     apart = np.hypot(*(np.log(points) - np.log(card["member"])).T)
     assert apart.min() < 0.03  # half of the distance of two columns
@@ -284,8 +284,8 @@ def test_the_member_lies_on_the_outline_of_all_where_nothing_absorbs_in_vain(mod
 def test_a_member_outside_snaps_to_the_class() -> None:
     state = appearance.invert({"target": saved("bati2021-15-b")["target"], "model": "bati2021"})
     body = {"target": state["target"], "lobe": 0, "material": state["material"], "model": "bati2021"}
-    x = classes.class_(body)["member"][0]
-    found = classes.member({**body, "point": [x, x]})  # where there would be no lower interface
+    x = class_maps.class_(body)["member"][0]
+    found = class_maps.member({**body, "point": [x, x]})  # where there would be no lower interface
     assert deviation(found["material"], state["target"], "bati2021") < EXACT
     assert Stack.from_dict(found["material"]).interfaces[0].eta == pytest.approx(x)
 
@@ -294,10 +294,10 @@ def test_a_member_outside_snaps_to_the_class() -> None:
 def test_a_conductor_moves_along_its_curves(model: str) -> None:
     state = appearance.invert({"target": saved("bati2021-19-b")["target"], "model": model})
     body = {"target": state["target"], "lobe": 1, "material": state["material"], "model": model}
-    card = classes.class_(body)
+    card = class_maps.class_(body)
     assert card["kind"] == "conductor"
     goal = card["outlines"][1]["points"][28]
-    found = classes.member({**body, "point": goal})
+    found = class_maps.member({**body, "point": goal})
     assert deviation(found["material"], state["target"], model) < EXACT
     metal = Stack.from_dict(found["material"]).interfaces[-1]
     assert (metal.eta[1], metal.k[1]) == pytest.approx(goal, rel=0.02)  # curves are those of smooth metals

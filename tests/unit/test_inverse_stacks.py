@@ -14,7 +14,7 @@ import pytest
 import velatura as vt
 from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Solution, Target, alternatives, coat, grazing, invert_stack, load_target
-from velatura.inverse.targets import FIGURES, INFEASIBLE
+from velatura.inverse.figure_targets import FIGURES, INFEASIBLE
 from velatura.model import MODELS, Model, named
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, loads, preset
 
@@ -29,7 +29,7 @@ def read(target: Target, stack: Stack, model: Model) -> tuple[float, float]:
         own = slice(first, first := first + lobe.interfaces)
         energy = max(energy, float(np.abs(np.sum(found.energy[own], axis=0)[:, 0] - lobe.colour).max()))
         for covariance in found.covariance[own]:
-            apart = covariance[..., 0, 0] - vt.model.maps.MAPS[model.map].variance(lobe.roughness)
+            apart = covariance[..., 0, 0] - vt.model.roughness_maps.MAPS[model.map].variance(lobe.roughness)
             variance = max(variance, float(np.abs(apart).min()))  # of channels of their own, one has it
     return energy, variance
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura.model import MODELS, bsdf, named
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.optics import fresnel
 from velatura.stack import Material
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, SWITCHES, named
-from velatura.model.maps import MAPS
-from velatura.model.statistics import statistics
+from velatura.model.roughness_maps import MAPS
+from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Covariance, Roughness
 from velatura.stack import Interface, Material, Medium, Stack, preset
 
@@ -41,7 +41,7 @@ def fresnel(cos_i: float, n: float) -> tuple[float, float]:
 def test_rough_coat_over_rough_metal_worked_by_hand() -> None:
     cos_i, n, a1, a2 = 0.6, 1.5, 0.1, 0.2
     stack = Stack([Interface(eta=n, alpha=a1), Interface(eta=0.3, k=3.0, alpha=a2)])
-    found = statistics(stack, cos_i, **PLAIN)
+    found = stack_lobes(stack, cos_i, **PLAIN)
 
     # Energies: R01, then T R / (1 - R R') T
     r01, cos_t = fresnel(cos_i, n)
@@ -67,7 +67,7 @@ def test_rough_coat_over_rough_metal_worked_by_hand() -> None:
 def test_three_interfaces_worked_by_hand_at_normal_incidence() -> None:
     n1, n2, (a1, a2, a3) = 1.5, 2.0, (0.1, 0.05, 0.2)
     stack = Stack([Interface(eta=n1, alpha=a1), Interface(eta=n2, alpha=a2), Interface(conductor="mirror", alpha=a3)])
-    found = statistics(stack, 1.0, **PLAIN)
+    found = stack_lobes(stack, 1.0, **PLAIN)
     r1, r2 = ((n1 - 1) / (n1 + 1)) ** 2, ((n2 / n1 - 1) / (n2 / n1 + 1)) ** 2
     up1, up2 = n1, n2 / n1  # Snell's factors at normal incidence, and relative indices
 
@@ -117,7 +117,7 @@ def test_bottom_lobe_of_dielectrics_over_a_mirror(indices, alphas, belcour, weie
     layers = [Interface(eta=n, alpha=a) for n, a in zip(indices, alphas)]
     stack = Stack([*layers, Interface(conductor="mirror", alpha=alphas[-1])])
     for name, expected in (("belcour", belcour), ("weier", weier)):
-        assert abs(statistics(stack, 1.0, map=name, **PLAIN).alpha[-1][0, 0] - expected) < 1e-3
+        assert abs(stack_lobes(stack, 1.0, map=name, **PLAIN).alpha[-1][0, 0] - expected) < 1e-3
 
 
 DECORRELATED = sorted(name for name, f_map in MAPS.items() if f_map.decorrelated)
@@ -125,7 +125,7 @@ DECORRELATED = sorted(name for name, f_map in MAPS.items() if f_map.decorrelated
 
 @given(st.floats(0, 0.9999), st.floats(0.05, 1), st.sampled_from(DECORRELATED))
 def test_one_interface_gives_its_roughness_and_fresnel(alpha: float, cos_theta: float, name: str) -> None:
-    found = statistics(Stack([Interface(eta=1.5, alpha=alpha)]), cos_theta, map=name, **PLAIN)
+    found = stack_lobes(Stack([Interface(eta=1.5, alpha=alpha)]), cos_theta, map=name, **PLAIN)
     assert np.allclose(found.alpha[0], alpha, rtol=1e-6, atol=1e-9)
     assert np.allclose(found.energy[0], fresnel(cos_theta, 1.5)[0], rtol=1e-12)
 
@@ -136,10 +136,10 @@ def test_one_interface_gives_its_roughness_and_fresnel(alpha: float, cos_theta: 
 def test_what_is_not_there_changes_nothing(reflectance: str, bound: float, cos_theta: float, alpha: float) -> None:
     coat, metal = Interface(eta=1.5, alpha=0.1), Interface(conductor="Cu", alpha=alpha)
     switches = {**PAPER, "tir": "off", "medium": "weighted", "reflectance": reflectance}
-    bare = statistics(Stack([coat, metal]), cos_theta, **switches)
+    bare = stack_lobes(Stack([coat, metal]), cos_theta, **switches)
     empty = Medium(depth=0, sigma_a=1.0, sigma_s=2.0, g=0.5)
-    filled = statistics(Stack([coat, empty, metal]), cos_theta, **switches)
-    parted = statistics(Stack([coat, Interface(eta=1.5), metal]), cos_theta, **switches)
+    filled = stack_lobes(Stack([coat, empty, metal]), cos_theta, **switches)
+    parted = stack_lobes(Stack([coat, Interface(eta=1.5), metal]), cos_theta, **switches)
     for other, below in ((filled, 1), (parted, 2)):
         assert np.allclose(bare.energy[1], other.energy[below], rtol=bound)
         assert np.allclose(bare.alpha[1], other.alpha[below], rtol=max(bound, 1e-9))
@@ -148,7 +148,7 @@ def test_what_is_not_there_changes_nothing(reflectance: str, bound: float, cos_t
 
 def test_nothing_passes_below_total_reflection() -> None:
     stack = Stack([Interface(eta=1.0, alpha=0.1), Interface(conductor="Au", alpha=0.1)], exterior=1.5)
-    found = statistics(stack, [0.3, 0.1, 0.74], reflectance="fresnel", **PAPER)
+    found = stack_lobes(stack, [0.3, 0.1, 0.74], reflectance="fresnel", **PAPER)
     assert np.allclose(found.energy[0], 1)
     assert np.all(found.energy[1] == 0)
     assert all(np.isfinite(a).all() for a in (*found.alpha, *found.covariance))
@@ -157,7 +157,7 @@ def test_nothing_passes_below_total_reflection() -> None:
 @pytest.mark.parametrize("name", ["furnace", "furnace-rough"])
 @pytest.mark.parametrize("tir", ["off", "published"])
 def test_the_furnace_keeps_all_energy(name: str, tir: str) -> None:
-    found = statistics(preset(name), np.linspace(0.05, 1, 50), reflectance="fresnel", tir=tir, **PAPER)
+    found = stack_lobes(preset(name), np.linspace(0.05, 1, 50), reflectance="fresnel", tir=tir, **PAPER)
     assert np.allclose(sum(found.energy), 1, atol=1e-6)
 
 
@@ -165,7 +165,7 @@ def test_the_furnace_keeps_all_energy(name: str, tir: str) -> None:
 def test_many_smooth_layers_keep_all_energy(count: int) -> None:
     """Total reflection as published keeps ever less from coming back, in the end 1e-15 of all light and less."""
     layers = [Interface(eta=1.5 if k % 2 == 0 else 1.3) for k in range(count)]
-    found = statistics(Stack([*layers, Interface(conductor="mirror")]), [1.0, 0.5, 0.1, 0.02], model="belcour2018")
+    found = stack_lobes(Stack([*layers, Interface(conductor="mirror")]), [1.0, 0.5, 0.1, 0.02], model="belcour2018")
     assert np.allclose(sum(found.energy), 1, atol=1e-6)
 
 
@@ -180,10 +180,10 @@ def test_axes_keep_their_names_where_a_value_changes_by_little(model: str, phi: 
     ]
     little = 1e-6
     for layers in map(Stack, stacks):
-        before = statistics(layers, [1.0, 0.6, 0.2], phi, model=model)
+        before = stack_lobes(layers, [1.0, 0.6, 0.2], phi, model=model)
         flat = layers.flat()
         for name in ("layer0_alpha_u", "layer1_alpha_v", "layer0_rotation", "layer1_rotation"):
-            after = statistics(layers.replace(**{name: flat[name] + little}), [1.0, 0.6, 0.2], phi, model=model)
+            after = stack_lobes(layers.replace(**{name: flat[name] + little}), [1.0, 0.6, 0.2], phi, model=model)
             assert np.allclose(after.alpha, before.alpha, atol=1e-4), name
 
 
@@ -191,7 +191,7 @@ def test_axes_keep_their_names_where_a_value_changes_by_little(model: str, phi: 
 @pytest.mark.parametrize("rotation", [0.0, 30.0, 45.0, 60.0, 100.0])
 def test_one_brushed_metal_is_reported_as_it_is_written(model: str, rotation: float) -> None:
     for alpha in ((0.1, 0.3), (0.3, 0.1)):
-        found = statistics(Stack([Interface(conductor="Au", alpha=alpha, rotation=rotation)]), 0.6, 0.4, model=model)
+        found = stack_lobes(Stack([Interface(conductor="Au", alpha=alpha, rotation=rotation)]), 0.6, 0.4, model=model)
         assert np.allclose(found.alpha[0][:, 0], alpha, rtol=1e-6)
         assert abs(np.sin(found.rotation[0][0] - np.radians(rotation))) < 1e-6
 
@@ -199,25 +199,25 @@ def test_one_brushed_metal_is_reported_as_it_is_written(model: str, rotation: fl
 def test_no_map_gives_a_roughness_above_1() -> None:
     stack = Stack([Interface(eta=1.5, alpha=0.9), Medium(sigma_s=5.0, g=0.1), Interface(conductor="Au", alpha=0.9)])
     for name in MAPS:
-        found = statistics(stack, [1.0, 0.05], model="belcour2018", map=name)
+        found = stack_lobes(stack, [1.0, 0.05], model="belcour2018", map=name)
         assert np.max(found.alpha) <= 1
 
 
 def test_many_layers_and_an_absorbing_medium_are_summed_as_by_hand() -> None:
     """The energy of a mirror below a stack and a medium of transmittance t is t^2 t_0 t_1 / (1 - r t^2)."""
     coats = [Interface(eta=1.5), Interface(eta=1.3)]
-    bare = statistics(Stack(coats), 1.0, **PLAIN)
+    bare = stack_lobes(Stack(coats), 1.0, **PLAIN)
     assert bare.transmitted is not None
     passed = bare.transmitted.energy[0, 0]  # as much in either direction, and nothing is absorbed
     t = np.exp(-0.3)
     stack = Stack([*coats, Medium(sigma_a=0.3), Interface(conductor="mirror")])
-    found = statistics(stack, 1.0, **PLAIN).energy[-1][0, 0]
+    found = stack_lobes(stack, 1.0, **PLAIN).energy[-1][0, 0]
     assert isclose(found, t * t * passed * passed / (1 - (1 - passed) * t * t), rel_tol=1e-12)
 
 
 def test_separate_channels_agree_with_their_mean_where_colour_is_none() -> None:
     stack = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=0.3, k=3.0, alpha=0.2)])
-    mean, separate = (statistics(stack, [1.0, 0.4], channels=c, **PAPER) for c in SWITCHES["channels"])
+    mean, separate = (stack_lobes(stack, [1.0, 0.4], channels=c, **PAPER) for c in SWITCHES["channels"])
     for k in range(2):
         assert separate.alpha[k].shape == (3, 2, 2)
         assert np.allclose(separate.alpha[k], mean.alpha[k], rtol=1e-12)
@@ -227,10 +227,10 @@ def test_separate_channels_agree_with_their_mean_where_colour_is_none() -> None:
 def test_one_channel_of_separate_is_the_grey_stack_of_that_channel() -> None:
     eta, k = (0.2, 0.5, 1.4), (3.9, 2.4, 1.7)
     coloured = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=eta, k=k, alpha=0.2)])
-    found = statistics(coloured, [1.0, 0.4], channels="separate", **PAPER)
+    found = stack_lobes(coloured, [1.0, 0.4], channels="separate", **PAPER)
     for c in range(3):
         layers = [Interface(eta=1.5, alpha=0.1), Interface(eta=eta[c], k=k[c], alpha=0.2)]
-        grey = statistics(Stack(layers), [1.0, 0.4], **PAPER)
+        grey = stack_lobes(Stack(layers), [1.0, 0.4], **PAPER)
         assert np.allclose(found.alpha[1][c], grey.alpha[1], rtol=1e-9)
 
 
@@ -245,8 +245,8 @@ def test_turning_every_interface_turns_the_lobes(u, v, rotation, turn, phi, cos_
             Interface(conductor="Au", alpha=(u, v), rotation=rotation + by),
         ])  # fmt: skip
 
-    before = statistics(turned(0), cos_theta, phi)
-    after = statistics(turned(turn), cos_theta, phi + np.deg2rad(turn))
+    before = stack_lobes(turned(0), cos_theta, phi)
+    after = stack_lobes(turned(turn), cos_theta, phi + np.deg2rad(turn))
     c, s = np.cos(np.deg2rad(turn)), np.sin(np.deg2rad(turn))
     for k in range(2):
         xx, xy, yy = before.covariance[k][:, 0]
@@ -337,7 +337,7 @@ def test_no_stack_or_direction_gives_nan_or_negative_energy(precision) -> None:
     In single precision, as renderers have it, and in double.
     """
     from velatura.model import adding, mixture, prepare
-    from velatura.model.merge import merged
+    from velatura.model.lobe_merging import merged
     from velatura.model.variance import Isotropic, PerAxis
 
     rng = np.random.default_rng(7)
@@ -376,7 +376,7 @@ def test_models_refuse_what_they_do_not_know() -> None:
     with pytest.raises(InvalidInput, match="did you mean reflectance"):
         named("belcour2018", reflectanse="fgd")
     with pytest.raises(InvalidInput, match="cos_theta: must lie in 0"):
-        statistics(preset("furnace"), [0.5, 1.5])
+        stack_lobes(preset("furnace"), [0.5, 1.5])
 
 
 def test_every_switch_of_every_model_has_a_known_value() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from velatura import reference
 from velatura.model.models import SWITCHES
-from velatura.model.statistics import Statistics, statistics
+from velatura.model.stack_lobes import StackLobes, stack_lobes
 from velatura.stack import Interface, Medium, Stack
 
 PLAIN = {"model": "yamaguchi2019"}
@@ -26,10 +26,10 @@ def thin_layers(count: int, **medium: float) -> Stack:
 def test_doubling_is_the_limit_of_thin_layers(cos_theta: float) -> None:
     """Each slice scatters once; what is left of the difference goes as 1/count (Belcour 2018, 5.1)."""
     medium = {"sigma_a": 0.3, "sigma_s": 0.8, "g": 0.7}
-    limit = statistics(Stack([Medium(**medium), MIRROR]), cos_theta, medium="doubled", **PLAIN)
+    limit = stack_lobes(Stack([Medium(**medium), MIRROR]), cos_theta, medium="doubled", **PLAIN)
     errors = []
     for count in (32, 64, 128):
-        found = statistics(thin_layers(count, **medium), cos_theta, medium="weighted", **PLAIN)
+        found = stack_lobes(thin_layers(count, **medium), cos_theta, medium="weighted", **PLAIN)
         errors.append(
             (found.energy[-1][0, 0] / limit.energy[0][0, 0] - 1, found.alpha[-1][0, 0] / limit.alpha[0][0, 0] - 1)
         )
@@ -42,7 +42,7 @@ def test_doubling_is_the_limit_of_thin_layers(cos_theta: float) -> None:
 def test_doubled_media_stay_the_same_when_they_are_cut(medium: str) -> None:
     """True of `doubled` to rounding; one layer that scatters once differs from four."""
     values = {"sigma_a": 0.3, "sigma_s": 0.8, "g": 0.7}
-    one, four = (statistics(thin_layers(n, **values), 0.6, medium=medium, **PLAIN) for n in (1, 4))
+    one, four = (stack_lobes(thin_layers(n, **values), 0.6, medium=medium, **PLAIN) for n in (1, 4))
     same = np.allclose(one.energy[-1], four.energy[-1]) and np.allclose(one.alpha[-1], four.alpha[-1])
     assert same == (medium == "doubled")
 
@@ -50,7 +50,7 @@ def test_doubled_media_stay_the_same_when_they_are_cut(medium: str) -> None:
 @given(st.floats(0, 5), st.floats(0, 3), st.floats(0.05, 0.99), st.floats(0.05, 1), st.sampled_from(SWITCHES["medium"]))
 def test_media_lose_what_they_absorb_or_more(tau_s, tau_a, g, cos_theta, medium) -> None:
     stack = Stack([Medium(sigma_a=tau_a, sigma_s=tau_s, g=g), MIRROR])
-    energy = statistics(stack, cos_theta, medium=medium, **PLAIN).energy[0][0, 0]
+    energy = stack_lobes(stack, cos_theta, medium=medium, **PLAIN).energy[0][0, 0]
     kept = np.exp(-2 * tau_a / cos_theta)
     assert energy <= kept * (1 + 1e-9)
     if medium == "doubled" or tau_s == 0:
@@ -60,7 +60,7 @@ def test_media_lose_what_they_absorb_or_more(tau_s, tau_a, g, cos_theta, medium)
 @pytest.mark.parametrize("medium", SWITCHES["medium"])
 def test_what_scatters_backwards_leaves_the_lobe(medium: str) -> None:
     for g in (0.0, -0.5):
-        found = statistics(Stack([Medium(sigma_s=0.5, g=g), MIRROR]), 1.0, medium=medium, **PLAIN)
+        found = stack_lobes(Stack([Medium(sigma_s=0.5, g=g), MIRROR]), 1.0, medium=medium, **PLAIN)
         assert found.energy[0][0, 0] == pytest.approx(np.exp(-1.0))
         assert found.alpha[0][0, 0] == pytest.approx(0.1)
 
@@ -75,7 +75,7 @@ def test_media_against_the_walk() -> None:
         stack = Stack([Medium(sigma_s=tau, g=g), MIRROR])
         truth = reference.statistics(stack, 1.0, paths=10**5, seed=3)
         width = float(np.mean(truth.alpha[0]))
-        told: dict[str, Statistics] = {m: statistics(stack, 1.0, medium=m, **PLAIN) for m in SWITCHES["medium"]}
+        told: dict[str, StackLobes] = {m: stack_lobes(stack, 1.0, medium=m, **PLAIN) for m in SWITCHES["medium"]}
         energy = {m: found.energy[0][0, 0] for m, found in told.items()}
         assert abs(energy["doubled"] - truth.energy[0].mean()) < 0.03
         assert abs(np.log(told["doubled"].alpha[0][0, 0] / width)) < np.log(4 / 3)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from velatura import tables
 from velatura.model import MODELS, adding, named, prepare
-from velatura.model.maps import MAPS
-from velatura.model.merge import merged
-from velatura.model.statistics import number, statistics
+from velatura.model.lobe_merging import merged
+from velatura.model.roughness_maps import MAPS
+from velatura.model.stack_lobes import number, stack_lobes
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics import fresnel, ggx
 from velatura.stack import Interface, Material, Medium, Stack, Texture, preset, presets
@@ -207,7 +207,7 @@ def split_sum(cos_theta: float, alpha: float) -> tuple[float, float]:
 def test_the_split_sum_is_schlicks_fresnel_averaged(cos_theta: float, alpha: float) -> None:
     x, y = split_sum(cos_theta, alpha)
     for interface, r_0 in ((Interface(eta=1.5, alpha=alpha), 0.04), (Interface(conductor="mirror", alpha=alpha), 1.0)):
-        found = statistics(Stack([interface]), cos_theta, model="realtime")
+        found = stack_lobes(Stack([interface]), cos_theta, model="realtime")
         assert found.energy[0][0, 0] == pytest.approx(x + r_0 * y, abs=1.5e-3)
 
 
@@ -219,7 +219,7 @@ def test_the_split_sum_of_anisotropic_interfaces_is_fetched_as_listed() -> None:
     shipped = tables.load()
     row = tables.schlick_row(shipped, 0.04)
     expected = tables.fgd(shipped, row, sqrt(1 - x * x - y * y), 0.1)
-    found = statistics(
+    found = stack_lobes(
         Stack([Interface(eta=1.5, alpha=alpha)]), cos_theta, phi, model="weier2020", reflectance="split-sum"
     )
     assert isclose(found.energy[0][0, 0], expected, rel_tol=1e-6)
@@ -228,7 +228,7 @@ def test_the_split_sum_of_anisotropic_interfaces_is_fetched_as_listed() -> None:
 @given(alphas, st.floats(0.05, 1))
 def test_fg_is_fresnel_times_masking_both_ways(alpha: float, cos_theta: float) -> None:
     stack = Stack([Interface(eta=1.5, alpha=alpha)])
-    found = statistics(stack, cos_theta, model="yamaguchi2019", reflectance="fg")
+    found = stack_lobes(stack, cos_theta, model="yamaguchi2019", reflectance="fg")
     tan2 = (1 - cos_theta**2) / cos_theta**2
     g1 = 2 / (1 + sqrt(1 + alpha**2 * tan2))
     assert isclose(found.energy[0][0, 0], fresnel.dielectric(cos_theta, 1.5) * g1**2, rel_tol=1e-6)
@@ -262,7 +262,7 @@ def test_every_model_gives_numbers_for_every_preset(model: str) -> None:
     for name in presets():
         stack = preset(name)
         plain = {key: 0.5 for key, value in stack.flat().items() if isinstance(value, Texture)}
-        found = statistics(stack.replace(**plain), cosines.ravel(), azimuths.ravel(), model)
+        found = stack_lobes(stack.replace(**plain), cosines.ravel(), azimuths.ravel(), model)
         for values in (found.energy, found.alpha, found.rotation, found.covariance):
             assert all(np.isfinite(v).all() for v in values), name
         total = sum(found.energy) + (found.transmitted.energy if found.transmitted else 0)
@@ -314,7 +314,7 @@ def test_anisotropic_averages_against_quadrature(what: str, averaged: float, str
             stack = Stack([Interface(alpha=alpha, **values)])
             for cos_theta in (1.0, 0.75, 0.4, 0.15):
                 for phi in (0.0, np.pi / 4, np.pi / 2):
-                    read = statistics(stack, cos_theta, phi, model="bati2021", fetch=fetch, **switches).energy[0][0, 0]
+                    read = stack_lobes(stack, cos_theta, phi, model="bati2021", fetch=fetch, **switches).energy[0][0, 0]
                     found.append(read - albedo(reflect, cos_theta, phi, alpha))
         error = np.sqrt(np.mean(np.square(found)))
         assert errors[0] < error < errors[1], (fetch, error)

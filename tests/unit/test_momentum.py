@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import velatura as vt
-from velatura.comparison.account import account
+from velatura.comparison.evaluated_lobes import account
 from velatura.model import named
 from velatura.stack import Interface, Material, Medium, Stack
 
@@ -85,7 +85,7 @@ def test_smooth_stacks_reflect_by_fresnel_and_absorption(reflectance: str) -> No
 def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
     """What is evaluated is F D G / 4 cos, with Fresnel at the half-vector."""
     from velatura.model import bsdf
-    from velatura.model.statistics import number
+    from velatura.model.stack_lobes import number
     from velatura.optics import fresnel, ggx
 
     stack = Stack([Interface(alpha=(0.1, 0.3), rotation=20, **GOLD)])

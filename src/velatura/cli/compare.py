@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from velatura.comparison import Comparison
-    from velatura.reference import Lobe
+    from velatura.reference import WalkedLobe
 
 
 def compare(
@@ -153,7 +153,7 @@ def _plus_minus(errors: Any, i: int) -> str:
     return "" if math.isnan(error) else f" ± {error:.1g}"
 
 
-def _rotation(lobe: Lobe, i: int, shown: bool) -> list[str]:
+def _rotation(lobe: WalkedLobe, i: int, shown: bool) -> list[str]:
     rotation = math.degrees(lobe.rotation[i])
     return [] if not shown else ["-"] if math.isnan(rotation) else [f"{rotation:.0f}°"]
 

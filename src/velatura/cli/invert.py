@@ -14,7 +14,7 @@ from velatura.errors import InvalidInput, needs
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from velatura.inverse import Lobe, Solution, Target
+    from velatura.inverse import Solution, Target, TargetLobe
     from velatura.model import Model
 
 ENDINGS = (".yaml", ".yml", ".json")
@@ -144,7 +144,7 @@ def draw_classes(solution: Solution, path: Path) -> None:
         figure.savefig(unfinished, dpi=120)
 
 
-def _made_of(lobe: Lobe) -> str:
+def _made_of(lobe: TargetLobe) -> str:
     return {1: f"one {lobe.base}", 2: f"a pair that ends in a {lobe.base}"}[lobe.interfaces]
 
 

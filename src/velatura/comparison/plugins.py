@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from velatura import api, kernel
 from velatura.checks.probe import Probe
-from velatura.comparison.account import Light, distribution
+from velatura.comparison.evaluated_lobes import Light, distribution
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
 from velatura.model import MODELS
 from velatura.optics.directions import directions
-from velatura.reference import Lobe
+from velatura.reference import WalkedLobe
 from velatura.stack import Stack
 from velatura.stack.schema import unknown
 
@@ -101,7 +101,7 @@ def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
     def nothing(*shape: int) -> NDArray[np.floating]:
         return np.full((*shape, len(grids)), np.nan)
 
-    lobe = Lobe(energy=nothing(3), alpha=nothing(2), rotation=nothing(), mean=nothing(2), covariance=nothing(3))
+    lobe = WalkedLobe(energy=nothing(3), alpha=nothing(2), rotation=nothing(), mean=nothing(2), covariance=nothing(3))
     surfaces = len(stack.interfaces) + ("diffuse" in stack.kinds)
     return Account((lobe,) * surfaces, lobe if stack.transmits else None, grid.sum(axis=(2, 3)), grid)
 

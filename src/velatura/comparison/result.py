@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.model.mixture import ALPHA_MIN
-from velatura.reference import Lobe
+from velatura.reference import WalkedLobe
 
 Array = NDArray[np.floating]
 
@@ -34,8 +34,8 @@ class Account:
     light over x and y of the projected disc.
     """
 
-    reflected: tuple[Lobe, ...]
-    transmitted: Lobe | None
+    reflected: tuple[WalkedLobe, ...]
+    transmitted: WalkedLobe | None
     evaluated: Array
     distribution: Array
 
@@ -45,7 +45,7 @@ class Account:
         return np.sum([lobe.energy for lobe in self.reflected], axis=0)
 
     @property
-    def lobes(self) -> tuple[Lobe, ...]:
+    def lobes(self) -> tuple[WalkedLobe, ...]:
         """All lobes, the transmitted one last."""
         return self.reflected + ((self.transmitted,) if self.transmitted else ())
 
@@ -82,7 +82,7 @@ class Comparison:
     paths: int
     microsurface: bool
     truth: Account
-    standard_error: tuple[Lobe, ...]
+    standard_error: tuple[WalkedLobe, ...]
     noise: Array
     models: Mapping[str, Account]
     pictures: Pictures | None = None
@@ -152,7 +152,7 @@ def _account_dict(names: tuple[str, ...], account: Account) -> dict[str, Any]:
     return {"lobes": lobes, "albedo": _plain(account.albedo.T), "evaluated": _plain(account.evaluated.T)}
 
 
-def _lobe_dict(lobe: Lobe) -> dict[str, Any]:
+def _lobe_dict(lobe: WalkedLobe) -> dict[str, Any]:
     return {
         field: _plain(getattr(lobe, field).T if turned else getattr(lobe, field)) for field, turned in _FIELDS.items()
     }

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import count
 
 from velatura.comparison import plugins
-from velatura.comparison.account import account, along
+from velatura.comparison.evaluated_lobes import account, along
 from velatura.comparison.pictures import pictures as spheres
 from velatura.comparison.plugins import Plugin
 from velatura.comparison.result import Account, Comparison

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from velatura import reference
 from velatura.comparison.result import Account
-from velatura.reference import Lobe
+from velatura.reference import WalkedLobe
 from velatura.stack import Stack
 
 Array = NDArray[np.floating]
@@ -18,7 +18,7 @@ Array = NDArray[np.floating]
 
 def truth(
     stack: Stack, cos_theta: Sequence[float], paths: int, seed: int, microsurface: bool, advance: Callable[[], None]
-) -> tuple[Account, tuple[Lobe, ...], Array]:
+) -> tuple[Account, tuple[WalkedLobe, ...], Array]:
     """The truth's account, the standard errors of its lobes, and the noise of its distribution as a total variation.
 
     Arguments are those of `compare`; `advance` is called three times for each direction.
@@ -54,13 +54,13 @@ def truth(
     )
 
 
-def _joined(each: Sequence[reference.Statistics]) -> tuple[tuple[Lobe, ...], Lobe | None]:
+def _joined(each: Sequence[reference.Statistics]) -> tuple[tuple[WalkedLobe, ...], WalkedLobe | None]:
     """Lobes over all directions, from statistics of single ones."""
-    names = [field.name for field in fields(Lobe)]
+    names = [field.name for field in fields(WalkedLobe)]
     reflected = tuple(
-        Lobe(**{name: np.concatenate([getattr(s, name)[k] for s in each], axis=-1) for name in names})
+        WalkedLobe(**{name: np.concatenate([getattr(s, name)[k] for s in each], axis=-1) for name in names})
         for k in range(len(each[0].energy))
     )
     below = [s.transmitted for s in each if s.transmitted]
     transmitted = {name: np.concatenate([getattr(lobe, name) for lobe in below], axis=-1) for name in names if below}
-    return reflected, Lobe(**transmitted) if below else None
+    return reflected, WalkedLobe(**transmitted) if below else None

@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from velatura.editor.bodies import LOBES, Answer, Body, Verb, document, material_of, model_of
+from velatura.editor.messages import LOBES, Answer, Body, Verb, document, material_of, model_of
 from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.explain import REASONS
-from velatura.inverse.nearby import Bound, Nearby, plain, seen
+from velatura.inverse.figure_targets import FIGURES
+from velatura.inverse.local_solver import Bound, Nearby, plain, seen
 from velatura.inverse.target import BLUR
-from velatura.inverse.targets import FIGURES
 from velatura.model import Model, named
-from velatura.model.maps import MAPS
-from velatura.model.statistics import statistics
+from velatura.model.roughness_maps import MAPS
+from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Diffuse, Interface, Stack, Varying
 
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
@@ -158,7 +158,7 @@ def _layers(stack: Stack, counts: list[int]) -> list[list[int]]:
 def _shown(stack: Stack, model: Model, says: str) -> Answer:
     """The lobes of a material that is no target, one for each interface, as far as they are those of one point."""
     try:
-        read = statistics(stack, 1.0, model=model)
+        read = stack_lobes(stack, 1.0, model=model)
     except InvalidInput:
         return {"target": None, "variances": [], "haze": [], "layers": [], "says": says}
     energies = [np.clip(energy[:, 0], 0, None).tolist() for energy in read.energy]

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from velatura.editor.bodies import TEXT, Answer, Body, Verb, admitting, document, field, material_of
+from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, material_of
 from velatura.errors import InvalidInput
 from velatura.files import whole
 from velatura.stack import dumps, load

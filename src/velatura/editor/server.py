@@ -27,9 +27,9 @@ from starlette.types import ASGIApp
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from velatura.editor import bundle, guard
-from velatura.editor.bodies import Answer, Body, Verb, field
 from velatura.editor.folder import LARGEST, PICTURES, Conflict, Folder
 from velatura.editor.guard import Guard, refusal
+from velatura.editor.messages import Answer, Body, Verb, field
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, VelaturaError
 from velatura.stack.schema import unknown

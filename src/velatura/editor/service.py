@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
 from velatura import __version__
-from velatura.editor import appearance, bundle, classes, truth, validations
-from velatura.editor.bodies import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
+from velatura.editor import appearance, bundle, class_maps, truth, validations
+from velatura.editor.messages import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
 from velatura.editor.shading import shading
 from velatura.editor.shading import tables as kept_tables
 from velatura.errors import InvalidInput
@@ -197,7 +197,7 @@ _VERBS: dict[str, Verb] = {
     "environment": environment,
     **validations.VERBS,
     **appearance.VERBS,
-    **classes.VERBS,
+    **class_maps.VERBS,
     **truth.VERBS,
 }
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.editor import bundle
-from velatura.editor.bodies import Answer, Body, Verb, array, material_of
+from velatura.editor.messages import Answer, Body, Verb, array, material_of
 from velatura.errors import InvalidInput
 from velatura.stack import Stack
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.editor.bodies import Answer, Body, Verb
+from velatura.editor.messages import Answer, Body, Verb
 from velatura.errors import InvalidInput
 from velatura.stack import Interface, Medium, Stack
 from velatura.stack.schema import show, unknown
@@ -89,7 +89,7 @@ def validation(body: Body) -> Answer:
 def reflection(alpha_1: float, alpha_2: float, angle: float) -> dict[str, Any]:
     """Two rough mirrors that face each other, beside the one that is as rough as a map adds them up (Eq. 5)."""
     from velatura.figures.bounces import along, bounce, uniform
-    from velatura.model.maps import MAPS
+    from velatura.model.roughness_maps import MAPS
 
     u = uniform(SAMPLES)
     first, second = max(alpha_1, SMOOTH), max(alpha_2, SMOOTH)
@@ -105,7 +105,7 @@ def reflection(alpha_1: float, alpha_2: float, angle: float) -> dict[str, Any]:
 
 def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
     """Light through a rough interface, beside the reflection that stands for it (Eq. 10)."""
-    from velatura.model.statistics import statistics
+    from velatura.model.stack_lobes import stack_lobes
 
     stack = Stack([Interface(eta=eta, alpha=alpha)])
     sine = np.sin(np.radians(angle))
@@ -113,7 +113,7 @@ def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
     _, through = _walk(stack, sine)
     curves, alphas = [_shape("random walk", through)], {"random walk": _equivalent(refracted, through)}
     for label, (model, switches) in _compared(scale="angles").items():
-        lobe = statistics(stack, np.cos(np.radians(angle)), model=model, **switches).transmitted
+        lobe = stack_lobes(stack, np.cos(np.radians(angle)), model=model, **switches).transmitted
         assert lobe is not None
         alphas[label] = float(lobe.alpha[0, 0])
         curves.append(_shape(label, _lobe(refracted, alphas[label]), "model"))
@@ -122,7 +122,7 @@ def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
 
 def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
     """A rough mirror below an absorbing slab, beside the mirror's lobe that is dimmed as a whole (Eqs. 15-17)."""
-    from velatura.model.statistics import statistics
+    from velatura.model.stack_lobes import stack_lobes
 
     stack = Stack([Medium(sigma_a=depth), Interface(conductor="mirror", alpha=alpha)])
     sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
@@ -130,7 +130,7 @@ def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
     energies, alphas = {"random walk": _energy(light)}, {"random walk": _equivalent(sine, light)}
     curves = [_density("random walk", light, PATHS)]
     for model in ("belcour2018", "velatura"):
-        found = statistics(stack, cosine, model=model, reflectance="fgd")
+        found = stack_lobes(stack, cosine, model=model, reflectance="fgd")
         energies[model], alphas[model] = float(found.energy[0][0, 0]), float(found.alpha[0][0, 0])
         lobe = _lobe(sine, alphas[model])
         curves.append(_density(model, lobe, _total(lobe) / energies[model], "model"))
@@ -140,7 +140,7 @@ def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
 
 def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
     """A slab that scatters, by how far it turns the light that comes through, beside one lobe for it (Eq. 21)."""
-    from velatura.model.statistics import statistics
+    from velatura.model.stack_lobes import stack_lobes
 
     stack = Stack([Medium(sigma_s=depth, g=g), Interface(eta=1.0)])
     sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
@@ -148,7 +148,7 @@ def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
     curves = [_within("random walk", sine, through)]
     energies = {"random walk": _energy(through)}
     for label, (model, switches) in _compared(medium="weighted").items():
-        lobe = statistics(stack, cosine, model=model, **switches).transmitted
+        lobe = stack_lobes(stack, cosine, model=model, **switches).transmitted
         assert lobe is not None
         energies[label] = float(lobe.energy[0, 0])
         curves.append(_within(label, sine, _lobe(sine, float(lobe.alpha[0, 0])), "model"))
@@ -203,7 +203,7 @@ def _lobe(sine: float, alpha: float) -> Light:
 
 def _walk(stack: Stack, sine: float) -> tuple[Light, Light]:
     """Light that random walks reflect, and light that they transmit, turned up."""
-    from velatura.reference.trace import ends
+    from velatura.reference.batches import ends
 
     found = ends(stack, np.array(_direction(-sine)), PATHS, 0, False)
     up, weight = found.w[2] > 0, found.weight.mean(axis=0)

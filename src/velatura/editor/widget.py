@@ -10,8 +10,8 @@ from typing import Any
 from urllib.parse import unquote
 
 from velatura.editor import bundle
-from velatura.editor.bodies import Answer, admitted, document, field, material_of, model_of
 from velatura.editor.folder import PICTURES, Conflict, Folder
+from velatura.editor.messages import Answer, admitted, document, field, material_of, model_of
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, VelaturaError, needs
 from velatura.model import DEFAULT, SWITCHES, Model, named

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import canvas
-from velatura.inverse import Above, EquivalenceClass, sets
+from velatura.inverse import Above, EquivalenceClass, smooth_pair
 from velatura.model import named
 
 ENERGIES, MEDIA = (0.05, 0.15, 0.3, 0.45), (1.0, 1.5, 2.0)
@@ -41,8 +41,8 @@ def compute(
             y = np.cosh(np.log(eta_1 / eta_0)) + np.cosh(np.log(eta_2 / eta_1))
             numbers["deviation"] = max(numbers["deviation"], float(abs(y * (1 - energy) / 2 - 1)))
         case: dict[str, Any] = {"part": part, "energy": energy, "eta_0": eta_0}
-        case["curve"] = [list(p) for p in sets.curve(eta_0, energy)]
-        named_points = {name: [list(p) for p in points] for name, points in sets.points(eta_0, energy).items()}
+        case["curve"] = [list(p) for p in smooth_pair.curve(eta_0, energy)]
+        named_points = {name: [list(p) for p in points] for name, points in smooth_pair.points(eta_0, energy).items()}
         numbers["cases"].append({**case, "inside": inside, "points": named_points})
     return numbers
 

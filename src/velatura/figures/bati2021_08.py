@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import canvas
-from velatura.inverse import sets
-from velatura.model.statistics import statistics
+from velatura.inverse import smooth_pair
+from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Interface, Stack
 
 ENERGY = 0.15
@@ -26,7 +26,7 @@ def compute(
     ratios: Sequence[float] = RATIOS, count: int = 90, progress: Callable[[int, int], None] | None = None
 ) -> dict[str, Any]:
     """By `point` its indices (eta_1, eta_2), and its energy over `angles` (degrees) less that of one interface."""
-    points = sets.points(1.0, ENERGY)
+    points = smooth_pair.points(1.0, ENERGY)
     named = {"slab": points["slab"][0], "one interface": points["matched above"][0]}
     c = 2 / (1 - ENERGY)
     for ratio in ratios:
@@ -38,7 +38,7 @@ def compute(
     energies = {}
     for name, indices in canvas.track(list(named.items()), progress):
         stack = Stack([Interface(eta=eta) for eta in indices])
-        read = statistics(stack, np.cos(np.radians(angles)), model=MODEL, reflectance="fresnel")
+        read = stack_lobes(stack, np.cos(np.radians(angles)), model=MODEL, reflectance="fresnel")
         energies[name] = np.sum(read.energy, axis=0)[0]
     rows = [
         {"name": name, "indices": list(named[name]), "gain": (energy - energies["one interface"]).tolist()}
@@ -55,7 +55,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     """
     figure = canvas.canvas(11, 4.6)
     gains, places = figure.subplots(1, 2, width_ratios=(2, 1))
-    places.plot(*np.transpose(sets.curve(1.0, ENERGY)), color="0.7")
+    places.plot(*np.transpose(smooth_pair.curve(1.0, ENERGY)), color="0.7")
     for n, point in enumerate(numbers["points"]):
         colour = f"C{n % 10}"
         style = "--" if point["name"].startswith("rarer") else "-"

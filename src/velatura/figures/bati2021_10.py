@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from velatura.figures import looks
-from velatura.inverse import invert_stack, sets
+from velatura.inverse import invert_stack, smooth_pair
 from velatura.stack import Interface, Stack
 
 ENERGY, VARIANCE = 0.15, 0.02
@@ -16,7 +16,7 @@ INDICES = {"clear": (1.2, None), "absorbing": (1.2, 4.0)}  # eta 1 and 2; None: 
 
 def stacks() -> dict[str, Stack]:
     """By name, in pairs."""
-    points = sets.points(1.0, ENERGY)
+    points = smooth_pair.points(1.0, ENERGY)
     (one, _), (slab, _) = points["matched below"], points["slab"]
     found = {
         "a one interface": Stack([Interface(eta=one[1])]),

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import canvas
-from velatura.inverse import Above, EquivalenceClass, sets
+from velatura.inverse import Above, EquivalenceClass, smooth_pair
 from velatura.model import named
-from velatura.model.maps import MAPS
+from velatura.model.roughness_maps import MAPS
 
 ENERGY, ALPHAS = 0.2, (0.01, 0.1, 0.2, 0.4)
 MODEL = named("bati2021")
@@ -41,7 +41,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     """
     figure = canvas.canvas(6, 5)
     axes = figure.subplots()
-    axes.plot(*np.transpose(sets.curve(1.0, numbers["energy"])), "k:", label="smooth")
+    axes.plot(*np.transpose(smooth_pair.curve(1.0, numbers["energy"])), "k:", label="smooth")
     for n, row in enumerate(numbers["classes"]):
         for m, curve in enumerate(row["curves"]):
             label = f"alpha {row['alpha']:g}" if m == 0 else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from velatura.figures import looks
 from velatura.inverse import invert_stack
-from velatura.inverse.targets import FIGURES
+from velatura.inverse.figure_targets import FIGURES
 from velatura.stack import Stack
 
 ETA_1, ETA_2 = 1.2, 4.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from velatura.figures import looks
 from velatura.inverse import invert_stack
-from velatura.inverse.targets import FIGURES
+from velatura.inverse.figure_targets import FIGURES
 from velatura.stack import Stack
 
 CLEAR, GREEN = [0.0, 0.0, 0.0], [0.0, 0.3, 0.0]  # optical depths of the coat

@@ -16,8 +16,8 @@ import numpy as np
 
 from velatura.figures import canvas
 from velatura.inverse import grazing, invert_stack, on_black, plots
-from velatura.inverse.targets import FIGURES
-from velatura.model.statistics import statistics
+from velatura.inverse.figure_targets import FIGURES
+from velatura.model.stack_lobes import stack_lobes
 
 ORDERS = ("17 blue over red", "17 red over blue")
 COSINES = (1.0, 0.8, 0.6, 0.4, 0.3, 0.2, 0.1)
@@ -39,7 +39,7 @@ def compute(
     numbers: dict[str, Any] = {"cosines": list(cosines), "pictures": {}}
     for order in canvas.track(ORDERS, progress):
         stack = invert_stack(FIGURES[order], MODEL).stack
-        energy = np.sum(statistics(stack, cosines, model=MODEL).energy, axis=0)
+        energy = np.sum(stack_lobes(stack, cosines, model=MODEL).energy, axis=0)
         red, _, blue = grazing(stack, MODEL).mean(axis=1)
         numbers[order] = {"stack": stack.to_dict(), "energy": energy.T.tolist(), "grazing": float(red / blue)}
         numbers["pictures"][order] = (

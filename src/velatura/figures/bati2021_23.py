@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import bati2021_15, canvas, looks
-from velatura.model.statistics import statistics
+from velatura.model.stack_lobes import stack_lobes
 
 NAMES = {"15 b, low": "low absorption", "15 b, high": "high absorption"}
 
@@ -31,7 +31,7 @@ def compute(
     numbers: dict[str, Any] = {"cosines": list(looks.COSINES), "pictures": {}}
     stacks = bati2021_15.stacks()
     for found, name in canvas.track(list(NAMES.items()), progress):
-        read = statistics(stacks[found], looks.COSINES, model=looks.MODEL)
+        read = stack_lobes(stacks[found], looks.COSINES, model=looks.MODEL)
         assert read.transmitted is not None
         energies = {"reflected": np.sum(read.energy, axis=0).T, "transmitted": read.transmitted.energy.T}
         numbers[name] = {key: energy.tolist() for key, energy in energies.items()}

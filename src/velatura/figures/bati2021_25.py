@@ -16,9 +16,9 @@ import numpy as np
 from velatura import reference
 from velatura.figures import canvas
 from velatura.inverse import Target, invert_stack
-from velatura.inverse.targets import FIGURES
-from velatura.model.maps import MAPS
-from velatura.model.statistics import statistics
+from velatura.inverse.figure_targets import FIGURES
+from velatura.model.roughness_maps import MAPS
+from velatura.model.stack_lobes import stack_lobes
 
 TARGETS = ("15 a", "15 b", "15 c", "16", "17 blue over red", "17 red over blue")
 MODEL = "bati2021"
@@ -41,7 +41,7 @@ def compute(
     for name in canvas.track(targets, progress):
         target = Target(FIGURES[name])
         stack, first = invert_stack(target, MODEL).stack, 0
-        read, true = statistics(stack, 1.0, model=MODEL), reference.statistics(stack, 1.0, paths=paths, seed=seed)
+        read, true = stack_lobes(stack, 1.0, model=MODEL), reference.statistics(stack, 1.0, paths=paths, seed=seed)
         for n, lobe in enumerate(target.lobes, 1):
             own = slice(first, first := first + lobe.interfaces)
             row: dict[str, Any] = {"target": name, "lobe": n, "energy": {}, "alpha": {}}

@@ -15,7 +15,7 @@ import numpy as np
 
 from velatura.figures import canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, along, bounce, equivalent, uniform
-from velatura.model.maps import ALPHA_MAX, MAPS
+from velatura.model.roughness_maps import ALPHA_MAX, MAPS
 
 FIRST = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 SECOND = tuple(np.linspace(0, 1, 41).round(3).tolist())

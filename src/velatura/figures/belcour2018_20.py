@@ -13,7 +13,7 @@ import numpy as np
 
 from velatura.figures import belcour2018_03, canvas
 from velatura.figures.bounces import equivalent
-from velatura.model.maps import MAPS
+from velatura.model.roughness_maps import MAPS
 
 ALPHAS = np.concatenate([np.geomspace(5e-3, 0.1, 12)[:-1], np.linspace(0.1, 1, 37)])
 

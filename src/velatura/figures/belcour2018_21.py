@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from velatura import reference
-from velatura.comparison.account import account
+from velatura.comparison.evaluated_lobes import account
 from velatura.figures import canvas
 from velatura.model import named
 from velatura.stack import Interface, Stack

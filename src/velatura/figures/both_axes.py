@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from velatura.figures.bounces import NORMAL, Array, along, bounce, equivalent_along, uniform, variances
-from velatura.model.maps import MAPS, WEIER_2D, weier_2d
+from velatura.model.roughness_maps import MAPS, WEIER_2D, weier_2d
 
 ALPHAS = np.array([0.003, 0.01, 0.02, 0.04, 0.07, *np.linspace(0.1, 1, 19)])
 SIDES = (0.06, 0.12, 0.24, 0.3, 0.36, 0.51)  # roughnesses of the surfaces along either axis

@@ -11,7 +11,7 @@ import numpy as np
 
 from velatura import reference
 from velatura.api import lobes
-from velatura.comparison.account import along
+from velatura.comparison.evaluated_lobes import along
 from velatura.figures import canvas
 from velatura.stack import Stack, Varying
 
@@ -109,10 +109,10 @@ def _last_lobe(stack: Stack, columns: Columns, paths: int, seed: int) -> dict[st
     }
 
 
-def _last(found: Any) -> reference.Lobe:
+def _last(found: Any) -> reference.WalkedLobe:
     """The last of the reflected lobes, without what only walks know."""
     unknown = np.full(1, np.nan)
-    return reference.Lobe(found.energy[-1], found.alpha[-1], found.rotation[-1], unknown, unknown)
+    return reference.WalkedLobe(found.energy[-1], found.alpha[-1], found.rotation[-1], unknown, unknown)
 
 
 def alpha(cell: Mapping[str, Any], title: str) -> Any:

@@ -21,7 +21,7 @@ import numpy as np
 
 from velatura.figures import both_axes, canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, Array, along, bounce, equivalent, uniform
-from velatura.model.maps import ALPHA_MAX, MAPS
+from velatura.model.roughness_maps import ALPHA_MAX, MAPS
 
 ALPHAS = np.concatenate([np.geomspace(1e-3, 0.1, 24)[:-1], np.linspace(0.1, 1, 31)])
 PAIRS = np.linspace(0.03, 0.51, 17)  # of roughnesses whose two bounces are fitted

@@ -11,9 +11,9 @@ import numpy as np
 
 from velatura.figures import canvas
 from velatura.inverse import Layers, invert_stack, on_black
+from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.plots import FILLS
-from velatura.inverse.targets import FIGURES
-from velatura.model.statistics import Statistics, statistics
+from velatura.model.stack_lobes import StackLobes, stack_lobes
 from velatura.stack import Stack
 
 MODEL = "bati2021"
@@ -82,14 +82,14 @@ def compute(
     """
     numbers: dict[str, Any] = {"cosines": list(COSINES), "looks": [], "pictures": []}
     for name, stack in canvas.track(list(stacks.items()), progress):
-        read = statistics(stack, COSINES, model=MODEL, **switches)
+        read = stack_lobes(stack, COSINES, model=MODEL, **switches)
         numbers["looks"].append({"name": name, "stack": stack.to_dict(), **_lobes(read)})
         passes = canvas.pictures(scene, on_black(stack), MODEL, env, size, spp, seed, **switches)
         numbers["pictures"].append(passes.mean(axis=0).tolist())
     return numbers
 
 
-def _lobes(read: Statistics) -> dict[str, Any]:
+def _lobes(read: StackLobes) -> dict[str, Any]:
     return {
         "energy": np.sum(read.energy, axis=0).T.tolist(),
         "energies": [energy.T.tolist() for energy in read.energy],

@@ -15,7 +15,7 @@ import numpy as np
 
 from velatura.figures import canvas
 from velatura.figures.bounces import NORMAL, Array, along, bounce, equivalent_along, uniform, variances
-from velatura.model.maps import MAPS
+from velatura.model.roughness_maps import MAPS
 
 ALPHAS = (0.02, 0.05, *np.linspace(0.1, 1, 19).round(2).tolist())
 LOW = 0.3

@@ -18,7 +18,7 @@ from velatura.figures import canvas
 from velatura.figures.bounces import Array, along, bounce, uniform
 from velatura.figures.weier2020_10 import stack
 from velatura.reference import roughness
-from velatura.reference.trace import ends
+from velatura.reference.batches import ends
 
 STACK = stack((0.1, 0.0), (0.0, 0.05))
 CHOICES = {"reflectance": "fresnel", "tir": "off"}

@@ -4,8 +4,7 @@ After Bati et al. 2021, "An Inverse Method for the Exploration of Layered Materi
 read by the model's own recursion, so that what is found holds for the model that renders it.
 """
 
-from velatura.inverse import sets
-from velatura.inverse.above import Above, Layers
+from velatura.inverse import smooth_pair
 from velatura.inverse.angles import Directions, ReflectanceTable, load_table, table_of
 from velatura.inverse.coats import Coated, coat
 from velatura.inverse.descent import Fit, fit
@@ -14,8 +13,9 @@ from velatura.inverse.explain import Direction, Infeasible
 from velatura.inverse.fitting import fit_target, simplify
 from velatura.inverse.interface import MODEL, Choice, invert_interface
 from velatura.inverse.pair import Pair, invert_pair
+from velatura.inverse.partial_stack import Above, Layers
 from velatura.inverse.stacks import Solution, alternatives, grazing, invert_stack, on_black
-from velatura.inverse.target import Fixed, Lobe, Target, load_target
+from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
 
 __all__ = [
     "MODEL",
@@ -29,11 +29,11 @@ __all__ = [
     "Fixed",
     "Infeasible",
     "Layers",
-    "Lobe",
     "Pair",
     "ReflectanceTable",
     "Solution",
     "Target",
+    "TargetLobe",
     "alternatives",
     "coat",
     "fit",
@@ -45,7 +45,7 @@ __all__ = [
     "load_table",
     "load_target",
     "on_black",
-    "sets",
     "simplify",
+    "smooth_pair",
     "table_of",
 ]

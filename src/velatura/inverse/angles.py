@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.errors import InvalidInput
-from velatura.inverse.above import Array, take
+from velatura.inverse.partial_stack import Array, take
 from velatura.model import Model, bsdf, mixture, named
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.ops import Value
 from velatura.stack import Material, MaterialLike, load
 

@@ -9,15 +9,15 @@ import numpy as np
 
 from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import interface
-from velatura.inverse.above import NORMAL, Above, Array, Layers, join
 from velatura.inverse.descent import written
 from velatura.inverse.equivalence import dislike
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_tint
+from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, join
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import Model, lobes, named, prepare, variance_kind
 from velatura.model.diffuse import under, with_means
-from velatura.model.statistics import Statistics, number, statistics, with_axes_named
+from velatura.model.stack_lobes import StackLobes, number, stack_lobes, with_axes_named
 from velatura.model.variance import Roughness
 from velatura.stack import (
     Diffuse,
@@ -44,8 +44,8 @@ class Coated:
     """
 
     stack: Stack
-    before: Statistics
-    after: Statistics
+    before: StackLobes
+    after: StackLobes
     model: Model
     diffuse: tuple[Array, Array] | None
 
@@ -98,7 +98,7 @@ def coat(
         if isinstance(below[0], Medium):
             raise InvalidInput("layer 0 (medium): is above all interfaces; a coat goes below it, not on it")
     coated = Stack([top, *below], name=f"{stack.name or 'material'}, coated", exterior=stack.exterior, thin=stack.thin)
-    before, after = (statistics(one, 1.0, model=chosen) for one in (stack, coated))
+    before, after = (stack_lobes(one, 1.0, model=chosen) for one in (stack, coated))
     diffuse = None
     if isinstance(stack.layers[-1], Diffuse):
         wanted = scattered(stack, chosen)

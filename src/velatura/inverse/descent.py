@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 
 from velatura.inverse import angles
-from velatura.inverse.above import CLEAR, Array
 from velatura.inverse.angles import ReflectanceTable, radiance
+from velatura.inverse.partial_stack import CLEAR, Array
 from velatura.model import Model, bsdf, named, variance_kind
 from velatura.model.mixture import ALPHA_MIN
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.ops import Value
 from velatura.stack import RGB, Layer, Material, MaterialLike, Medium, Stack, is_colour, load
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from velatura.inverse import interface, pair, sets
-from velatura.inverse.above import Above, Array, Layers, Mask, mapped, take
+from velatura.inverse import interface, pair, smooth_pair
 from velatura.inverse.interface import DENSER, DIELECTRIC, RARER, Choice
+from velatura.inverse.partial_stack import Above, Array, Layers, Mask, mapped, take
 from velatura.inverse.roots import intervals
-from velatura.inverse.sets import Interval
+from velatura.inverse.smooth_pair import Interval
 from velatura.model.variance import Isotropic, Roughness
 from velatura.ops import Value
 
@@ -98,7 +98,7 @@ class EquivalenceClass:
             return self._beyond(channel)
         if self._smooth_in_one_medium:
             e = self.energy[self._channels(channel)]
-            return sets.indices_1(self._eta_0, float(e.min()), float(e.max()), self.choice.eta_max)
+            return smooth_pair.indices_1(self._eta_0, float(e.min()), float(e.max()), self.choice.eta_max)
         return intervals(lambda eta: self._reachable(eta, channel), self._axis)
 
     def indices_2(self, eta_1: float, channel: int | None = None) -> list[Interval]:
@@ -113,7 +113,7 @@ class EquivalenceClass:
     def highest(self) -> float:
         """The largest energy, equal in all channels, of a lobe with as many interfaces and the same blur."""
         if self._smooth_in_one_medium:
-            return sets.highest(self._eta_0, self.choice.eta_max)
+            return smooth_pair.highest(self._eta_0, self.choice.eta_max)
         low, high = 0.0, 1.0
         for _ in range(40):
             middle = (low + high) / 2
@@ -285,7 +285,7 @@ class EquivalenceClass:
         bounds = (1.0, self.choice.eta_max)
         alone = self._clear or self.choice.eta is not None
         spans = [(e, e) if alone else (min(e, bound), max(e, bound)) for e, bound in zip(ends, bounds) if e == e]
-        return sets.union(spans)
+        return smooth_pair.union(spans)
 
 
 @dataclass(frozen=True)

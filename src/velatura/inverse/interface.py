@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura import ops
-from velatura.inverse.above import Above, Array, Layers, take
+from velatura.inverse.partial_stack import Above, Array, Layers, take
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import BLUR
 from velatura.model import Model, named

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura.inverse import interface
-from velatura.inverse.above import Above, Array, Layers, Mask
 from velatura.inverse.interface import DIELECTRIC, MODEL, Choice, Found
+from velatura.inverse.partial_stack import Above, Array, Layers, Mask
 from velatura.model import Model, named
 from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value

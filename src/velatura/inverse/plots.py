@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import needs
-from velatura.inverse.above import Layers
 from velatura.inverse.equivalence import EquivalenceClass
+from velatura.inverse.partial_stack import Layers
 
 RESOLUTION = 256
 SIZE, DPI = (4.2, 4.2), 90  # of a picture: inches, and pixels in one

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from velatura.inverse import interface, pair
-from velatura.inverse.above import Above, Array, Layers, take
 from velatura.inverse.equivalence import EquivalenceClass, dislike
 from velatura.inverse.interface import DENSER, MODEL, RARER, Choice
+from velatura.inverse.partial_stack import Above, Array, Layers, take
 from velatura.inverse.roots import false_position
-from velatura.inverse.target import Lobe, Target, read
+from velatura.inverse.target import Target, TargetLobe, read
 from velatura.model import Model, named
-from velatura.model.statistics import statistics
+from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic
 from velatura.stack import Diffuse, MaterialLike, Stack, load
 
@@ -176,7 +176,7 @@ def grazing(stack: MaterialLike, model: str | Model = MODEL) -> Array:
     Raises:
         InvalidInput: not a valid material (a stack, a file, or a preset's name), an unknown model, a texture.
     """
-    return np.sum(statistics(load(stack), GRAZING, model=model).energy, axis=0)
+    return np.sum(stack_lobes(load(stack), GRAZING, model=model).energy, axis=0)
 
 
 def follow(target: Target, model: Model, spread: int, keep: int) -> Iterator[Partial]:
@@ -203,7 +203,7 @@ def start(target: Target, model: Model) -> Above:
     return Above.nothing(model, target.exterior)
 
 
-def class_of(above: Above, lobe: Lobe, target: Target, first: bool) -> EquivalenceClass:
+def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> EquivalenceClass:
     """The class of one lobe below given layers."""
     last = lobe.interfaces - 1
     return EquivalenceClass(
@@ -216,7 +216,7 @@ def class_of(above: Above, lobe: Lobe, target: Target, first: bool) -> Equivalen
     )
 
 
-def extended(paths: Partial, lobe: Lobe, target: Target, spread: int, first: bool) -> Partial:
+def extended(paths: Partial, lobe: TargetLobe, target: Target, spread: int, first: bool) -> Partial:
     """All partial stacks with all that a lobe leaves open, feasible or not."""
     variance = Isotropic(np.atleast_1d(paths.above.f.variance(lobe.roughness)))
     energy = np.array(lobe.colour)[:, None]
@@ -252,7 +252,7 @@ def extended(paths: Partial, lobe: Lobe, target: Target, spread: int, first: boo
 
 
 def _of_fixed_roughness(
-    paths: Partial, lobe: Lobe, variance: Isotropic, choice: Choice, tried: Array
+    paths: Partial, lobe: TargetLobe, variance: Isotropic, choice: Choice, tried: Array
 ) -> tuple[np.ndarray, Array]:
     """Indices between the interfaces for which the lower one is as rough as is fixed, and below which stack."""
     energy, alpha, tau = np.array(lobe.colour)[:, None], lobe.fixed.of("alpha", 1), _pinned(lobe, "tau", 0)
@@ -277,11 +277,11 @@ def _of_fixed_roughness(
     return np.r_[index[same], index[passes]], np.r_[eta[same], found]
 
 
-def _open(lobe: Lobe) -> bool:
+def _open(lobe: TargetLobe) -> bool:
     return lobe.interfaces == 2 and lobe.fixed.of("eta", 0) is None
 
 
-def _choice(lobe: Lobe, n: int, target: Target, absorbs: bool) -> Choice:
+def _choice(lobe: TargetLobe, n: int, target: Target, absorbs: bool) -> Choice:
     return Choice(
         kind=lobe.base,
         eta=_pinned(lobe, "eta", n),
@@ -293,13 +293,13 @@ def _choice(lobe: Lobe, n: int, target: Target, absorbs: bool) -> Choice:
     )
 
 
-def _pinned(lobe: Lobe, key: str, n: int) -> Any:
+def _pinned(lobe: TargetLobe, key: str, n: int) -> Any:
     """A fixed parameter of an interface as a colour, None where it is free."""
     value = lobe.fixed.of(key, n)
     return value if value is None else np.reshape(np.asarray(value, float), (-1, 1))
 
 
-def _held(layers: Layers, lobe: Lobe, n: int) -> Layers:
+def _held(layers: Layers, lobe: TargetLobe, n: int) -> Layers:
     """With the constraint that a roughness which is fixed is the one that the target needs."""
     alpha = lobe.fixed.of("alpha", n)
     if alpha is None:

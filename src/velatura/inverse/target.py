@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput
-from velatura.model.maps import MAPS
+from velatura.model.roughness_maps import MAPS
 from velatura.stack import RGB, io
 from velatura.stack.schema import Parameter, Record, show
 from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Scalar, Text
@@ -79,7 +79,7 @@ class Fixed(Record):
         return entries[interface] if entries else None
 
 
-class Lobe(Record):
+class TargetLobe(Record):
     """A lobe: its energy, its blur (`alpha`, or `variance` in the space of Belcour's map), and what makes it."""
 
     energy: Annotated[float | RGB, _colour("energy at normal incidence")]
@@ -104,7 +104,7 @@ class Lobe(Record):
         super().__init__(**fields)
 
     @model_validator(mode="after")
-    def _one_way_to_say_it(self) -> Lobe:
+    def _one_way_to_say_it(self) -> TargetLobe:
         if self.alpha is not None and self.variance is not None:
             raise ValueError("variance: not together with alpha; write one of them")
         for key, entries in self.fixed:
@@ -146,9 +146,9 @@ class Target(Record):
         str | None,
         Choice("one variance for all colours or the brightest one's; else the model's", options=("mean", "separate")),
     ] = None
-    lobes: tuple[Lobe, ...]
+    lobes: tuple[TargetLobe, ...]
 
-    def __init__(self, /, lobes: Iterable[Lobe | Mapping[str, Any]] = (), **options: Any) -> None:
+    def __init__(self, /, lobes: Iterable[TargetLobe | Mapping[str, Any]] = (), **options: Any) -> None:
         if isinstance(lobes, str | Mapping) or not isinstance(lobes, Iterable):
             raise InvalidInput(f"lobes: must be a list of lobes, got {show(lobes)}")
         super().__init__(lobes=tuple(_lobe(n, entry) for n, entry in enumerate(lobes, 1)), **options)
@@ -211,12 +211,12 @@ def _asked(fields: Any) -> Target:
     return target
 
 
-def _lobe(number: int, entry: Any) -> Lobe:
-    if isinstance(entry, Lobe):
+def _lobe(number: int, entry: Any) -> TargetLobe:
+    if isinstance(entry, TargetLobe):
         return entry
     if not isinstance(entry, Mapping):
         raise InvalidInput(f"lobe {number}: must hold keys and values, got {show(entry)}")
     try:
-        return Lobe.from_dict(entry)
+        return TargetLobe.from_dict(entry)
     except InvalidInput as error:
         raise InvalidInput(f"lobe {number}: {error}") from None

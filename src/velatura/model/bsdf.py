@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from velatura import ops
-from velatura.model import memo, mixture, scaling
+from velatura.model import energy_balance, mixture, precomputed_lobes
 from velatura.model.adding import Lobe
 from velatura.model.context import Context
 from velatura.model.diffuse import Base, under, with_means
-from velatura.model.merge import merged
+from velatura.model.energy_balance import Scaling
+from velatura.model.lobe_merging import merged
 from velatura.model.models import Model
 from velatura.model.prepare import Prepared, prepare, variance_kind
-from velatura.model.scaling import Scaling
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
@@ -45,8 +45,8 @@ class Body:
     above: Prepared
     below: Prepared | None
     eta: Value
-    lobes_above: memo.Lobes
-    lobes_below: memo.Lobes
+    lobes_above: precomputed_lobes.Lobes
+    lobes_below: precomputed_lobes.Lobes
     scaling: Scaling | None = None
     base_above: Callable[[Direction], Base | None] | None = None
 
@@ -119,11 +119,11 @@ def body(
     context = context or Context()
     material, variance = material.solid(), variance or variance_kind(material)
 
-    def lobes(prepared: Prepared) -> memo.Lobes:
+    def lobes(prepared: Prepared) -> precomputed_lobes.Lobes:
         added = partial(_lobes, prepared)
         if context.number is None or context.colour is None or not material.interfaces:
             return added
-        return memo.sample(added, prepared, context.number, context.colour, material.transmits)
+        return precomputed_lobes.sample(added, prepared, context.number, context.colour, material.transmits)
 
     above = with_means(prepare(material, model, variance, context), context.settle)
     if not material.transmits:
@@ -309,7 +309,7 @@ def balanced(stack: Body, context: Context) -> Body:
 
     isotropic = stack.above.variance is Isotropic
     number, transmits = context.number, stack.below is not None
-    return replace(stack, scaling=scaling.balanced(sampled, energy, colour, number, isotropic, transmits))
+    return replace(stack, scaling=energy_balance.balanced(sampled, energy, colour, number, isotropic, transmits))
 
 
 def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:

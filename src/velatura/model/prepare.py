@@ -11,8 +11,8 @@ from math import pi
 
 from velatura import ops, tables
 from velatura.model.context import Context
-from velatura.model.maps import MAPS, RoughnessMap
 from velatura.model.models import Model
+from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel

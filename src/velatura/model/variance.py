@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 from velatura import ops
-from velatura.model.maps import VARIANCE_MAX, RoughnessMap
+from velatura.model.roughness_maps import VARIANCE_MAX, RoughnessMap
 from velatura.ops import Value
 
 V = TypeVar("V", bound="Variance")

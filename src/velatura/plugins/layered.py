@@ -14,7 +14,7 @@ from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
 from velatura.model.context import Context, at_a_point
-from velatura.model.merge import merging
+from velatura.model.lobe_merging import merging
 from velatura.model.models import EXCEPTIONS, GAIN
 from velatura.model.variance import Isotropic
 from velatura.plugins import spectral

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from velatura import ops
-from velatura.model import bsdf, memo
+from velatura.model import bsdf, precomputed_lobes
 from velatura.model.adding import Lobe
 from velatura.model.prepare import Prepared
 from velatura.ops import Value
@@ -25,10 +25,10 @@ NODES = 48  # over these, a multiple of those of a ray
 class Side:
     """The lobes on one side: those of fixed wavelengths, and the energies of all (gains too, of lobes with facets)."""
 
-    fixed: memo.Memo
+    fixed: precomputed_lobes.PrecomputedLobes
     energies: directional_grid.Curves
 
-    def at(self, prepared: Prepared, mi: Any, place: Any) -> memo.Lobes:
+    def at(self, prepared: Prepared, mi: Any, place: Any) -> precomputed_lobes.Lobes:
         """The lobes at the wavelengths of a ray, by their place among all; `prepared` holds the facets there."""
 
         def lobes(w: Direction) -> tuple[list[Lobe], Lobe | None]:
@@ -88,11 +88,11 @@ def sample(mi: Any, fixed: bsdf.Body, body_at: Callable[[Any], bsdf.Body]) -> Sp
     return Spectra(mi, fixed, above, below, means)
 
 
-def _side(mi: Any, fixed: memo.Lobes, lobes_at: Callable[[Any], memo.Lobes]) -> Side:
+def _side(mi: Any, fixed: precomputed_lobes.Lobes, lobes_at: Callable[[Any], precomputed_lobes.Lobes]) -> Side:
     import drjit as dr
 
     # See every direction at all wavelengths
-    assert isinstance(fixed, memo.Memo)
+    assert isinstance(fixed, precomputed_lobes.PrecomputedLobes)
     shape = fixed.curves.shape
     w = directional_grid.directions(shape, mi.Float)
     count, none = dr.width(w[2]), dr.zeros(mi.Float, dr.width(w[2]))

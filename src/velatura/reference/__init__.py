@@ -2,6 +2,6 @@
 
 from velatura.reference import plugin  # noqa: F401  (declares it)
 from velatura.reference.distribution import Distribution, distribution
-from velatura.reference.statistics import Lobe, Statistics, statistics
+from velatura.reference.statistics import Statistics, WalkedLobe, statistics
 
-__all__ = ["Distribution", "Lobe", "Statistics", "distribution", "statistics"]
+__all__ = ["Distribution", "Statistics", "WalkedLobe", "distribution", "statistics"]

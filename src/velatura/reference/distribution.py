@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from velatura.optics.directions import directions
-from velatura.reference.trace import trace
+from velatura.reference.batches import trace
 from velatura.stack import MaterialLike, Stack, load
 
 BINS = 40

@@ -13,8 +13,8 @@ from velatura import kernel
 from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
-from velatura.reference.connection import way_out
 from velatura.reference.layers import ALPHA_MIN, Layers, from_material, relative_index
+from velatura.reference.next_event import way_out
 from velatura.reference.walk import Path, walk
 from velatura.stack import Material
 

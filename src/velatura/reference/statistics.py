@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from velatura.optics import fresnel, ggx
 from velatura.optics.directions import directions
 from velatura.reference import roughness
-from velatura.reference.trace import ends, relative_index
+from velatura.reference.batches import ends, relative_index
 from velatura.stack import Diffuse, Interface, MaterialLike, Stack, load
 
 Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
-class Lobe:
+class WalkedLobe:
     """One lobe, for N directions; or the standard errors of one.
 
     energy (3, N) by colour; mean (2, N) and covariance (3, N: xx, xy, yy) of the outgoing directions on the projected
@@ -46,7 +46,7 @@ class Statistics:
     rotation: list[Array]
     mean: list[Array]
     covariance: list[Array]
-    transmitted: Lobe | None
+    transmitted: WalkedLobe | None
     truncated: Array
     standard_error: Statistics | None = None
 
@@ -90,14 +90,14 @@ def statistics(
 # From lobes of single directions to arrays
 
 
-def _collect(columns: Sequence[Sequence[Lobe]]) -> list[Lobe]:
-    names = [f.name for f in fields(Lobe)]
-    return [Lobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in zip(*columns)]
+def _collect(columns: Sequence[Sequence[WalkedLobe]]) -> list[WalkedLobe]:
+    names = [f.name for f in fields(WalkedLobe)]
+    return [WalkedLobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in zip(*columns)]
 
 
-def _statistics(stack: Stack, lobes: Sequence[Lobe], truncated: Array, error: Statistics | None) -> Statistics:
+def _statistics(stack: Stack, lobes: Sequence[WalkedLobe], truncated: Array, error: Statistics | None) -> Statistics:
     reflected, transmitted = (lobes[:-1], lobes[-1]) if stack.transmits else (lobes, None)
-    lists = {f.name: [getattr(lobe, f.name) for lobe in reflected] for f in fields(Lobe)}
+    lists = {f.name: [getattr(lobe, f.name) for lobe in reflected] for f in fields(WalkedLobe)}
     return Statistics(**lists, transmitted=transmitted, truncated=truncated, standard_error=error)
 
 
@@ -106,7 +106,7 @@ def _statistics(stack: Stack, lobes: Sequence[Lobe], truncated: Array, error: St
 
 def _column(
     stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool
-) -> tuple[list[tuple[Lobe, Lobe]], float]:
+) -> tuple[list[tuple[WalkedLobe, WalkedLobe]], float]:
     """The lobes of one direction with their errors, and the energy lost by cutting paths off."""
     found = ends(stack, wi, paths, seed, microsurface)
     surfaces = [layer for layer in stack.layers if isinstance(layer, Interface | Diffuse)]
@@ -130,7 +130,7 @@ def _anisotropic(surface: Interface | Diffuse) -> bool:
     return isinstance(surface, Interface) and isinstance(surface.alpha, tuple)
 
 
-def _lobe(wi: Array, wo: Array, weight: Array, paths: int, radial: bool, turned: bool) -> tuple[Lobe, Lobe]:
+def _lobe(wi: Array, wo: Array, weight: Array, paths: int, radial: bool, turned: bool) -> tuple[WalkedLobe, WalkedLobe]:
     """Moments of paths that leave along wo (3, n) with weight (3, n), out of all `paths`; and their errors."""
     # Energy
     energy = weight.sum(axis=1, dtype=float) / paths
@@ -146,8 +146,8 @@ def _lobe(wi: Array, wo: Array, weight: Array, paths: int, radial: bool, turned:
     target, target_error = roughness.medians(along, grey, radial)
     alpha = roughness.matching(np.array(ggx.rotate(tuple(wi), rotation)), target, radial)
     alpha_error = target_error * np.where(target > 0, alpha / np.where(target > 0, target, 1), 0)
-    value = Lobe(energy, alpha, np.array(rotation), mean, covariance)
-    return value, Lobe(energy_error, alpha_error, np.array(rotation_error), mean_error, covariance_error)
+    value = WalkedLobe(energy, alpha, np.array(rotation), mean, covariance)
+    return value, WalkedLobe(energy_error, alpha_error, np.array(rotation_error), mean_error, covariance_error)
 
 
 def _moments(x: Array, weight: Array) -> tuple[Array, Array, Array, Array]:

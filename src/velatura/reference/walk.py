@@ -15,10 +15,10 @@ from velatura.ops import Value
 from velatura.optics import ggx, phase
 from velatura.optics.ggx import Direction
 from velatura.reference import events, facets
-from velatura.reference.connection import WayOut, connect_medium, connect_surface, way_up
 from velatura.reference.events import Meeting
 from velatura.reference.facets import UP
 from velatura.reference.layers import Layers, pick
+from velatura.reference.next_event import WayOut, connect_medium, connect_surface, way_up
 
 ROULETTE = 0.25  # a path that carries less than this survives by chance, and carries this then
 

@@ -1,8 +1,8 @@
 """The lobes of a uniform material, worked out once over direction for a texture, and read back from it.
 
 A tape works them out, so that another stack of layers asks for no compiler. What they are, and how lobes are made of
-them again, are those of `velatura.model.memo`: energies, gains, and roughness as a matrix, over the cosine, and over
-the azimuth where an interface is anisotropic.
+them again, are those of `velatura.model.precomputed_lobes`: energies, gains, and roughness as a matrix, over the
+cosine, and over the azimuth where an interface is anisotropic.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from velatura import ops
-from velatura.model import bsdf, memo
+from velatura.model import bsdf, precomputed_lobes
 from velatura.model.context import at_a_point
 from velatura.model.diffuse import Base
 from velatura.model.prepare import Prepared, PreparedInterface
@@ -145,10 +145,10 @@ def _seen(material: Material, body: bsdf.Body, w: Direction) -> tuple[list[Value
     return [ops.select(above, a, b) for a, b in zip(columns, _columns(body.lobes_below, body, w)[0])], facets
 
 
-def _columns(lobes: memo.Lobes, body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
+def _columns(lobes: precomputed_lobes.Lobes, body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
     reflected, passed = lobes(w)
     seen = [*reflected, *([passed] if body.below is not None and passed is not None else [])]
-    columns = [column for lobe in seen for column in memo.columns(lobe, body.above, _apart)]
+    columns = [column for lobe in seen for column in precomputed_lobes.columns(lobe, body.above, _apart)]
     return columns, [lobe.facets is not None for lobe in seen]
 
 
@@ -197,11 +197,11 @@ def _read(body: bsdf.Body, nodes: tuple[int, ...], groups: Sequence[Group], face
     side = 0.0 if not transmits else ops.select(number("wi.z") > 0, 0.0, 1.0)
     sides = (0.0, 1.0) if body.above.model.form == "symmetric" else (side, side)
 
-    def lobes(prepared: Prepared, side: Value) -> memo.Lobes:
+    def lobes(prepared: Prepared, side: Value) -> precomputed_lobes.Lobes:
         first = prepared.layers[0]
         own = [first if each and isinstance(first, PreparedInterface) else None for each in facets]
         columns = _Texture(nodes, held, side, _OF_BASE if prepared.base else 0)
-        return memo.Memo(columns, _together, 3, prepared, own, transmits)
+        return precomputed_lobes.PrecomputedLobes(columns, _together, 3, prepared, own, transmits)
 
     if body.below is not None:
         return replace(body, lobes_above=lobes(body.above, sides[0]), lobes_below=lobes(body.below, sides[1]))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura.model.statistics import number as plain
+from velatura.model.stack_lobes import number as plain
 from velatura.shader.glsl import block, literal
 from velatura.shader.symbol import operand
 from velatura.stack import Brushing, Stack, Texture, Varying, is_colour, within

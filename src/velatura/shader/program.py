@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from velatura.model import DEFAULT, SWITCHES, Model, named
-from velatura.model.merge import merging
+from velatura.model.lobe_merging import merging
 from velatura.shader import atlas, glsl, material
 from velatura.shader.bake import Bake
 from velatura.shader.recording import SHOWN, Recording, part, record

@@ -9,11 +9,11 @@ from typing import TypeGuard
 
 from velatura import ops
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT, Model, bsdf, memo, named, variance_kind
+from velatura.model import DEFAULT, Model, bsdf, named, precomputed_lobes, variance_kind
 from velatura.model.adding import Lobe
 from velatura.model.context import at_a_point
 from velatura.model.diffuse import Base
-from velatura.model.merge import merging
+from velatura.model.lobe_merging import merging
 from velatura.model.prepare import PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
@@ -163,7 +163,7 @@ def _weighed(body: bsdf.Body) -> tuple[bsdf.Body, list[str]]:
         gain = seen.gain * weight if seen.facets else seen.gain
         return replace(seen, energy=seen.energy * weight, gain=gain)
 
-    def weighed(lobes: memo.Lobes) -> memo.Lobes:
+    def weighed(lobes: precomputed_lobes.Lobes) -> precomputed_lobes.Lobes:
         def shown(w: Direction) -> tuple[list[Lobe], Lobe | None]:
             reflected, passed = lobes(w)
             weights = [symbol.number(f"{SHOWN}[{k}]") for k in range(count)]

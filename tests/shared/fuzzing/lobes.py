@@ -12,7 +12,7 @@ from fuzzing import Failure
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
 from velatura.model.models import Model
-from velatura.model.statistics import Statistics
+from velatura.model.stack_lobes import StackLobes
 
 COSINES = (1.0, 0.9, 0.7, 0.5, 0.2, 0.03, 1e-3, 1e-6)
 GAIN = 1e-3  # of energy, by which tables may err
@@ -49,7 +49,7 @@ def tried(stack: vt.Stack, model: Model, rng: np.random.Generator, continuous: b
     return [Failure(kind, detail, case) for kind, detail in wrong]
 
 
-def _wrong(found: Statistics) -> list[tuple[str, str]]:
+def _wrong(found: StackLobes) -> list[tuple[str, str]]:
     lobes = {field: list(getattr(found, field)) for field in ("energy", "covariance", "alpha", "rotation")}
     if found.transmitted:
         lobes = {field: [*values, getattr(found.transmitted, field)] for field, values in lobes.items()}
@@ -70,7 +70,7 @@ def _wrong(found: Statistics) -> list[tuple[str, str]]:
     return wrong
 
 
-def _energies(found: Statistics) -> np.ndarray:
+def _energies(found: StackLobes) -> np.ndarray:
     energies = [*found.energy, *([found.transmitted.energy] if found.transmitted else [])]
     return np.array([energy[:, :STEADY] for energy in energies])
 

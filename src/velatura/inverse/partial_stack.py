@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.model import Model, adding, lobes, operators, prepare
-from velatura.model.maps import MAPS, RoughnessMap
 from velatura.model.prepare import Prepared, PreparedInterface
+from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.stack import Interface, InterfaceValues, Kind, Layer, LayerValues, Material, Medium, MediumValues

@@ -36,7 +36,7 @@ class LobeStatistics:
 
 
 @dataclass(frozen=True)
-class Statistics:
+class StackLobes:
     """Reflected lobes as lists over interfaces from the top, and the transmitted lobe (None below an opaque base)."""
 
     energy: list[np.ndarray]
@@ -46,13 +46,13 @@ class Statistics:
     transmitted: LobeStatistics | None
 
 
-def statistics(
+def stack_lobes(
     stack: Stack,
     cos_theta: ArrayLike,
     phi: ArrayLike = 0.0,
     model: str | Model = DEFAULT,
     **switches: str,
-) -> Statistics:
+) -> StackLobes:
     """The lobes of a stack, as `velatura.lobes` says."""
     chosen = named(model, **switches)
     x, y, z = directions(cos_theta, phi).T
@@ -62,7 +62,7 @@ def statistics(
     in_plane = chosen.recursion.lobe_kind(Isotropic) is not Isotropic
     axis = _axis(material, np.arctan2(y, x) if in_plane else np.zeros_like(z))
     each = [_collect(lobe, chosen, axis) for lobe in reflected]
-    return Statistics(
+    return StackLobes(
         energy=[lobe.energy for lobe in each],
         covariance=[lobe.covariance for lobe in each],
         alpha=[lobe.alpha for lobe in each],

@@ -13,8 +13,8 @@ from typing import Protocol
 from velatura import ops
 from velatura.model import mixture
 from velatura.model.adding import Lobe
-from velatura.model.maps import RoughnessMap
 from velatura.model.prepare import Prepared, PreparedInterface
+from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -39,7 +39,7 @@ class Sampled(Protocol):
 
 
 @dataclass(frozen=True)
-class Memo:
+class PrecomputedLobes:
     """Energies and roughnesses of all lobes, the transmitted one last if there is one; `colour` makes an energy of
     `width` channels.
 
@@ -73,21 +73,24 @@ class Memo:
         return self.colour(*(next(channels) for _ in range(self.width)))
 
 
-def sample(lobes: Lobes, prepared: Prepared, number: type, colour: Callable[..., Value], transmits: bool) -> Memo:
+def sample(
+    lobes: Lobes, prepared: Prepared, number: type, colour: Callable[..., Value], transmits: bool
+) -> PrecomputedLobes:
     """The lobes over direction, for Dr.Jit's types of numbers and colours."""
     shape = directional_grid.LINE if prepared.variance is Isotropic else directional_grid.PLANE
     reflected, passed = lobes(directional_grid.directions(shape, number))
     seen = [*reflected, passed] if transmits and passed is not None else reflected
     facets = [lobe.facets for lobe in seen]
 
-    def kept(seen: Sequence[Lobe]) -> Memo:
+    def kept(seen: Sequence[Lobe]) -> PrecomputedLobes:
         held = [column for lobe in seen for column in columns(lobe, prepared, colour)]
-        return Memo(directional_grid.curves(held, shape, number), colour, len(colour()), prepared, facets, transmits)
+        curves = directional_grid.curves(held, shape, number)
+        return PrecomputedLobes(curves, colour, len(colour()), prepared, facets, transmits)
 
-    memo = kept(seen)
+    precomputed = kept(seen)
     if prepared.variance is Isotropic or not prepared.model.recursion.has_gain:
-        return memo
-    return kept([replace(lobe, gain=gain) for lobe, gain in zip(seen, _gains(memo, seen, number))])
+        return precomputed
+    return kept([replace(lobe, gain=gain) for lobe, gain in zip(seen, _gains(precomputed, seen, number))])
 
 
 def _kind(prepared: Prepared) -> type[Variance]:
@@ -96,19 +99,19 @@ def _kind(prepared: Prepared) -> type[Variance]:
 
 
 def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Value]]) -> list[Value]:
-    """The numbers of a lobe that a `Memo` is made of, in order; `apart` gives the channels of a colour."""
+    """The numbers of a lobe that a `PrecomputedLobes` is made of, in order; `apart` gives the channels of a colour."""
     if lobe.facets is not None:
         return [*apart(lobe.energy), *apart(lobe.gain)]
     roughness = vars(_kind(prepared).of(lobe.roughness, _AS_IT_IS)).values()
     return [*apart(lobe.energy), *roughness, *([lobe.gain] if prepared.model.recursion.has_gain else [])]
 
 
-def _gains(memo: Memo, seen: Sequence[Lobe], number: type) -> list[Value]:
+def _gains(precomputed: PrecomputedLobes, seen: Sequence[Lobe], number: type) -> list[Value]:
     """Those that give lobes their energy when they are drawn, however they are turned."""
-    x, y, z = directional_grid.directions(memo.curves.shape, number)
+    x, y, z = directional_grid.directions(precomputed.curves.shape, number)
     _, u_1, u_2 = low_discrepancy.at_nodes(len(z), NORMALS, number)
     w = low_discrepancy.repeated(x, NORMALS), low_discrepancy.repeated(y, NORMALS), low_discrepancy.repeated(z, NORMALS)
-    reflected, passed = memo(w)
+    reflected, passed = precomputed(w)
     drawn = [mixture.drawn(lobe, w, u_1, u_2) for lobe in [*reflected, *([passed] if passed else [])]]
     albedos = [low_discrepancy.averaged(each, NORMALS) for each in drawn]
     return [ops.divide(lobe.energy if lobe.facets else 1.0, albedo) for lobe, albedo in zip(seen, albedos)]

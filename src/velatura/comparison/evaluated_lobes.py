@@ -12,10 +12,10 @@ from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
 from velatura.model import Model, adding, bsdf, mixture
 from velatura.model.diffuse import Base
-from velatura.model.statistics import number
+from velatura.model.stack_lobes import number
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
-from velatura.reference import Lobe
+from velatura.reference import WalkedLobe
 from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import square
 from velatura.stack import Material, Stack
@@ -46,15 +46,15 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     body = bsdf.body(Material.of(stack, number), model)
     columns = [_column(body, wi) for wi in directions(cos_theta, 0.0)]
 
-    names = [field.name for field in dataclasses.fields(Lobe)]
+    names = [field.name for field in dataclasses.fields(WalkedLobe)]
     rows = zip(*(lobes for lobes, _ in columns))
-    lobes = tuple(Lobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in rows)
+    lobes = tuple(WalkedLobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in rows)
     reflected, transmitted = (lobes[:-1], lobes[-1]) if stack.transmits else (lobes, None)
     grids = np.stack([grid for _, grid in columns], axis=1)
     return Account(reflected, transmitted, grids.sum(axis=(2, 3)), grids)
 
 
-def _column(body: bsdf.Body, incident: Array) -> tuple[list[Lobe], Array]:
+def _column(body: bsdf.Body, incident: Array) -> tuple[list[WalkedLobe], Array]:
     """The lobes of one direction, and the distribution (3, bins, bins) of what is reflected."""
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
@@ -111,19 +111,19 @@ def _sampled_base(base: Base) -> Light:
     return Light(points, _colour(np.pi * value / BASE_SAMPLES, BASE_SAMPLES))
 
 
-def _described(lobe: adding.Lobe, light: Light) -> Lobe:
+def _described(lobe: adding.Lobe, light: Light) -> WalkedLobe:
     alpha_u, alpha_v, rotation = (np.broadcast_to(x, 1)[0] for x in lobe.roughness)
     return _lobe(lobe.energy, (alpha_u, alpha_v), rotation, light)
 
 
-def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: Light) -> Lobe:
+def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: Light) -> WalkedLobe:
     """Moments on the disc weigh by the mean of the colours, as the truth's do; NaN where there is no light."""
     grey = light.energy.mean(axis=0)
     share = grey / (grey.sum() or np.nan)
     mean = light.points @ share
     x, y = light.points - mean[:, None]
     covariance = np.stack([x * x, x * y, y * y]) @ share
-    return Lobe(_colour(energy)[:, 0], np.array(alpha), np.array(rotation), mean, covariance)
+    return WalkedLobe(_colour(energy)[:, 0], np.array(alpha), np.array(rotation), mean, covariance)
 
 
 def distribution(light: Light) -> Array:
@@ -137,7 +137,7 @@ def _colour(energy: Array, count: int = 1) -> Array:
     return np.broadcast_to(energy, (3, count))
 
 
-def along(lobe: Lobe, true: Lobe) -> Lobe:
+def along(lobe: WalkedLobe, true: WalkedLobe) -> WalkedLobe:
     """A model's lobe with its roughness along the axes of the true lobe, or along its own where those are not known."""
     turn = np.nan_to_num(true.rotation - lobe.rotation)
     cos2, sin2 = np.cos(turn) ** 2, np.sin(turn) ** 2

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.editor.appearance import answered, held, lobe_of, reader_of
-from velatura.editor.bodies import Answer, Body, Verb, array
+from velatura.editor.messages import Answer, Body, Verb, array
 from velatura.errors import InvalidInput
 from velatura.inverse import EquivalenceClass, Target, interface, stacks
 from velatura.inverse.interface import conductor_index
-from velatura.inverse.nearby import Nearby
+from velatura.inverse.local_solver import Nearby
 
 Array = NDArray[np.float64]
 

@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.inverse.above import NORMAL, Above, Array, Layers, whole
 from velatura.inverse.coats import scattered
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import CONDUCTOR_MAX, CONDUCTOR_MIN, ENERGY_MIN, conductor_index, conductor_tint
-from velatura.inverse.target import Fixed, Lobe, Target
+from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, whole
+from velatura.inverse.target import Fixed, Target, TargetLobe
 from velatura.model import Model, lobes, prepare
-from velatura.model.maps import MAPS, VARIANCE_MAX
-from velatura.model.statistics import number
+from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
+from velatura.model.stack_lobes import number
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Kind, Layer, Medium, Stack, Varying
@@ -572,7 +572,7 @@ class _Reader:
         return slice(first, len(self.z))
 
 
-def _pinned(lobe: Lobe, first: bool) -> bool:
+def _pinned(lobe: TargetLobe, first: bool) -> bool:
     """Whether more is fixed of a lobe than what is a constant here: media above the first and of pairs, their index."""
     last = lobe.interfaces - 1
     pins = [("eta", last), ("k", last), *(("alpha", n) for n in range(lobe.interfaces))]
