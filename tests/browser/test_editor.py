@@ -269,6 +269,21 @@ SLOW = """(() => {
 })()"""
 
 
+def test_names_that_arrive_late_move_none_under_the_hand(visit: Open) -> None:
+    page = visit(script=SLOW.replace("120", "500"))
+    page.page.get_by_role("button", name="Open", exact=True).click()
+    dialog = page.page.locator("dialog.open")
+    entry = dialog.get_by_role("button", name="Coated brushed aluminium", exact=True)
+    assert dialog.get_by_text("On their way.").is_visible()
+    before = entry.bounding_box()
+    dialog.get_by_text("On their way.").wait_for(state="detached")
+    assert dialog.get_by_role("button").count() > 40
+    assert entry.bounding_box() == before
+    entry.click()
+    assert page.state("name") == "Coated brushed aluminium"
+    page.settled()
+
+
 @pytest.mark.parametrize("pause", [0, 110])
 def test_what_is_typed_is_taken_once_though_the_server_is_slow(visit: Open, pause: int) -> None:
     """Expected: the answer to one number comes while the next is typed, and neither is lost."""
