@@ -69,10 +69,6 @@ class _Numpy(Unrolled):
         return np.mean(x, axis=0) if np.ndim(x) else x
 
     @staticmethod
-    def maximum_channel(x: Value) -> Value:
-        return np.max(x, axis=0) if np.ndim(x) else x
-
-    @staticmethod
     def interpolate(table: Any, coordinates: Sequence[Value]) -> list[Value]:
         channels = table.data.shape[-1]
         index: Value = 0
@@ -120,9 +116,6 @@ class _DrJit(Unrolled):
         if not self._is_colour(x):
             return x
         return self._dr.mean(x[: len(x) // 2] if self._dr.size_v(x) < 0 else x)
-
-    def maximum_channel(self, x: Value) -> Value:
-        return self._dr.max(x) if self._is_colour(x) else x
 
     def interpolate(self, table: Gridded, coordinates: Sequence[Value]) -> list[Value]:
         colour = next((x for x in coordinates if self._is_colour(x)), None)
@@ -267,11 +260,6 @@ def divide(a: Value, b: Value) -> Value:
 def mean(colour: Value) -> Value:
     """Mean over the channels."""
     return _dialect(colour).mean(colour)
-
-
-def maximum_channel(colour: Value) -> Value:
-    """Largest of the channels."""
-    return _dialect(colour).maximum_channel(colour)
 
 
 def interpolate(table: Gridded, *coordinates: Value) -> list[Value]:

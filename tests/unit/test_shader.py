@@ -45,7 +45,7 @@ def printed(value: Symbol) -> str:
         lambda x, y, c: ops.clip(c, 0.2, x),
         lambda x, y, c: ops.select((x < y) & (c > 0.5), c, y),
         lambda x, y, c: ops.select((x <= y) & (x >= 0.1), 1.0, c),
-        lambda x, y, c: ops.divide(x, c - c) * ops.mean(c) * ops.maximum_channel(c),
+        lambda x, y, c: ops.divide(x, c - c) * ops.mean(c),
         lambda x, y, c: np.array([0.1, 0.2, 0.3])[:, None] * c + x * np.array([0.5, 0.0, 2.0])[:, None],
         lambda x, y, c: ops.select(np.array([True, False, True])[:, None], x, y) + 0 * c,
         lambda x, y, c: ops.interpolate(tables.load().dielectric, x, y)[5] + 0 * c,

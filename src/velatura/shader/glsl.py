@@ -21,7 +21,6 @@ HELPERS = """\
 float vt_sqrt(float x) { return sqrt(max(x, 0.0)); }
 vec3 vt_sqrt(vec3 x) { return sqrt(max(x, 0.0)); }
 float vt_mean(vec3 x) { return (x.r + x.g + x.b) / 3.0; }
-float vt_max(vec3 x) { return max(max(x.r, x.g), x.b); }
 
 // Drivers may leave sine and cosine with errors of 2e-4; this series is as good as single precision
 vec3 vt_sin(vec3 x) {
@@ -46,7 +45,6 @@ _FUNCTIONS = {
     "sqrt": "vt_sqrt",
     "absolute": "abs",
     "mean": "vt_mean",
-    "maximum_channel": "vt_max",
 }
 _TWO = {"power": "pow", "arctan2": "atan", "minimum": "min", "maximum": "max"}
 _OPERATORS = {  # with their precedence

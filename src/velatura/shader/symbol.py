@@ -203,9 +203,6 @@ class Recorder(Unrolled):
     def mean(self, x: Symbol) -> Value:
         return Symbol("mean", (x,), "number") if is_colour(x) else x
 
-    def maximum_channel(self, x: Symbol) -> Value:
-        return Symbol("maximum_channel", (x,), "number") if is_colour(x) else x
-
     def interpolate(self, table: tables.Table, coordinates: Sequence[Value]) -> list[Value]:
         args = tuple(operand(x) for x in coordinates)
         wide = any(is_colour(x) for x in args)

@@ -49,9 +49,6 @@ const LOOPS = {
   mean(o, n, a, s, b, t, c, u) {
     for (let i = 0, p = 0, q = 0, r = 0; i < n; i++, p += s, q += t, r += u) o[i] = (a[p] + b[q] + c[r]) / 3;
   },
-  maximum_channel(o, n, a, s, b, t, c, u) {
-    for (let i = 0, p = 0, q = 0, r = 0; i < n; i++, p += s, q += t, r += u) o[i] = Math.max(a[p], b[q], c[r]);
-  },
   colour(o, n, a, s) {
     for (let i = 0, p = 0; i < n; i++, p += s) o[i] = a[p];
   },
@@ -157,7 +154,7 @@ export class Tape {
     if (op === 'component') return made({ ...given[0], channels: [given[0].channels[detail]], wide: false }, []);
     const count = Math.max(...given.map((x) => x.count));
     if (op === 'texels' || op === 'value') return made(...this.lookedUp(this.tables[detail], given, count));
-    if (op === 'mean' || op === 'maximum_channel') {
+    if (op === 'mean') {
       const value = this.value(count, 1);
       return made(value, [loop(op, value, 0, [0, 1, 2].map((c) => [given[0], c]))]);
     }
