@@ -19,7 +19,7 @@ from unittest import mock
 
 import numpy as np
 
-from fuzzing import Failure, files
+from fuzzing import Failure, files, pictures
 from fuzzing.stacks import random_stack
 from velatura import cli
 from velatura.stack import dumps
@@ -193,7 +193,7 @@ def _folder(inputs: dict[str, str]) -> Iterator[Path]:
         folder = Path(name)
         for path, text in inputs.items():
             (folder / path).write_bytes(text.encode("utf-8", "surrogatepass"))
-        (folder / "texture.png").write_bytes(_PNG)
+        (folder / "texture.png").write_bytes(pictures.png())
         (folder / "light.exr").write_bytes(b"not a picture")
         for made in ("folder", "closed"):
             (folder / made).mkdir()
@@ -263,18 +263,3 @@ def _run_process(line: list[str], environment: dict[str, str], redirection: str)
     except (ValueError, OSError) as error:  # a word that no process can be given
         return 2, "", f"velatura: {error}\n"
     return done.returncode, done.stdout.decode("utf-8", "replace"), done.stderr.decode("utf-8", "replace")
-
-
-def _png() -> bytes:
-    import struct
-    import zlib
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    header = struct.pack(">IIBBBBB", 2, 2, 8, 2, 0, 0, 0)
-    rows = zlib.compress(b"\0" + bytes(range(6)) + b"\0" + bytes(range(6, 12)))
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
-
-
-_PNG = _png()

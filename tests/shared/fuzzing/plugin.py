@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import velatura as vt
-from fuzzing import Failure
+from fuzzing import Failure, pictures
 from fuzzing.models import described, random_model
-from fuzzing.stacks import random_stack
+from fuzzing.stacks import random_stack, textured
 from velatura.checks.grid import Grid, integrate
 from velatura.checks.probe import Array, Probe
 from velatura.model.models import Model
 
+TEXTURED = 0.05  # share of stacks: whatever may vary is compiled anew, which takes long
 COSINES = (1.0, 0.8, 0.5, 0.2, 0.02, 1e-4, 1e-6)
 SAMPLES = 512  # at each of them, on either side
 OFF = 1e-2  # two numbers that should be equal are not where they differ by this share
@@ -24,9 +27,14 @@ INTEGRATED = (0.7, -0.7)  # cosines where densities are integrated
 
 
 def trial(rng: np.random.Generator) -> list[Failure]:
-    """One random stack, one in three of them absurd, with a random model."""
-    stack = random_stack(rng, absurd=rng.random() < 1 / 3)
-    return tried(stack, random_model(rng, keep=["channels"]), rng)
+    """One random stack with a random model; one in three is absurd, and a few have textures."""
+    model = random_model(rng, keep=["channels"])
+    if rng.random() >= TEXTURED:
+        return tried(random_stack(rng, absurd=rng.random() < 1 / 3), model, rng)
+    with tempfile.TemporaryDirectory() as folder:
+        image = Path(folder, "texture.png")
+        image.write_bytes(pictures.png())
+        return tried(textured(random_stack(rng, most=1), rng, str(image)), model, rng)
 
 
 def tried(stack: vt.Stack, model: Model, rng: np.random.Generator) -> list[Failure]:

@@ -43,6 +43,16 @@ def random_stack(rng: np.random.Generator, absurd: bool = False, most: int = 4, 
     return draw.accepted(lambda: Stack(layers, exterior=draw.exterior(), thin=base == "thin"))
 
 
+def textured(stack: Stack, rng: np.random.Generator, image: str) -> Stack:
+    """The stack with one or two of its values from an image in colour."""
+    names = [name for name in stack.flat() if name != "exterior"]
+    chosen = rng.choice(names, size=min(len(names), int(rng.integers(1, 3))), replace=False)
+    values = {
+        str(name): {"texture": image, "scale": rng.uniform(0.1, 1.5), "offset": rng.uniform(0, 0.5)} for name in chosen
+    }
+    return stack.replace(**values)
+
+
 class _Tame:
     """Values as users give them, the special ones among them."""
 
