@@ -287,8 +287,8 @@ LAWS: tuple[Law, ...] = (
     Law(
         "sides", "Nothing passes through what does not transmit, and no light comes from a side that is not lit.", sides
     ),
-    Law("energy", "No more light leaves than arrives, as the weights of samples have it.", energy),
-    Law("white furnace", "No more light leaves than arrives, as the integral of `eval` has it.", white_furnace),
+    Law("energy", "No more light leaves than arrives, estimated from the weights of samples.", energy),
+    Law("white furnace", "No more light leaves than arrives, by the integral of `eval`.", white_furnace),
     Law("lossless", "No less light leaves than arrives, where nothing absorbs.", lossless),
     Law("albedo", "Samples carry as much light as the integral of `eval`.", albedo),
     Law(

@@ -28,6 +28,7 @@ from velatura.optics.ggx import Direction
 from velatura.stack import Material
 
 MIN_BRANCH_PROBABILITY = 0.1  # of reflection and of transmission, in the symmetric form
+EVEN = 0.1  # share of samples that do not go by energy, in the symmetric form
 GRAZING = 0.05  # cosine
 ROUNDING = 1e-6  # share of samples that reflection gets at least: less than that single precision takes for none
 
@@ -39,7 +40,9 @@ class Body:
     `eta` is the index below over the index above, one for all colours; 1 where nothing is transmitted. `lobes_above`
     and `lobes_below` give the lobes on either side, for a direction turned up, and `base_above` the diffuse base; None
     where it is worked out from the layers. `scaling` keeps the energy of the symmetric form; None where it is as
-    published.
+    published. `even` is the share of samples that goes to all lobes alike, and to the cosine: the symmetric form has
+    light where the lobes by which it is sampled have no energy, and samples would miss it. While a stack is balanced it
+    is 0: of the few samples there, all go where most of the light is.
     """
 
     above: Prepared
@@ -49,6 +52,7 @@ class Body:
     lobes_below: precomputed_lobes.Lobes
     scaling: Scaling | None = None
     base_above: Callable[[Direction], Base | None] | None = None
+    even: float = 0.0
 
     def base(self, w: Direction) -> Base | None:
         """The diffuse base for a direction above; None without one."""
@@ -125,14 +129,15 @@ def body(
             return added
         return precomputed_lobes.sample(added, prepared, context.number, context.colour, material.transmits)
 
+    even = EVEN if model.form == "symmetric" else 0.0
     above = with_means(prepare(material, model, variance, context), context.settle)
     if not material.transmits:
         from_above = lobes(above)
         opaque = Body(above, None, 1.0, from_above, from_above)
-        return balanced(opaque, context) if material.interfaces else opaque
+        return replace(balanced(opaque, context) if material.interfaces else opaque, even=even)
     below = prepare(material.reversed(), model, variance, context)
     eta = ops.mean(material.below) / ops.mean(material.exterior)
-    return balanced(Body(above, below, eta, lobes(above), lobes(below)), context)
+    return replace(balanced(Body(above, below, eta, lobes(above), lobes(below)), context), even=even)
 
 
 def scattered(stack: Body, wi: Direction) -> Scattered:
@@ -160,7 +165,7 @@ def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) 
         reflected = asked.lobes(reflected)
 
     # Reflect
-    value, density = mixture.eval_pdf(seen.reflected, seen.base, i, o, reflected)
+    value, density = mixture.eval_pdf(seen.reflected, seen.base, i, o, reflected, stack.even)
     if stack.below is None:
         lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
@@ -169,7 +174,7 @@ def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) 
 
     # Transmit, as a reflection in the medium beyond; radiance is squeezed into the cone there
     i_beyond, o_beyond = _beyond(stack, i, seen.eta), _down(o)
-    through, density_through = mixture.eval_pdf([seen.transmitted], None, i_beyond, o_beyond)
+    through, density_through = mixture.eval_pdf([seen.transmitted], None, i_beyond, o_beyond, even=stack.even)
     if symmetric:
         # In the medium below whichever way light goes
         i_below, o_below = _pair_below(stack, wi, wo)
@@ -194,12 +199,12 @@ def sample(
     """
     seen, i = scattered(stack, wi).only(asked), _upright(wi, wi)
     if stack.below is None:
-        return mixture.sample(seen.reflected, seen.base, i, u, u1, u2), 1.0
+        return mixture.sample(seen.reflected, seen.base, i, u, u1, u2, stack.even), 1.0
     passes, u = _way(seen, u, _least(stack))
-    o = mixture.sample(seen.reflected, seen.base, i, u, u1, u2)
+    o = mixture.sample(seen.reflected, seen.base, i, u, u1, u2, stack.even)
     if seen.transmitted is None:
         return _upright(o, wi), 1.0
-    beyond = _down(mixture.sample([seen.transmitted], None, _beyond(stack, i, seen.eta), u, u1, u2))
+    beyond = _down(mixture.sample([seen.transmitted], None, _beyond(stack, i, seen.eta), u, u1, u2, stack.even))
     x, y, z = _chosen_direction(passes, beyond, o)
     # Clamp samples that end up in the wrong hemisphere
     z = ops.select(passes, ops.minimum(z, 0.0), ops.maximum(z, 0.0))
@@ -230,9 +235,10 @@ def component(stack: Body, wi: Direction, u: Value, asked: Asked = Asked(), smoo
     the diffuse base or the transmitted lobe."""
     every = scattered(stack, wi)
     seen, count = every.only(asked), len(every.reflected)
-    passes, u = _way(seen, u, 0.0 if smooth else _least(stack))
+    least, even = (0.0, 0.0) if smooth else (_least(stack), stack.even)
+    passes, u = _way(seen, u, least)
     numbers = [float(k) for k in range(count + (every.base is not None)) if asked.reflects(k)]
-    return ops.select(passes, float(count), mixture.picked(seen.reflected, seen.base, u, numbers))
+    return ops.select(passes, float(count), mixture.picked(seen.reflected, seen.base, u, numbers, even))
 
 
 def _way(seen: Scattered, u: Value, least: float) -> tuple[Value, Value]:

@@ -19,16 +19,27 @@ from velatura.optics.ggx import Direction
 ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
 
 
-def probabilities(lobes: Sequence[Lobe], base: Base | None) -> list[Value]:
-    """Of sampling each lobe, and at last the base: its share of the energy."""
+def probabilities(lobes: Sequence[Lobe], base: Base | None, even: float = 0.0) -> list[Value]:
+    """Of sampling each lobe, and at last the base by the cosine: its share of the energy.
+
+    A share `even` is divided equally among them, whatever their energy, and the cosine takes part without a base, too.
+    """
     parts: list[Lobe | Base] = [*lobes, *([base] if base else [])]
-    energies = [ops.mean(part.energy) + 1e-9 for part in parts]  # the offset decides where none has any
+    energies = [ops.mean(part.energy) for part in parts]
+    if even and not base:
+        energies.append(0.0)
+    energies = [energy + 1e-9 for energy in energies]  # the offset decides where none has any
     total = sum(energies[1:], energies[0]) if energies else 0.0
-    return [energy / total for energy in energies]
+    return [even / len(energies) + (1 - even) * (energy / total) for energy in energies]
 
 
 def eval_pdf(
-    lobes: Sequence[Lobe], base: Base | None, wi: Direction, wo: Direction, lit: Sequence[Lobe] | None = None
+    lobes: Sequence[Lobe],
+    base: Base | None,
+    wi: Direction,
+    wo: Direction,
+    lit: Sequence[Lobe] | None = None,
+    even: float = 0.0,
 ) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface.
 
@@ -37,12 +48,13 @@ def eval_pdf(
     above = (wi[2] > 0) & (wo[2] > 0)
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
     jacobian = 0.25 / ops.maximum(wi[2], ops.TINY)
-    shares = probabilities(lobes, base)
+    shares = probabilities(lobes, base, even)
     value: Value = 0.0
     density: Value = 0.0
+    cos_o = ops.maximum(wo[2], 0.0)
     if base:
-        cos_o = ops.maximum(wo[2], 0.0)
         value = base.value((wo[0], wo[1], cos_o)) * cos_o
+    if base or even:
         density = shares[-1] * cos_o / pi
     for lobe, probability in zip(lobes, shares):
         visible, _ = _visible(lobe.roughness, wi, wo, h)
@@ -53,7 +65,9 @@ def eval_pdf(
     return ops.select(above, value, 0.0), ops.select(above, density, 0.0)
 
 
-def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+def sample(
+    lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1: Value, u2: Value, even: float = 0.0
+) -> Direction:
     """A direction wo from uniform numbers: a lobe by its energy, then a visible normal of it, or the base's cosine.
 
     The direction may lie below the surface, where `eval_pdf` is 0.
@@ -64,7 +78,7 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
     if not lobes:
         return scattered
     # Or pick a lobe: of those that begin below u, the last
-    shares = probabilities(lobes, base)
+    shares = probabilities(lobes, base, even)
     chosen, begin = _bounded(lobes[0].roughness), 0.0
     for lobe, before in zip(lobes[1:], shares):
         begin = begin + before
@@ -73,18 +87,18 @@ def sample(lobes: Sequence[Lobe], base: Base | None, wi: Direction, u: Value, u1
     frame_wi = ggx.rotate(wi, chosen.rotation)
     h = ggx.sample_visible(frame_wi, chosen.alpha_u, chosen.alpha_v, u1, u2)
     wo = ggx.rotate(ggx.reflect(frame_wi, h), -chosen.rotation)
-    if not base:
+    if not base and not even:
         return wo
     from_base = u > 1 - shares[-1]
     x, y, z = (ops.select(from_base, a, b) for a, b in zip(scattered, wo))
     return x, y, z
 
 
-def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence[float]) -> Value:
+def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence[float], even: float = 0.0) -> Value:
     """Of numbers, one for each lobe and for the base, that of the part that `sample` draws from; 0 without parts."""
     chosen: Value = numbers[0] if numbers else 0.0
     begin: Value = 0.0
-    for number, before in zip(numbers[1:], probabilities(lobes, base)):
+    for number, before in zip(numbers[1:], probabilities(lobes, base, even)):
         begin = begin + before
         chosen = ops.select(u > begin, number, chosen)
     return chosen
