@@ -16,8 +16,10 @@ from evaluation import evaluate
 import velatura as vt
 from velatura import ops, tables
 from velatura.errors import InvalidInput
-from velatura.shader import Recording, glsl, record, shader
+from velatura.shader import Recording, record, shader
+from velatura.shader.glsl import GLSL
 from velatura.shader.graph import Graph
+from velatura.shader.statements import statements
 from velatura.shader.symbol import Symbol, colour, component, in_order, number
 from velatura.shader.tape import tape
 
@@ -27,8 +29,8 @@ RGB = np.random.default_rng(2).uniform(0.05, 0.95, (3, 20))
 
 def printed(value: Symbol) -> str:
     """The statements for a value, and the expression that it ends in."""
-    statements, texts = glsl.statements([(value, value.kind)])
-    return "\n".join([*statements, *texts])
+    lines, texts = statements([(value, value.kind)], GLSL)
+    return "\n".join([*lines, *texts])
 
 
 # Symbols

@@ -1,8 +1,10 @@
-"""The tables that a shader reads, as one texture of floats, and the code that reads it."""
+"""The tables that a shader reads, as one texture of floats."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,80 +13,59 @@ from velatura.tables import Table
 
 WIDTH = 1024  # texels
 
-# Loops over corners, where code without them is longer: compilers of shaders take their time for every call again
-HELPERS = f"""\
-vec4 vt_texel(int i) {{
-    return texelFetch(vt_tables, ivec2(i & {WIDTH - 1}, i >> {WIDTH.bit_length() - 1}), 0);
-}}
 
-float vt_float(int i) {{
-    vec4 texel = vt_texel(i >> 2);
-    return texel[i & 3];
-}}
+class Layout(NamedTuple):
+    """Where a table lies: its first texel, and its nodes along each axis, those along the last beside one another.
 
-// One texel of the nodes of a plane, interpolated in single precision, which filters of textures do not have
-vec4 vt_plane(int start, ivec2 nodes, int texels, int texel, vec2 at) {{
-    vec2 position = clamp(at, 0.0, 1.0) * vec2(nodes - 1);
-    ivec2 cell = min(ivec2(position), nodes - 2);
-    vec2 upper = position - vec2(cell);
-    vec4 sum = vec4(0.0);
-    for (int k = 0; k < 4; k++) {{
-        ivec2 corner = ivec2(k >> 1, k & 1), node = cell + corner;
-        vec2 weight = mix(1.0 - upper, upper, vec2(corner));
-        sum += weight.x * weight.y * vt_texel(start + (node.x * nodes.y + node.y) * texels + texel);
-    }}
-    return sum;
-}}
+    A node has as many texels as hold its channels; the nodes of a table with a single channel share texels.
+    """
 
-// The same in space
-vec4 vt_space(int start, ivec3 nodes, int texels, int texel, vec3 at) {{
-    vec3 position = clamp(at, 0.0, 1.0) * vec3(nodes - 1);
-    ivec3 cell = min(ivec3(position), nodes - 2);
-    vec3 upper = position - vec3(cell);
-    vec4 sum = vec4(0.0);
-    for (int k = 0; k < 8; k++) {{
-        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1), node = cell + corner;
-        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
-        int i = ((node.x * nodes.y + node.y) * nodes.z + node.z) * texels + texel;
-        sum += weight.x * weight.y * weight.z * vt_texel(start + i);
-    }}
-    return sum;
-}}
+    name: str
+    start: int
+    nodes: tuple[int, ...]
+    channels: int
 
-// The same for one number a node, four of them in a texel
-float vt_volume(int start, ivec3 nodes, vec3 at) {{
-    vec3 position = clamp(at, 0.0, 1.0) * vec3(nodes - 1);
-    ivec3 cell = min(ivec3(position), nodes - 2);
-    vec3 upper = position - vec3(cell);
-    float sum = 0.0;
-    for (int k = 0; k < 8; k++) {{
-        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1), node = cell + corner;
-        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
-        int i = (node.x * nodes.y + node.y) * nodes.z + node.z;
-        sum += weight.x * weight.y * weight.z * vt_float(4 * start + i);
-    }}
-    return sum;
-}}
-"""
+    @property
+    def texels(self) -> int:
+        """How many texels a node takes, if it has more than one channel."""
+        return -(-self.channels // 4)
+
+    @property
+    def end(self) -> int:
+        """The texel after the last."""
+        count = math.prod(self.nodes)
+        return self.start + (count * self.texels if self.channels > 1 else -(-count // 4))
 
 
-def pack(names: Iterable[str]) -> tuple[np.ndarray, str]:
-    """The texture, float32 of shape (height, WIDTH, 4), and the functions that read each table from it."""
-    parts: list[np.ndarray] = []
-    readers, start = [], 0
+def height(layouts: Sequence[Layout]) -> int:
+    """Lines of the texture."""
+    return -(-layouts[-1].end // WIDTH) if layouts else 1
+
+
+def layouts(names: Collection[str]) -> list[Layout]:
+    """Where each of the tables named lies in their texture."""
+    found: list[Layout] = []
+    start = 0
     for name, table in tables.load().items():
-        if name in set(names):
-            flat = _texels(table)
-            parts.append(flat)
-            readers.append(_reader(name, table, start))
-            start += len(flat)
-    filled = np.concatenate([*parts, np.zeros((-start % WIDTH if parts else WIDTH, 4), np.float32)])
-    return filled.reshape(-1, WIDTH, 4), "".join(readers)
+        if name in names:
+            found.append(Layout(name, start, table.shape, table.data.shape[-1]))
+            start = found[-1].end
+    return found
+
+
+def texture(names: Collection[str]) -> np.ndarray:
+    """The texture of the tables named, float32 of shape (height, WIDTH, 4); a line of zeros for none."""
+    placed = layouts(names)
+    filled = np.zeros((height(placed) * WIDTH, 4), np.float32)
+    for layout in placed:
+        filled[layout.start : layout.end] = _texels(getattr(tables.load(), layout.name))
+    return filled.reshape(-1, WIDTH, 4)
 
 
 def texels(name: str) -> int:
     """How many texels a node of a table takes, if it has more than one channel."""
-    return (getattr(tables.load(), name).data.shape[-1] + 3) // 4
+    (layout,) = layouts([name])
+    return layout.texels
 
 
 def _texels(table: Table) -> np.ndarray:
@@ -94,33 +75,3 @@ def _texels(table: Table) -> np.ndarray:
     if channels == 1:
         return np.pad(flat.ravel(), (0, -len(flat) % 4)).reshape(-1, 4)
     return np.pad(flat, ((0, 0), (0, -channels % 4))).reshape(-1, 4)
-
-
-def _reader(name: str, table: Table, start: int) -> str:
-    """A function of the coordinates; it loops over texels, which compiles faster than reading them one by one."""
-    nodes, channels, count = table.shape, table.data.shape[-1], texels(name)
-    axes = "xyz"[: len(nodes)]
-    size, at = f"ivec{len(nodes)}({', '.join(map(str, nodes))})", f"vec{len(nodes)}({', '.join(axes)})"
-    arguments = ", ".join(f"float {axis}" for axis in axes)
-    if channels == 1:
-        colours = arguments.replace("float", "vec3")
-        each = ", ".join(f"{axis}[c]" for axis in axes)
-        lines = [
-            f"float vt_{name}({arguments}) {{",
-            f"    return vt_volume({start}, {size}, {at});",
-            "}",
-            f"vec3 vt_{name}({colours}) {{",
-            "    vec3 colour;",
-            f"    for (int c = 0; c < 3; c++) colour[c] = vt_{name}({each});",
-            "    return colour;",
-        ]
-    else:
-        read = f"vt_{'plane' if len(nodes) == 2 else 'space'}({start}, {size}, {count}, i, {at})"
-        lines = [
-            f"vec4[{count}] vt_{name}({arguments}) {{",
-            f"    vec4 texels[{count}];",
-            f"    for (int i = 0; i < {count}; i++) texels[i] = {read};",
-            "    return texels;",
-        ]
-    described = f"{' x '.join(map(str, nodes))} nodes, {channels} channel{'s' * (channels > 1)}"
-    return "\n".join(["", f"// {described}", *lines, "}", ""])

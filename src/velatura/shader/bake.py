@@ -21,7 +21,6 @@ from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid
-from velatura.shader import glsl
 from velatura.shader.symbol import Operand, Symbol, component, number, operand
 from velatura.shader.tape import Tape, tape
 from velatura.stack import Material
@@ -66,49 +65,6 @@ class Bake:
     def to_dict(self) -> dict[str, Any]:
         """Input of the interpreter, in JSON's types: the tape, its tables, and the nodes and sides."""
         return {**vars(self.tape), "tables": self.tape.tables, "nodes": self.nodes, "sides": self.sides}
-
-    def reading(self) -> str:
-        """The sampler, and functions that read each group."""
-        return "".join([_READING[len(self.nodes)].format(*self.nodes, sides=self.sides), *map(_reader, self.groups)])
-
-
-_READING = {
-    1: """\
-// The lobes over direction: RGBA32F, never filtered
-uniform highp sampler2D vt_baked;
-
-vec4 vt_baked_texel(int texel, vec3 place) {{
-    float position = clamp(place.x, 0.0, 1.0) * float({0} - 1);
-    int node = min(int(position), {0} - 2), line = {sides} * texel + int(place.z);
-    vec4 a = texelFetch(vt_baked, ivec2(node, line), 0), b = texelFetch(vt_baked, ivec2(node + 1, line), 0);
-    return mix(a, b, position - float(node));
-}}
-""",
-    2: """\
-// The lobes over direction: RGBA32F, never filtered
-uniform highp sampler2D vt_baked;
-
-vec4 vt_baked_texel(int texel, vec3 place) {{
-    vec2 position = clamp(place.xy, 0.0, 1.0) * vec2({0} - 1, {1} - 1);
-    ivec2 node = min(ivec2(position), ivec2({0}, {1}) - 2);
-    vec2 upper = position - vec2(node);
-    int line = ({sides} * texel + int(place.z)) * {1} + node.y;
-    vec4 a = texelFetch(vt_baked, ivec2(node.x, line), 0), b = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
-    line++;
-    vec4 c = texelFetch(vt_baked, ivec2(node.x, line), 0), d = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
-    return mix(mix(a, b, upper.x), mix(c, d, upper.x), upper.y);
-}}
-""",
-}
-
-
-def _reader(group: Group) -> str:
-    lines = [
-        f"vec4 texels[{group.texels}];",
-        f"for (int i = 0; i < {group.texels}; i++) texels[i] = vt_baked_texel({group.begin} + i, place);",
-        "return texels;",
-    ]
-    return "\n" + glsl.block(f"vec4[{group.texels}] vt_baked_{group.name}(vec3 place)", lines)
 
 
 def bake(material: Material, body: bsdf.Body) -> Bake:

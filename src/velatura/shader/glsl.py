@@ -1,23 +1,350 @@
-"""Recorded values as statements of GLSL ES 3.00."""
+"""GLSL ES 3.00."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from itertools import chain, count
+from collections.abc import Mapping, Sequence
+from math import inf
 
 import numpy as np
 
-from velatura.shader import atlas
-from velatura.shader.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
+from velatura.shader.atlas import WIDTH, Layout, height
+from velatura.shader.bake import Bake, Group
+from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
+from velatura.shader.printer import CHOICE, Output, Printer, Struct
+from velatura.shader.recording import SHOWN
+from velatura.shader.statements import statements
+from velatura.shader.symbol import Kind, Operand, Symbol
 
-TYPES: dict[Kind, str] = {
-    "number": "float",
-    "colour": "vec3",
-    "condition": "bool",
-    "conditions": "bvec3",
+_TYPES: dict[str, str] = {"number": "float", "colour": "vec3", "condition": "bool", "conditions": "bvec3"}
+_COMPARE = {"less": "lessThan", "greater": "greaterThan", "at_most": "lessThanEqual", "at_least": "greaterThanEqual"}
+_FUNCTIONS = {
+    "exp": "exp",
+    "log": "log",
+    "sin": "vt_sin",
+    "cos": "vt_cos",
+    "sqrt": "vt_sqrt",
+    "absolute": "abs",
+    "mean": "vt_mean",
+    "power": "pow",
+    "arctan2": "atan",
+    "minimum": "min",
+    "maximum": "max",
+    "clip": "clamp",
 }
-HELPERS = """\
+_OPERATORS = {  # with how strongly they bind
+    "add": ("+", 5),
+    "subtract": ("-", 5),
+    "multiply": ("*", 6),
+    "divide": ("/", 6),
+    "less": ("<", 3),
+    "greater": (">", 3),
+    "at_most": ("<=", 3),
+    "at_least": (">=", 3),
+    "both": ("&&", 2),
+}
+# Words of the language, and functions that statements call
+_WORDS = """
+    abs acos active all any asin asm atan attribute break case cast class clamp coherent common const continue cos
+    cross default degrees discard distance do dot else enum exp extern external false far filter fixed flat float
+    floor for fract goto greaterThan greaterThanEqual half highp if in inline inout input int interface invariant
+    layout length lessThan lessThanEqual log long lowp main max mediump min mix mod namespace near noinline noise
+    normalize not out output partition patch place pow precision public radians reflect refract resource return row
+    sample sampler short sign sin sizeof smooth sqrt static step struct superp switch tan template texel texels
+    texture this true typedef uniform union unsigned using varying void volatile while
+"""
+
+
+class Glsl(Printer):
+    """GLSL ES 3.00, which WebGL 2 reads."""
+
+    words = frozenset(_WORDS.split())
+    functions = _FUNCTIONS
+    operators = _OPERATORS
+
+    # Values
+
+    def literal(self, x: Operand) -> str:
+        if isinstance(x, tuple):
+            return self.colour([self.literal(channel) for channel in x])
+        if isinstance(x, bool):
+            return "true" if x else "false"
+        assert not isinstance(x, Symbol)
+        text = str(np.float32(x))
+        return text if "." in text or "e" in text else f"{text}.0"
+
+    def colour(self, channels: Sequence[str]) -> str:
+        return f"vec3({', '.join(channels)})"
+
+    def component(self, x: str, channel: int, kind: Kind) -> str:
+        texel, channel = divmod(channel, 4)
+        return f"{x}{f'[{texel}]' if kind == 'texels' else ''}.{'rgba'[channel]}"
+
+    def each_channel(self, op: str, a: str, b: str) -> str:
+        return f"vt_both(bvec3({a}), bvec3({b}))" if op == "both" else f"{_COMPARE[op]}({a}, {b})"
+
+    def select(self, condition: str, a: str, b: str) -> tuple[str, int]:
+        return f"{condition} ? {a} : {b}", CHOICE
+
+    def select_channels(self, conditions: str, a: str, b: str) -> str:
+        return f"mix({b}, {a}, {conditions})"
+
+    def value(self, table: str, args: Sequence[str], wide: bool) -> str:
+        return f"vt_{table}({', '.join(args)})"
+
+    # Statements
+
+    def title(self, text: str) -> str:
+        return f"// {text}"
+
+    def named(self, name: str, kind: Kind, text: str) -> str:
+        return f"{_TYPES[kind]} {name} = {text};"
+
+    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+        return [f"vec4[{count}] {name} = vt_{table}({', '.join(args)});"]
+
+    def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
+        return [f"vec4[{group.texels}] {name} = vt_baked_{group.name}({self.colour(place)});"]
+
+    def nodes(self, name: str, nodes: Sequence[float]) -> list[str]:
+        listed = f"float[{len(nodes)}]({', '.join(map(self.literal, nodes))})"
+        return [f"const float {name}[{len(nodes)}] = {listed};"]
+
+    def results(self, name: str, kind: Kind, count: int) -> list[str]:
+        return [f"{_TYPES[kind]} {name}[{count}];"]
+
+    def state(self, name: str, following: str, kind: Kind, begin: Sequence[str]) -> list[str]:
+        array = f"{_TYPES[kind]}[{len(begin)}]"
+        return [f"{_TYPES[kind]} {name}[{len(begin)}] = {array}({', '.join(begin)}), {following}[{len(begin)}];"]
+
+    def loop(self, index: str, times: int, lines: Sequence[str]) -> list[str]:
+        return _block(f"for (int {index} = 0; {index} < {times}; {index}++)", lines)
+
+    def store(self, array: str, place: str, text: str) -> str:
+        return f"{array}[{place}] = {text};"
+
+    def advance(self, name: str, following: str) -> str:
+        return f"{name} = {following};"
+
+    # Programs
+
+    def header(self, name: str, model: str) -> str:
+        return _HEADER.format(name=name, model=model)
+
+    def structs(self, structs: Sequence[Struct]) -> str:
+        def member(name: str, kind: str, count: int) -> str:
+            return f"    {_TYPES.get(kind, kind)} {name}{f'[{count}]' if count else ''};"
+
+        return "".join(
+            "\n".join([f"struct {struct.name} {{ // {struct.comment}", *(member(*x) for x in struct.fields), "};", ""])
+            for struct in structs
+        )
+
+    def parameters(self, shown: int) -> str:
+        return f"uniform VtMaterial {PARAMETERS};\n\nuniform float {SHOWN}[{shown}];\n"
+
+    def material(self, filled: Filled) -> str:
+        samplers = [
+            f"uniform sampler2D {name}; // {image.texture}{', to be decoded from sRGB' * (image.encoding == 'srgb')}\n"
+            for name, image in filled.samplers.items()
+        ]
+        begin = f"VtMaterial m = {PARAMETERS};" if filled.parameters else "VtMaterial m;"
+        lines = [f"m.{entry.place} = {self._entry(entry)};" for entry in filled.entries]
+        return "".join([*samplers, _function("VtMaterial vt_material(vec2 uv)", [begin, *lines, "return m;"])])
+
+    def _entry(self, entry: Entry) -> str:
+        value, literal = entry.value, self.literal
+        if isinstance(value, Brushed):
+            centre = f"uv.y - {literal(value.v)}, uv.x - {literal(value.u)}"
+            return f"degrees(atan({centre})) + {literal(value.offset)}"
+        if not isinstance(value, Mapped):
+            return literal(value) if isinstance(value, tuple) or not entry.wide else self.colour([literal(value)])
+        texel = f"texture({value.sampler}, uv).{value.channel} * {literal(value.scale)} + {literal(value.offset)}"
+        low, high = literal(max(value.low, -1e6)), literal(value.high)
+        bounded = f"max({texel}, {low})" if value.high == inf else f"clamp({texel}, {low}, {high})"
+        return self.colour([bounded]) if entry.wide and value.channel != "rgb" else bounded
+
+    def tables(self, layouts: Sequence[Layout]) -> str:
+        return "\n".join([_TABLES.format(WIDTH, height(layouts)), _TEXELS + "".join(map(_table, layouts))])
+
+    def lookup(self, bake: Bake) -> str:
+        texel = _BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides)
+        return "".join([texel, *map(_group, bake.groups)])
+
+    def helpers(self) -> str:
+        return _HELPERS
+
+    def lobes(self, outputs: Mapping[str, Output]) -> str:
+        lines, texts = statements(list(outputs.values()), self)
+        assigned = [f"l.{name} = {text};" for name, text in zip(outputs, texts)]
+        return _function("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [*lines, "", "VtLobes l;", *assigned, "return l;"])
+
+    def eval_pdf(self, value: Output, density: Output) -> str:
+        lines, texts = statements([value, density], self)
+        head = "vec4 vt_eval_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo)"
+        return "\n".join([_function(head, [*lines, f"return vec4({', '.join(texts)});"]), _WRAPPERS])
+
+    def sample(self, drawn: Sequence[Output]) -> str:
+        lines, texts = statements(drawn, self)
+        head = "vec3 vt_sample(VtMaterial m, VtLobes l, vec3 wi, vec3 u)"
+        return _function(head, [*lines, f"return {self.colour(texts)};"])
+
+
+#: The language that shaders are printed in by default.
+GLSL = Glsl()
+
+
+def _block(head: str, lines: Sequence[str]) -> list[str]:
+    return [f"{head} {{", *(f"    {line}".rstrip() for line in lines), "}"]
+
+
+def _function(head: str, lines: Sequence[str]) -> str:
+    return "\n".join([*_block(head, lines), ""])
+
+
+def _group(group: Group) -> str:
+    lines = [
+        f"vec4 texels[{group.texels}];",
+        f"for (int i = 0; i < {group.texels}; i++) texels[i] = vt_baked_texel({group.begin} + i, place);",
+        "return texels;",
+    ]
+    return "\n" + _function(f"vec4[{group.texels}] vt_baked_{group.name}(vec3 place)", lines)
+
+
+def _table(layout: Layout) -> str:
+    """A function of the coordinates; it loops over texels, which compiles faster than reading them one by one."""
+    name, start, nodes, channels = layout
+    axes = "xyz"[: len(nodes)]
+    size, at = f"ivec{len(nodes)}({', '.join(map(str, nodes))})", f"vec{len(nodes)}({', '.join(axes)})"
+    arguments = ", ".join(f"float {axis}" for axis in axes)
+    described = f"\n// {' x '.join(map(str, nodes))} nodes, {channels} channel{'s' * (channels > 1)}\n"
+    if channels == 1:
+        each = f"vt_{name}({', '.join(f'{axis}[c]' for axis in axes)})"
+        lines = ["vec3 colour;", f"for (int c = 0; c < 3; c++) colour[c] = {each};", "return colour;"]
+        single = _function(f"float vt_{name}({arguments})", [f"return vt_volume({start}, {size}, {at});"])
+        return described + single + _function(f"vec3 vt_{name}({arguments.replace('float', 'vec3')})", lines)
+    count = layout.texels
+    read = f"vt_{'plane' if len(nodes) == 2 else 'space'}({start}, {size}, {count}, i, {at})"
+    lines = [f"vec4 texels[{count}];", f"for (int i = 0; i < {count}; i++) texels[i] = {read};", "return texels;"]
+    return described + _function(f"vec4[{count}] vt_{name}({arguments})", lines)
+
+
+_HEADER = """\
+// {name} as the model {model} has it; GLSL ES 3.00, written by Velatura.
+//
+//     VtMaterial m = vt_material(uv);        // or from uniforms, or your own textures
+//     VtLobes l = vt_lobes(m, wi);           // once for a direction of view
+//     vec4 f = vt_eval_pdf(m, l, wi, wo);    // f(wi, wo) |cos theta_o|, and the density of vt_sample
+//     vec3 wo = vt_sample(m, l, wi, u);      // from three uniform numbers; f may be 0 there
+//
+// Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
+
+precision highp float;
+precision highp int;
+"""
+
+_WRAPPERS = """\
+// f(wi, wo) |cos theta_o|
+vec3 vt_eval(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
+    return vt_eval_pdf(m, l, wi, wo).rgb;
+}
+
+// Density of vt_sample, per solid angle
+float vt_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
+    return vt_eval_pdf(m, l, wi, wo).a;
+}
+"""
+
+_TABLES = """\
+// Averages of Fresnel over rough interfaces: RGBA32F, {} x {} texels, never filtered.
+// `velatura export -o` writes them beside this text, row by row.
+uniform highp sampler2D vt_tables;
+"""
+
+_TEXELS = f"""\
+vec4 vt_texel(int i) {{
+    return texelFetch(vt_tables, ivec2(i & {WIDTH - 1}, i >> {WIDTH.bit_length() - 1}), 0);
+}}
+
+float vt_float(int i) {{
+    vec4 texel = vt_texel(i >> 2);
+    return texel[i & 3];
+}}
+
+// One texel of the nodes of a plane, interpolated in single precision, which filters of textures do not have
+vec4 vt_plane(int start, ivec2 nodes, int texels, int texel, vec2 at) {{
+    vec2 position = clamp(at, 0.0, 1.0) * vec2(nodes - 1);
+    ivec2 cell = min(ivec2(position), nodes - 2);
+    vec2 upper = position - vec2(cell);
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < 4; k++) {{
+        ivec2 corner = ivec2(k >> 1, k & 1), node = cell + corner;
+        vec2 weight = mix(1.0 - upper, upper, vec2(corner));
+        sum += weight.x * weight.y * vt_texel(start + (node.x * nodes.y + node.y) * texels + texel);
+    }}
+    return sum;
+}}
+
+// The same in space
+vec4 vt_space(int start, ivec3 nodes, int texels, int texel, vec3 at) {{
+    vec3 position = clamp(at, 0.0, 1.0) * vec3(nodes - 1);
+    ivec3 cell = min(ivec3(position), nodes - 2);
+    vec3 upper = position - vec3(cell);
+    vec4 sum = vec4(0.0);
+    for (int k = 0; k < 8; k++) {{
+        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1), node = cell + corner;
+        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
+        int i = ((node.x * nodes.y + node.y) * nodes.z + node.z) * texels + texel;
+        sum += weight.x * weight.y * weight.z * vt_texel(start + i);
+    }}
+    return sum;
+}}
+
+// The same for one number a node, four of them in a texel
+float vt_volume(int start, ivec3 nodes, vec3 at) {{
+    vec3 position = clamp(at, 0.0, 1.0) * vec3(nodes - 1);
+    ivec3 cell = min(ivec3(position), nodes - 2);
+    vec3 upper = position - vec3(cell);
+    float sum = 0.0;
+    for (int k = 0; k < 8; k++) {{
+        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1), node = cell + corner;
+        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
+        int i = (node.x * nodes.y + node.y) * nodes.z + node.z;
+        sum += weight.x * weight.y * weight.z * vt_float(4 * start + i);
+    }}
+    return sum;
+}}
+"""
+
+_BAKED = {
+    1: """\
+// The lobes over direction: RGBA32F, never filtered
+uniform highp sampler2D vt_baked;
+
+vec4 vt_baked_texel(int texel, vec3 place) {{
+    float position = clamp(place.x, 0.0, 1.0) * float({0} - 1);
+    int node = min(int(position), {0} - 2), line = {sides} * texel + int(place.z);
+    vec4 a = texelFetch(vt_baked, ivec2(node, line), 0), b = texelFetch(vt_baked, ivec2(node + 1, line), 0);
+    return mix(a, b, position - float(node));
+}}
+""",
+    2: """\
+// The lobes over direction: RGBA32F, never filtered
+uniform highp sampler2D vt_baked;
+
+vec4 vt_baked_texel(int texel, vec3 place) {{
+    vec2 position = clamp(place.xy, 0.0, 1.0) * vec2({0} - 1, {1} - 1);
+    ivec2 node = min(ivec2(position), ivec2({0}, {1}) - 2);
+    vec2 upper = position - vec2(node);
+    int line = ({sides} * texel + int(place.z)) * {1} + node.y;
+    vec4 a = texelFetch(vt_baked, ivec2(node.x, line), 0), b = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
+    line++;
+    vec4 c = texelFetch(vt_baked, ivec2(node.x, line), 0), d = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
+    return mix(mix(a, b, upper.x), mix(c, d, upper.x), upper.y);
+}}
+""",
+}
+
+_HELPERS = """\
 float vt_sqrt(float x) { return sqrt(max(x, 0.0)); }
 vec3 vt_sqrt(vec3 x) { return sqrt(max(x, 0.0)); }
 float vt_mean(vec3 x) { return (x.r + x.g + x.b) / 3.0; }
@@ -35,208 +362,3 @@ float vt_cos(float x) { return vt_sin(x + 1.57079633); }
 
 bvec3 vt_both(bvec3 a, bvec3 b) { return bvec3(a.x && b.x, a.y && b.y, a.z && b.z); }
 """
-
-_LONG = 72  # characters of an expression that gets a name of its own
-_FUNCTIONS = {
-    "exp": "exp",
-    "log": "log",
-    "sin": "vt_sin",
-    "cos": "vt_cos",
-    "sqrt": "vt_sqrt",
-    "absolute": "abs",
-    "mean": "vt_mean",
-}
-_TWO = {"power": "pow", "arctan2": "atan", "minimum": "min", "maximum": "max"}
-_OPERATORS = {  # with their precedence
-    "add": ("+", 5),
-    "subtract": ("-", 5),
-    "multiply": ("*", 6),
-    "divide": ("/", 6),
-    "less": ("<", 3),
-    "greater": (">", 3),
-    "at_most": ("<=", 3),
-    "at_least": (">=", 3),
-    "both": ("&&", 2),
-}
-_COMPARE = {"less": "lessThan", "greater": "greaterThan", "at_most": "lessThanEqual", "at_least": "greaterThanEqual"}
-_ATOM, _NEGATIVE, _CHOICE = 9, 7, 1
-# Words of the language, functions that statements call, and the arguments
-_WORDS = """
-    abs acos active all any asin asm atan attribute break case cast class clamp coherent common const continue cos cross
-    default degrees discard distance do dot else enum exp extern external false far filter fixed flat float floor for
-    fract goto greaterThan greaterThanEqual half highp if in inline inout input int interface invariant l layout length
-    lessThan lessThanEqual log long lowp m main max mediump min mix mod namespace near noinline noise normalize not out
-    output partition patch place pow precision public radians reflect refract resource return row sample sampler short
-    sign sin sizeof smooth sqrt static step struct superp switch tan template texel texels texture this true typedef u
-    uniform union unsigned using varying void volatile wi while wo
-"""
-
-
-def statements(outputs: Sequence[tuple[Operand, Kind]]) -> tuple[list[str], list[str]]:
-    """Lines that work out the outputs, and an expression for each, of the kind given."""
-    written = _Statements([value for value, _ in outputs])
-    return written.lines, [written.of(value, wide=kind == "colour") for value, kind in outputs]
-
-
-def _type(symbol: Symbol) -> str:
-    if symbol.kind == "texels":
-        return f"vec4[{symbol.detail.texels if symbol.op == 'baked' else atlas.texels(symbol.detail)}]"
-    return TYPES[symbol.kind]
-
-
-def literal(x: Operand) -> str:
-    """A constant."""
-    if isinstance(x, tuple):
-        return f"vec3({', '.join(literal(channel) for channel in x)})"
-    if isinstance(x, bool):
-        return "true" if x else "false"
-    assert not isinstance(x, Symbol)
-    text = str(np.float32(x))
-    return text if "." in text or "e" in text else f"{text}.0"
-
-
-def block(head: str, lines: Sequence[str]) -> str:
-    """A function or struct with its lines."""
-    return "\n".join([f"{head} {{", *(f"    {line}".rstrip() for line in lines), "}", ""])
-
-
-class _Statements:
-    """Names for values that are used more than once, that the model names, or that are long."""
-
-    def __init__(self, outputs: Sequence[Operand]) -> None:
-        order = in_order(outputs)
-        self.uses = Counter(x for symbol in order for x in symbol.args if isinstance(x, Symbol))
-        self.uses.update(x for x in outputs if isinstance(x, Symbol))
-        self.inside = inside(order)
-        self.open: frozenset[str] = frozenset()  # what is bound where we are
-        self.text: dict[Symbol, tuple[str, int]] = {}
-        self.taken = set(_WORDS.split())
-        self.lines: list[str] = []
-        self._write([symbol for symbol in order if not self.inside[symbol]])
-
-    def _write(self, order: Sequence[Symbol]) -> None:
-        title = ""
-        for symbol in order:
-            text, precedence = ("", _ATOM) if symbol.kind == "loop" else self._expression(symbol)
-            if symbol.kind != "loop" and self._inline(symbol, text):
-                self.text[symbol] = text, precedence
-                continue
-            if symbol.title != title:
-                title = symbol.title
-                self.lines += ["", *([f"// {title}"] if title else [])]
-            name = self._name(symbol)
-            if symbol.kind == "loop":
-                self._loop(symbol, name)
-            else:
-                self.lines.append(f"{_type(symbol)} {name} = {text};")
-            self.text[symbol] = name, _ATOM
-
-    def _loop(self, symbol: Symbol, name: str) -> None:
-        """A loop that fills an array, or goes from one state to the next."""
-        bound, nodes, times = symbol.detail
-        count = len(symbol.args) - (0 if nodes else len(bound))
-        results, wide = symbol.args[-count:], any(is_colour(x) for x in symbol.args)
-        kind, index = "vec3" if wide else "float", self._free("i")
-        if nodes:
-            values = self._free("nodes")
-            listed = f"float[{times}]({', '.join(map(literal, nodes))})"
-            self.lines += [f"const float {values}[{times}] = {listed};", f"{kind} {name}[{count * times}];"]
-        else:
-            begin = ", ".join(self.of(x, wide=wide) for x in symbol.args[:count])
-            self.lines += [f"{kind} {name}[{count}] = {kind}[{count}]({begin}), {name}_next[{count}];"]
-        self.lines.append(f"for (int {index} = 0; {index} < {times}; {index}++) {{")
-
-        # Write what depends on what is bound
-        before, self.lines = self.lines, []
-        outside, self.open = self.open, self.open | set(bound)
-        body = [x for x in in_order(results) if set(bound) & self.inside[x] and self.inside[x] <= self.open]
-        for x in body:
-            if x.op == "bound":
-                self.text[x] = f"{values}[{index}]" if nodes else f"{name}[{bound.index(x.detail)}]", _ATOM
-        self._write([x for x in body if x.op != "bound"])
-        place = f"{count} * {index} + " if nodes and count > 1 else ""
-        for k, result in enumerate(results):
-            at = (f"{place}{k}" if count > 1 else index) if nodes else str(k)
-            self.lines.append(f"{name}{'' if nodes else '_next'}[{at}] = {self.of(result, wide=wide)};")
-        if not nodes:
-            self.lines.append(f"{name} = {name}_next;")
-        for x in body:
-            del self.text[x]
-        self.open = outside
-        self.lines = [*before, *(f"    {line}".rstrip() for line in self.lines), "}"]
-
-    def of(self, x: Operand, least: int = 0, wide: bool = False) -> str:
-        """An argument, in parentheses where it binds less than `least`; a number made a colour where it is `wide`."""
-        if not isinstance(x, Symbol):
-            text, precedence = literal(x), _NEGATIVE if isinstance(x, float) and x < 0 else _ATOM
-        else:
-            text, precedence = self.text[x]
-        if wide and not is_colour(x):
-            return f"vec3({text})"
-        return f"({text})" if precedence < least else text
-
-    def _inline(self, symbol: Symbol, text: str) -> bool:
-        if symbol.op in ("input", "component", "item") and len(text) < _LONG:
-            return True
-        return self.uses[symbol] == 1 and not symbol.name and symbol.kind != "texels" and len(text) < _LONG
-
-    def _name(self, symbol: Symbol) -> str:
-        if symbol.kind == "texels":
-            return self._free(symbol.detail.name if symbol.op == "baked" else symbol.detail)
-        return self._free(symbol.name.strip("_").replace("__", "_") or "value")
-
-    def _free(self, name: str) -> str:
-        """The name, or with a number where it is taken."""
-        free = (x for x in chain([name], (f"{name}_{n}" for n in count(2))) if x not in self.taken)
-        self.taken.add(chosen := next(free))
-        return chosen
-
-    def _expression(self, symbol: Symbol) -> tuple[str, int]:
-        """The text, and how strongly its last operator binds."""
-        op, args, wide = symbol.op, symbol.args, any(is_colour(x) for x in symbol.args)
-        if op == "input":
-            return symbol.detail, _ATOM
-        if op in ("texels", "value"):
-            return f"vt_{symbol.detail}({', '.join(self.of(x, wide=wide) for x in args)})", _ATOM
-        if op == "baked":
-            return f"vt_baked_{symbol.detail.name}(vec3({', '.join(map(self.of, args))}))", _ATOM
-        if op == "item":
-            return f"{self.of(args[0], _ATOM)}[{symbol.detail}]", _ATOM
-        if op == "component":
-            texel, channel = divmod(symbol.detail, 4)
-            of_texels = isinstance(args[0], Symbol) and args[0].kind == "texels"
-            return f"{self.of(args[0], _ATOM)}{f'[{texel}]' if of_texels else ''}.{'rgba'[channel]}", _ATOM
-        if op == "colour":
-            return f"vec3({', '.join(map(self.of, args))})", _ATOM
-        if op == "negative":
-            return f"-{self.of(args[0], _ATOM)}", _NEGATIVE
-        if op == "select":
-            return self._selected(symbol)
-        if op in _FUNCTIONS:
-            return f"{_FUNCTIONS[op]}({self.of(args[0])})", _ATOM
-        if op == "minimum" and self._clamps(symbol):
-            assert isinstance(args[0], Symbol)
-            return f"clamp({', '.join(map(self.of, (*args[0].args, args[1])))})", _ATOM
-        if op in _TWO:
-            return f"{_TWO[op]}({', '.join(self.of(x, wide=wide) for x in args)})", _ATOM
-        if wide and op == "both":
-            return f"vt_both({', '.join(f'bvec3({self.of(x)})' for x in args)})", _ATOM
-        if wide and op in _COMPARE:
-            return f"{_COMPARE[op]}({', '.join(self.of(x, wide=True) for x in args)})", _ATOM
-        sign, precedence = _OPERATORS[op]
-        return f"{self.of(args[0], precedence)} {sign} {self.of(args[1], precedence + 1)}", precedence
-
-    def _clamps(self, symbol: Symbol) -> bool:
-        """Whether it keeps a value that nothing else uses between two constants."""
-        inner, high = symbol.args
-        if not isinstance(inner, Symbol) or inner.op != "maximum" or self.uses[inner] > 1 or inner.name:
-            return False
-        x, low = inner.args
-        return isinstance(x, Symbol) and isinstance(low, float) and isinstance(high, float)
-
-    def _selected(self, symbol: Symbol) -> tuple[str, int]:
-        condition, a, b = symbol.args
-        wide = symbol.kind == "colour"
-        if is_colour(condition):
-            return f"mix({self.of(b, wide=True)}, {self.of(a, wide=True)}, {self.of(condition)})", _ATOM
-        return f"{self.of(condition, 2)} ? {self.of(a, wide=wide)} : {self.of(b, wide=wide)}", _CHOICE

@@ -12,16 +12,17 @@ import numpy as np
 
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.lobe_merging import merging
-from velatura.shader import atlas, glsl, material
+from velatura.shader import atlas, material
 from velatura.shader.bake import Bake
-from velatura.shader.recording import SHOWN, Recording, part, record
-from velatura.shader.symbol import Kind, Operand, Symbol
+from velatura.shader.glsl import GLSL
+from velatura.shader.printer import Field, Printer, Struct
+from velatura.shader.recording import Recording, part, record
 from velatura.stack import MaterialLike, Texture, load
 
 
 @dataclass(frozen=True)
 class Shader:
-    """GLSL ES 3.00, the texture of tables that it reads (float32, shape (height, width, 4)), and its uniforms.
+    """The code, the names of the tables that it looks up, and its uniforms.
 
     `uniforms` are the values that the struct of the material holds, or that `baked` reads: flat names (`layer0_eta`)
     and where they lie in the struct (`layer0.eta`). `maps` are the textures of the material by sampler.
@@ -32,12 +33,17 @@ class Shader:
     """
 
     text: str
-    tables: np.ndarray
+    looked_up: Sequence[str]
     uniforms: Mapping[str, str]
     maps: Mapping[str, Texture]
     lobes: Sequence[Sequence[int]]
     shown: Sequence[str]
     baked: Bake | None
+
+    @property
+    def tables(self) -> np.ndarray:
+        """The texture of the tables that are looked up, float32 of shape (height, width, 4)."""
+        return atlas.texture(self.looked_up)
 
     @cached_property
     def key(self) -> str:
@@ -51,9 +57,10 @@ def shader(
     model: str | Model = DEFAULT,
     constant: Collection[str] = (),
     values: Literal["literals", "uniforms"] = "literals",
+    printer: Printer = GLSL,
     **switches: str,
 ) -> Shader:
-    """A material as GLSL ES 3.00: the structs `VtMaterial` and `VtLobes`, and functions on them.
+    """A material as shader code: the structs `VtMaterial` and `VtLobes`, and functions on them.
 
     Args:
         stack: a material (a stack, a file, or a preset's name). Its kinds of layers make the code; its values go into
@@ -61,98 +68,45 @@ def shader(
         constant: flat names of values that never change, which are worked out now and are not in the struct.
         values: plain values as `literals`, or as `uniforms` that a user changes; then the code is the same for all
             of them, be roughnesses equal or not, and lobes are drawn once for a change, and read.
+        printer: the language; GLSL ES 3.00 by default.
 
     Raises:
         InvalidInput: as `record`.
     """
     stack = load(stack)
     recording = record(stack, model, constant, values == "uniforms", **switches)
-    baked, read = recording.baked, recording.read
-    texture, tables = _tables(recording.symbols)
-    name = "A material" if recording.shown else " ".join(stack.name.split()) or "A material"
-    structs = material.structs(stack, list(read))
-    parameters = f"uniform VtMaterial {material.PARAMETERS};\n"
+    baked, read, shown = recording.baked, list(recording.read), recording.shown
+    looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
+    layouts, filled = atlas.layouts(looked_up), material.filled(stack, read, bool(shown))
+    name = "A material" if shown else " ".join(stack.name.split()) or "A material"
     parts = [
-        _HEADER.format(name=name, model=_described(recording.model)) + _PRECISION,
-        structs,
-        *([parameters, f"uniform float {SHOWN}[{len(recording.shown)}];\n"] if recording.shown else []),
-        material.filled(stack, list(read), bool(recording.shown)),
-        _lobes_struct(recording),
-        *tables,
-        *([baked.reading()] if baked else []),
-        glsl.HELPERS,
-        _lobes(recording),
-        _function(
-            "vec4 vt_eval_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo)",
-            [(recording.value, "colour"), (recording.density, "number")],
-            "vec4({}, {})",
-        ),
-        _WRAPPERS,
-        _function(
-            "vec3 vt_sample(VtMaterial m, VtLobes l, vec3 wi, vec3 u)",
-            [(w, "number") for w in recording.drawn],
-            "vec3({}, {}, {})",
-        ),
+        printer.header(name, _described(recording.model)),
+        printer.structs(material.structs(stack, read)),
+        *([printer.parameters(len(shown))] if shown else []),
+        printer.material(filled),
+        printer.structs(_structs(recording)),
+        *([printer.tables(layouts)] if layouts else []),
+        *([printer.lookup(baked)] if baked else []),
+        printer.helpers(),
+        printer.lobes({name: (value, recording.kinds[name]) for name, value in recording.lobes.items()}),
+        printer.eval_pdf((recording.value, "colour"), (recording.density, "number")),
+        printer.sample([(w, "number") for w in recording.drawn]),
     ]
     return Shader(
         text="\n".join(parts),
-        tables=texture,
+        looked_up=[layout.name for layout in layouts],
         uniforms=recording.parameters,
-        maps={sampler: image for image, sampler in material.maps(stack, list(read)).items()},
+        maps=filled.samplers,
         lobes=_interfaces(recording),
-        shown=recording.shown,
+        shown=shown,
         baked=baked,
     )
-
-
-def _tables(symbols: Sequence[Symbol]) -> tuple[np.ndarray, list[str]]:
-    """The texture of tables, and what declares and reads it."""
-    looked_up = {symbol.detail for symbol in symbols if symbol.op in ("texels", "value")}
-    texture, readers = atlas.pack(looked_up)
-    return texture, [_TABLES.format(*texture.shape[1::-1]), atlas.HELPERS + readers] if looked_up else []
 
 
 def _interfaces(recording: Recording) -> list[list[int]]:
     """By reflected lobe, seen from above: the layers whose light it is."""
     places = [i for i, kind in enumerate(recording.stack.kinds) if kind not in ("medium", "diffuse")]
     return [[places[k] for k in group] for group in merging(recording.model, len(places))]
-
-
-_WRAPPERS = """\
-// f(wi, wo) |cos theta_o|
-vec3 vt_eval(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
-    return vt_eval_pdf(m, l, wi, wo).rgb;
-}
-
-// Density of vt_sample, per solid angle
-float vt_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
-    return vt_eval_pdf(m, l, wi, wo).a;
-}
-"""
-
-
-_TABLES = """\
-// Averages of Fresnel over rough interfaces: RGBA32F, {} x {} texels, never filtered.
-// `velatura export -o` writes them beside this text, row by row.
-uniform highp sampler2D vt_tables;
-"""
-
-_PRECISION = """\
-precision highp float;
-precision highp int;
-"""
-
-_HEADER = """\
-// {name} as the model {model} has it; GLSL ES 3.00, written by Velatura.
-//
-//     VtMaterial m = vt_material(uv);        // or from uniforms, or your own textures
-//     VtLobes l = vt_lobes(m, wi);           // once for a direction of view
-//     vec4 f = vt_eval_pdf(m, l, wi, wo);    // f(wi, wo) |cos theta_o|, and the density of vt_sample
-//     vec3 wo = vt_sample(m, l, wi, u);      // from three uniform numbers; f may be 0 there
-//
-// Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
-
-"""
 
 
 def _described(model: Model) -> str:
@@ -162,25 +116,15 @@ def _described(model: Model) -> str:
     return " ".join([model.name, *([f"({', '.join(changed)})"] if changed else [])])
 
 
-def _lobes_struct(recording: Recording) -> str:
-    """The struct of all that is known once wi is."""
-    count = sum(name.startswith("reflected") and name.endswith("energy") for name in recording.kinds)
-    parts = {part(name): kind for name, kind in recording.kinds.items() if "." in name}
-    members = [f"VtLobe reflected[{count}];"] if count else []
-    members += ["VtLobe transmitted;"] if "transmitted.energy" in recording.kinds else []
-    members += [f"vec3 {name};" for name in recording.kinds if "." not in name]
-    lobe = material.struct(
-        "VtLobe", [f"{glsl.TYPES[kind]} {name};" for name, kind in parts.items()], "rotation in radians"
-    )
-    return lobe + material.struct("VtLobes", members, "of light from one direction")
-
-
-def _lobes(recording: Recording) -> str:
-    lines, texts = glsl.statements([(value, recording.kinds[name]) for name, value in recording.lobes.items()])
-    assigned = [f"l.{name} = {text};" for name, text in zip(recording.lobes, texts)]
-    return glsl.block("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [*lines, "", "VtLobes l;", *assigned, "return l;"])
-
-
-def _function(head: str, outputs: Sequence[tuple[Operand, Kind]], result: str) -> str:
-    lines, texts = glsl.statements(outputs)
-    return glsl.block(head, [*lines, f"return {result.format(*texts)};"])
+def _structs(recording: Recording) -> list[Struct]:
+    """A lobe, and all that is known once wi is."""
+    kinds = recording.kinds
+    count = sum(name.startswith("reflected") and name.endswith("energy") for name in kinds)
+    parts = {part(name): kind for name, kind in kinds.items() if "." in name}
+    members = [Field("reflected", "VtLobe", count)] if count else []
+    members += [Field("transmitted", "VtLobe")] if "transmitted.energy" in kinds else []
+    members += [Field(name, "colour") for name in kinds if "." not in name]
+    return [
+        Struct("VtLobe", [Field(name, kind) for name, kind in parts.items()], "rotation in radians"),
+        Struct("VtLobes", members, "of light from one direction"),
+    ]

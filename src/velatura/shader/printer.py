@@ -1,0 +1,181 @@
+"""A shader language: how values, statements and the parts of a program are written in it.
+
+`shader.statements` puts the values of a function in order and names them, `shader.program` puts the parts of a program
+in order; both take a printer, which gives each its text. A language is a class of its own with these methods.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
+
+from velatura.shader.symbol import Kind, Operand
+
+if TYPE_CHECKING:
+    from velatura.shader.atlas import Layout
+    from velatura.shader.bake import Bake, Group
+    from velatura.shader.material import Filled
+
+Output: TypeAlias = tuple[Operand, Kind]  # a value, and the kind as which it is returned
+
+ATOM, NEGATIVE, CHOICE = 9, 7, 1  # how strongly a text binds: nothing needs parentheses, a sign, a choice
+CONDITION = 2  # how strongly the condition of a choice has to bind
+
+
+class Field(NamedTuple):
+    """A member of a struct: its kind, or the name of its struct; an array where `length` is not 0."""
+
+    name: str
+    type: Kind | str
+    length: int = 0
+
+
+class Struct(NamedTuple):
+    name: str
+    fields: Sequence[Field]
+    comment: str
+
+
+class Printer(ABC):
+    """A shader language.
+
+    Arguments that are texts are expressions, in parentheses where they need any; in what takes colours, numbers among
+    them have been made colours before.
+
+    Attributes:
+        words: names that values of a function may not have, apart from its arguments.
+        functions: by operation, the function of as many arguments; with `clip`, which takes three, of a number kept
+            between two constants.
+        operators: by operation of two values, its sign and how strongly that binds, from 2 to 6.
+    """
+
+    words: ClassVar[frozenset[str]]
+    functions: ClassVar[Mapping[str, str]]
+    operators: ClassVar[Mapping[str, tuple[str, int]]]
+
+    # Values
+
+    def input(self, place: str) -> str:
+        """What a function is given: `m.layer0.eta`, `l.reflected[0].energy` or its `.r`, `wi.x`, `vt_shown[0]`."""
+        return place
+
+    @abstractmethod
+    def literal(self, x: Operand) -> str:
+        """A constant: a number, a condition, or a colour."""
+
+    @abstractmethod
+    def colour(self, channels: Sequence[str]) -> str:
+        """A colour of three channels, or of one number that is the same in all."""
+
+    @abstractmethod
+    def component(self, x: str, channel: int, kind: Kind) -> str:
+        """A channel of a colour, of conditions, or of texels, which have four channels each."""
+
+    def item(self, array: str, place: str) -> str:
+        """A value of an array."""
+        return f"{array}[{place}]"
+
+    def call(self, op: str, args: Sequence[str], wide: bool) -> str:
+        """A function of numbers, or of colours where it is `wide`."""
+        return f"{self.functions[op]}({', '.join(args)})"
+
+    @abstractmethod
+    def each_channel(self, op: str, a: str, b: str) -> str:
+        """Conditions of two colours (`less`, `greater`, `at_most`, `at_least`); `both` of conditions, single or not."""
+
+    @abstractmethod
+    def select(self, condition: str, a: str, b: str) -> tuple[str, int]:
+        """`a` where a condition holds, else `b`, and how strongly that binds."""
+
+    @abstractmethod
+    def select_channels(self, conditions: str, a: str, b: str) -> str:
+        """Likewise for each channel of colours."""
+
+    @abstractmethod
+    def value(self, table: str, args: Sequence[str], wide: bool) -> str:
+        """A table of a single channel, looked up at numbers, or for each channel of colours where it is `wide`."""
+
+    # Statements
+
+    @abstractmethod
+    def title(self, text: str) -> str:
+        """A comment over the statements that follow."""
+
+    @abstractmethod
+    def named(self, name: str, kind: Kind, text: str) -> str:
+        """A value gets a name."""
+
+    @abstractmethod
+    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+        """The channels of a table at a place get a name, as so many texels."""
+
+    @abstractmethod
+    def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
+        """The texels of a group get a name, looked up in the texture of lobes at a place of three coordinates."""
+
+    @abstractmethod
+    def nodes(self, name: str, nodes: Sequence[float]) -> list[str]:
+        """An array of constant numbers."""
+
+    @abstractmethod
+    def results(self, name: str, kind: Kind, count: int) -> list[str]:
+        """An array that is filled later."""
+
+    @abstractmethod
+    def state(self, name: str, following: str, kind: Kind, begin: Sequence[str]) -> list[str]:
+        """An array of values to begin with, and one of as many values that follow."""
+
+    @abstractmethod
+    def loop(self, index: str, times: int, lines: Sequence[str]) -> list[str]:
+        """Statements, repeated for an index from 0 on."""
+
+    @abstractmethod
+    def store(self, array: str, place: str, text: str) -> str:
+        """A value is put into an array."""
+
+    @abstractmethod
+    def advance(self, name: str, following: str) -> str:
+        """An array takes the values of another."""
+
+    # Programs
+
+    @abstractmethod
+    def header(self, name: str, model: str) -> str:
+        """Comments that describe the material and how the code is called; what has to stand first."""
+
+    @abstractmethod
+    def structs(self, structs: Sequence[Struct]) -> str:
+        """Declarations of structs, each before those that contain it."""
+
+    @abstractmethod
+    def parameters(self, shown: int) -> str:
+        """The uniforms that change: a material, and the weights of so many lobes."""
+
+    @abstractmethod
+    def material(self, filled: Filled) -> str:
+        """`vt_material`, which gives the values at texture coordinates, and the textures that it reads."""
+
+    @abstractmethod
+    def tables(self, layouts: Sequence[Layout]) -> str:
+        """The texture of tables, and functions that look up each of them in it."""
+
+    @abstractmethod
+    def lookup(self, bake: Bake) -> str:
+        """The texture of lobes over direction, and functions that look up each group of its texels."""
+
+    @abstractmethod
+    def helpers(self) -> str:
+        """Functions that the statements call."""
+
+    @abstractmethod
+    def lobes(self, outputs: Mapping[str, Output]) -> str:
+        """`vt_lobes(m, wi)`, which fills the struct; outputs by their place in it."""
+
+    @abstractmethod
+    def eval_pdf(self, value: Output, density: Output) -> str:
+        """`vt_eval_pdf(m, l, wi, wo)`, with `vt_eval` and `vt_pdf`."""
+
+    @abstractmethod
+    def sample(self, drawn: Sequence[Output]) -> str:
+        """`vt_sample(m, l, wi, u)`, of the three coordinates of a direction."""

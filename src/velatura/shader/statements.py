@@ -1,0 +1,169 @@
+"""Recorded values as statements of a function, in the language of a printer."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import chain, count
+
+from velatura.shader import atlas
+from velatura.shader.printer import ATOM, CONDITION, NEGATIVE, Output, Printer
+from velatura.shader.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
+
+ARGUMENTS = frozenset({"m", "l", "wi", "wo", "u"})  # of the functions
+_LONG = 72  # characters of an expression that gets a name of its own
+_COMPARE = ("less", "greater", "at_most", "at_least")
+
+
+def statements(outputs: Sequence[Output], printer: Printer) -> tuple[list[str], list[str]]:
+    """Lines that work out the outputs, and an expression for each, of the kind given."""
+    written = _Statements([value for value, _ in outputs], printer)
+    return written.lines, [written.of(value, wide=kind == "colour") for value, kind in outputs]
+
+
+class _Statements:
+    """Names for values that are used more than once, that the model names, or that are long."""
+
+    def __init__(self, outputs: Sequence[Operand], printer: Printer) -> None:
+        order = in_order(outputs)
+        self.printer = printer
+        self.uses = Counter(x for symbol in order for x in symbol.args if isinstance(x, Symbol))
+        self.uses.update(x for x in outputs if isinstance(x, Symbol))
+        self.inside = inside(order)
+        self.open: frozenset[str] = frozenset()  # what is bound where we are
+        self.text: dict[Symbol, tuple[str, int]] = {}
+        self.taken = {*printer.words, *ARGUMENTS}
+        self.lines: list[str] = []
+        self._write([symbol for symbol in order if not self.inside[symbol]])
+
+    def _write(self, order: Sequence[Symbol]) -> None:
+        title = ""
+        for symbol in order:
+            named = symbol.kind in ("loop", "texels")
+            text, precedence = ("", ATOM) if named else self._expression(symbol)
+            if not named and self._inline(symbol, text):
+                self.text[symbol] = text, precedence
+                continue
+            if symbol.title != title:
+                title = symbol.title
+                self.lines += ["", *([self.printer.title(title)] if title else [])]
+            name = self._name(symbol)
+            if symbol.kind == "loop":
+                self._loop(symbol, name)
+            elif symbol.kind == "texels":
+                self.lines += self._texels(symbol, name)
+            else:
+                self.lines.append(self.printer.named(name, symbol.kind, text))
+            self.text[symbol] = name, ATOM
+
+    def _texels(self, symbol: Symbol, name: str) -> list[str]:
+        """What is looked up under a name, in a table or in the lobes over direction."""
+        args = [self.of(x) for x in symbol.args]
+        if symbol.op == "baked":
+            return self.printer.baked(name, symbol.detail, args)
+        return self.printer.texels(name, symbol.detail, atlas.texels(symbol.detail), args)
+
+    def _loop(self, symbol: Symbol, name: str) -> None:
+        """A loop that fills an array, or goes from one state to the next."""
+        bound, nodes, times = symbol.detail
+        count = len(symbol.args) - (0 if nodes else len(bound))
+        results, wide = symbol.args[-count:], any(is_colour(x) for x in symbol.args)
+        kind: Kind = "colour" if wide else "number"
+        index, printer = self._free("i"), self.printer
+        filled = name if nodes else f"{name}_next"
+        if nodes:
+            values = self._free("nodes")
+            self.lines += [*printer.nodes(values, nodes), *printer.results(name, kind, count * times)]
+        else:
+            self.lines += printer.state(name, filled, kind, [self.of(x, wide=wide) for x in symbol.args[:count]])
+
+        # Write what depends on what is bound
+        before, self.lines = self.lines, []
+        outside, self.open = self.open, self.open | set(bound)
+        body = [x for x in in_order(results) if set(bound) & self.inside[x] and self.inside[x] <= self.open]
+        for x in body:
+            if x.op == "bound":
+                self.text[x] = printer.item(*((values, index) if nodes else (name, str(bound.index(x.detail))))), ATOM
+        self._write([x for x in body if x.op != "bound"])
+        place = f"{count} * {index} + " if nodes and count > 1 else ""
+        for k, result in enumerate(results):
+            at = (f"{place}{k}" if count > 1 else index) if nodes else str(k)
+            self.lines.append(printer.store(filled, at, self.of(result, wide=wide)))
+        if not nodes:
+            self.lines.append(printer.advance(name, filled))
+        for x in body:
+            del self.text[x]
+        self.open = outside
+        self.lines = [*before, *printer.loop(index, times, self.lines)]
+
+    def of(self, x: Operand, least: int = 0, wide: bool = False) -> str:
+        """An argument, in parentheses where it binds less than `least`; a number made a colour where it is `wide`."""
+        if not isinstance(x, Symbol):
+            text, precedence = self.printer.literal(x), NEGATIVE if isinstance(x, float) and x < 0 else ATOM
+        else:
+            text, precedence = self.text[x]
+        if wide and not is_colour(x):
+            return self.printer.colour([text])
+        return f"({text})" if precedence < least else text
+
+    def _inline(self, symbol: Symbol, text: str) -> bool:
+        if symbol.op in ("input", "component", "item") and len(text) < _LONG:
+            return True
+        return self.uses[symbol] == 1 and not symbol.name and len(text) < _LONG
+
+    def _name(self, symbol: Symbol) -> str:
+        if symbol.kind == "texels":
+            return self._free(symbol.detail.name if symbol.op == "baked" else symbol.detail)
+        return self._free(symbol.name.strip("_").replace("__", "_") or "value")
+
+    def _free(self, name: str) -> str:
+        """The name, or with a number where it is taken."""
+        free = (x for x in chain([name], (f"{name}_{n}" for n in count(2))) if x not in self.taken)
+        self.taken.add(chosen := next(free))
+        return chosen
+
+    def _expression(self, symbol: Symbol) -> tuple[str, int]:
+        """The text, and how strongly its last operator binds."""
+        op, args, printer = symbol.op, symbol.args, self.printer
+        wide = any(is_colour(x) for x in args)
+        if op == "input":
+            return printer.input(symbol.detail), ATOM
+        if op == "value":
+            return printer.value(symbol.detail, [self.of(x, wide=wide) for x in args], wide), ATOM
+        if op == "item":
+            return printer.item(self.of(args[0], ATOM), str(symbol.detail)), ATOM
+        if op == "component":
+            assert isinstance(args[0], Symbol)
+            return printer.component(self.of(args[0], ATOM), symbol.detail, args[0].kind), ATOM
+        if op == "colour":
+            return printer.colour([self.of(x) for x in args]), ATOM
+        if op == "negative":
+            return f"-{self.of(args[0], ATOM)}", NEGATIVE
+        if op == "select":
+            return self._selected(symbol)
+        if op == "minimum" and "clip" in printer.functions and self._clamps(symbol):
+            assert isinstance(args[0], Symbol)
+            return printer.call("clip", [self.of(x) for x in (*args[0].args, args[1])], wide), ATOM
+        if op in printer.functions:
+            return printer.call(op, [self.of(x, wide=wide) for x in args], wide), ATOM
+        if wide and op == "both":
+            return printer.each_channel(op, *map(self.of, args)), ATOM
+        if wide and op in _COMPARE:
+            return printer.each_channel(op, *(self.of(x, wide=True) for x in args)), ATOM
+        sign, precedence = printer.operators[op]
+        return f"{self.of(args[0], precedence)} {sign} {self.of(args[1], precedence + 1)}", precedence
+
+    def _clamps(self, symbol: Symbol) -> bool:
+        """Whether it keeps a value that nothing else uses between two constants."""
+        inner, high = symbol.args
+        if not isinstance(inner, Symbol) or inner.op != "maximum" or self.uses[inner] > 1 or inner.name:
+            return False
+        x, low = inner.args
+        return isinstance(x, Symbol) and isinstance(low, float) and isinstance(high, float)
+
+    def _selected(self, symbol: Symbol) -> tuple[str, int]:
+        condition, a, b = symbol.args
+        wide = symbol.kind == "colour"
+        if is_colour(condition):
+            return self.printer.select_channels(self.of(condition), self.of(a, wide=True), self.of(b, wide=True)), ATOM
+        return self.printer.select(self.of(condition, CONDITION), self.of(a, wide=wide), self.of(b, wide=wide))
