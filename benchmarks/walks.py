@@ -1,0 +1,284 @@
+"""Random stacks of every kind, and walks through them, kept in a folder: what `fidelity.py` holds models to.
+
+    python benchmarks/walks.py [FOLDER] [--half fit] [--kind NAME]... [--stacks 12] [--paths 1000000] [--seed 0]
+
+Stacks have 1 to 4 interfaces, of an index in 1.1 to 2.2 and alpha to .55 (one in seven is smooth), over metals,
+mirrors, glass and diffuse bases; what each kind has besides, its function says. Those of the half `fit` are for
+fitting, those of the half `test` never. Light comes from above at cosines 1, .7 and .35, and into solids also from
+inside, at the momenta n sin = 0, .6, .93, 1.04 and 1 + .6 (n - 1). Every stack is a file in YAML, with its walks beside
+it as NPZ. What is there already is not walked again.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.progress import track
+
+import velatura as vt
+from velatura import files
+from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, dumps
+
+Array = NDArray[np.floating]
+
+COSINES = (1.0, 0.7, 0.35)
+MOMENTA = (0.0, 0.6, 0.93, 1.04)  # from inside
+DEEP = 0.6  # of the way from the critical angle to grazing
+HALVES = ("fit", "test")
+STACKS, PATHS, FOLDER = 12, 1_000_000, Path("walks")
+
+# Layers of every sort ------------------------------------------------------------------------------------------------
+
+
+def roughness(rng: np.random.Generator, low: float = 0.0) -> float:
+    """Smooth, evenly distributed, or evenly in its logarithm."""
+    u, even, power = rng.uniform(), rng.uniform(low, 0.55), 10 ** rng.uniform(-2.3, -0.26)
+    return 0.0 if u < 0.15 and not low else float(even if u < 0.7 else power)
+
+
+def surface(rng: np.random.Generator, turned: str | None = None, **index: Any) -> Interface:
+    """An interface; seven in ten of a brushed or turned stack have two roughnesses."""
+    if turned is None:
+        return Interface(alpha=roughness(rng), **index)
+    alpha: Any = (roughness(rng, 0.01), roughness(rng, 0.01))
+    rotation = float(rng.uniform(0, 180)) if turned == "turned" else float(rng.choice([0, 90]))
+    return Interface(alpha=alpha if rng.uniform() < 0.7 else alpha[0], rotation=rotation, **index)
+
+
+def coat(rng: np.random.Generator, turned: str | None = None) -> Interface:
+    """A dielectric."""
+    return surface(rng, turned, eta=float(rng.uniform(1.1, 2.2)))
+
+
+def base(rng: np.random.Generator, turned: str | None = None) -> Interface:
+    """A metal of any colour, more rarely a mirror or glass."""
+    u = rng.uniform()
+    if u < 0.7:
+        eta, k = (tuple(map(float, rng.uniform(*span, 3))) for span in ((0.2, 2.0), (1.5, 5.0)))
+        return surface(rng, turned, eta=eta, k=k)
+    return surface(rng, turned, conductor="mirror") if u < 0.85 else coat(rng, turned)
+
+
+def absorbing(rng: np.random.Generator) -> Medium:
+    """A coloured medium that scatters nothing."""
+    return Medium(sigma_a=tuple(map(float, rng.uniform(0, 1) * rng.uniform(0, 1, 3))))
+
+
+def scattering(rng: np.random.Generator) -> Medium:
+    """A medium of any asymmetry, depth and single-scattering albedo, every second one coloured."""
+    depth, g = float(10 ** rng.uniform(-1, np.log10(8))), float(rng.uniform(-0.3, 0.95))
+    albedo = rng.uniform(0.5, 1, 3) if rng.uniform() < 0.5 else np.full(3, rng.uniform(0.5, 1))
+    return Medium(depth=depth, sigma_s=tuple(map(float, albedo)), sigma_a=tuple(map(float, 1 - albedo)), g=g)
+
+
+# Stacks of every kind ------------------------------------------------------------------------------------------------
+
+
+def isotropic(rng: np.random.Generator, number: int) -> Stack:
+    """Up to three dielectrics over a base."""
+    return Stack([*(coat(rng) for _ in range(number % 4)), base(rng)])
+
+
+def turned(rng: np.random.Generator, number: int) -> Stack:
+    """The same, brushed along one of two axes or turned by any angle."""
+    way = ("brushed", "turned")[number % 2]
+    return Stack([*(coat(rng, way) for _ in range(number // 2 % 4)), base(rng, way)])
+
+
+def tinted(rng: np.random.Generator, number: int) -> Stack:
+    """One to three dielectrics over a base, above which there is a medium that absorbs, and others anywhere."""
+    layers: list[Layer] = []
+    for k in reversed(range(1 + number % 3)):
+        layers += [coat(rng), *([absorbing(rng)] if k == 0 or rng.uniform() < 0.5 else [])]
+    return Stack([*layers, base(rng)])
+
+
+def cloudy(rng: np.random.Generator, number: int) -> Stack:
+    """One or two dielectrics, a medium that scatters, and a base; three in ten of two have a second medium."""
+    layers: list[Layer] = [coat(rng)]
+    if number % 2:
+        layers += [*([scattering(rng)] if rng.uniform() < 0.3 else []), coat(rng)]
+    painted = rng.uniform() < 1 / 6
+    return Stack([*layers, scattering(rng), diffuse(rng) if painted else base(rng)])
+
+
+def diffuse(rng: np.random.Generator) -> Diffuse:
+    """A coloured base."""
+    return Diffuse(albedo=tuple(map(float, rng.uniform(0.1, 0.95, 3))))
+
+
+def painted(rng: np.random.Generator, number: int) -> Stack:
+    """One to three dielectrics over a diffuse base, a third of them with a medium that absorbs."""
+    medium = [absorbing(rng)] if rng.uniform() < 1 / 3 else []
+    return Stack([*(coat(rng) for _ in range(1 + number % 3)), *medium, diffuse(rng)])
+
+
+def clear(rng: np.random.Generator, number: int) -> Stack:
+    """Solids and panes in turn; a quarter of them turned, a fifth with a medium that absorbs."""
+    thin = bool(number % 2)
+    way = "turned" if number % 8 >= 6 else None
+    layers: list[Layer] = [coat(rng, way) for _ in range(max(1 + number // 2 % 4, 1 + thin))]
+    if rng.uniform() < 0.2 and len(layers) > 1:
+        layers.insert(1, absorbing(rng))
+    return Stack(layers, thin=thin)
+
+
+def milky(rng: np.random.Generator, number: int) -> Stack:
+    """Solids and panes in turn, of two or three interfaces with a medium that scatters between two of them."""
+    layers: list[Layer] = [coat(rng) for _ in range(2 + number // 2 % 2)]
+    layers.insert(int(rng.integers(1, len(layers))), scattering(rng))
+    return Stack(layers, thin=bool(number % 2))
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Stacks that `draw` makes from random numbers and a running number.
+
+    often: whether light is scattered many times between facets; passes: whether it is what passes that is looked at.
+    """
+
+    name: str
+    draw: Callable[[np.random.Generator, int], Stack]
+    often: bool
+    passes: bool = False
+
+    def stack(self, seed: int, half: str, number: int) -> Stack:
+        """One of its stacks, whichever others are drawn."""
+        rng = np.random.default_rng([seed, HALVES.index(half), number, *self.name.encode()])
+        return self.draw(rng, number).replace(name=f"{self.name}, {half}, {number}")
+
+
+KINDS = (
+    Kind("isotropic, once", isotropic, False),
+    Kind("isotropic, often", isotropic, True),
+    Kind("turned, once", turned, False),
+    Kind("turned, often", turned, True),
+    Kind("absorbing, often", tinted, True),
+    Kind("scattering, often", cloudy, True),
+    Kind("diffuse base, often", painted, True),
+    Kind("passing, once", clear, False, True),
+    Kind("passing, often", clear, True, True),
+    Kind("passing scattering, often", milky, True, True),
+)
+
+# Their walks ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Incidence:
+    """A direction that light comes from, in the plane of the tangent: its cosine, and from which side."""
+
+    cosine: float
+    inside: bool
+    momentum: float  # n sin
+
+
+@dataclass(frozen=True)
+class Walks:
+    """Where light goes that comes into `stack` from N `incidences`.
+
+    grids (2, 2, 3, N, bins, bins): by half of the paths, and whether light is thrown back or passes, energies over the
+    projected disc, whose x and y are those of the stack. energy (K, 3, N): of what the stack throws back upwards, by
+    the deepest of K interfaces, None where light passes.
+    """
+
+    stack: Stack
+    incidences: tuple[Incidence, ...]
+    grids: Array
+    energy: Array | None
+
+
+def incidences(kind: Kind, stack: Stack) -> tuple[Incidence, ...]:
+    """Every direction that a stack of that kind is lit from."""
+    found = [Incidence(c, False, float(np.sqrt(1 - c * c))) for c in COSINES]
+    if kind.passes and not stack.thin:
+        index = Material.of(stack).below
+        momenta = sorted({*MOMENTA, 1 + DEEP * (index - 1)})
+        found += [Incidence(float(np.sqrt(1 - (p / index) ** 2)), True, p) for p in momenta]
+    return tuple(found)
+
+
+def walked(kind: Kind, stack: Stack, paths: int) -> Walks:
+    """Walk through a stack from all its directions."""
+    lit = incidences(kind, stack)
+    sides = []
+    for inside in sorted({i.inside for i in lit}):
+        seen = _reversed(stack) if inside else stack
+        cosines = [i.cosine for i in lit if i.inside == inside]
+        halves = [vt.reference.distribution(seen, cosines, 0.0, paths // 2, seed, kind.often) for seed in (1, 2)]
+        nothing = np.zeros_like(halves[0].reflected)
+        sides.append([[h.reflected, nothing if h.transmitted is None else h.transmitted] for h in halves])
+    grids = np.concatenate([np.array(side, np.float32) for side in sides], axis=3)
+    if kind.passes:
+        return Walks(stack, lit, grids, None)
+    energy = np.array(vt.reference.statistics(stack, COSINES, 0.0, paths, 3, kind.often).energy)
+    return Walks(stack, lit, grids, energy)
+
+
+def _reversed(stack: Stack) -> Stack:
+    """A solid as it is from inside, mirrored, so that x and y stay."""
+    turned = Material.of(stack).reversed()
+    return Stack.from_flat(turned.kinds, turned.flat())
+
+
+def kept(kind: Kind, half: str, number: int, paths: int, seed: int, folder: Path) -> Walks:
+    """The walks through a stack, from the folder if they are there, else walked and kept there."""
+    stack = kind.stack(seed, half, number)
+    place = folder / f"seed-{seed}-paths-{paths}" / half / kind.name.replace(", ", "-").replace(" ", "-")
+    text, array = place / f"{number:03d}.yaml", place / f"{number:03d}.npz"
+    if array.exists() and text.exists() and text.read_text(encoding="utf-8") == dumps(stack):
+        with np.load(array) as found:
+            return Walks(stack, incidences(kind, stack), found["grids"], found.get("energy"))
+    new = walked(kind, stack, paths)
+    place.mkdir(parents=True, exist_ok=True)
+    array.unlink(missing_ok=True)
+    vt.save(stack, text)
+    described = {name: np.array([getattr(i, name) for i in new.incidences]) for name in Incidence.__annotations__}
+    with files.whole(array) as unfinished, open(unfinished, "wb") as stream:
+        energy = {} if new.energy is None else {"energy": new.energy}
+        np.savez_compressed(stream, grids=new.grids, **described, **energy)
+    return new
+
+
+def every(
+    kinds: Sequence[Kind], halves: Sequence[str], stacks: int, paths: int, seed: int, folder: Path
+) -> Iterator[tuple[Kind, Walks]]:
+    """The walks of all kinds and halves, with progress."""
+    jobs = [(kind, half, number) for number in range(stacks) for kind in kinds for half in halves]
+    for kind, half, number in track(jobs, description="walking"):
+        yield kind, kept(kind, half, number, paths, seed, folder)
+
+
+def chosen(names: Sequence[str] | None) -> tuple[Kind, ...]:
+    """The kinds of these names; all if there are none."""
+    return tuple(kind for kind in KINDS if not names or kind.name in names)
+
+
+def arguments(description: str | None) -> argparse.ArgumentParser:
+    """What both programs take."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kind", action="append", choices=[kind.name for kind in KINDS], help="one or more; else all")
+    parser.add_argument("--stacks", type=int, default=STACKS, help="of each kind")
+    parser.add_argument("--paths", type=int, default=PATHS, help="of each direction")
+    parser.add_argument("--seed", type=int, default=0)
+    return parser
+
+
+def main() -> None:
+    parser = arguments(__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=FOLDER)
+    parser.add_argument("--half", action="append", choices=HALVES, help="one or both; else both")
+    options = parser.parse_args()
+    halves = options.half or HALVES
+    for _ in every(chosen(options.kind), halves, options.stacks, options.paths, options.seed, options.folder):
+        pass
+
+
+if __name__ == "__main__":
+    main()
