@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import compileall
+import re
 import shutil
 import subprocess
 import sys
@@ -314,15 +315,19 @@ def test_the_texture_holds_the_tables() -> None:
     assert not flat[start:].any()
 
 
-@pytest.mark.parametrize("archive", [False, True], ids=["byte code", "zip"])
-def test_shaders_need_no_source_text(archive: bool, tmp_path: Path) -> None:
-    """The package as byte code alone, in a folder or in a zip, prints the shader that its source prints."""
+@pytest.mark.parametrize("form", ["byte code", "zip", "other comments"])
+def test_shaders_need_no_source_text(form: str, tmp_path: Path) -> None:
+    """The package as byte code alone, in a folder or a zip, and with other comments, prints what its source prints."""
     own = Path(vt.__file__).parent
     shutil.copytree(own, tmp_path / "velatura", ignore=shutil.ignore_patterns("page", "static", "__pycache__"))
-    compileall.compile_dir(tmp_path / "velatura", quiet=2, legacy=True)
+    if form != "other comments":
+        compileall.compile_dir(tmp_path / "velatura", quiet=2, legacy=True)
     for path in tmp_path.rglob("*.py"):
-        path.unlink()
-    place = Path(shutil.make_archive(str(tmp_path / "velatura"), "zip", tmp_path)) if archive else tmp_path
+        if form == "other comments":
+            path.write_text(re.sub(r"(?m)^( *)# .*$", r"\1# Another comment\n\1# of two lines", path.read_text()))
+        else:
+            path.unlink()
+    place = Path(shutil.make_archive(str(tmp_path / "velatura"), "zip", tmp_path)) if form == "zip" else tmp_path
     program = (
         f"import sys; sys.path.insert(0, {str(place)!r}); import velatura as vt; from velatura.shader import shader;"
         f"assert vt.__file__.startswith({str(place)!r}), vt.__file__;"

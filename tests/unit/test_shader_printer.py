@@ -1,0 +1,102 @@
+"""The seam between shaders and their languages: a second printer, of Python, whose programs are run against NumPy."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from agreement import PATTERNS, in_numpy, random_case
+from evaluation import evaluate
+from python_printer import PythonPrinter, put, run
+
+import velatura as vt
+from velatura.model import MODELS
+from velatura.shader import constant, record, shader
+from velatura.stack import is_colour
+
+PYTHON = PythonPrinter()
+NAMES = [model.name for model in MODELS]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "model"), [(pattern, NAMES[k % len(NAMES)]) for k, pattern in enumerate(PATTERNS)], ids=str
+)
+def test_another_language_prints_the_same_functions(pattern, model: str) -> None:
+    """Random stacks of every pattern: lobes, value, density and samples as the model has them, in double precision."""
+    case = random_case(pattern, 20, np.random.default_rng(7))
+    recording, made = record(case.stack, model), shader(case.stack, model, printer=PYTHON)
+    program, truth = run(made.text, vt_tables=made.tables.astype(float)), in_numpy(case, recording)
+    m = program.VtMaterial()
+    for name, place in made.uniforms.items():
+        put(m, place, case.values[name])
+
+    lobes = program.vt_lobes(m, case.directions["wi"])
+    seen = [*getattr(lobes, "reflected", []), *([lobes.transmitted] if hasattr(lobes, "transmitted") else [])]
+    energy = [np.broadcast_to(lobe.energy, (3, 20)) for lobe in seen]
+    np.testing.assert_allclose(energy, truth.energy, rtol=1e-10, atol=1e-14)
+    value, density = program.vt_eval_pdf(m, lobes, case.directions["wi"], case.directions["wo"])
+    np.testing.assert_allclose(np.broadcast_to(value, (3, 20)), truth.value, rtol=1e-9, atol=1e-14)
+    np.testing.assert_allclose(np.broadcast_to(density, 20), truth.density, rtol=1e-9, atol=1e-14)
+    drawn = program.vt_sample(m, lobes, case.directions["wi"], case.directions["u"])
+    np.testing.assert_allclose(np.broadcast_arrays(*drawn), truth.drawn, atol=1e-11)
+
+
+def test_textures_and_brushing_are_read_where_the_material_is(tmp_path: Path) -> None:
+    for name in ("scratches.png", "wood.png"):
+        (tmp_path / name).touch()
+    scratches = {"texture": str(tmp_path / "scratches.png"), "scale": 0.5, "offset": 0.1, "channel": "g"}
+    wood = {"texture": str(tmp_path / "wood.png"), "scale": 2.0}
+    brushing = {"brushing": "concentric", "u": 0.25, "v": 0.5, "offset": 10}
+    coat = vt.Interface(eta=[1.4, 1.5, 1.6], alpha=[scratches, 0.2], rotation=brushing)
+    made = shader(vt.Stack([coat, vt.Diffuse(albedo=wood)]), printer=PYTHON)
+    texels = {
+        "vt_map_layer0_alpha_u": lambda uv: [0.0, uv[0], 0.0, 1.0],
+        "vt_map_layer1_albedo": lambda uv: [0.1, uv[1], 0.9],
+    }
+    assert {name: image.texture.name for name, image in made.maps.items()} == {
+        "vt_map_layer0_alpha_u": "scratches.png",
+        "vt_map_layer1_albedo": "wood.png",
+    }
+    m = run(made.text, **texels).vt_material((0.75, 0.5 + math.sqrt(0.75)))
+    assert m.exterior == 1.0
+    assert (m.layer0.alpha_u, m.layer0.alpha_v) == (0.475, 0.2)
+    assert m.layer0.rotation == pytest.approx(60 + 90 + 10)
+    np.testing.assert_allclose(m.layer0.eta.ravel(), [1.4, 1.5, 1.6])
+    np.testing.assert_allclose(m.layer1.albedo.ravel(), [0.2, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("name", ["coated-gold", "varnished-paint", "frosted-glass"])
+def test_lobes_over_direction_are_read_in_another_language(name: str) -> None:
+    """Parameters from a uniform, weights of lobes, and lobes from the texture that the tape fills."""
+    stack = vt.preset(name)
+    made = shader(stack, "velatura", values="uniforms", printer=PYTHON)
+    assert made.baked is not None
+    flat = {name: np.ravel(constant(name, value)) for name, value in stack.flat().items()}
+    values = {name: np.resize(x, (3, 1)) if is_colour(name) else x for name, x in flat.items()}
+
+    # Fill the texture as the tape does, a line for each texel, side and azimuth
+    nodes, sides = made.baked.nodes, made.baked.sides
+    x, y = np.meshgrid(*(np.linspace(0, 1, n) for n in (nodes[0], nodes[1] if len(nodes) > 1 else 1)))
+    inputs = {f"m.{place}": values[name] for name, place in made.uniforms.items()}
+    inputs |= {"place.x": x.ravel(), "place.y": y.ravel()}
+    columns = [evaluate(made.baked.columns, {**inputs, "place.z": float(side)}) for side in range(sides)]
+    grid = np.array([[np.broadcast_to(column, x.size) for column in side] for side in columns])
+    vt_baked = grid.reshape(sides, -1, 4, *x.shape).transpose(1, 0, 3, 4, 2).reshape(-1, nodes[0], 4)
+
+    shown = np.ones(len(made.shown))
+    given = {"vt_tables": made.tables, "vt_baked": vt_baked, "vt_shown": shown}
+    program = run(made.text, **given, vt_parameters=None)
+    parameters = program.VtMaterial()
+    for name, place in made.uniforms.items():
+        if hasattr(parameters, place.partition(".")[0]):
+            put(parameters, place, values[name])
+    m = run(made.text, **given, vt_parameters=parameters).vt_material((0.5, 0.5))
+    cos_theta = np.array([0.2, 0.5, 0.9])
+    wi = (np.sqrt(1 - cos_theta**2), np.zeros(3), cos_theta)
+    expected = vt.lobes(stack, cos_theta=cos_theta, model="velatura")
+    lobes = program.vt_lobes(m, wi)
+    np.testing.assert_allclose([lobe.energy for lobe in lobes.reflected], expected.energy, atol=2e-3)
+    shown[0] = 0
+    assert not program.vt_lobes(m, wi).reflected[0].energy.any()
