@@ -45,6 +45,26 @@ def test_a_base_looks_as_rough_as_in_walks(coats: list[tuple[float, float]], bas
     assert abs(np.log(alpha / true)).max() < 0.08
 
 
+@pytest.mark.parametrize(
+    ("layers", "cosine", "true"),
+    [
+        (
+            [Interface(eta=1.6, alpha=0.05), Medium(sigma_a=(0.1, 0.3, 0.8)), Interface(conductor="mirror", alpha=0.5)],
+            1.0,
+            (0.492, 0.248, 0.0743),
+        ),
+        ([Interface(eta=2.0, alpha=0.3), Interface(eta=1.2, alpha=0.3)], 0.5, (0.183, 0.183, 0.183)),
+    ],
+    ids=["over a rough base", "above a lower index"],
+)
+def test_trapped_light_is_absorbed_and_reflected_as_in_walks(
+    layers: list[Any], cosine: float, true: tuple[float, float, float]
+) -> None:
+    """Energy of the last lobe, within 10 % of 10^5 walks, which are exact to 1 %."""
+    energy = lobes(Stack(layers), [cosine]).energy[-1]
+    np.testing.assert_allclose(np.broadcast_to(energy, (3, 1))[:, 0], true, rtol=0.1)
+
+
 @pytest.mark.parametrize("reflectance", REFLECTANCES)
 def test_smooth_steps_of_the_index_below_a_rough_coat_change_no_blur(reflectance: str) -> None:
     """Where they reflect little: within 1 %, which is what they reflect back."""

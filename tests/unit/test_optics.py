@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from math import acos, atan, pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -133,9 +134,12 @@ def test_fresnel_has_finite_gradients_everywhere(mi: Any) -> None:
 ROUGHNESSES = [(0.05, 0.05), (0.3, 0.3), (1.0, 1.0), (0.1, 0.5), (0.8, 0.2)]
 
 
+gauss_legendre = cache(np.polynomial.legendre.leggauss)
+
+
 def normals(alpha_u: float, alpha_v: float, count: int = 400) -> tuple[ggx.Direction, np.ndarray]:
     """Nodes over the hemisphere of normals and their solid angles, for smooth integrands."""
-    x, w = np.polynomial.legendre.leggauss(count)
+    x, w = gauss_legendre(count)
     s, w = (x + 1) * pi / 4, w * pi / 4
     scale = sqrt(alpha_u * alpha_v)
     theta = np.arctan(scale * np.tan(s))  # follows the width of the distribution
