@@ -1,4 +1,4 @@
-"""What the source cites: `Author Year`, by the keys of references.bib."""
+"""What the source cites: `Author Year`, by the keys of references.bib, and of some papers every equation."""
 
 from __future__ import annotations
 
@@ -10,18 +10,71 @@ ROOT = Path(__file__).parents[2]
 
 # One author, two, or several, and a year; lines are joined before they are searched
 CITATION = re.compile(r"\b([A-Z][a-zà-ÿ]+)(?:(?: and | & )[A-Z][a-zà-ÿ]+| et al\.)? \(?((?:19|20)\d\d)\b")
-EQUATIONS = re.compile(CITATION.pattern + r", Eqs?\. (\d+(?:(?:-|, | and )\d+)*)")
+PARTS = re.compile(CITATION.pattern + r", (Eq|Algorithm)s?\.? (\d+(?:(?:-|, | and )\d+)*)")
+UNNAMED = re.compile(r"\bEqs?\. \d")
 
-#: Equations of Belcour 2018 by file, each compared with the print when it was put here.
-OF_BELCOUR_2018 = {
-    "model/adding.py": {"28-31", "34-35", "38, 49-51"},
-    "model/maps.py": {"6"},
-    "model/mixture.py": {"39-40"},
-    "model/momentum.py": {"21", "28-31"},
-    "model/operators.py": {"7-13", "10", "15-17, 21-24"},
-    "tables/build/quadrature.py": {"2"},
-    "tables/build/single_scattering.py": {"2"},
-    "tables/fetch.py": {"2"},
+#: What the papers print under the numbers that are cited, and where: each compared with the print when it was put here.
+PRINTED = {
+    "belcour2018": {
+        "Eq 2": ("directional albedo", {"tables/build/quadrature", "tables/build/single_scattering", "tables/fetch"}),
+        "Eq 5": ("reflection adds a variance", {"editor/validations"}),
+        "Eq 6": ("variance of a roughness, f", {"model/roughness_maps"}),
+        "Eq 7": ("reflection: energy", {"model/operators"}),
+        "Eq 8": ("reflection: mean", {"model/operators"}),
+        "Eq 9": ("reflection: variance", {"model/operators"}),
+        "Eq 10": ("scale of a roughness", {"model/operators", "editor/validations", "figures/belcour2018_07"}),
+        "Eq 11": ("refraction: energy", {"model/operators"}),
+        "Eq 12": ("refraction: mean", {"model/operators"}),
+        "Eq 13": ("refraction: variance", {"model/operators"}),
+        "Eq 15": ("absorption: energy", {"model/operators", "editor/validations"}),
+        "Eq 16": ("absorption: mean", {"model/operators", "editor/validations"}),
+        "Eq 17": ("absorption: variance", {"model/operators", "editor/validations"}),
+        "Eq 21": ("width of forward scattering", {"model/operators", "model/momentum", "editor/validations"}),
+        "Eq 22": ("forward scattering: energy", {"model/operators"}),
+        "Eq 23": ("forward scattering: mean", {"model/operators"}),
+        "Eq 24": ("forward scattering: variance", {"model/operators"}),
+        "Eq 28": ("adding: reflectance from above", {"model/adding", "model/momentum"}),
+        "Eq 29": ("adding: transmittance upwards", {"model/adding", "model/momentum"}),
+        "Eq 30": ("adding: reflectance from below", {"model/adding", "model/momentum"}),
+        "Eq 31": ("adding: transmittance downwards", {"model/adding", "model/momentum"}),
+        "Eq 33": ("total internal reflection: integral over a lobe", {"editor/validations"}),
+        "Eq 34": ("total internal reflection: reflectance", {"model/adding"}),
+        "Eq 35": ("total internal reflection: transmittance", {"model/adding"}),
+        "Eq 38": ("adding: variance of the reflection from above", {"model/adding"}),
+        "Eq 39": ("sum of lobes", {"model/mixture"}),
+        "Eq 40": ("choice of a lobe by its energy", {"model/mixture"}),
+        "Eq 49": ("adding: variance of the transmission downwards", {"model/adding"}),
+        "Eq 50": ("adding: variance of the transmission upwards", {"model/adding"}),
+        "Eq 51": ("adding: variance of the reflection from below", {"model/adding"}),
+    },
+    "yamaguchi2019": {
+        "Eq 1": ("reflection", {"model/adding", "model/variance"}),
+        "Eq 2": ("refraction", {"model/adding", "model/variance"}),
+        "Eq 4": ("Jacobian, reflected", {"model/variance", "figures/yamaguchi2019_02", "figures/yamaguchi2019_03"}),
+        "Eq 5": ("Jacobian, refracted", {"model/variance", "figures/yamaguchi2019_03"}),
+    },
+    "bati2021": {
+        "Eq 1": ("Fresnel reflectance at normal incidence", {"optics/fresnel", "inverse/interface"}),
+        "Eq 6": ("variances of one interface", {"model/operators"}),
+        "Eq 7": ("index of a dielectric", {"inverse/interface"}),
+        "Eq 8": ("k of a conductor", {"inverse/interface"}),
+        "Eq 9": ("largest eta of a conductor", {"inverse/interface"}),
+        "Eq 10": ("smallest eta of a conductor", {"inverse/interface"}),
+        "Eq 11": ("attenuated reflectance below one interface", {"inverse/interface"}),
+        "Eq 12": ("N1, first indices of a pair", {"inverse/equivalence"}),
+        "Eq 13": ("optical depth between two interfaces", {"inverse/equivalence", "inverse/interface"}),
+        "Eq 14": ("N2, second indices of a pair", {"inverse/equivalence"}),
+        "Eq 15": ("variance of a reflection below one interface", {"inverse/interface"}),
+        "Eq 16": ("T0, optical depths above a pair", {"inverse/equivalence"}),
+        "Eq 18": ("attenuated reflectance below a stack", {"inverse/interface"}),
+        "Eq 19": ("variance of a reflection below a stack", {"inverse/interface"}),
+        "Eq 20": ("energy that is left to the lower interface of a pair", {"inverse/pair"}),
+        "Algorithm 1": ("class of a pair", {"inverse/pair"}),
+        "Algorithm 2": ("several lobes, from the top", {"inverse/stacks"}),
+        "Algorithm 3": ("demands on what lies below a stack", {"inverse/interface"}),
+        "Algorithm 4": ("one more interface", {"inverse/interface"}),
+        "Algorithm 5": ("a pair of interfaces", {"inverse/interface", "inverse/pair"}),
+    },
 }
 
 
@@ -37,6 +90,15 @@ def key(author: str, year: str) -> str:
     return letters.lower() + year
 
 
+def numbers(listed: str) -> list[int]:
+    """Of `1-3, 5 and 7` every number."""
+    found: list[int] = []
+    for span in re.split(", | and ", listed):
+        first, *last = map(int, span.split("-"))
+        found += range(first, (last or [first])[0] + 1)
+    return found
+
+
 def test_every_citation_has_an_entry() -> None:
     entries = set(re.findall(r"^@\w+\{(\w+),", (ROOT / "references.bib").read_text(encoding="utf-8"), re.MULTILINE))
     cited = {(key(m[1], m[2]), file) for file, text in source().items() for m in CITATION.finditer(text)}
@@ -45,9 +107,18 @@ def test_every_citation_has_an_entry() -> None:
 
 
 def test_equations_are_those_that_were_read_in_print() -> None:
-    found: dict[str, set[str]] = {}
+    found: dict[str, dict[str, set[str]]] = {paper: {} for paper in PRINTED}
     for file, text in source().items():
-        for citation in EQUATIONS.finditer(text):
-            if key(citation[1], citation[2]) == "belcour2018":
-                found.setdefault(file, set()).add(citation[3])
-    assert found == OF_BELCOUR_2018
+        for citation in PARTS.finditer(text):
+            paper = key(citation[1], citation[2])
+            if paper in found:
+                for number in numbers(citation[4]):
+                    found[paper].setdefault(f"{citation[3]} {number}", set()).add(file.removesuffix(".py"))
+    for paper, parts in PRINTED.items():
+        assert found[paper] == {part: files for part, (_, files) in parts.items()}
+
+
+def test_equations_name_their_paper() -> None:
+    """No `Eq. 5` alone, for which a reader would have to look further up."""
+    for file, text in source().items():
+        assert not UNNAMED.search(PARTS.sub("", text)), file

@@ -87,7 +87,10 @@ def validation(body: Body) -> Answer:
 
 
 def reflection(alpha_1: float, alpha_2: float, angle: float) -> dict[str, Any]:
-    """Two rough mirrors that face each other, beside the one that is as rough as a map adds them up (Eq. 5)."""
+    """Two rough mirrors that face each other, beside the one that is as rough as a map adds them up.
+
+    Belcour 2018, Eq. 5.
+    """
     from velatura.figures.bounces import along, bounce, uniform
     from velatura.model.roughness_maps import MAPS
 
@@ -104,7 +107,10 @@ def reflection(alpha_1: float, alpha_2: float, angle: float) -> dict[str, Any]:
 
 
 def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
-    """Light through a rough interface, beside the reflection that stands for it (Eq. 10)."""
+    """Light through a rough interface, beside the reflection that stands for it.
+
+    Belcour 2018, Eq. 10.
+    """
     from velatura.model.stack_lobes import stack_lobes
 
     stack = Stack([Interface(eta=eta, alpha=alpha)])
@@ -121,7 +127,10 @@ def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
 
 
 def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
-    """A rough mirror below an absorbing slab, beside the mirror's lobe that is dimmed as a whole (Eqs. 15-17)."""
+    """A rough mirror below an absorbing slab, beside the mirror's lobe that is dimmed as a whole.
+
+    Belcour 2018, Eqs. 15-17.
+    """
     from velatura.model.stack_lobes import stack_lobes
 
     stack = Stack([Medium(sigma_a=depth), Interface(conductor="mirror", alpha=alpha)])
@@ -139,7 +148,10 @@ def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
 
 
 def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
-    """A slab that scatters, by how far it turns the light that comes through, beside one lobe for it (Eq. 21)."""
+    """A slab that scatters, by how far it turns the light that comes through, beside one lobe for it.
+
+    Belcour 2018, Eq. 21.
+    """
     from velatura.model.stack_lobes import stack_lobes
 
     stack = Stack([Medium(sigma_s=depth, g=g), Interface(eta=1.0)])
@@ -157,7 +169,10 @@ def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
 
 
 def decoupling(eta: float, alpha: float) -> dict[str, Any]:
-    """Light of a rough mirror that leaves through a smooth coat, beside TIR times the mean direction's (Eq. 33)."""
+    """Light of a rough mirror that leaves through a smooth coat, beside TIR times the mean direction's.
+
+    Belcour 2018, Eq. 33.
+    """
     from velatura import tables
     from velatura.figures.bounces import along, bounce, uniform
     from velatura.optics import fresnel

@@ -1,9 +1,9 @@
 """Belcour 2018, figure 7: rough refraction, and the rough reflection that stands for it.
 
-The reflection is that of the refracted direction from below, by a roughness scaled with the real cosines (Eq. 10, in
-magnitudes) or as at normal incidence, as the released code has it. Lobes and widths are those of figure 6; indices,
-alpha (0.1) and angles are chosen here. The scale of Kulla and Conty 2017, which the paper shows beside its own, is not
-printed in it and left out.
+The reflection is that of the refracted direction from below, by a roughness scaled with the real cosines (Belcour 2018,
+Eq. 10, in magnitudes) or as at normal incidence, as the released code has it. Lobes and widths are those of figure 6;
+indices, alpha (0.1) and angles are chosen here. The scale of Kulla and Conty 2017, which the paper shows beside its
+own, is not printed in it and left out.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ SHOWN = 100
 def compute(count: int = 500, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
     """For `normals` and `reflected`: `aspect`, mean `size`, `turn` (degrees, from the bitangent); `pictures`.
 
-    `size_by_jacobian` is the ratio of their sizes by Eq. 4, 2 cos theta.
+    `size_by_jacobian` is 2 cos theta, the ratio of their sizes by Yamaguchi et al. 2019, Eq. 4.
     """
     x, y = disc.grid(count)
     wi = disc.incidence(THETA, -TURN)  # in the frame of the roughness

@@ -1,7 +1,8 @@
 """Yamaguchi et al. 2019, figure 3: reflected and refracted lobes on the projected disc, over the angle of incidence.
 
 The roughness is that chosen for figure 2, the index 1.5. Sizes and aspects are those of the spots that are at least
-half as high as the peak, and stand beside what the Jacobians of Eqs. 4 and 5 make of the distribution of normals.
+half as high as the peak, and stand beside what the Jacobians (Yamaguchi et al. 2019, Eqs. 4-5) make of the distribution
+of normals.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ def compute(
 ) -> dict[str, Any]:
     """For `reflected` and `refracted` over `angle`: `aspect`, `turn` (degrees), `size` over that of the normals.
 
-    `jacobian` is what that ratio is by Eqs. 4 and 5; `pictures` are the lobes on grids over the disc.
+    `jacobian` is that ratio by Yamaguchi et al. 2019, Eqs. 4-5; `pictures` are the lobes on grids over the disc.
     """
     x, y = disc.grid(count)
     step = max(count // SHOWN, 1)

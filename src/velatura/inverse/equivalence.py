@@ -93,7 +93,10 @@ class EquivalenceClass:
         return not self.indices_1() if self.free else not bool(self.member()[0].feasible.all())
 
     def indices_1(self, channel: int | None = None) -> list[Interval]:
-        """All values of the first free index (N1), as disjoint intervals; in one channel, or in all."""
+        """All values of the first free index, as disjoint intervals; in one channel, or in all.
+
+        N1 of Bati et al. 2021, Eq. 12.
+        """
         if self.interfaces == 1:
             return self._beyond(channel)
         if self._smooth_in_one_medium:
@@ -102,11 +105,12 @@ class EquivalenceClass:
         return intervals(lambda eta: self._reachable(eta, channel), self._axis)
 
     def indices_2(self, eta_1: float, channel: int | None = None) -> list[Interval]:
-        """All values of the second index below a pair's first one (N2)."""
+        """All values of the second index below a pair's first one: N2 of Bati et al. 2021, Eq. 14."""
         return self._beyond(channel, np.array([eta_1]))
 
     def indices_blur(self) -> list[Interval]:
-        """All values of a pair's first index for which its second interface need not be smoother than smooth (V)."""
+        """All values of a pair's first index for which its second interface need not be smoother than smooth: V of
+        Bati et al. 2021, section 5.2.2."""
         return intervals(lambda eta: self._last(eta)[1].blur >= 0, self._axis)
 
     @cached_property
@@ -123,7 +127,7 @@ class EquivalenceClass:
 
     @property
     def depth_above(self) -> list[Interval]:
-        """Optical depths that a medium above all of the stack may have in every channel (T0, Eq. 16)."""
+        """Optical depths that a medium above all of the stack may have in every channel (Bati et al. 2021, Eq. 16)."""
         return [(0.0, 0.5 * float(np.log(self.highest / e))) for e in self.energy[:, 0] if e <= self.highest]
 
     # Points ----------------------------------------------------------------------------------------------------------
@@ -308,7 +312,7 @@ def dislike(eta_0: Value, layers: Layers) -> Array:
 
 
 def _depth(below: Above, rest: _Rest, eta: Array) -> Array:
-    """Optical depths, (C, N), that make dielectrics of given indices reflect what they must."""
+    """Optical depths (C, N) with which dielectrics of given indices reflect enough (Bati et al. 2021, Eq. 13)."""
     layers = Layers("dielectric", eta[None], None, rest.roughness, 0.0)
     found = below.reflectance(layers)
     return 0.5 * np.log(np.maximum(found, interface.ENERGY_MIN) / rest.r)

@@ -141,8 +141,9 @@ def with_index(above: Above, eta: Value, tau: Value, variance: Variance, paired:
     The roughness depends on the light that bounces above, that on the reflectance, and that on the roughness.
 
     Args:
-        paired: energy of the pair whose upper interface this is, for Algorithm 5 as Bati et al. 2021 print it: then
-            the whole pair's reflectance tells the light that bounces above, and the variance is missed by a little.
+        paired: energy of the pair whose upper interface this is, for the roughness as printed in Bati et al. 2021,
+            Algorithm 5: then the light that bounces above follows from the reflectance of the whole pair, and the
+            variance is missed by a little.
     """
     lit = above.through(tau)
     smooth = np.atleast_2d(fresnel.normal_incidence(eta / above.eta))
@@ -190,18 +191,18 @@ def _size(s: Variance) -> Array:
 def _closed_form(
     above: Above, energy: Array, variance: Variance, bright: Array, choice: Choice
 ) -> tuple[Layers, Value]:
-    """The one formula for an interface below any state (Bati et al. 2021, Eqs. 11, 15, 18 and 19 in one).
+    """The one formula for an interface below any state: Bati et al. 2021, Algorithms 3 and 4.
 
     Returns the interfaces, and what they reflect.
     """
-    # Give absorption that is pinned to what lies above
+    # Ask for what the lobe has below the stack, absorption that is pinned included (Bati et al. 2021, Algorithm 3)
     if choice.tau is not None:
         above = above.through(choice.tau)
     r = attenuated(above, energy)
     s_r = reflected(above, variance, r, bright)
     roughness = floor(s_r).roughness(above.f)
 
-    # Find its index, and what absorption must take away
+    # Find its index, and what absorption must take away (Bati et al. 2021, Algorithm 4)
     solver = _conductor if choice.kind == "conductor" else dielectric
     if choice.kind == "mirror":
         layers = Layers("mirror", 1.0, None, roughness, 0.0)
@@ -209,7 +210,7 @@ def _closed_form(
         layers = solver(above, r, roughness, choice)
     margins = {"blur": margin(least(s_r)), **layers.margins}
     reflectance = above.reflectance(layers)
-    tau = 0.5 * np.log(np.maximum(reflectance, ops.TINY) / r)
+    tau = 0.5 * np.log(np.maximum(reflectance, ops.TINY) / r)  # Bati et al. 2021, Eq. 13
     if choice.tau is not None or not choice.absorbs:
         margins["colour"] = margin(-np.max(np.abs(tau), axis=0), NEGLIGIBLE)
         tau = choice.tau if choice.tau is not None else 0.0
@@ -220,13 +221,18 @@ def _closed_form(
 
 
 def attenuated(above: Above, energy: Array) -> Array:
-    """Reflectance that an interface needs under the medium above it, for a lobe of that energy (Eq. 18)."""
+    """Reflectance that an interface needs under the medium above it, for a lobe of that energy.
+
+    Bati et al. 2021, Eqs. 11 and 18; the former below one interface.
+    """
     state = above.state
     return 1 / (state.t_0i * state.t_i0 / np.maximum(energy, ENERGY_MIN) + state.r_i0)
 
 
 def reflected(above: Above, variance: Variance, r: Array, bright: Array) -> Variance:
-    """The variance of an interface's own reflection, for a lobe of that variance (Eq. 19).
+    """The variance of an interface's own reflection, for a lobe of that variance.
+
+    Bati et al. 2021, Eqs. 15 and 19, the former below one interface; 1 - R_n0 R' is 1 / (1 + m) here.
 
     r: its reflectance (C, N). bright: the brightest channel of this is the one whose variance is asked for, where every
     channel has its own.
@@ -251,7 +257,7 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     denser = np.broadcast_to(np.asarray(choice.side) > 0, np.broadcast_shapes(np.shape(choice.side), r.shape[1:]))
 
     def index(u: Array) -> Array:
-        """Of reflectance u at normal incidence when smooth (Eq. 7)."""
+        """Of reflectance u at normal incidence when smooth (Bati et al. 2021, Eq. 7)."""
         root = np.sqrt(np.maximum(u, 0.0))  # of what rounding makes less than nothing
         ratio = (1 + root) / (1 - root)
         return above.eta * np.where(denser, ratio, 1 / ratio)[None]
@@ -269,7 +275,7 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
 
 
 def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
-    """The conductor that reflects r in every channel (Eqs. 8-10, and numerically where it is rough)."""
+    """The conductor that reflects r in every channel (Bati et al. 2021, Eqs. 8-10; numerically where it is rough)."""
     eta_1 = above.eta
     pinned = None if choice.eta is None else _colour(choice.eta) / eta_1
     given = None if choice.kappa is None else _colour(choice.kappa) / eta_1
@@ -277,12 +283,12 @@ def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     def indices(u: Array) -> tuple[Array, Array]:
         """Relative eta and kappa of reflectance u when smooth."""
         if given is not None:
-            # eta below kappa, the lower root of Eq. 1
+            # eta below kappa, the lower root of Bati et al. 2021, Eq. 1
             b = (1 + u) / (1 - u)
             n = b - np.sqrt(np.maximum(b * b - 1 - given * given, 0))
             return n, np.broadcast_to(given, n.shape)
         n = conductor_index(u, choice.tint) if pinned is None else np.broadcast_to(pinned, u.shape)
-        return n, np.sqrt(np.maximum(u * (n + 1) ** 2 - (n - 1) ** 2, 0) / (1 - u))
+        return n, conductor_extinction(u, n)
 
     def layers(n: Value, k: Value) -> Layers:
         return Layers("conductor", n * eta_1, k * eta_1, roughness, 0.0)
@@ -298,12 +304,11 @@ def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     low, high = np.full(r.shape, CONDUCTOR_MIN + 1e-12), np.full(r.shape, CONDUCTOR_MAX)
     if given is not None:  # eta from kappa down to almost nothing
         k2 = np.broadcast_to(given * given, r.shape)
-        n = np.sqrt(k2)
-        low = ((n - 1) ** 2 + k2) / ((n + 1) ** 2 + k2)
+        low = fresnel.normal_incidence(np.sqrt(k2), np.sqrt(k2))
         high = np.full(r.shape, 1 - 1e-9)
     elif pinned is not None:  # kappa from eta upwards
         n = np.broadcast_to(pinned, r.shape)
-        low = ((n - 1) ** 2 + n * n) / ((n + 1) ** 2 + n * n)
+        low = fresnel.normal_incidence(n, n)
     least, most = excess(low), excess(high)
     u = false_position(excess, low, high, least, most)
     margins = {"energy": margin(np.min(most, axis=0), NEGLIGIBLE)}
@@ -313,11 +318,16 @@ def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
 
 
 def conductor_index(reflectance: Value, tint: Value) -> Value:
-    """Relative eta of a conductor of that reflectance between its bounds (Eqs. 9-10)."""
+    """Relative eta of a conductor of that reflectance between its bounds (Bati et al. 2021, Eqs. 9-10)."""
     low = (1 - reflectance) / (1 + reflectance)
     root = ops.sqrt(6 * reflectance - 1 - reflectance * reflectance)
     high = (1 + reflectance + root) / (2 * (1 - reflectance))
     return low + tint * (high - low)
+
+
+def conductor_extinction(reflectance: Value, eta: Value) -> Value:
+    """Relative kappa of a conductor of that reflectance and relative eta (Bati et al. 2021, Eq. 8); 0 if none has."""
+    return ops.sqrt((reflectance * (eta + 1) ** 2 - (eta - 1) ** 2) / (1 - reflectance))
 
 
 def conductor_tint(eta: Array, kappa: Array) -> Array:

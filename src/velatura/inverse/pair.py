@@ -47,7 +47,8 @@ def invert_pair(
     model: str | Model = MODEL,
     **switches: str,
 ) -> Pair:
-    """The pairs of interfaces that give one lobe of these energies and variances (Algorithms 1 and 5).
+    """The pairs of interfaces that give one lobe of these energies and variances: Bati et al. 2021, Algorithms 1
+    and 5.
 
     Args:
         energy: of both interfaces together, colours (C, N), or (N,) or a number for one channel.
@@ -75,9 +76,10 @@ def invert_pair(
 def solve(
     above: Above, energy: Array, variance: Variance, eta_1: Value, tau: Value, choice: Choice, printed: bool = False
 ) -> tuple[Found, Found]:
-    """Both interfaces of pairs below any stacks, and what these then read."""
+    """Both interfaces of pairs below any stacks, and what these then read: Bati et al. 2021, Algorithm 5."""
     upper = top(above, energy, variance, eta_1, tau, choice.eta_max, printed)
-    return upper, interface.solve(upper.below, energy - upper.energy, variance, choice)
+    left = energy - upper.energy  # Bati et al. 2021, Eq. 20
+    return upper, interface.solve(upper.below, left, variance, choice)
 
 
 def top(

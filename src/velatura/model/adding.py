@@ -1,7 +1,7 @@
 """Adding: the statistics of light through a stack, from the top down, one lobe per interface.
 
 The recursion is Belcour 2018, section 5, as its authors released it, written over any kind of variance (Weier &
-Belcour 2020, Listing 3; Yamaguchi et al. 2019, section 3). A subscript 0i is for light that enters at the top and goes
+Belcour 2020, Listing 3; Yamaguchi et al. 2019, Eqs. 1-2). A subscript 0i is for light that enters at the top and goes
 down to layer i, i0 for light that comes up to the top, 12 and 21 for the layer being added.
 """
 

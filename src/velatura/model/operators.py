@@ -85,7 +85,10 @@ def reflectance(prepared: Prepared, layer: PreparedInterface, cos_theta: Value, 
 
 
 def _transmitted(prepared: Prepared, roughness: Roughness, ratio: Value, passes: Value) -> Variance:
-    """Variance of a refraction: that of a reflection by a rescaled roughness (Belcour 2018, Eq. 10 in magnitudes)."""
+    """Variance of a refraction: that of a reflection by a rescaled roughness (Belcour 2018, Eq. 10 in magnitudes).
+
+    At normal incidence Bati et al. 2021, Eq. 6.
+    """
     scale = ops.select(passes, 0.5 * ops.absolute(1 - ratio), 0.0)
     return prepared.variance.of(roughness.scaled(scale), prepared.f)
 

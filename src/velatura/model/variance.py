@@ -109,7 +109,11 @@ class PerAxis(Variance):
 
 @dataclass(frozen=True)
 class Covariance(Variance):
-    """A symmetric 2x2 matrix, where every interface has its own axes (Yamaguchi et al. 2019)."""
+    """A symmetric 2x2 matrix, where every interface has its own axes.
+
+    Reflection and refraction scale all axes alike (Yamaguchi et al. 2019, Eqs. 4-5), so that the matrix is turned from
+    the variances along the interface's axes, and stands for the variance in Yamaguchi et al. 2019, Eqs. 1-2.
+    """
 
     xx: Value
     xy: Value

@@ -53,6 +53,6 @@ def schlick(cos_theta: Value, f0: Value) -> Value:
 
 
 def normal_incidence(eta: Value, kappa: Value = 0.0) -> Value:
-    """Reflectance at normal incidence, ((eta-1)^2 + kappa^2) / ((eta+1)^2 + kappa^2)."""
+    """Reflectance at normal incidence, ((eta-1)^2 + kappa^2) / ((eta+1)^2 + kappa^2) (Bati et al. 2021, Eq. 1)."""
     kappa2 = kappa * kappa
     return ((eta - 1) * (eta - 1) + kappa2) / ((eta + 1) * (eta + 1) + kappa2)
