@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from velatura import tables
 from velatura.editor import bundle, shading
 from velatura.editor.folder import Conflict, Folder
+from velatura.editor.messages import admitted
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, MissingTool
 from velatura.model import MODELS
@@ -149,12 +151,27 @@ def test_tables_are_those_that_are_read(here: Path) -> None:
     texture = decoded(VERBS["tables"]({"key": textured["tables"]})["texture"])
     assert texture.shape[1:] == (1024, 4)
     assert np.isfinite(texture).all()
-    with pytest.raises(InvalidInput, match="no tables"):
+    with pytest.raises(InvalidInput, match="unknown table 'nonsense'"):
         VERBS["tables"]({"key": "nonsense"})
 
-    shading._made.cache_clear()  # as when other shaders have taken its place
-    with pytest.raises(InvalidInput, match="ask for the shader first"):
-        VERBS["tables"]({"key": textured["tables"]})
+    shading._made.cache_clear()  # as when other shaders have taken its place, or after a new start
+    np.testing.assert_array_equal(decoded(VERBS["tables"]({"key": textured["tables"]})["texture"]), texture)
+
+
+def test_the_names_of_all_tables_make_a_key() -> None:
+    everything = ",".join(name for name, _ in tables.load().items())
+    assert decoded(VERBS["tables"](admitted({"key": everything}))["texture"]).shape[1:] == (1024, 4)
+
+
+def test_threads_share_the_code_of_a_pattern() -> None:
+    """Asked from several threads at once: the same answers, and as many programs as there are patterns."""
+    materials = [changed(alpha=[0.1, 0.2]), COAT, {**COAT, "layers": [COAT["layers"][1]]}] * 8
+    shading._made.cache_clear()
+    with ThreadPoolExecutor(8) as pool:
+        keys = [made["key"] for made in pool.map(shader, materials)]
+    assert keys == [shader(material)["key"] for material in materials]
+    assert shading._made.cache_info().currsize == 3
+    assert shading._made.cache_info().maxsize is not None
 
 
 # Objects, light, texts

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import os
-import weakref
 from typing import Any
 
 import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.model import Model
-from velatura.shader import Shader, constant, shader
+from velatura.shader import Shader, atlas, constant, shader
 from velatura.stack import Stack, Varying, is_colour
+from velatura.stack.schema import unknown
+from velatura.tables import load
 
 #: Plain values of the material that stands for all of its pattern; those of every other parameter are the default.
 _STAND_INS = {"eta": 1.5, "k": 1.0, "alpha_u": 0.1, "alpha_v": 0.1}
@@ -30,7 +30,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
     Raises:
         InvalidInput: a stack without an interface, or a model, that there is no shader for.
     """
-    made, key, _ = _made(pattern(stack, stretched), model)
+    made = _made(pattern(stack, stretched), model)
     values = {name: value for name, value in stack.flat().items() if name in made.uniforms}
     free = {name: value for name, value in values.items() if not isinstance(value, Varying)}
     return {
@@ -38,7 +38,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         "text": made.text,
         "baked": made.baked and made.baked.to_dict(),
         "uniforms": {name: made.uniforms[name] for name in free},
-        "tables": key,
+        "tables": ",".join(made.looked_up) or None,
         "maps": [
             {"sampler": sampler, "texture": os.path.relpath(image.texture), "encoding": image.encoding}
             for sampler, image in made.maps.items()
@@ -70,32 +70,21 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
 
 
 @functools.lru_cache(64)
-def _made(stack: Stack, model: Model) -> tuple[Shader, str | None, np.ndarray | None]:
-    """The code, and its tables with their key; those of a tape are known by their names."""
-    made = shader(stack, model, values="uniforms")
-    return (made, None, None) if made.baked else (made, *_kept(made.tables))
-
-
-# Tables are known by what they hold, so that the page fetches those that several shaders read only once, for as long as
-# one of these shaders is remembered
-_tables: weakref.WeakValueDictionary[str, np.ndarray] = weakref.WeakValueDictionary()
-
-
-def _kept(texture: np.ndarray) -> tuple[str, np.ndarray]:
-    key = hashlib.sha256(texture.tobytes()).hexdigest()[:16]
-    return key, _tables.setdefault(key, texture)
+def _made(stack: Stack, model: Model) -> Shader:
+    return shader(stack, model, values="uniforms")
 
 
 def tables(key: str) -> np.ndarray:
-    """The texture of tables, float32 of shape (height, width, 4), that a shader was given the key of.
+    """The texture of tables, float32 of shape (height, width, 4), that a shader was given the key of: their names.
 
     Raises:
-        InvalidInput: no shader that was made here has it.
+        InvalidInput: no table has one of the names.
     """
-    found = _tables.get(key)
-    if found is None:
-        raise InvalidInput(f"there are no tables {key}: ask for the shader first")
-    return found
+    names, known = key.split(","), dict(load().items())
+    for name in names:
+        if name not in known:
+            raise InvalidInput(unknown("table", name, known))
+    return atlas.texture(names)
 
 
 def _plain(name: str, value: Any) -> float | list[float]:

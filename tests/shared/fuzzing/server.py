@@ -42,7 +42,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "targets": {},
     "validations": {},
     "shader": {"material": COAT, **MODEL},
-    "tables": {"key": "0123456789abcdef"},
+    "tables": {"key": "conductor,inside"},
     "table": {"name": "conductor"},
     "read": {"text": "layers: [{interface: {eta: 1.5, alpha: 0.1}}]"},
     "write": {"material": COAT},
