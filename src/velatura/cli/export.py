@@ -10,10 +10,11 @@ import typer
 
 from velatura.cli import options
 from velatura.errors import InvalidInput
-from velatura.exports import FORMATS, check_writable
+from velatura.exports import FORMATS, check_writable, with_constants
 from velatura.exports import export as exported
 
 To = Enum("To", {name: name for name in FORMATS}, type=str)  # type: ignore[misc]
+_SHADERS = " and ".join(with_constants())
 
 
 def export(
@@ -28,7 +29,7 @@ def export(
         typer.Option(
             "--constant",
             metavar="KEY",
-            help="For glsl: a parameter that never changes (layer0_eta), or all; may be repeated.",
+            help=f"For {_SHADERS}: a parameter that never changes (layer0_eta), or all; may be repeated.",
         ),
     ] = None,
     settings: options.Settings = None,
@@ -37,7 +38,7 @@ def export(
     if output is not None:
         check_writable(output, to.value)
     if constant and not FORMATS[to.value].constants:
-        raise InvalidInput(f"--constant: only for --to glsl, not for {to.value}")
+        raise InvalidInput(f"--constant: only for --to {_SHADERS}, not for {to.value}")
     stack, switches = options.read(material, settings)
     folder = output.parent if output else None
     made = exported(stack, to.value, options.model_name(model), constant=constant or (), folder=folder, **switches)

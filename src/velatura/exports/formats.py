@@ -29,7 +29,7 @@ class Format(NamedTuple):
 
 
 FORMATS: dict[str, Format] = {
-    "glsl": Format((".glsl", ".frag"), "velatura.exports.glsl", beside=(".tables.bin",), constants=True),
+    "glsl": Format((".glsl", ".frag"), "velatura.exports.shader", beside=(".tables.bin",), constants=True),
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
@@ -38,11 +38,12 @@ FORMATS: dict[str, Format] = {
 
 @dataclass(frozen=True)
 class Request:
-    """A request for an export: a stack, the model with its changed switches, and the values that are worked in.
+    """A request for an export: a format, a stack, the model with its changed switches, and values that are worked in.
 
     Paths of textures are relative to `folder`, where the format allows that; absolute without one.
     """
 
+    to: str
     stack: Stack
     model: Model
     switches: Mapping[str, str]
@@ -102,9 +103,9 @@ def export(
     if to not in FORMATS:
         raise InvalidInput(unknown("format", to, FORMATS))
     if constant and not FORMATS[to].constants:
-        raise InvalidInput(f"constant: only for {' and '.join(_with_constants())}, not for {to}")
+        raise InvalidInput(f"constant: only for {' and '.join(with_constants())}, not for {to}")
     chosen = named(DEFAULT if model is None else model, **switches)
-    request = Request(load(material), chosen, switches, constant, None if folder is None else Path(folder))
+    request = Request(to, load(material), chosen, switches, constant, None if folder is None else Path(folder))
     written: Export = import_module(FORMATS[to].module).write(request)
     return written
 
@@ -120,5 +121,6 @@ def check_writable(path: Path, to: str) -> None:
         files.check_writable(path.with_suffix(ending), "what belongs beside it", (Path(ending).suffix,))
 
 
-def _with_constants() -> list[str]:
+def with_constants() -> list[str]:
+    """The formats of which values may be constants."""
     return [name for name, each in FORMATS.items() if each.constants]

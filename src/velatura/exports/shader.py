@@ -1,0 +1,19 @@
+"""A material as shader code, and the texture of the tables that it looks up."""
+
+from __future__ import annotations
+
+from velatura.exports.formats import Export, Request
+from velatura.shader import shader
+from velatura.shader.glsl import GLSL
+from velatura.stack import Varying
+
+#: The language of each format.
+PRINTERS = {"glsl": GLSL}
+
+
+def write(request: Request) -> Export:
+    """The shader; beside it, if it looks up any tables, little-endian floats in rows of RGBA."""
+    free = [name for name, value in request.stack.flat().items() if not isinstance(value, Varying)]
+    constant = free if list(request.constant) == ["all"] else request.constant
+    made = shader(request.stack, request.model, constant, printer=PRINTERS[request.to])
+    return Export(made.text, {".tables.bin": made.tables.astype("<f4").tobytes()} if made.looked_up else {})
