@@ -17,7 +17,6 @@ from rich.progress import track
 
 import velatura as vt
 from velatura.model import DEFAULT, bsdf, named
-from velatura.model.stack_lobes import number
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
 COSINES = (1.0, 0.6, 0.2)
@@ -36,7 +35,7 @@ def random_stack(rng: np.random.Generator, interfaces: int) -> Stack:
 
 def albedo(stack: Stack, cos_theta: tuple[float, ...], model: str) -> np.ndarray:
     """Of the base as a model has it, shape (3, cosines)."""
-    body = bsdf.body(Material.of(stack, number), named(model))
+    body = bsdf.body(Material.of(stack), named(model))
     cosine = np.array(cos_theta)
     base = body.base((np.sqrt(1 - cosine**2), 0 * cosine, cosine))
     assert base is not None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from velatura.model.models import DEFAULT, SWITCHES, Model, named
 from velatura.model.stack_lobes import StackLobes, stack_lobes
-from velatura.stack import MaterialLike, Stack, dumps, load
+from velatura.stack import MaterialLike, dumps, load
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -148,7 +148,7 @@ def check(
     if isinstance(material, MaterialLike):
         material = load(material)
         subject = f"{material.name or 'material'} ({model if isinstance(model, str) else model.name})"
-        lossless = lossless or _lossless(material)
+        lossless = lossless or all(layer.lossless for layer in material.layers)
     return checks.check(
         made(material),
         exceptions=exceptions,
@@ -158,10 +158,3 @@ def check(
         subject=subject,
         progress=progress,
     )
-
-
-def _lossless(stack: Stack) -> bool:
-    """Whether no layer is known to absorb: no metal, no absorbing medium, a base that is white if there is one."""
-    white = {"sigma_a": (0.0, (0.0,) * 3), "albedo": (1.0, (1.0,) * 3)}
-    values = ((name.partition("_")[2], value) for name, value in stack.flat().items())
-    return "conductor" not in stack.kinds and all(value in white[key] for key, value in values if key in white)

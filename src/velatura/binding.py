@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import textwrap
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,18 +18,17 @@ import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.stack import (
+    Address,
     Brushing,
+    Material,
     Measured,
     Stack,
     Texture,
-    declared,
-    is_colour,
+    addressed,
     load,
     loads,
-    reduced,
     spectrum,
     srgb_weights,
-    within,
 )
 from velatura.stack.spectra import VISIBLE_NM
 
@@ -50,8 +49,8 @@ _SPECTRA = (
     "BlackBodySpectrum",
 )
 
-#: What stands in the stack for a value that a plugin got as a texture object.
-_STAND_IN = {"alpha_u": 0.1, "alpha_v": 0.1, "eta": 1.5, "k": 1.0}
+#: What stands in the stack for a value that a plugin got as a texture object, where its parameter declares nothing.
+_STAND_IN = 0.5
 
 
 @dataclass(frozen=True)
@@ -146,6 +145,7 @@ class Binding:
 
     Attributes:
         stack: the material as described; textures given as objects have a number standing in.
+        addresses: of all values by flat name.
         parameters: Dr.Jit values by flat name, as they were given or last changed.
         constants: the same, within the ranges of their parameters.
         images: textures, spectra and fields by flat name.
@@ -159,16 +159,19 @@ class Binding:
         self.mi = mi
         given = {name: self._given(properties, name) for name in list(properties.keys()) if name not in options}
         objects: dict[str, Any] = {}
+        stand_ins: dict[str, float] = {}
         for name, value in given.items():
             if isinstance(value, mi.Object):
-                if name == "exterior":
+                found = addressed(name)
+                if not all(address.declared.texturable for address in found):
                     raise InvalidInput(
-                        "exterior: must be a number, which is the same everywhere and for all wavelengths"
+                        f"{name}: must be a number, which is the same everywhere and for all wavelengths"
                     )
-                axes = ("_u", "_v") if name.endswith("_alpha") else ("",)
-                objects.update({name + axis: value for axis in axes})
+                objects.update({address.name: value for address in found})
+                stand_ins.update({address.name: address.declared.typical or _STAND_IN for address in found})
+                if not found:
+                    stand_ins[name] = _STAND_IN  # to be refused as any unknown name
         numbers = {k: v for k, v in given.items() if not isinstance(v, mi.Object) and k != "material"}
-        stand_ins = {name: _STAND_IN.get(name.partition("_")[2], 0.5) for name in objects}
         if "material" in given:
             self.stack = _described(mi, str(given["material"])).replace(**numbers, **stand_ins)
         else:
@@ -176,13 +179,14 @@ class Binding:
         self.parameters: dict[str, Any] = {}
         self.constants: dict[str, Any] = {}
         self.images: dict[str, Image | Field] = {}
-        values = {**self.stack.flat(), **objects}
-        for name, value in values.items():
-            along = name.replace("_alpha_v", "_alpha_u")
-            if along != name and along in self.images and value == values[along]:
-                self.images[name] = self.images[along]  # so that the interface stays isotropic
+        values = {address: objects.get(address.name, value) for address, value in self.stack.values()}
+        self.addresses = {address.name: address for address in values}
+        for address, value in values.items():
+            first = next(at for at in values if (at.layer, at.declared) == (address.layer, address.declared))
+            if first != address and first.name in self.images and value == values[first]:
+                self.images[address.name] = self.images[first.name]  # so that the interface stays isotropic
             else:
-                self._bind(name, value)
+                self._bind(address, value)
         self.steering: dict[str, Any] = {}
         self.clamped: set[str] = set()
         self.update()
@@ -218,51 +222,74 @@ class Binding:
         """
         import drjit as dr
 
-        channels = np.ravel(np.array(dr.detach(value), float))
+        declared, channels = self.addresses[name].declared, np.ravel(np.array(dr.detach(value), float))
         try:
             for channel in channels.tolist():
-                declared(name).check(channel)
+                declared.check(channel)
         except ValueError as error:
             if not np.isfinite(channels).all():
                 raise InvalidInput(f"{name}: {error}") from None
             if name not in self.clamped:
                 self.clamped.add(name)
                 warnings.warn(f"{name}: {error}; the nearest value that is allowed stands for it", stacklevel=2)
-            return dr.replace_grad(dr.clip(value, *within(name)), value)
+            return dr.replace_grad(dr.clip(value, *declared.within), value)
         return value
 
-    def at(self, si: Any, active: Any) -> dict[str, Any]:
-        """All values at a surface point by flat name."""
-        found = {name: image.at(si, active) for name, image in self.images.items()}
-        return {**self.values(), **found}
+    def material(self, values: Mapping[str, Any]) -> Material:
+        """The material with these values by flat name."""
+        return Material.from_flat(self.stack.kinds, values, self.stack.thin)
 
-    def steered(self, si: Any, active: Any) -> dict[str, Any]:
+    def at(self, si: Any, active: Any) -> Material:
+        """The material at a surface point."""
+        return self.material(self._at(si, active))
+
+    def steered(self, si: Any, active: Any) -> Material:
         """As `at`, but spectra are at fixed wavelengths and then at those of the ray, as `velatura.ops` has them.
 
         So the shape of a lobe does not depend on which wavelengths a ray carries.
         """
-        values = self.at(si, active)
+        values = self._at(si, active)
         if not self.mi.is_spectral:
-            return values
+            return self.material(values)
         fixed = self._at_fixed_wavelengths(si)
         spectra = {name: image for name, image in self.images.items() if image.colour}
         for name, image in spectra.items():
             steering = self.steering[name] if name in self.steering else image.at(fixed, active)
             values[name] = self.mi.ArrayXf([*steering, *values[name]])
-        return {**values, **self.constants}
+        return self.material({**values, **self.constants})
+
+    def uniform_material(self) -> Material:
+        """The material of values that are the same everywhere; spectra are at fixed wavelengths."""
+        return self.material({**self._colours(), **self.steering})
+
+    def looked_at(self, symbolic: bool = False) -> Material:
+        """The material with constants as plain numbers where they are numbers, and images as they are.
+
+        With `symbolic`, what is being differentiated stays as it is, and so never equals another value.
+        """
+        import drjit as dr
+
+        def plain(value: Any) -> Any:
+            if isinstance(value, float) or dr.size_v(value) > 1 or (symbolic and dr.grad_enabled(value)):
+                return value
+            return float(value[0])
+
+        return self.material({**{name: plain(value) for name, value in self.constants.items()}, **self.images})
+
+    def _at(self, si: Any, active: Any) -> dict[str, Any]:
+        found = {name: image.at(si, active) for name, image in self.images.items()}
+        return {**self._colours(), **found}
 
     def _at_fixed_wavelengths(self, si: Any) -> Any:
         fixed = self.mi.SurfaceInteraction3f(si)
         fixed.wavelengths = type(si.wavelengths)(*STEERING_NM)
         return fixed
 
-    def values(self) -> dict[str, Any]:
-        """The constants by flat name, colours as colours."""
+    def _colours(self) -> dict[str, Any]:
+        """The constants by flat name, colours as colours, and the exterior index, which is one to the model."""
         spectrum_type = self.mi.UnpolarizedSpectrum
-        return {
-            name: spectrum_type(value) if is_colour(name) or name == "exterior" else value
-            for name, value in self.constants.items()
-        }
+        wide = {name for name, address in self.addresses.items() if address.colour or address.layer is None}
+        return {name: spectrum_type(value) if name in wide else value for name, value in self.constants.items()}
 
     def traverse(self, callback: Any) -> None:
         """Offer every value under its flat name."""
@@ -274,7 +301,7 @@ class Binding:
 
     def _flags(self, name: str) -> Any:
         flags = self.mi.ParamFlags
-        return flags.NonDifferentiable if name == "exterior" else flags.Differentiable
+        return flags.Differentiable if self.addresses[name].declared.differentiable else flags.NonDifferentiable
 
     # What a plugin is asked about its values
 
@@ -288,7 +315,7 @@ class Binding:
 
     def attribute_1(self, name: str, si: Any, active: Any) -> Any:
         """A value at a surface point as one number: of a colour or spectrum, its luminance."""
-        if is_colour(name):
+        if self.addresses[name].colour:
             return self.mi.luminance(self.attribute_3(name, si, active))
         return self.mi.Float(self._one(name, si, active))
 
@@ -297,7 +324,7 @@ class Binding:
         mi, image = self.mi, self.images.get(name)
         if not (mi.is_spectral and image and image.colour):
             value = self._one(name, si, active)
-            return mi.Color3f(value[0] if mi.is_monochromatic and is_colour(name) and image else value)
+            return mi.Color3f(value[0] if mi.is_monochromatic and self.addresses[name].colour and image else value)
         # Sum over wavelengths, as many at once as a ray carries
         nm, weights = srgb_weights()
         carried, rgb = len(mi.UnpolarizedSpectrum()), mi.Color3f(0)
@@ -326,7 +353,8 @@ class Binding:
         if isinstance(value, bool | int | float | str):
             return value
         if properties.type(name).name == "Spectrum":
-            bounded = name.endswith("_albedo")  # as Mitsuba's own plugins read a reflectance
+            # As Mitsuba's own plugins read a reflectance
+            bounded = any(address.colour and address.declared.high <= 1 for address in addressed(name))
             value = properties.get_texture(name) if bounded else properties.get_unbounded_texture(name)
         if isinstance(value, mi.Object):
             if value.class_name() not in (_NUMBERS if mi.is_spectral else _SPECTRA):
@@ -354,42 +382,42 @@ class Binding:
             mend = "; write it as a spectrum" if colour and texture.class_name() in _SPECTRA else ""
             raise InvalidInput(f"{name}: {needs}{mend}") from None
 
-    def _bind(self, name: str, value: Any) -> None:
-        mi = self.mi
+    def _bind(self, address: Address, value: Any) -> None:
+        mi, name = self.mi, address.name
         if isinstance(value, mi.Object):
-            self.images[name] = self._object(name, value)
+            self.images[name] = self._object(address, value)
         elif isinstance(value, Texture):
-            self.images[name] = self._image(name, value)
+            self.images[name] = self._image(address, value)
         elif isinstance(value, Brushing):
             self.images[name] = Field(value)
-        elif is_colour(name) and mi.is_spectral and not isinstance(value, float):
-            self.images[name] = self._spectrum(name, value)
+        elif address.colour and mi.is_spectral and not isinstance(value, float):
+            self.images[name] = self._spectrum(address, value)
         else:
-            value = reduced(name, value) if isinstance(value, Measured) else value
+            value = address.declared.reduced(value) if isinstance(value, Measured) else value
             if isinstance(value, tuple):
                 colour = mi.Color3f(*value)
                 self.parameters[name] = mi.luminance(colour) if mi.is_monochromatic else colour
             else:
                 self.parameters[name] = mi.Float(value)
 
-    def _object(self, name: str, texture: Any) -> Image:
-        colour, kind = is_colour(name), texture.class_name()
+    def _object(self, address: Address, texture: Any) -> Image:
+        colour, kind = address.colour, texture.class_name()
         if kind in _SPECTRA or kind.startswith("BitmapTexture") or not isinstance(texture, self.mi.Texture):
-            self._tried(name, texture, colour)
-        return Image(texture, colour, **_range(name))
+            self._tried(address.name, texture, colour)
+        return Image(texture, colour, **_range(address))
 
-    def _image(self, name: str, image: Texture) -> Image:
-        colour = is_colour(name) and image.channel in (None, "rgb")
-        texels, scale = _texels(self.mi, name, image, colour), image.scale
+    def _image(self, address: Address, image: Texture) -> Image:
+        colour = address.colour and image.channel in (None, "rgb")
+        texels, scale = _texels(self.mi, address.name, image, colour), image.scale
         upsampled = self.mi.is_spectral and texels.shape[-1] == 3
         if upsampled:
             peak = max(float(texels.max()), 1.0)
             texels, scale = np.clip(texels / peak, 0, 1), scale * peak
         texture = {"type": "bitmap", "bitmap": self.mi.Bitmap(texels), "raw": not upsampled}
-        return Image(self.mi.load_dict(texture), colour, scale, image.offset, **_range(name))
+        return Image(self.mi.load_dict(texture), colour, scale, image.offset, **_range(address))
 
-    def _spectrum(self, name: str, value: Any) -> Image:
-        limits = _range(name)
+    def _spectrum(self, address: Address, value: Any) -> Image:
+        limits = _range(address)
         if isinstance(value, Measured):
             measured_nm, values = spectrum(value)
             begin, end = VISIBLE_NM
@@ -443,6 +471,6 @@ def _described(mi: Any, material: str) -> Stack:
     return load(find(material) if Path(material).suffix else material)
 
 
-def _range(name: str) -> dict[str, float]:
-    low, high = within(name)
+def _range(address: Address) -> dict[str, float]:
+    low, high = address.declared.within
     return {"low": low, "high": high}

@@ -27,7 +27,6 @@ from agreement import (
 import velatura as vt
 from velatura.model import bsdf, named
 from velatura.model.context import at_a_point
-from velatura.model.stack_lobes import number
 from velatura.shader import record, shader, structure
 from velatura.stack import Material
 
@@ -107,7 +106,7 @@ def test_lobes_that_are_drawn_once_are_the_lobes(layers: list, model: str, page:
     wi = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
     found = read_back(stack, made, wi, page)
 
-    body = bsdf.body(Material.of(stack, number), named(model), structure(stack), at_a_point())
+    body = bsdf.body(Material.of(stack), named(model), structure(stack), at_a_point())
     seen = bsdf.scattered(body, tuple(wi))
     parts: list[Any] = [*seen.reflected, *filter(None, [seen.base, seen.transmitted])]
     for part, (*energy, alpha_u, alpha_v, _) in zip(parts, found, strict=True):

@@ -16,7 +16,7 @@ from velatura.editor import messages
 from velatura.model import bsdf
 from velatura.model.context import at_a_point
 from velatura.shader import Recording, Shader, constant, record, shader, variance
-from velatura.stack import Kind, Material, Stack, is_colour
+from velatura.stack import Kind, Material, Stack
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
 
@@ -222,8 +222,9 @@ void main() {{
 def placed(stack: Stack, made: Shader) -> dict[str, list[float]]:
     """The values of a stack by their place in the struct of its shader, as many as a uniform holds."""
     return {
-        place: np.broadcast_to(constant(name, stack.flat()[name]), 3 if is_colour(name) else 1).tolist()
-        for name, place in made.uniforms.items()
+        made.uniforms[address.name]: np.broadcast_to(constant(address, value), 3 if address.colour else 1).tolist()
+        for address, value in stack.values()
+        if address.name in made.uniforms
     }
 
 

@@ -12,7 +12,6 @@ from velatura import kernel
 from velatura.comparison.evaluated_lobes import account
 from velatura.errors import InvalidInput
 from velatura.model import bsdf, named
-from velatura.model.stack_lobes import number
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -116,7 +115,7 @@ def test_eval_pdf_and_sample_agree(name: str) -> None:
 def test_the_plugin_is_the_model_that_numpy_runs(name: str, model: str) -> None:
     """In single precision, with averages sampled once per material: within 1 % where the lobes are."""
     stack, ctx = vt.preset(name), mi.BSDFContext()
-    body = bsdf.body(Material.of(stack, number), named(model))
+    body = bsdf.body(Material.of(stack), named(model))
     rng, n = np.random.default_rng(11), 2000
     cos_theta, phi = rng.uniform(0.05, 1, n), rng.uniform(0, 2 * np.pi, n)
     sin_theta = np.sqrt(1 - cos_theta**2)

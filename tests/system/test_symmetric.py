@@ -11,7 +11,6 @@ from scipy import stats
 import velatura as vt
 from velatura import kernel
 from velatura.model import bsdf, named
-from velatura.model.stack_lobes import number
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -127,7 +126,7 @@ def test_the_laws() -> None:
 def test_the_plugin_is_the_model_that_numpy_runs(name: str) -> None:
     """In single precision, with averages sampled once per material: within 1 % where the lobes are."""
     stack, rng, n = vt.preset(name), np.random.default_rng(11), 2000
-    body = bsdf.body(Material.of(stack, number), named("belcour2018", form="symmetric"))
+    body = bsdf.body(Material.of(stack), named("belcour2018", form="symmetric"))
     z, phi = rng.uniform(0.05, 1, n), rng.uniform(0, 2 * np.pi, n)
     z = z * np.where(rng.random(n) < 0.5 * stack.transmits, -1, 1)
     wi = (np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z)

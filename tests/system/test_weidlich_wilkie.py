@@ -10,7 +10,7 @@ import pytest
 import velatura.plugins.weidlich_wilkie as plugin
 from velatura import kernel
 from velatura.optics import fresnel
-from velatura.stack import Interface, Material, Medium, Stack, dumps, preset
+from velatura.stack import Interface, Material, Medium, Stack, as_described, dumps, preset
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -129,5 +129,5 @@ def test_reciprocity(name: str) -> None:
 def test_it_computes_with_floats_too() -> None:
     stack = Stack([Interface(eta=1.5, alpha=0.2), Interface(conductor="mirror", alpha=0.1)])
     wi, wo = direction(0.8, 0.3), direction(0.7, 3.2)
-    by_hand = plugin.evaluate(Material.of(stack), tuple(wi), tuple(wo))
+    by_hand = plugin.evaluate(Material.of(stack, as_described), tuple(wi), tuple(wo))
     np.testing.assert_allclose(value_and_density(material(stack), wi, wo)[0], by_hand, rtol=1e-4)

@@ -12,7 +12,6 @@ import velatura as vt
 from velatura import tables
 from velatura.model import bsdf, named
 from velatura.model.prepare import PreparedBase
-from velatura.model.stack_lobes import number
 from velatura.optics import fresnel
 from velatura.stack import Material
 from velatura.tables import coordinates, diffuse_nodes
@@ -25,7 +24,7 @@ COSINES = np.array([1.0, 0.7, 0.4, 0.2])
 
 
 def prepared(stack: vt.Stack, model: str = "velatura", **switches: str) -> bsdf.Body:
-    return bsdf.body(Material.of(stack, number), named(model, **switches))
+    return bsdf.body(Material.of(stack), named(model, **switches))
 
 
 def seen(stack: vt.Stack, model: str = "velatura", **switches: str) -> tuple[Array, PreparedBase]:
@@ -94,7 +93,7 @@ def test_the_base_is_reciprocal(model: str) -> None:
     stack = vt.Stack(
         [vt.Interface(eta=1.9, alpha=(0.1, 0.4), rotation=20), vt.Interface(eta=1.4, alpha=0.3), vt.Diffuse()]
     )
-    body = bsdf.body(Material.of(stack, number), named(model))
+    body = bsdf.body(Material.of(stack), named(model))
     wi, wo = (0.6, 0.0, 0.8), (0.3, -0.4, np.sqrt(0.75))
     there, back = body.base(wi), body.base(wo)
     assert there is not None and back is not None

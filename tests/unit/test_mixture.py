@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura.model import MODELS, bsdf, named
-from velatura.model.stack_lobes import number
 from velatura.optics import fresnel
-from velatura.stack import Material
+from velatura.stack import Material, as_described
 
 Array = NDArray[np.floating]
 
@@ -34,7 +33,7 @@ STACKS = {
 
 
 def body_of(stack: vt.Stack, model: str = "belcour2018", **switches: str) -> bsdf.Body:
-    return bsdf.body(Material.of(stack, number), named(model, **switches))
+    return bsdf.body(Material.of(stack), named(model, **switches))
 
 
 def directions(n: int, both: bool, seed: int) -> tuple[Array, Array, Array]:
@@ -91,7 +90,7 @@ def test_the_symmetric_form_of_velatura_keeps_the_energy_of_a_furnace() -> None:
 
 
 def test_a_stack_turned_over_twice_is_itself() -> None:
-    pane = Material.of(BRUSHED_PANE)
+    pane = Material.of(BRUSHED_PANE, as_described)
     turned = pane.reversed()
     kinds, values = turned.kinds, turned.flat()
     assert kinds == ("dielectric", "medium", "dielectric")

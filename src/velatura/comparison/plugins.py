@@ -102,8 +102,7 @@ def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
         return np.full((*shape, len(grids)), np.nan)
 
     lobe = WalkedLobe(energy=nothing(3), alpha=nothing(2), rotation=nothing(), mean=nothing(2), covariance=nothing(3))
-    surfaces = len(stack.interfaces) + ("diffuse" in stack.kinds)
-    return Account((lobe,) * surfaces, lobe if stack.transmits else None, grid.sum(axis=(2, 3)), grid)
+    return Account((lobe,) * len(stack.surfaces), lobe if stack.transmits else None, grid.sum(axis=(2, 3)), grid)
 
 
 def _is_file(plugin: Plugin) -> bool:

@@ -14,7 +14,7 @@ from velatura.comparison.result import Account, Comparison
 from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
-from velatura.stack import Diffuse, Interface, MaterialLike, Stack, load
+from velatura.stack import MaterialLike, Stack, load
 
 COSINES = (1.0, 0.7, 0.35)
 PATHS = 3 * 10**6
@@ -121,9 +121,8 @@ def _beside(model: Account, truth: Account) -> Account:
 
 
 def _lobe_names(stack: Stack) -> tuple[str, ...]:
-    surfaces = [layer for layer in stack.layers if isinstance(layer, Interface | Diffuse)]
-    names = ["D" if isinstance(layer, Diffuse) else f"R{k}" for k, layer in enumerate(surfaces, 1)]
-    return (*names, "T") if stack.transmits else tuple(names)
+    names = [f"R{k}" for k in range(1, len(stack.interfaces) + 1)]
+    return (*names, *(["D"] if stack.base else []), *(["T"] if stack.transmits else []))
 
 
 def _counter(progress: Progress | None, total: int) -> Callable[[], None]:

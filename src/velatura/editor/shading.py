@@ -11,13 +11,12 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.model import Model
 from velatura.shader import Shader, atlas, constant, shader
-from velatura.stack import Stack, Varying, is_colour
+from velatura.stack import Address, Stack, Varying
 from velatura.stack.schema import unknown
 from velatura.tables import load
 
-#: Plain values of the material that stands for all of its pattern; those of every other parameter are the default.
-_STAND_INS = {"eta": 1.5, "k": 1.0, "alpha_u": 0.1, "alpha_v": 0.1}
-_STRETCHED = {**_STAND_INS, "alpha_v": 0.2, "rotation": 30.0}
+#: Of an interface with a roughness for each axis, in the material that stands for all of its pattern.
+_STRETCHED = {"alpha_v": 0.2, "rotation": 30.0}
 
 
 def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
@@ -31,13 +30,12 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         InvalidInput: a stack without an interface, or a model, that there is no shader for.
     """
     made = _made(pattern(stack, stretched), model)
-    values = {name: value for name, value in stack.flat().items() if name in made.uniforms}
-    free = {name: value for name, value in values.items() if not isinstance(value, Varying)}
+    free = [(at, value) for at, value in stack.values() if at.name in made.uniforms and not isinstance(value, Varying)]
     return {
         "key": made.key,
         "text": made.text,
         "baked": made.baked and made.baked.to_dict(),
-        "uniforms": {name: made.uniforms[name] for name in free},
+        "uniforms": {address.name: made.uniforms[address.name] for address, _ in free},
         "tables": ",".join(made.looked_up) or None,
         "maps": [
             {"sampler": sampler, "texture": os.path.relpath(image.texture), "encoding": image.encoding}
@@ -49,22 +47,22 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         ],
         "shown": made.shown,
         "transmitted": stack.transmits,
-        "base": stack.kinds[-1] == "diffuse",
+        "base": stack.base is not None,
         "thin": stack.thin,
-        "values": {name: _plain(name, value) for name, value in free.items()},
+        "values": {address.name: _plain(address, value) for address, value in free},
     }
 
 
 def pattern(stack: Stack, stretched: bool) -> Stack:
     """The stack that stands for all with the same code: of the same layers and textures, stretched or not."""
     values: dict[str, Any] = {"thin": stack.thin}
-    stand_ins = _STRETCHED if stretched else _STAND_INS
-    for name, value in stack.flat().items():
-        key = name.partition("_")[2]
+    for address, value in stack.values():
         if isinstance(value, Varying):
-            values[name] = value
-        elif key in stand_ins:
-            values[name] = stand_ins[key]
+            values[address.name] = value
+        elif stretched and address.key in _STRETCHED:
+            values[address.name] = _STRETCHED[address.key]
+        elif address.declared.typical is not None:
+            values[address.name] = address.declared.typical
     mirrors = {f"layer{i}_conductor": "mirror" for i, kind in enumerate(stack.kinds) if kind == "mirror"}
     return Stack.from_flat(stack.kinds, {**values, **mirrors})
 
@@ -87,7 +85,7 @@ def tables(key: str) -> np.ndarray:
     return atlas.texture(names)
 
 
-def _plain(name: str, value: Any) -> float | list[float]:
+def _plain(address: Address, value: Any) -> float | list[float]:
     """A value as a uniform holds it: a number, or three for what may be a colour."""
-    number = constant(name, value)
-    return np.broadcast_to(number, 3).tolist() if is_colour(name) else float(number)
+    number = constant(address, value)
+    return np.broadcast_to(number, 3).tolist() if address.colour else float(number)

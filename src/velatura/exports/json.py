@@ -12,8 +12,8 @@ from velatura.stack import Varying, dumps
 
 def write(request: Request) -> Export:
     """`material` as its file would have it, `model` with all switches, and `values` by flat name."""
-    free = {name: value for name, value in request.stack.flat().items() if not isinstance(value, Varying)}
-    numbers = {name: constant(name, value) for name, value in free.items()}
+    free = [(address, value) for address, value in request.stack.values() if not isinstance(value, Varying)]
+    numbers = {address.name: constant(address, value) for address, value in free}
     report = {
         "material": json.loads(dumps(request.stack, "json")),
         "model": {"name": request.model.name, **{switch: getattr(request.model, switch) for switch in SWITCHES}},

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from velatura.errors import InvalidInput
 from velatura.inverse.partial_stack import Array, take
 from velatura.model import Model, bsdf, mixture, named
-from velatura.model.stack_lobes import number
 from velatura.ops import Value
 from velatura.stack import Material, MaterialLike, load
 
@@ -113,7 +112,7 @@ def table_of(stack: MaterialLike, directions: Directions, model: str | Model) ->
         InvalidInput: not a valid material, an unknown model, or a texture, which has no one value.
     """
     stack = load(stack)
-    seen = bsdf.body(Material.of(stack, number), named(model))
+    seen = bsdf.body(Material.of(stack), named(model))
     value = radiance(seen, directions) / directions.wo[2]
     return ReflectanceTable(directions, np.broadcast_to(value, (3, len(directions.theta_i))))
 

@@ -17,7 +17,7 @@ from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, join
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import Model, lobes, named, prepare, variance_kind
 from velatura.model.diffuse import under, with_means
-from velatura.model.stack_lobes import StackLobes, number, stack_lobes, with_axes_named
+from velatura.model.stack_lobes import StackLobes, stack_lobes, with_axes_named
 from velatura.model.variance import Roughness
 from velatura.stack import (
     Diffuse,
@@ -111,7 +111,7 @@ def coat(
 def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
     """The layers that give below a coat the lobes that those of the stack give bare."""
     # Read the lobes of the bare stack
-    material = Material.of(stack, number)
+    material = Material.of(stack)
     kind = variance_kind(material)
     wanted, _ = lobes(prepare(material, model, kind), NORMAL)
 
@@ -150,7 +150,7 @@ def scattered(stack: Stack, model: Model) -> Array:
 
 def _scattered(stack: Stack, model: Model, *albedos: float) -> Array:
     """Energy of a diffuse base at normal incidence, its own or of N albedos, (3, N)."""
-    material = Material.of(stack, number)
+    material = Material.of(stack)
     if albedos:
         material = material.with_layer(-1, albedo=np.tile(albedos, (3, 1)))
     prepared = with_means(prepare(material, model))

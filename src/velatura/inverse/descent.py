@@ -6,7 +6,7 @@ call of the model.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,9 +17,19 @@ from velatura.inverse.angles import ReflectanceTable, radiance
 from velatura.inverse.partial_stack import CLEAR, Array
 from velatura.model import Model, bsdf, named, variance_kind
 from velatura.model.mixture import ALPHA_MIN
-from velatura.model.stack_lobes import number
 from velatura.ops import Value
-from velatura.stack import RGB, Layer, Material, MaterialLike, Medium, Stack, is_colour, load
+from velatura.stack import (
+    RGB,
+    DiffuseValues,
+    InterfaceValues,
+    LayerValues,
+    Material,
+    MaterialLike,
+    MediumValues,
+    Stack,
+    as_described,
+    load,
+)
 
 STEP = 1e-5  # of a value, to see how the model changes
 ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: what a round changes, as a share of what there is
@@ -44,9 +54,10 @@ class Fit:
 
 @dataclass(frozen=True)
 class Free:
-    """A value that may change: the flat names that share it, its channel (None for all alike), its bounds."""
+    """A value that may change: its layer, the keys that share it, its channel (None for all alike), its bounds."""
 
-    names: tuple[str, ...]
+    layer: int
+    keys: tuple[str, ...]
     channel: int | None
     low: float
     high: float
@@ -89,17 +100,16 @@ class Descent:
     eta_max: float
 
     @cached_property
-    def values(self) -> dict[str, Value]:
+    def material(self) -> Material:
         """Of the start: a colour (3, 1, 1), for channels, points and directions, or a float; k over eta for k."""
-        values = {name: number(name, value) for name, value in self.start.flat().items()}
-        values = {name: value[..., None] if is_colour(name) else value for name, value in values.items()}
-        for n in self._metals:
-            values[f"layer{n}_k"] = values[f"layer{n}_k"] / values[f"layer{n}_eta"]
-        return values
+        material = Material.of(self.start).each(lambda address, value: value[..., None] if address.colour else value)
+        return _metals(material, lambda layer: layer.k / layer.eta)
 
     @cached_property
     def free(self) -> list[Free]:
-        return [free for n, kind in enumerate(self.start.kinds) for free in self._of_layer(n, kind)]
+        return [
+            free for n, layer in enumerate(self.material.layers) for free in FREE[type(layer)](n, layer, self.eta_max)
+        ]
 
     @cached_property
     def wanted(self) -> Array:
@@ -130,13 +140,13 @@ class Descent:
 
     def residuals(self, x: Array) -> Array:
         """By how much log(1 + f cos) is missed, (P, 3 N), at P points x (P, free) (Low et al. 2012)."""
-        values = dict(self.values)
+        material = self.material
         for n, free in enumerate(self.free):
-            for name in free.names:
-                values[name] = _changed(values[name], free, free.shown(x[:, n, None]))
-        values = self._with_extinctions(values)
-        material = Material.from_flat(self.start.kinds, values, self.start.thin)
-        seen = bsdf.body(material, self.model, variance_kind(Material.of(self.start)))
+            layer, shown = material.layers[free.layer], free.shown(x[:, n, None])
+            changed = {key: _changed(getattr(layer, key), free, shown) for key in free.keys}
+            material = material.with_layer(free.layer, **changed)
+        variance = variance_kind(Material.of(self.start, as_described))
+        seen = bsdf.body(_metals(material, lambda layer: layer.k * layer.eta), self.model, variance)
         value = radiance(seen, self.table.directions)
         shape = (3, len(x), len(self.table.directions.theta_i))
         missed = np.log1p(np.broadcast_to(value, shape)) - self.wanted[:, None]
@@ -150,51 +160,62 @@ class Descent:
 
     def stack(self, x: Array) -> Stack:
         """The material at a point; a medium that is clear is left out."""
-        values = {name: np.ravel(value) for name, value in self.values.items()}
+        material = self.material.each(lambda address, value: np.ravel(value))
         for free, coordinate in zip(self.free, x):
-            for name in free.names:
-                own = values[name] = np.array(values[name])
+            for key in free.keys:
+                own = np.array(getattr(material.layers[free.layer], key))
                 own[slice(None) if free.channel is None else free.channel] = free.written(coordinate)
-        values = self._with_extinctions(values)
-        changed = {name: written(values[name]) for free in self.free for name in free.names}
-        found = self.start.replace(**changed)
-        layers = [layer for layer in found.layers if not _clear(layer)]
+                material = material.with_layer(free.layer, **{key: own})
+        changed = {(free.layer, key) for free in self.free for key in free.keys}
+        values = _metals(material, lambda layer: layer.k * layer.eta).values()
+        found = self.start.replace(**{at.name: written(x) for at, x in values if (at.layer, at.key) in changed})
+        layers = [layer for layer, own in zip(found.layers, Material.of(found).layers) if not _clear(own)]
         return Stack(layers, name=found.name, exterior=found.exterior, thin=found.thin)
 
-    def _of_layer(self, n: int, kind: str) -> list[Free]:
-        name = f"layer{n}_"
-        if kind == "diffuse":
-            return [Free((f"{name}albedo",), c, 0.0, 1.0, False) for c in range(3)]
-        if kind == "medium":
-            depth = self.values[f"{name}depth"]
-            return [Free((f"{name}sigma_a",), c, 0.0, DEPTH_MAX / depth, False) for c in range(3)] if depth > 0 else []
-        u, v = self.values[f"{name}alpha_u"], self.values[f"{name}alpha_v"]
-        axes = [(f"{name}alpha_u", f"{name}alpha_v")] if u == v else [(f"{name}alpha_u",), (f"{name}alpha_v",)]
-        found = [Free(names, None, ALPHA_MIN, 1.0, True) for names in axes]
-        if kind == "dielectric":
-            eta = self.values[f"{name}eta"]
-            channels = range(3) if np.ptp(eta) > 0 else (None,)
-            found += [
-                Free((f"{name}eta",), c, min(1.0, eta.min()), max(self.eta_max, eta.max()), True) for c in channels
-            ]
-        if kind == "conductor":
-            # A conductor has k >= eta, unless it begins with less
-            ratio = np.ravel(self.values[f"{name}k"])
-            found += [Free((f"{name}eta",), c, *CONDUCTOR, True) for c in range(3)]
-            found += [Free((f"{name}k",), c, float(np.clip(ratio[c], RATIO[0], 1)), RATIO[1], True) for c in range(3)]
-        return found
-
-    @property
-    def _metals(self) -> list[int]:
-        return [n for n, kind in enumerate(self.start.kinds) if kind == "conductor"]
-
-    def _with_extinctions(self, values: dict[str, Value]) -> dict[str, Value]:
-        """Values with k, in place of k over eta."""
-        return values | {f"layer{n}_k": values[f"layer{n}_k"] * values[f"layer{n}_eta"] for n in self._metals}
-
     def _first(self, free: Free) -> float:
-        value = np.ravel(self.values[free.names[0]])
+        value = np.ravel(getattr(self.material.layers[free.layer], free.keys[0]))
         return float(np.mean(value) if free.channel is None else value[free.channel])
+
+
+def _of_base(n: int, layer: DiffuseValues, eta_max: float) -> list[Free]:
+    return [Free(n, ("albedo",), c, 0.0, 1.0, False) for c in range(3)]
+
+
+def _of_medium(n: int, layer: MediumValues, eta_max: float) -> list[Free]:
+    if layer.depth <= 0:
+        return []
+    return [Free(n, ("sigma_a",), c, 0.0, DEPTH_MAX / layer.depth, False) for c in range(3)]
+
+
+def _of_interface(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
+    axes = [("alpha_u", "alpha_v")] if layer.alpha_u == layer.alpha_v else [("alpha_u",), ("alpha_v",)]
+    found = [Free(n, keys, None, ALPHA_MIN, 1.0, True) for keys in axes]
+    if layer.kind == "dielectric":
+        eta = layer.eta
+        channels = range(3) if np.ptp(eta) > 0 else (None,)
+        found += [Free(n, ("eta",), c, min(1.0, eta.min()), max(eta_max, eta.max()), True) for c in channels]
+    if layer.kind == "conductor":
+        # A conductor has k >= eta, unless it begins with less
+        ratio = np.ravel(layer.k)
+        found += [Free(n, ("eta",), c, *CONDUCTOR, True) for c in range(3)]
+        found += [Free(n, ("k",), c, float(np.clip(ratio[c], RATIO[0], 1)), RATIO[1], True) for c in range(3)]
+    return found
+
+
+#: What may change, by the layer.
+FREE: dict[type, Callable[..., list[Free]]] = {
+    DiffuseValues: _of_base,
+    MediumValues: _of_medium,
+    InterfaceValues: _of_interface,
+}
+
+
+def _metals(material: Material, k: Callable[[InterfaceValues], Value]) -> Material:
+    """The material with another `k` of its conductors."""
+    for n, layer in enumerate(material.layers):
+        if isinstance(layer, InterfaceValues) and layer.kind == "conductor":
+            material = material.with_layer(n, k=k(layer))
+    return material
 
 
 def _changed(value: Value, free: Free, x: Array) -> Value:
@@ -216,9 +237,8 @@ def written(value: Array) -> float | RGB:
     return r, g, b
 
 
-def _clear(layer: Layer) -> bool:
+def _clear(layer: LayerValues) -> bool:
     """Whether it is a medium that does nothing."""
-    if not isinstance(layer, Medium):
+    if not isinstance(layer, MediumValues):
         return False
-    sigma = np.broadcast_arrays(number("layer0_sigma_a", layer.sigma_a), number("layer0_sigma_s", layer.sigma_s))
-    return bool(np.max(sigma) * number("depth", layer.depth) < CLEAR)
+    return bool(np.maximum(layer.sigma_a, layer.sigma_s).max() * layer.depth < CLEAR)

@@ -19,7 +19,7 @@ from velatura.inverse.stacks import alternatives, model_of
 from velatura.inverse.target import Target, read
 from velatura.model import Model, named, variance_kind
 from velatura.model.variance import Isotropic
-from velatura.stack import Diffuse, Interface, Layer, Material, MaterialLike, Medium, Stack, load
+from velatura.stack import Diffuse, Interface, Layer, Material, MaterialLike, Medium, Stack, as_described, load
 
 STARTS = 4
 TRIED = 3  # sets of interfaces from which simplification descends
@@ -70,7 +70,7 @@ def simplify(
         raise InvalidInput(
             f"interfaces: must be at least 1, and fewer than the {count} that there are, got {interfaces}"
         )
-    turned = variance_kind(Material.of(stack)) is not Isotropic
+    turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
     table = angles.table_of(stack, Directions.about_lobes(turned), chosen)
 
     # Descend from the sets of interfaces that come closest as they are

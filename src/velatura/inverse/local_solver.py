@@ -25,10 +25,20 @@ from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, whole
 from velatura.inverse.target import Fixed, Target, TargetLobe
 from velatura.model import Model, lobes, prepare
 from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
-from velatura.model.stack_lobes import number
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
-from velatura.stack import Diffuse, Interface, Kind, Layer, Medium, Stack, Varying
+from velatura.stack import (
+    Diffuse,
+    Interface,
+    InterfaceValues,
+    Kind,
+    Layer,
+    Material,
+    MediumValues,
+    Stack,
+    Varying,
+    number,
+)
 
 ROUNDS, ATTEMPTS = 8, 4  # of Newton's method, and bounds that are tried on the way
 ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
@@ -607,24 +617,23 @@ def plain(stack: Stack) -> list[Layers]:
         raise InvalidInput("thin: a pane ends in the index outside; a target has no such last index")
     found: list[Layers] = []
     tau: Array | float = 0.0
-    given = stack.flat()
-    for n, (layer, kind) in enumerate(zip(stack.layers, stack.kinds)):
-        where = f"layer {n} ({kind})"
-        if isinstance(layer, Diffuse):
-            break
-        if kind == "mirror":
-            raise InvalidInput(f"{where}: reflects all light whatever its index; a target has a conductor there")
-        values = {key: number(f"layer{n}_{key}", given[f"layer{n}_{key}"]) for key in layer.flat()}
-        if isinstance(layer, Medium):
-            if np.any(values["sigma_s"] > 0):
+    base = len(stack.layers) - 1 if stack.base else None
+    material = Material.of(stack, lambda at, value: value if at.layer == base else number(at, value))
+    for n, layer in enumerate(material.layers[:base]):
+        where = f"layer {n} ({layer.kind})"
+        if isinstance(layer, MediumValues):
+            if np.any(layer.sigma_s > 0):
                 raise InvalidInput(f"{where}: scatters light; the media of a target only absorb")
-            tau = np.broadcast_to(values["sigma_a"] * values["depth"], (3, 1))
+            tau = np.broadcast_to(layer.sigma_a * layer.depth, (3, 1))
             continue
-        if values["alpha_u"] != values["alpha_v"]:
+        if not isinstance(layer, InterfaceValues):
+            raise InvalidInput(f"{where}: a target has interfaces and media only")
+        if layer.kind == "mirror":
+            raise InvalidInput(f"{where}: reflects all light whatever its index; a target has a conductor there")
+        if layer.alpha_u != layer.alpha_v:
             raise InvalidInput(f"{where}: is brushed; the lobes of a target are round")
-        eta = values["eta"] if kind == "conductor" else np.full((1, 1), np.mean(values["eta"]))
-        rough = Roughness(values["alpha_u"], values["alpha_u"], 0.0)
-        found.append(Layers(kind, eta, values.get("k"), rough, tau))
+        eta = layer.eta if layer.kind == "conductor" else np.full((1, 1), np.mean(layer.eta))
+        found.append(Layers(layer.kind, eta, layer.k, Roughness(layer.alpha_u, layer.alpha_u, 0.0), tau))
         tau = 0.0
     if not found:
         raise InvalidInput("layers: no interface; without one there is no lobe")

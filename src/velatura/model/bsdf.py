@@ -20,7 +20,7 @@ from velatura.model.diffuse import Base, under, with_means
 from velatura.model.energy_balance import Scaling
 from velatura.model.lobe_merging import merged
 from velatura.model.models import Model
-from velatura.model.prepare import Prepared, prepare, variance_kind
+from velatura.model.prepare import Prepared, lobes, prepare, variance_kind
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
@@ -320,7 +320,7 @@ def balanced(stack: Body, context: Context) -> Body:
 
 def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:
     """The reflected lobes that the model evaluates, and the transmitted one."""
-    reflected, passed = prepared.model.recursion.lobes(prepared, w)
+    reflected, passed = lobes(prepared, w)
     return merged(prepared, reflected), passed
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
+from typing import TYPE_CHECKING
 
 from velatura import ops, tables
 from velatura.model.context import Context
@@ -16,8 +17,12 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
+from velatura.optics.ggx import Direction
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.tables import Average, Row, Tables
+
+if TYPE_CHECKING:  # a lobe may hold the interface that it is drawn with
+    from velatura.model.adding import Lobe
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,14 @@ class Prepared:
     tables: Tables
     base: PreparedBase | None = None
     once: Average | None = None
+
+
+def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
+    """The reflected lobes of a stack, one per interface from the top, and the transmitted one, by its model.
+
+    `wi` points away from the surface. Where nothing passes, the transmitted lobe has energy 0.
+    """
+    return prepared.model.recursion.lobes(prepared, wi)
 
 
 def variance_kind(material: Material) -> type[Variance]:

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from velatura.errors import InvalidInput
 from velatura.model.adding import Lobe
 from velatura.model.models import DEFAULT, Model, named
-from velatura.model.prepare import prepare
+from velatura.model.prepare import lobes, prepare
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics.directions import directions
-from velatura.stack import Material, Measured, Stack, Varying, is_colour, reduced
+from velatura.stack import Material, Stack
 
 FAINTLY_BRUSHED = 0.01  # difference of two roughnesses, below which an interface hardly has axes
 
@@ -56,9 +55,8 @@ def stack_lobes(
     """The lobes of a stack, as `velatura.lobes` says."""
     chosen = named(model, **switches)
     x, y, z = directions(cos_theta, phi).T
-    material = Material.of(stack, number)
-    prepared = prepare(material.solid(), chosen)
-    reflected, transmitted = chosen.recursion.lobes(prepared, (x, y, z))
+    material = Material.of(stack)
+    reflected, transmitted = lobes(prepare(material.solid(), chosen), (x, y, z))
     in_plane = chosen.recursion.lobe_kind(Isotropic) is not Isotropic
     axis = _axis(material, np.arctan2(y, x) if in_plane else np.zeros_like(z))
     each = [_collect(lobe, chosen, axis) for lobe in reflected]
@@ -69,23 +67,6 @@ def stack_lobes(
         rotation=[lobe.rotation for lobe in each],
         transmitted=_collect(transmitted, chosen, axis) if stack.transmits else None,
     )
-
-
-def number(name: str, value: Any) -> Any:
-    """A value of a material for the model in NumPy: a float, or a colour of shape (3, 1).
-
-    Raises:
-        InvalidInput: a texture, which has no one value.
-    """
-    if isinstance(value, Varying):
-        raise InvalidInput(
-            f"{name}: is a {value.what}, and lobes are those of one point; replace it, as in --set {name}=0.1"
-        )
-    if isinstance(value, Measured):
-        value = reduced(name, value)
-    if is_colour(name):
-        return np.broadcast_to(np.asarray(value, float), (3,))[:, None]
-    return float(value)
 
 
 def _axis(material: Material, isotropic: np.ndarray) -> np.ndarray:

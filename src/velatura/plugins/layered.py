@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from velatura import kernel, tables
-from velatura.binding import Binding, plugin_class
+from velatura.binding import Binding, Image, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
 from velatura.model.context import Context, at_a_point
@@ -74,10 +74,10 @@ def make(mi: Any) -> type:
                 form = "balanced"
             declared = EXCEPTIONS[form, shape]
             # The albedo of a base is a sum over cosines, which hardly resolves a critical angle outside
-            indices = [np.mean(np.array(v)) for name, v in self.binding.constants.items() if name.endswith("_eta")]
-            outside = float(np.max(np.array(self.binding.constants["exterior"])))
-            based = "diffuse" in self.binding.stack.kinds
-            return declared | GAIN if based and any(index < outside for index in indices) else declared
+            seen = self.binding.looked_at()
+            known = [layer.eta for layer in seen.interfaces if not (layer.eta is None or isinstance(layer.eta, Image))]
+            below_outside = any(np.mean(np.array(eta)) < np.max(np.array(seen.exterior)) for eta in known)
+            return declared | GAIN if self.binding.stack.base and below_outside else declared
 
         # The material, and what follows from it
 
@@ -87,26 +87,22 @@ def make(mi: Any) -> type:
         def _update(self) -> None:
             """Work out what does not depend on direction, and how the surface reflects."""
             self.binding.update()
-            binding, kinds = self.binding, self.binding.stack.kinds
+            binding, based = self.binding, self.binding.stack.base is not None
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
-            flat = {**binding.stack.flat(), **self._looked_at()}
-            self.variance = variance_kind(Material.from_flat(kinds, {**flat, **binding.images}))
+            self.variance = variance_kind(binding.looked_at(symbolic=True))
             self.body: bsdf.Body | None = None
             if binding.uniform:
-                self.body = self._prepared(binding.values(), self._sampled())
+                self.body = self._prepared(binding.uniform_material(), self._sampled())
                 dr.eval(self.body)
             self.spectra: spectral.Spectra | None = None
             sampled = binding.stack.interfaces and not binding.uniform and not binding.varies
             if sampled and dr.is_jit_v(mi.Float):
-                steering = {**binding.values(), **binding.steering}
-                fixed = self._prepared(steering, self._sampled())
+                fixed = self._prepared(binding.uniform_material(), self._sampled())
                 dr.eval(fixed)
                 self.spectra = spectral.sample(mi, fixed, self._at_wavelengths)
                 dr.eval(self.spectra.above, self.spectra.below, self.spectra.means)
             # Say how light leaves
-            smooth = all(value == 0.0 for name, value in flat.items() if "_alpha_" in name)
-            clear = all(value == 0.0 for name, value in flat.items() if name.endswith("_sigma_s"))
-            self.delta = smooth and clear and not binding.varies and "diffuse" not in kinds
+            self.delta = not binding.varies and not any(layer.spreads for layer in binding.looked_at().layers)
             self.transmits = binding.stack.transmits
             common = flags.FrontSide | (flags.SpatiallyVarying if binding.varies else flags.Empty)
             common |= flags.Empty if self.variance is Isotropic else flags.Anisotropic
@@ -118,14 +114,12 @@ def make(mi: Any) -> type:
             if self.transmits:
                 self.kinds += [flags.DeltaTransmission if self.delta else flags.GlossyTransmission]
                 self.m_components += [self.kinds[-1] | common | flags.NonSymmetric]
-            if "diffuse" in kinds:
+            if based:
                 self.kinds += [flags.DiffuseReflection]
                 self.m_components += [self.kinds[-1] | common]
             self.m_flags = functools.reduce(operator.or_, self.m_components)
 
-        def _prepared(self, values: Any, context: Context) -> bsdf.Body:
-            stack = self.binding.stack
-            material = Material.from_flat(stack.kinds, values, stack.thin)
+        def _prepared(self, material: Material, context: Context) -> bsdf.Body:
             return bsdf.body(material, self.model, self.variance, context)
 
         def _sampled(self) -> Context:
@@ -137,16 +131,6 @@ def make(mi: Any) -> type:
         def _settled(self, value: Any) -> Any:
             dr.make_opaque(value)
             return value
-
-        def _looked_at(self) -> dict[str, Any]:
-            """Constants as plain numbers; what is being differentiated stays symbolic, and so never equals another."""
-            numbers = {}
-            for name, value in self.binding.constants.items():
-                if dr.is_jit_v(value) and dr.grad_enabled(value):
-                    numbers[name] = value
-                elif dr.size_v(value) <= 1:
-                    numbers[name] = float(value) if isinstance(value, float) else float(value[0])
-            return numbers
 
         def _at_wavelengths(self, wavelengths: Any) -> bsdf.Body:
             si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wavelengths))

@@ -48,24 +48,27 @@ def make(mi: Any) -> type:
         def __init__(self, properties: Any) -> None:
             mi.BSDF.__init__(self, properties)
             self.binding = Binding(mi, properties)
-            kinds = self.binding.stack.kinds
-            self.surfaces = [k for k, kind in enumerate(kinds) if kind != "medium"]
+            stack = self.binding.stack
+            self.surfaces = stack.surfaces
             common = flags.FrontSide | (flags.SpatiallyVarying if self.binding.varies else flags.Empty)
-            reflection = flags.GlossyReflection | flags.Anisotropic
-            each = [flags.DiffuseReflection if kinds[k] == "diffuse" else reflection for k in self.surfaces]
+            self.types = [flags.GlossyReflection] * len(self.surfaces)
+            if stack.base:
+                self.types[-1] = flags.DiffuseReflection
+            glossy = flags.GlossyReflection | flags.Anisotropic
+            each = [glossy if kind == flags.GlossyReflection else kind for kind in self.types]
             self.m_components = [common | kind for kind in each]
             self.m_flags = functools.reduce(operator.or_, self.m_components)
-            self.facts = {"kinds": ", ".join(kinds)}
+            self.facts = {"kinds": ", ".join(stack.kinds)}
 
         def parameters_changed(self, keys: list[str]) -> None:
             self.binding.update()
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            bs, material = mi.BSDFSample3f(), self._material(si, active)
+            bs, material = mi.BSDFSample3f(), self.binding.at(si, active)
             wo, number = sample(material, tuple(si.wi), sample1, sample2.x, sample2.y, self._asked(ctx))
             bs.wo, bs.eta, bs.sampled_component = mi.Vector3f(*wo), 1.0, mi.UInt32(number)
-            paint = (material.kinds[-1] == "diffuse") & (bs.sampled_component == len(self.surfaces) - 1)
-            bs.sampled_type = dr.select(paint, mi.UInt32(+flags.DiffuseReflection), mi.UInt32(+flags.GlossyReflection))
+            last = bs.sampled_component == len(self.surfaces) - 1
+            bs.sampled_type = dr.select(last, mi.UInt32(+self.types[-1]), mi.UInt32(+self.types[0]))
             value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
             return bs, value / dr.maximum(bs.pdf, 1e-30) & (bs.pdf > 0)
 
@@ -76,24 +79,19 @@ def make(mi: Any) -> type:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
-            material, asked = self._material(si, active), self._asked(ctx)
+            material, asked = self.binding.at(si, active), self._asked(ctx)
             active = active & (si.wi.z > 0) & (wo.z > 0)
             value = evaluate(material, tuple(si.wi), tuple(wo), asked)
             pdf = density(material, tuple(si.wi), tuple(wo), asked)
             return mi.depolarizer(mi.UnpolarizedSpectrum(value)) & active, dr.select(active, pdf, 0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            albedo = mi.UnpolarizedSpectrum(sum(_energies(self._material(si, active), si.wi.z).values()))
+            albedo = mi.UnpolarizedSpectrum(sum(_energies(self.binding.at(si, active), si.wi.z).values()))
             return dr.clip(albedo, 0, 1) & active & (si.wi.z > 0)
-
-        def _material(self, si: Any, active: Any) -> Material:
-            return Material.from_flat(self.binding.stack.kinds, self.binding.at(si, active))
 
         def _asked(self, ctx: Any) -> list[int]:
             """The surfaces that are wanted."""
-            paint = [self.binding.stack.kinds[k] == "diffuse" for k in self.surfaces]
-            types = [flags.DiffuseReflection if each else flags.GlossyReflection for each in paint]
-            return [k for number, k in enumerate(self.surfaces) if ctx.is_enabled(types[number], number)]
+            return [k for number, k in enumerate(self.surfaces) if ctx.is_enabled(self.types[number], number)]
 
     return WeidlichWilkie
 
@@ -168,9 +166,8 @@ def sample(
             alpha_u, alpha_v, i = _in_frame(layer, wi)
             h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
             drawn = ggx.rotate(ggx.reflect(i, h), -_rotation(layer))
-        before = sum(kind != "medium" for kind in material.kinds[:k])
         x, y, z = (ops.select(u >= begin, a, b) for a, b in zip(drawn, wo))
-        wo, number = (x, y, z), ops.select(u >= begin, float(before), number)
+        wo, number = (x, y, z), ops.select(u >= begin, float(material.surfaces.index(k)), number)
         begin = begin + share
     return wo, number
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.errors import InvalidInput
-from velatura.reference.layers import Layers, from_material
+from velatura.reference.layers import Layers, from_material, zeros
 from velatura.reference.walk import walk
-from velatura.stack import Material, Measured, Stack, Varying, reduced
+from velatura.stack import RGB, Address, Material, Stack
 
 Array = NDArray[np.floating]
 
@@ -84,32 +84,27 @@ def _layers(stack: Stack, microsurface: bool) -> Layers:
     import drjit as dr
     import drjit.llvm as types
 
-    values: dict[str, Any] = {}
-    for name, value in _numbers(stack).items():
-        if value == 0.0 and "_alpha_" not in name:
-            values[name] = 0.0  # spares work in every step
-        else:
-            values[name] = types.Array3f(*value) if isinstance(value, tuple) else types.Float(value)
-            dr.make_opaque(values[name])
-    return from_material(Material.from_flat(stack.kinds, values, stack.thin), microsurface)
+    plain = Material.of(stack, _plain)
+    spared = zeros(plain)
+
+    def opaque(address: Address, value: Any) -> Any:
+        if address in spared:
+            return 0.0
+        value = types.Array3f(*value) if isinstance(value, tuple) else types.Float(value)
+        dr.make_opaque(value)
+        return value
+
+    return from_material(plain.each(opaque), microsurface)
 
 
-def _numbers(stack: Stack) -> Mapping[str, float | tuple[float, float, float]]:
-    numbers = {}
-    for name, value in stack.flat().items():
-        if isinstance(value, Varying):
-            raise InvalidInput(
-                f"{name}: is a {value.what}, and statistics are those of one point; replace it by a number"
-            )
-        numbers[name] = reduced(name, value) if isinstance(value, Measured) else value
-    return numbers
+def _plain(address: Address, value: Any) -> float | RGB:
+    return address.plain(value, "statistics are those of one point; replace it by a number")
 
 
 def relative_index(stack: Stack) -> float:
     """Index below a stack that transmits over the index above, one for all colours."""
-    numbers = _numbers(stack)
-    below = numbers["exterior" if stack.thin else f"layer{len(stack.layers) - 1}_eta"]
-    return float(np.mean(below) / np.mean(numbers["exterior"]))
+    plain = Material.of(stack, _plain)
+    return float(np.mean(plain.below) / np.mean(plain.exterior))
 
 
 def _mixed(seed: int) -> int:

@@ -8,14 +8,16 @@ chooses.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from math import pi
+from typing import TypeVar
 
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
-from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
+from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues
+from velatura.stack.values import Pair
 
 ALPHA_MIN = 1e-3  # an interface smoother than this along both axes is perfectly smooth
 _MATCHED = 1e-3  # and so is one between indices this close, which bends no light
@@ -67,6 +69,17 @@ class Slab:
     def scatters(self) -> bool:
         return not _is_zero(self.scattering)
 
+    def absorbed(self, length: Value) -> Value:
+        """What absorption leaves of light, along a way through it of that length."""
+        return ops.exp(-self.absorption * length)
+
+    def straight(self, length: Value) -> Value:
+        """What goes straight on along a way of that length, neither absorbed nor scattered."""
+        return ops.exp(-(self.absorption + self.scattering) * length)
+
+
+Part = TypeVar("Part", Surface, Slab)
+
 
 @dataclass(frozen=True)
 class Layers:
@@ -102,26 +115,20 @@ class Layers:
         def swap(items: Sequence[Value]) -> tuple[Value, ...]:
             return tuple(_choose(where, below, above) for above, below in zip(items, reversed(items)))
 
-        def columns(items: Sequence[object], fields: str) -> list[tuple[Value, ...]]:
-            return [swap([getattr(item, field) for item in items]) for field in fields.split()]
+        def swapped(items: Sequence[Part]) -> tuple[Part, ...]:
+            columns = (swap([getattr(item, field.name) for item in items]) for field in fields(items[0]))
+            return tuple(type(items[0])(*values) for values in zip(*columns))
 
-        surfaces = zip(*columns(self.surfaces, "alpha_u alpha_v rotation smooth"))
-        slabs = zip(*columns(self.slabs, "absorption scattering g"))
-        return replace(
-            self,
-            surfaces=tuple(Surface(*fields) for fields in surfaces),
-            slabs=tuple(Slab(*fields) for fields in slabs),
-            index=swap(self.index),
-        )
+        surfaces, slabs = swapped(self.surfaces), swapped(self.slabs)
+        return replace(self, surfaces=surfaces, slabs=slabs, index=swap(self.index))
 
     # What a path meets -----------------------------------------------------------------------------------------------
 
     def surface(self, j: Value) -> Surface:
-        fields = ("alpha_u", "alpha_v", "rotation", "smooth")
-        return Surface(*(pick([getattr(s, field) for s in self.surfaces], j) for field in fields))
+        return _picked(self.surfaces, j)
 
     def slab(self, k: Value) -> Slab:
-        return Slab(*(pick([getattr(s, field) for s in self.slabs], k) for field in ("absorption", "scattering", "g")))
+        return _picked(self.slabs, k)
 
     def is_base(self, j: Value) -> Value:
         return True if self.count == 1 else j == self.count - 1
@@ -174,6 +181,19 @@ def from_material(material: Material, microsurface: bool) -> Layers:
         last.albedo if isinstance(last, DiffuseValues) else 0.0,
         microsurface,
     )
+
+
+def zeros(material: Material) -> set[Address]:
+    """Values that are known to be 0, and as plain numbers spare work in every step. A roughness does not: whether it is
+    0 decides between two ways to go on."""
+    return {
+        address for address, value in material.values() if _is_zero(value) and not isinstance(address.declared, Pair)
+    }
+
+
+def _picked(parts: Sequence[Part], index: Value) -> Part:
+    """The surface or slab at an index, by its fields."""
+    return type(parts[0])(*(pick([getattr(part, field.name) for part in parts], index) for field in fields(parts[0])))
 
 
 def pick(items: Sequence[Value], index: Value) -> Value:

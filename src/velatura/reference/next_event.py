@@ -142,7 +142,7 @@ def connect_medium(layers: Layers, out: WayOut, path: Path) -> Value:
 
 def transmittance(slab: Slab, cosine: Value, depth: Value = 1.0) -> Value:
     """Of a slab, straight through a part of its depth."""
-    return ops.exp(-(slab.absorption + slab.scattering) * ops.divide(depth, cosine))
+    return slab.straight(ops.divide(depth, cosine))
 
 
 def _direction(out: WayOut, k: Value) -> Direction:

@@ -13,10 +13,10 @@ from velatura import kernel
 from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
-from velatura.reference.layers import ALPHA_MIN, Layers, from_material, relative_index
+from velatura.reference.layers import ALPHA_MIN, Layers, from_material, relative_index, zeros
 from velatura.reference.next_event import way_out
 from velatura.reference.walk import Path, walk
-from velatura.stack import Material
+from velatura.stack import InterfaceValues, LayerValues
 
 _MAX_DEPTH = 1000
 
@@ -76,17 +76,14 @@ def make(mi: Any) -> type:
             """Find out what the walk may leave out, and which kinds of scattering there are."""
             binding = self.binding
             peaks = {name: float(np.max(np.abs(np.array(value)))) for name, value in binding.constants.items()}
-            # Zeros that spare work in every step
-            spared = ("_rotation", "_sigma_a", "_sigma_s")
-            self.zeros = {name: 0.0 for name, peak in peaks.items() if peak == 0 and name.endswith(spared)}
+            seen = binding.material({**peaks, **binding.images})
+            self.zeros = zeros(seen)
             # An interface whose roughness varies may be smooth here and rough there
-            kinds = binding.stack.kinds
-            surfaces = [i for i, kind in enumerate(kinds) if kind != "medium"]
-            widest = [_widest(peaks, kinds[i], i) for i in surfaces]
-            scatters = any(name.endswith("_sigma_s") and name not in self.zeros for name in binding.stack.flat())
+            widest = [_widest(seen.layers[k]) for k in seen.surfaces]
+            scatters = any(layer.spreads for k, layer in enumerate(seen.layers) if k not in seen.surfaces)
             rough = [alpha is None or alpha >= ALPHA_MIN for alpha in widest]
             smooth = [alpha is None or alpha < ALPHA_MIN for alpha in widest]
-            self.transmits, self.painted = binding.stack.transmits, "diffuse" in kinds
+            self.transmits, self.painted = binding.stack.transmits, binding.stack.base is not None
             self.glossy = scatters or any(rough)
             # Declare them
             sides = flags.FrontSide | (flags.BackSide if self.transmits else flags.Empty)
@@ -105,12 +102,12 @@ def make(mi: Any) -> type:
             self.m_components = [kind | common | extra for kind, extra in zip(self.kinds, one_way)]
             self.m_flags = functools.reduce(operator.or_, self.m_components)
             options = {"microsurface": str(self.microsurface).lower(), "max_depth": str(self.max_depth)}
-            self.facts = {**options, "seed": str(self.seed), "kinds": ", ".join(kinds)}
+            self.facts = {**options, "seed": str(self.seed), "kinds": ", ".join(binding.stack.kinds)}
 
         def _layers(self, si: Any, active: Any, flipped: Any) -> Layers:
             """The layers at a point, seen from below where `flipped`."""
-            values = {**self.binding.at(si, active), **self.zeros}
-            material = Material.from_flat(self.binding.stack.kinds, values, self.binding.stack.thin)
+            material = self.binding.at(si, active)
+            material = material.each(lambda address, value: 0.0 if address in self.zeros else value)
             layers = from_material(material, self.microsurface)
             return layers.reversed(flipped) if self.transmits else layers
 
@@ -213,12 +210,12 @@ def make(mi: Any) -> type:
     return LayeredReference
 
 
-def _widest(peaks: dict[str, float], kind: str, layer: int) -> float | None:
+def _widest(layer: LayerValues) -> float | None:
     """The larger roughness of a surface: None where that is a texture's business, 1 for a diffuse base."""
-    if kind == "diffuse":
+    if not isinstance(layer, InterfaceValues):
         return 1.0
-    alphas = [peaks.get(f"layer{layer}_alpha_{axis}") for axis in "uv"]
-    return max(alpha for alpha in alphas if alpha is not None) if None not in alphas else None
+    alphas = (layer.alpha_u, layer.alpha_v)
+    return max(alphas) if all(isinstance(alpha, float) for alpha in alphas) else None
 
 
 def _bits(mi: Any, x: Any) -> Any:

@@ -57,7 +57,7 @@ def density(layers: Layers, wi: Direction, wo: Direction) -> Value:
     for k, surface in enumerate(layers.surfaces):
         # Lose light in the medium
         slab = layers.slabs[k]
-        left = left * ops.mean(ops.exp(-slab.absorption))
+        left = left * ops.mean(slab.absorbed(1.0))
         spread = spread + left * (1 - ops.mean(ops.exp(-slab.scattering)))
         if k == layers.count - 1 and layers.base == "diffuse":
             spread = spread + left

@@ -12,7 +12,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.directions import directions
 from velatura.reference import roughness
 from velatura.reference.batches import ends, relative_index
-from velatura.stack import Diffuse, Interface, MaterialLike, Stack, load
+from velatura.stack import Interface, Layer, MaterialLike, Stack, load
 
 Array = NDArray[np.floating]
 
@@ -109,8 +109,8 @@ def _column(
 ) -> tuple[list[tuple[WalkedLobe, WalkedLobe]], float]:
     """The lobes of one direction with their errors, and the energy lost by cutting paths off."""
     found = ends(stack, wi, paths, seed, microsurface)
-    surfaces = [layer for layer in stack.layers if isinstance(layer, Interface | Diffuse)]
-    turned = any(isinstance(s, Interface) and _anisotropic(s) and s.rotation != 0 for s in surfaces)
+    surfaces = [stack.layers[place] for place in stack.surfaces]
+    turned = any(_anisotropic(s) and s.rotation != 0 for s in stack.interfaces)
     lobes = []
     up = found.w[2] > 0
     for k in range(len(surfaces)):
@@ -126,7 +126,7 @@ def _column(
     return lobes, found.truncated
 
 
-def _anisotropic(surface: Interface | Diffuse) -> bool:
+def _anisotropic(surface: Layer) -> bool:
     return isinstance(surface, Interface) and isinstance(surface.alpha, tuple)
 
 

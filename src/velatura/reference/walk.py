@@ -188,7 +188,7 @@ def _travel(layers: Layers, path: Path) -> None:
         path.weight *= ops.divide(seen, ops.divide(ops.mean(path.weight * seen), ops.mean(path.weight)))
     else:
         length = 1 / cosine
-    path.weight *= ops.exp(-slab.absorption * length)
+    path.weight *= slab.absorbed(length)
     # Leave
     leaves = ops.select(down, path.slab == layers.count, path.slab == 0)
     path.alive &= (leaves & (path.inside ^ True)) ^ True

@@ -90,10 +90,10 @@ def _seen(material: Material, body: bsdf.Body, w: Direction) -> tuple[list[Value
     above = number(f"{PLACE}.z") < 0.5
     if body.below is not None and material.kinds == material.kinds[::-1]:
         # Layers that are of the same kinds from both sides are added up once, for either
-        turned = material.reversed().flat()
-        chosen = {name: ops.select(above, value, turned[name]) for name, value in material.solid().flat().items()}
+        turned = dict(material.reversed().values())
+        chosen = material.solid().each(lambda address, value: ops.select(above, value, turned[address]))
         model, variance = body.above.model, body.above.variance
-        body = bsdf.body(Material.from_flat(material.kinds, chosen), model, variance, at_a_point())
+        body = bsdf.body(chosen, model, variance, at_a_point())
         return _columns(body.lobes_above, body, w)
     columns, facets = _columns(body.lobes_above, body, w)
     if body.below is None:

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from velatura.model.stack_lobes import number as plain
 from velatura.shader.printer import Field, Struct
 from velatura.shader.symbol import Operand, operand
-from velatura.stack import Brushing, Stack, Texture, Varying, is_colour, within
+from velatura.stack import Address, Brushing, Stack, Texture, Varying
+from velatura.stack import number as plain
 
 PARAMETERS = "vt_parameters"  # in the code: the values that change
 
@@ -50,14 +50,14 @@ class Filled(NamedTuple):
     parameters: bool
 
 
-def place(name: str) -> str:
+def place(address: Address) -> str:
     """Where a value lies in the struct: `layer0.eta` for `layer0_eta`."""
-    return name.replace("_", ".", 1) if name.startswith("layer") else name
+    return address.key if address.layer is None else f"layer{address.layer}.{address.key}"
 
 
-def constant(name: str, value: Any) -> Any:
+def constant(address: Address, value: Any) -> Any:
     """A value of a material as a float, or as an array of three channels where they differ."""
-    channels = np.ravel(plain(name, value))
+    channels = np.ravel(plain(address, value))
     return float(channels[0]) if np.all(channels == channels[0]) else channels
 
 
@@ -65,10 +65,9 @@ def structs(stack: Stack, read: Sequence[str]) -> list[Struct]:
     """`VtMaterial`, which holds the values that are read, by flat name, and a struct for each layer that has any."""
     layers, members = [], [Field("exterior", "number")]
     for i, kind in enumerate(stack.kinds):
-        prefix = f"layer{i}_"
-        names = [name for name in read if name.startswith(prefix)]
-        if names:
-            fields = [Field(name.removeprefix(prefix), "colour" if is_colour(name) else "number") for name in names]
+        own = [address for address, _ in stack.values() if address.layer == i and address.name in read]
+        if own:
+            fields = [Field(address.key, "colour" if address.colour else "number") for address in own]
             layers.append(Struct(f"VtLayer{i}", fields, kind))
             members.append(Field(f"layer{i}", f"VtLayer{i}"))
     return [*layers, Struct("VtMaterial", members, "indices are absolute, rotations in degrees")]
@@ -76,9 +75,12 @@ def structs(stack: Stack, read: Sequence[str]) -> list[Struct]:
 
 def filled(stack: Stack, read: Sequence[str], parameters: bool) -> Filled:
     """What fills the struct; with `parameters`, plain values are those of a uniform."""
-    flat, images = stack.flat(), _images(stack, read)
-    names = [name for name in ("exterior", *read) if isinstance(flat[name], Varying) or not parameters]
-    entries = [Entry(place(name), _value(name, flat[name], images), is_colour(name)) for name in dict.fromkeys(names)]
+    images = _images(stack, read)
+    entries = [
+        Entry(place(address), _value(address, value, images), address.colour)
+        for address, value in stack.values()
+        if (address.layer is None or address.name in read) and (isinstance(value, Varying) or not parameters)
+    ]
     return Filled(entries, {sampler: image for image, sampler in images.items()}, parameters)
 
 
@@ -91,12 +93,12 @@ def _images(stack: Stack, read: Sequence[str]) -> dict[Texture, str]:
     return images
 
 
-def _value(name: str, value: Any, images: Mapping[Texture, str]) -> Operand | Mapped | Brushed:
+def _value(address: Address, value: Any, images: Mapping[Texture, str]) -> Operand | Mapped | Brushed:
     if isinstance(value, Brushing):
         return Brushed(value.u, value.v, (90.0 if value.brushing == "concentric" else 0.0) + value.offset)
     if not isinstance(value, Varying):
-        return operand(constant(name, value))
+        return operand(constant(address, value))
     assert isinstance(value, Texture)
-    colour = is_colour(name) and value.channel in (None, "rgb")
+    colour = address.colour and value.channel in (None, "rgb")
     channel = "rgb" if colour else (value.channel or "r")
-    return Mapped(images[value], channel, value.scale, value.offset, *within(name))
+    return Mapped(images[value], channel, value.scale, value.offset, *address.declared.within)

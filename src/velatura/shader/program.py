@@ -105,7 +105,7 @@ def shader(
 
 def _interfaces(recording: Recording) -> list[list[int]]:
     """By reflected lobe, seen from above: the layers whose light it is."""
-    places = [i for i, kind in enumerate(recording.stack.kinds) if kind not in ("medium", "diffuse")]
+    places = recording.stack.surfaces[: len(recording.stack.interfaces)]
     return [[places[k] for k in group] for group in merging(recording.model, len(places))]
 
 

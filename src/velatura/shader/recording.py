@@ -22,7 +22,7 @@ from velatura.shader import material, symbol
 from velatura.shader.bake import Bake, bake
 from velatura.shader.graph import Graph
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Material, Stack, Varying, is_colour
+from velatura.stack import Address, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
 
 SHOWN = "vt_shown"  # in the code: the weights of lobes
@@ -62,7 +62,7 @@ class Recording:
         return {**self._places(set(self.baked.tape.inputs)), **self.read} if self.baked else self.read
 
     def _places(self, inputs: Collection[str]) -> dict[str, str]:
-        places = {name: material.place(name) for name in self.stack.flat()}
+        places = {address.name: material.place(address) for address, _ in self.stack.values()}
         return {name: place for name, place in places.items() if f"m.{place}" in inputs}
 
 
@@ -91,12 +91,11 @@ def record(
     for name in constant:
         if name not in flat:
             raise InvalidInput(f"constant: {unknown('parameter', name, flat)}")
-    values = {name: material.constant(name, flat[name]) if name in constant else _input(name) for name in flat}
     wi, wo, u = _direction("wi"), _direction("wo"), _direction("u")
 
     # Run the model
     kind = structure(stack) if parameters else variance(stack)
-    recorded = Material.from_flat(stack.kinds, values, stack.thin)
+    recorded = Material.of(stack, lambda at, value: material.constant(at, value) if at.name in constant else _input(at))
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     uniform = not any(isinstance(value, Varying) for value in flat.values())
     baked = bake(recorded, prepared()) if parameters and uniform else None
@@ -133,14 +132,14 @@ def _direction(name: str) -> tuple[Symbol, Symbol, Symbol]:
     return symbol.number(f"{name}.x"), symbol.number(f"{name}.y"), symbol.number(f"{name}.z")
 
 
-def _input(name: str) -> Symbol:
-    place = f"m.{material.place(name)}"
-    return symbol.colour(place) if is_colour(name) else symbol.number(place)
+def _input(address: Address) -> Symbol:
+    place = f"m.{material.place(address)}"
+    return symbol.colour(place) if address.colour else symbol.number(place)
 
 
 def variance(stack: Stack) -> type[Variance]:
     """The kind of variance that the shader of a stack computes with."""
-    return variance_kind(Material.of(stack))
+    return variance_kind(Material.of(stack, as_described))
 
 
 def structure(stack: Stack) -> type[Variance]:

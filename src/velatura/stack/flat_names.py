@@ -1,29 +1,87 @@
 """Flat names of a stack's values: `layer0_eta`, `layer0_alpha_u`, `layer1_sigma_a`, ...
 
-Renderers and command lines address single values by them. Here they are turned into the mapping that a file would hold,
-so that they are validated as a file is.
+Renderers and command lines address single values by them. They follow from the declared parameters of the layers. Here
+they are turned into the mapping that a file would hold, so that they are validated as a file is.
 """
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from velatura.errors import InvalidInput
-from velatura.stack.layers import LAYERS, Diffuse, Medium
-from velatura.stack.schema import unknown
-from velatura.stack.spectra import MIRROR, Named
+from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, has
+from velatura.stack.schema import parameters, unknown
+from velatura.stack.spectra import MIRROR, Measured, Named
+from velatura.stack.values import RGB, Colour, Scalar, Varying
 
 _OPTIONS = ("name", "source", "exterior", "thin")
-_SURFACE = ("alpha", "alpha_u", "alpha_v", "rotation")
-_KEYS = {
-    "dielectric": ("eta", *_SURFACE),
-    "conductor": ("eta", "k", "conductor", *_SURFACE),
-    "mirror": ("conductor", *_SURFACE),
-    "medium": tuple(Medium.model_fields),
-    "diffuse": tuple(Diffuse.model_fields),
-}
+_LAYER = re.compile(r"layer(\d{1,9})_(\w+)")
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where a value of a stack is: its layer (None for the exterior), its key there, and how it is declared."""
+
+    layer: int | None
+    key: str
+    declared: Scalar
+
+    @property
+    def name(self) -> str:
+        """The flat name."""
+        return self.key if self.layer is None else f"layer{self.layer}_{self.key}"
+
+    @property
+    def colour(self) -> bool:
+        """Whether the value may differ between colours."""
+        return isinstance(self.declared, Colour)
+
+    def plain(self, value: Any, refusal: str) -> float | RGB:
+        """A value of the stack as numbers.
+
+        Raises:
+            InvalidInput: it varies over the surface; `refusal` ends the message.
+        """
+        if isinstance(value, Varying):
+            raise InvalidInput(f"{self.name}: is a {value.what}, and {refusal}")
+        return self.declared.reduced(value) if isinstance(value, Measured) else value
+
+
+@functools.lru_cache(256)
+def addresses(kinds: tuple[str, ...]) -> tuple[Address, ...]:
+    """All values of a stack of these kinds of layers."""
+    found = [Address(None, "exterior", EXTERIOR)]
+    for index, kind in enumerate(kinds):
+        for key, declared in has(kind).items():
+            if isinstance(declared, Scalar):
+                found += [Address(index, part, declared) for part in declared.parts(key)]
+    return tuple(found)
+
+
+def addressed(name: str) -> tuple[Address, ...]:
+    """The values that a flat name stands for, two for `layer0_alpha`; none for a name of anything else."""
+    parts = _LAYER.fullmatch(name)
+    if not parts:
+        return (Address(None, name, EXTERIOR),) if name == "exterior" else ()
+    for layer in LAYERS.values():
+        for key, declared in parameters(layer).items():
+            if isinstance(declared, Scalar) and parts[2] in (key, *declared.parts(key)):
+                wanted = declared.parts(key) if parts[2] == key else (parts[2],)
+                return tuple(Address(int(parts[1]), part, declared) for part in wanted)
+    return ()
+
+
+def _keys(kind: str) -> list[str]:
+    """The keys that a layer of a kind may be given, those of single values included."""
+    found: list[str] = []
+    for key, declared in has(kind).items():
+        parts = declared.parts(key) if isinstance(declared, Scalar) else ()
+        found += [key, *(part for part in parts if part != key)]
+    return found
 
 
 def document(kinds: Sequence[str] | None, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -31,8 +89,8 @@ def document(kinds: Sequence[str] | None, values: Mapping[str, Any]) -> dict[str
     layers = _split(values)[1]
     kinds = _inferred_kinds(layers) if kinds is None else kinds
     for kind in kinds:
-        if kind not in _KEYS:
-            raise InvalidInput(unknown("kind of layer", kind, _KEYS))
+        if kind not in KINDS:
+            raise InvalidInput(unknown("kind of layer", kind, KINDS))
     for index, fields in layers.items():
         if len({"alpha_u", "alpha_v"} & set(fields)) == 1 and "alpha" not in fields:
             raise InvalidInput(f"layer {index}: alpha_u and alpha_v only together; alpha is for both")
@@ -50,7 +108,7 @@ def changed(mapping: Mapping[str, Any], kinds: Sequence[str], values: Mapping[st
         # Accept only what this layer has
         if index >= len(entries):
             raise InvalidInput(f"layer{index}_{next(iter(fields))}: the last layer is layer {len(entries) - 1}")
-        keys = _KEYS[kinds[index]]
+        keys = _keys(kinds[index])
         for key in fields:
             if key not in keys:
                 where = f"layer{index}_{key}: layer {index} ({kinds[index]})"
@@ -66,13 +124,13 @@ def _split(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[int, dict[st
     options: dict[str, Any] = {}
     layers: dict[int, dict[str, Any]] = {}
     for name, value in values.items():
-        parts = re.fullmatch(r"layer(\d{1,9})_(\w+)", name)
+        parts = _LAYER.fullmatch(name)
         if parts:
             layers.setdefault(int(parts[1]), {})[parts[2]] = value
         elif name in _OPTIONS:
             options[name] = value
         else:
-            examples = (*_OPTIONS, *(f"layer0_{key}" for keys in _KEYS.values() for key in keys))
+            examples = (*_OPTIONS, *(f"layer0_{key}" for kind in KINDS for key in _keys(kind)))
             raise InvalidInput(unknown("parameter", name, examples))
     return options, layers
 
@@ -91,7 +149,8 @@ def _inferred_kind(fields: Mapping[str, Any]) -> str:
         return "mirror"
     if "conductor" in fields or "k" in fields:
         return "conductor"
-    return max(("dielectric", "medium", "diffuse"), key=lambda kind: len(set(fields) & set(_KEYS[kind])))
+    kinds = [next(iter(layer.lacks)) for layer in LAYERS.values()]
+    return max(kinds, key=lambda kind: len(set(fields) & set(_keys(kind))))
 
 
 def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

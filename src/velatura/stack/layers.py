@@ -1,13 +1,19 @@
-"""The layers of a stack: interfaces, media, and a diffuse base."""
+"""The layers of a stack: interfaces, media, and a diffuse base, as they are written, and the values that they have.
+
+A kind of layer is declared here and nowhere else in this package: its parameters, the record of its values, and what
+it is to its neighbours. Files, flat names, `--set`, plugins, textures, schema and manual follow from that.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeAlias
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import model_validator
 
-from velatura.stack.schema import Record, parameters
-from velatura.stack.spectra import MIRROR, Measured, Named, names, rgb
+from velatura.stack.schema import Parameter, Record, parameters
+from velatura.stack.spectra import MIRROR, Named, names
 from velatura.stack.values import (
     INDEX_HIGH,
     INDEX_LOW,
@@ -26,16 +32,124 @@ from velatura.stack.values import (
 Kind: TypeAlias = Literal["dielectric", "conductor", "mirror", "medium", "diffuse"]
 Value: TypeAlias = float | RGB | Named | Spectrum | Texture | Brushing
 
+# Values, in any dialect: floats, arrays, a renderer's numbers, recorded symbols --------------------------------------
 
-class Interface(Record):
+
+@dataclass(frozen=True)
+class InterfaceValues:
+    """A dielectric, a conductor or a mirror: GGX roughness along two axes, turned by `rotation` (degrees), and absolute
+    indices of what lies below; a mirror has none, and a dielectric no extinction `k`.
+    """
+
+    kind: Kind
+    alpha_u: Any
+    alpha_v: Any
+    rotation: Any
+    eta: Any = None
+    k: Any = None
+
+    @property
+    def spreads(self) -> bool:
+        """Whether it spreads light over directions; what is not known to be 0 does."""
+        return not (is_zero(self.alpha_u) and is_zero(self.alpha_v))
+
+
+@dataclass(frozen=True)
+class MediumValues:
+    """A medium: thickness, coefficients per unit of length, and the mean cosine of the scattering angle."""
+
+    kind: ClassVar[Kind] = "medium"
+    depth: Any
+    sigma_a: Any
+    sigma_s: Any
+    g: Any
+
+    @property
+    def spreads(self) -> bool:
+        """Whether it spreads light over directions; what is not known to be 0 does."""
+        return not is_zero(self.sigma_s)
+
+
+@dataclass(frozen=True)
+class DiffuseValues:
+    """A diffuse base, by its albedo."""
+
+    kind: ClassVar[Kind] = "diffuse"
+    spreads: ClassVar[bool] = True
+    albedo: Any
+
+
+LayerValues: TypeAlias = InterfaceValues | MediumValues | DiffuseValues
+
+
+def is_zero(value: object) -> bool:
+    """Whether a value is 0 and may be looked at."""
+    return isinstance(value, float) and value == 0.0
+
+
+# As they are written -------------------------------------------------------------------------------------------------
+
+
+class LayerRecord(Record):
+    """What all kinds of layers have in common.
+
+    Attributes:
+        record: of its values.
+        lacks: kinds that it may be of, each with the parameters that it then has not.
+        surface: whether light meets it at one depth and may turn back; media lie above surfaces.
+    """
+
+    record: ClassVar[type[LayerValues]]
+    lacks: ClassVar[Mapping[Kind, tuple[str, ...]]]
+    surface: ClassVar[bool]
+
+    @property
+    def kind(self) -> Kind:
+        """What it is."""
+        return next(iter(self.lacks))
+
+    @property
+    def opaque(self) -> bool:
+        """Whether nothing may lie below it."""
+        return False
+
+    @property
+    def lossless(self) -> bool:
+        """Whether it absorbs no light, wherever light meets it."""
+        return True
+
+    def written(self, key: str) -> Any:
+        """What stands for a parameter."""
+        return getattr(self, key)
+
+    def flat(self) -> dict[str, Value]:
+        """Every value under its own key, those of its kind only."""
+        values: dict[str, Value] = {}
+        for key, declared in parameters(type(self)).items():
+            if isinstance(declared, Scalar) and key not in self.lacks[self.kind]:
+                values.update(zip(declared.parts(key), declared.single(self.written(key))))
+        return values
+
+
+class Interface(LayerRecord):
     """A boundary to the medium below it.
 
     It is a dielectric where `eta` stands alone, and opaque where `k` (even 0) or `conductor` is given.
     """
 
+    record = InterfaceValues
+    lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {
+        "dielectric": ("k", "conductor"),
+        "conductor": (),
+        "mirror": ("eta", "k"),
+    }
+    surface = True
+
     eta: Annotated[
         float | RGB | str | Spectrum | Texture | None,
-        Index("absolute index of refraction of the medium below", low=INDEX_LOW, high=INDEX_HIGH, part="eta"),
+        Index(
+            "absolute index of refraction of the medium below", low=INDEX_LOW, high=INDEX_HIGH, part="eta", typical=1.5
+        ),
     ] = None
     k: Annotated[
         float | RGB | str | Spectrum | Texture | None,
@@ -44,6 +158,7 @@ class Interface(Record):
             low=0,
             high=INDEX_HIGH,
             part="k",
+            typical=1.0,
         ),
     ] = None
     conductor: Annotated[
@@ -52,7 +167,7 @@ class Interface(Record):
     ] = None
     alpha: Annotated[
         float | Texture | tuple[float | Texture, float | Texture],
-        Pair("GGX roughness along the tangent and the bitangent", low=0, high=1),
+        Pair("GGX roughness along the tangent and the bitangent", low=0, high=1, typical=0.1),
     ] = 0.0
     rotation: Annotated[
         float | Texture | Brushing,
@@ -82,20 +197,23 @@ class Interface(Record):
             return "mirror"
         return "conductor" if self.opaque else "dielectric"
 
-    def flat(self) -> dict[str, Value]:
-        """Every value under its own key; a mirror has no indices, a dielectric no extinction."""
-        values: dict[str, Value] = {}
-        if self.kind != "mirror":
-            values["eta"] = _spectrum(self.conductor or self.eta, "eta")
-        if self.kind == "conductor":
-            values["k"] = _spectrum(self.conductor or self.k, "k")
-        values["alpha_u"], values["alpha_v"] = self.alpha if isinstance(self.alpha, tuple) else (self.alpha, self.alpha)
-        values["rotation"] = self.rotation
-        return values
+    @property
+    def lossless(self) -> bool:
+        """Whether it absorbs no light: it is no metal."""
+        return self.kind != "conductor"
+
+    def written(self, key: str) -> Any:
+        """What stands for a parameter: of the indices, the name of a conductor."""
+        value = getattr(self, key)
+        return self.conductor if value is None else value
 
 
-class Medium(Record):
+class Medium(LayerRecord):
     """A homogeneous medium between two interfaces, or above the first."""
+
+    record = MediumValues
+    lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"medium": ()}
+    surface = False
 
     depth: Annotated[float | Texture, Scalar("thickness, in the unit of length of sigma", unit="length", low=0)] = 1.0
     sigma_a: Annotated[float | RGB | Spectrum | Texture, Colour("absorption coefficient", unit="1/length", low=0)] = 0.0
@@ -106,73 +224,51 @@ class Medium(Record):
     ] = 0.0
 
     @property
-    def kind(self) -> Kind:
-        """medium."""
-        return "medium"
-
-    def flat(self) -> dict[str, Value]:
-        """Every value under its own key."""
-        return {"depth": self.depth, "sigma_a": self.sigma_a, "sigma_s": self.sigma_s, "g": self.g}
+    def lossless(self) -> bool:
+        """Whether it absorbs no light."""
+        return self.sigma_a in (0.0, (0.0, 0.0, 0.0))
 
 
-class Diffuse(Record):
+class Diffuse(LayerRecord):
     """An ideally diffuse base, opaque, below everything else."""
+
+    record = DiffuseValues
+    lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"diffuse": ()}
+    surface = True
 
     albedo: Annotated[float | RGB | Spectrum | Texture, Colour("fraction of light reflected", low=0, high=1)] = 0.5
 
     @property
-    def kind(self) -> Kind:
-        """diffuse."""
-        return "diffuse"
+    def opaque(self) -> bool:
+        """Always."""
+        return True
 
-    def flat(self) -> dict[str, Value]:
-        """Every value under its own key."""
-        return {"albedo": self.albedo}
+    @property
+    def lossless(self) -> bool:
+        """Whether it absorbs no light: it is white."""
+        return self.albedo in (1.0, (1.0, 1.0, 1.0))
 
 
 Layer: TypeAlias = Interface | Medium | Diffuse
 
-LAYERS: dict[str, type[Interface] | type[Medium] | type[Diffuse]] = {
-    "interface": Interface,
-    "medium": Medium,
-    "diffuse": Diffuse,
-}
+LAYERS: dict[str, type[Layer]] = {"interface": Interface, "medium": Medium, "diffuse": Diffuse}
+
+#: The index above the first layer.
+EXTERIOR = Scalar(
+    "absolute index of refraction above", low=INDEX_LOW, high=INDEX_HIGH, texturable=False, differentiable=False
+)
+
+#: The layers by what they may be.
+KINDS: dict[str, type[Layer]] = {kind: layer for layer in LAYERS.values() for kind in layer.lacks}
 
 
-_COLOURS = {k for model in LAYERS.values() for k, declared in parameters(model).items() if isinstance(declared, Colour)}
-
-
-def is_colour(name: str) -> bool:
-    """Whether the value of that flat name (`layer0_eta`) may differ between colours."""
-    return name.partition("_")[2] in _COLOURS
-
-
-def declared(name: str) -> Scalar:
-    """How the value of that flat name is declared; `exterior` is an index as well."""
-    key = "eta" if name == "exterior" else name.partition("_")[2]
-    known: dict[str, Any] = {k: p for model in LAYERS.values() for k, p in parameters(model).items()}
-    return known["alpha" if key.startswith("alpha") else key]
-
-
-def within(name: str) -> tuple[float, float]:
-    """Range of the value of that flat name, a little inside where its ends are excluded."""
-    parameter = declared(name)
-    margin = 1e-3 if parameter.strict else 0.0
-    return parameter.low + margin, parameter.high - margin
-
-
-def reduced(name: str, measured: Measured) -> RGB:
-    """A spectrum as the colour that it gives the value of that flat name; where sRGB does not hold it, the nearest."""
-    low, high = within(name)
-    red, green, blue = (min(max(channel, low), high) for channel in rgb(measured))
-    return red, green, blue
+def has(kind: str) -> dict[str, Parameter]:
+    """The declared parameters of a kind of layer."""
+    layer = KINDS[kind]
+    lacks = next(keys for name, keys in layer.lacks.items() if name == kind)
+    return {key: declared for key, declared in parameters(layer).items() if key not in lacks}
 
 
 def entry_name(layer: Layer) -> str:
     """Name of the layer in a file: interface, medium or diffuse."""
     return type(layer).__name__.lower()
-
-
-def _spectrum(value: float | RGB | str | Spectrum | Texture | None, part: Literal["eta", "k"]) -> Value:
-    assert value is not None  # the validator saw to that
-    return Named(value, part) if isinstance(value, str) else value

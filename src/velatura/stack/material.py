@@ -5,60 +5,32 @@ Files, command lines, renderers and shaders address single values by flat names 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, TypeAlias
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
-from velatura.stack.layers import Kind
+from velatura.stack.flat_names import Address, addresses
+from velatura.stack.layers import KINDS, InterfaceValues, Kind, LayerValues
 from velatura.stack.stack import Stack
 
 Value: TypeAlias = Any
 
 
-@dataclass(frozen=True)
-class InterfaceValues:
-    """A dielectric, a conductor or a mirror: GGX roughness along two axes, turned by `rotation` (degrees), and absolute
-    indices of what lies below; a mirror has none, and a dielectric no extinction `k`.
+def number(address: Address, value: Any) -> Value:
+    """A value of a stack in NumPy: a float, or a colour of shape (3, 1).
+
+    Raises:
+        InvalidInput: a texture, which has no one value.
     """
+    import numpy as np
 
-    kind: Kind
-    alpha_u: Value
-    alpha_v: Value
-    rotation: Value
-    eta: Value = None
-    k: Value = None
+    plain = address.plain(value, f"lobes are those of one point; replace it, as in --set {address.name}=0.1")
+    return np.broadcast_to(np.asarray(plain, float), (3,))[:, None] if address.colour else float(plain)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True)
-class MediumValues:
-    """A medium: thickness, coefficients per unit of length, and the mean cosine of the scattering angle."""
-
-    kind: ClassVar[Kind] = "medium"
-    depth: Value
-    sigma_a: Value
-    sigma_s: Value
-    g: Value
-
-
-@dataclass(frozen=True)
-class DiffuseValues:
-    """A diffuse base, by its albedo."""
-
-    kind: ClassVar[Kind] = "diffuse"
-    albedo: Value
-
-
-LayerValues: TypeAlias = InterfaceValues | MediumValues | DiffuseValues
-
-_SURFACE = ("alpha_u", "alpha_v", "rotation")
-#: By kind: the record, and those of its fields that are values.
-_RECORDS: dict[Kind, tuple[type[LayerValues], tuple[str, ...]]] = {
-    "dielectric": (InterfaceValues, ("eta", *_SURFACE)),
-    "conductor": (InterfaceValues, ("eta", "k", *_SURFACE)),
-    "mirror": (InterfaceValues, _SURFACE),
-    "medium": (MediumValues, tuple(field.name for field in fields(MediumValues))),
-    "diffuse": (DiffuseValues, tuple(field.name for field in fields(DiffuseValues))),
-}
+def as_described(address: Address, value: Any) -> Value:
+    """A value as the stack has it."""
+    return value
 
 
 @dataclass(frozen=True)
@@ -70,27 +42,39 @@ class Material:
     thin: bool = False
 
     @classmethod
-    def of(cls, stack: Stack, value: Callable[[str, Any], Value] = lambda name, value: value) -> Material:
-        """The values of a stack, each as `value(flat name, value)` converts it."""
-        values = {name: value(name, described) for name, described in stack.flat().items()}
-        return cls.from_flat(stack.kinds, values, stack.thin)
+    def of(cls, stack: Stack, value: Callable[[Address, Any], Value] = number) -> Material:
+        """The values of a stack, each as `value` converts it: in NumPy unless given."""
+        values = iter([value(address, described) for address, described in stack.values()])
+        return cls._of(stack.kinds, values, stack.thin)
 
     @classmethod
     def from_flat(cls, kinds: Sequence[Kind], values: Mapping[str, Value], thin: bool = False) -> Material:
         """Values by flat name, as `Stack.flat` has them."""
-        layers: list[LayerValues] = []
-        for i, kind in enumerate(kinds):
-            record, keys = _RECORDS[kind]
-            own = {key: values[f"layer{i}_{key}"] for key in keys}
-            layers.append(InterfaceValues(kind, **own) if record is InterfaceValues else record(**own))
-        return cls(tuple(layers), values["exterior"], thin)
+        return cls._of(kinds, (values[address.name] for address in addresses(tuple(kinds))), thin)
+
+    @classmethod
+    def _of(cls, kinds: Sequence[Kind], values: Iterator[Value], thin: bool) -> Material:
+        exterior, layers = next(values), []
+        of_layers = addresses(tuple(kinds))[1:]
+        for index, kind in enumerate(kinds):
+            own: dict[str, Any] = {address.key: next(values) for address in of_layers if address.layer == index}
+            several = {"kind": kind} if len(KINDS[kind].lacks) > 1 else {}
+            layers.append(KINDS[kind].record(**several, **own))
+        return cls(tuple(layers), exterior, thin)
+
+    def values(self) -> Iterator[tuple[Address, Value]]:
+        """The exterior index, and every value of every layer."""
+        for address in addresses(self.kinds):
+            owner = self if address.layer is None else self.layers[address.layer]
+            yield address, getattr(owner, address.key)
+
+    def each(self, change: Callable[[Address, Value], Value]) -> Material:
+        """The material with every value changed."""
+        return self._of(self.kinds, (change(*pair) for pair in self.values()), self.thin)
 
     def flat(self) -> dict[str, Value]:
         """All values by flat name."""
-        values = {"exterior": self.exterior}
-        for i, layer in enumerate(self.layers):
-            values |= {f"layer{i}_{key}": getattr(layer, key) for key in _RECORDS[layer.kind][1]}
-        return values
+        return {address.name: value for address, value in self.values()}
 
     @property
     def kinds(self) -> tuple[Kind, ...]:
@@ -103,9 +87,14 @@ class Material:
         return tuple(layer for layer in self.layers if isinstance(layer, InterfaceValues))
 
     @property
+    def surfaces(self) -> tuple[int, ...]:
+        """Places of the interfaces, and of a diffuse base, among the layers."""
+        return tuple(index for index, kind in enumerate(self.kinds) if KINDS[kind].surface)
+
+    @property
     def transmits(self) -> bool:
         """Whether light passes: the last layer is a dielectric."""
-        return bool(self.layers) and self.layers[-1].kind == "dielectric"
+        return bool(self.layers) and self.kinds[-1] == "dielectric"
 
     @property
     def below(self) -> Value:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput
 from velatura.stack import flat_names
-from velatura.stack.layers import LAYERS, Diffuse, Interface, Kind, Layer, Medium, Value, entry_name
+from velatura.stack.flat_names import Address
+from velatura.stack.layers import EXTERIOR, LAYERS, Diffuse, Interface, Kind, Layer, Value, entry_name
 from velatura.stack.schema import Record, show, unknown
-from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Flag, Scalar, Text
+from velatura.stack.values import Flag, Text
 
 
 class Stack(Record):
@@ -27,12 +28,7 @@ class Stack(Record):
 
     name: Annotated[str, Text("name of the material")] = ""
     source: Annotated[str, Text("where the numbers come from")] = ""
-    exterior: Annotated[
-        float,
-        Scalar(
-            "absolute index of refraction above", low=INDEX_LOW, high=INDEX_HIGH, texturable=False, differentiable=False
-        ),
-    ] = 1.0
+    exterior: Annotated[float, EXTERIOR] = 1.0
     thin: Annotated[bool, Flag("a thin pane: light leaves it into the exterior index")] = False
     layers: tuple[Layer, ...]
 
@@ -43,15 +39,15 @@ class Stack(Record):
     def _layers_fit_together(self) -> Stack:
         if not self.layers:
             raise ValueError("layers: must hold at least one layer")
-        for index, (above, below) in enumerate(zip(self.kinds, self.kinds[1:]), start=1):
-            where = f"layer {index} ({entry_name(self.layers[index])})"
-            if above in ("conductor", "mirror", "diffuse"):
-                raise ValueError(f"{where}: nothing may lie below layer {index - 1} ({above}), which is opaque")
-            if above == below == "medium":
+        for index, (above, below) in enumerate(zip(self.layers, self.layers[1:]), start=1):
+            where = f"layer {index} ({entry_name(below)})"
+            if above.opaque:
+                raise ValueError(f"{where}: nothing may lie below layer {index - 1} ({above.kind}), which is opaque")
+            if not above.surface and not below.surface:
                 raise ValueError(f"{where}: two media in a row; put an interface between them")
-        if self.kinds[-1] == "medium":
-            last = len(self.layers) - 1
-            raise ValueError(f"layer {last} (medium): an interface or a diffuse base must lie below a medium")
+        if not self.layers[-1].surface:
+            last = f"layer {len(self.layers) - 1} ({self.kinds[-1]})"
+            raise ValueError(f"{last}: an interface or a diffuse base must lie below a {self.kinds[-1]}")
         if self.thin and not self.transmits:
             raise ValueError("thin: only for a stack that ends in a dielectric interface")
         return self
@@ -69,9 +65,20 @@ class Stack(Record):
         return tuple(layer for layer in self.layers if isinstance(layer, Interface))
 
     @property
+    def surfaces(self) -> tuple[int, ...]:
+        """Places of the interfaces, and of a diffuse base, among the layers."""
+        return tuple(index for index, layer in enumerate(self.layers) if layer.surface)
+
+    @property
+    def base(self) -> Diffuse | None:
+        """The diffuse base; None without one."""
+        last = self.layers[-1]
+        return last if isinstance(last, Diffuse) else None
+
+    @property
     def transmits(self) -> bool:
-        """Whether light passes: the last layer is a dielectric interface."""
-        return self.kinds[-1] == "dielectric"
+        """Whether light passes: no layer is opaque."""
+        return not self.layers[-1].opaque
 
     # As a file holds it ----------------------------------------------------------------------------------------------
 
@@ -90,6 +97,11 @@ class Stack(Record):
         """The mapping that `from_dict` reads back: plain values, defaults left out."""
         return {**super().to_dict(), "layers": [{entry_name(layer): layer.to_dict()} for layer in self.layers]}
 
+    def values(self) -> Iterator[tuple[Address, Value]]:
+        """The exterior index, and every value of every layer."""
+        described = [self.exterior, *(value for layer in self.layers for value in layer.flat().values())]
+        return zip(flat_names.addresses(self.kinds), described)
+
     # As flat names ---------------------------------------------------------------------------------------------------
 
     def flat(self) -> dict[str, Value]:
@@ -97,10 +109,7 @@ class Stack(Record):
 
         The number counts all layers from the top. `name`, `source` and `thin` are not among them: they are no numbers.
         """
-        values: dict[str, Value] = {"exterior": self.exterior}
-        for index, layer in enumerate(self.layers):
-            values.update({f"layer{index}_{key}": value for key, value in layer.flat().items()})
-        return values
+        return {address.name: value for address, value in self.values()}
 
     @classmethod
     def from_flat(cls, kinds: Sequence[Kind] | None, values: Mapping[str, Any]) -> Stack:
@@ -140,7 +149,7 @@ def _layers(entries: Any) -> tuple[Layer, ...]:
 
 def _layer(index: int, entry: Any) -> Layer:
     """A layer as it is, or from an entry of a file, `{interface: {eta: 1.5}}`."""
-    if isinstance(entry, Interface | Medium | Diffuse):
+    if isinstance(entry, Layer):
         return entry
     if not isinstance(entry, Mapping) or not entry:
         raise InvalidInput(f"layer {index}: must be one of {', '.join(LAYERS)} with its keys, got {show(entry)}")

@@ -10,12 +10,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import PrivateAttr, model_validator
 
 from velatura.stack.schema import Parameter, Record, show, unknown
-from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read
+from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read, rgb
 
 RGB: TypeAlias = tuple[float, float, float]
 
@@ -137,9 +137,30 @@ class Scalar(Parameter):
     strict: bool = False  # the ends of the range are excluded
     differentiable: bool = True
     texturable: bool = True
+    typical: float | None = None  # stands for a value that is not known; None: the default does
 
     what = "a number"
     channel: ClassVar[str] = "r"  # what a texture gives where it does not say
+
+    @property
+    def within(self) -> tuple[float, float]:
+        """The range, a little inside where its ends are excluded."""
+        margin = 1e-3 if self.strict else 0.0
+        return self.low + margin, self.high - margin
+
+    def reduced(self, measured: Measured) -> RGB:
+        """A spectrum as the colour that it gives the value; where sRGB does not hold it, the nearest."""
+        low, high = self.within
+        red, green, blue = (min(max(channel, low), high) for channel in rgb(measured))
+        return red, green, blue
+
+    def parts(self, key: str) -> tuple[str, ...]:
+        """Keys of the single values that a value under this key stands for."""
+        return (key,)
+
+    def single(self, value: Any) -> tuple[Any, ...]:
+        """The values of `parts`."""
+        return (value,)
 
     @property
     def expects(self) -> str:
@@ -262,7 +283,7 @@ class Colour(Scalar):
 class Index(Colour):
     """A colour, or the name of a measured spectrum."""
 
-    part: str = "eta"
+    part: Literal["eta", "k"] = "eta"
 
     what = "a number, [r, g, b], a name"
 
@@ -279,6 +300,9 @@ class Index(Colour):
             return value
         return super().check(value)
 
+    def single(self, value: Any) -> tuple[Any, ...]:
+        return (Named(value, self.part) if isinstance(value, str) else value,)
+
     def _names(self) -> tuple[str, ...]:
         conductors, dielectrics = names()
         return conductors + dielectrics if self.part == "eta" else conductors
@@ -291,6 +315,12 @@ class Pair(Scalar):
     """A number for both tangent axes, or one for each; equal ones are kept as one number."""
 
     what = "a number, [u, v]"
+
+    def parts(self, key: str) -> tuple[str, ...]:
+        return f"{key}_u", f"{key}_v"
+
+    def single(self, value: Any) -> tuple[Any, ...]:
+        return value if isinstance(value, tuple) else (value, value)
 
     def _check_value(self, value: Any) -> Any:
         if not isinstance(value, list | tuple):
