@@ -1,0 +1,148 @@
+"""The energies of the lobes of a material, for beams from above.
+
+Three systems of layers share their interfaces. In the first, light meets all that there is. In the others a lobe has
+the light that meets one facet of each interface and is not scattered by media (sharp), or is scattered by little (its
+veil). What the first system reflects besides is the remainder.
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.model.transport.adding import Leaving, Part, indices, layer, leaving, parts
+from velatura.model.transport.interfaces import Facets, Setting
+from velatura.model.transport.media import Slab
+from velatura.model.transport.modes import TINY, Basis, Even, Relative
+from velatura.model.transport.nodes import Nodes
+from velatura.model.transport.operators import Layer, Operator
+from velatura.stack import InterfaceValues, LayerValues, Material
+from velatura.tables import Tables
+
+Array = NDArray[np.floating]
+
+NODES = 24
+SAMPLES = 377  # normals for light from each node, and of each beam
+MODES = 3  # of the azimuth, of the remainder
+INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
+AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
+
+Straight = Callable[[float], float]  # share of scattered light that counts as going straight on, by asymmetry
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies by colour (C,), or 1 for all, for M beams.
+
+    Attributes:
+        lobes: (K, C, M) of the interfaces from the top, of light that no medium has scattered.
+        veils: (K, C, M), of light that media have scattered by little.
+        rest: (C, M), reflected in no lobe.
+        straight, bounced, passed: (C, M), of what passes: straight through, and after reflections, where facets are met
+            once and media do not scatter; and all of it.
+        remainder: what is reflected in no lobe for beams of cosines `INCIDENCES`, by mode of azimuth at the `nodes`,
+            (C, MODES, N, 8).
+    """
+
+    lobes: Array
+    veils: Array
+    rest: Array
+    straight: Array
+    bounced: Array
+    passed: Array
+    remainder: Array
+    nodes: Nodes
+
+
+def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | None, forward: Straight) -> Energies:
+    """Energies for beams at cosines and azimuths (M,).
+
+    `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
+    into veils.
+    """
+    everything = parts(material)
+    facets = [part for part in everything if isinstance(part, Facets)]
+    brushed = any(part.alpha_u != part.alpha_v for part in facets)
+    azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
+    cosines = np.concatenate([cos_theta, np.tile(INCIDENCES, len(azimuths))])
+    around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(INCIDENCES))])
+    nodes = Nodes.of(indices(everything), NODES)
+    basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES)
+    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, SAMPLES, None)
+
+    # Sum up the systems
+    scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
+    once = {i: layer(part, setting) for i, part in enumerate(everything) if not isinstance(part, Slab)}
+    sharp = _system(parts(material, lambda g: 0.0) if scatters else everything, setting, once)
+    kept = _system(parts(material, forward), setting, once) if scatters else sharp
+    full = sharp
+    if often:
+        many = replace(setting, often=often)
+        full = leaving([layer(part, many) for part in everything], many)
+    elif scatters:
+        full = _system(everything, setting, once)
+
+    # Sort what leaves
+    own = [i for i, part in enumerate(everything) if isinstance(part, Facets)]
+    total = _sum(full.reflected)
+    reflected = full.energy(total)
+
+    def of_lobes(system: Leaving) -> list[Operator]:
+        # All that an interface reflects is one lobe, where nothing lies above it
+        return [(system if i else full).reflected[i] for i in own] or [Operator.nothing(basis.size, len(setting.p))]
+
+    unscattered, veiled = (
+        np.array(np.broadcast_arrays(*map(full.energy, of_lobes(system)), reflected)[:-1]) for system in (sharp, kept)
+    )
+    # No lobe has more than there is: what quadrature says beyond is its error
+    share = np.minimum(reflected / np.maximum(veiled.sum(axis=0), TINY), 1)
+    lobes, veils = unscattered * share, np.maximum(veiled - unscattered, 0) * share
+    rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
+    count = np.size(cos_theta)
+    in_lobes = _sum(of_lobes(kept))
+    remainder = _remainder(total, in_lobes, rest[:, count:], basis, material, often, forward)
+    straight = sharp.energy(sharp.straight)
+    return Energies(
+        lobes=lobes[..., :count],
+        veils=veils[..., :count],
+        rest=rest[:, :count],
+        straight=straight[:, :count],
+        bounced=np.maximum(sharp.energy(sharp.passed) - straight, 0)[:, :count],
+        passed=full.energy(full.passed)[:, :count],
+        remainder=remainder,
+        nodes=nodes,
+    )
+
+
+def _system(found: Sequence[Part], setting: Setting, known: Mapping[int, Layer]) -> Leaving:
+    return leaving([known.get(i) or layer(part, setting) for i, part in enumerate(found)], setting)
+
+
+def _sum(lights: Sequence[Operator]) -> Operator:
+    return functools.reduce(operator.add, lights)
+
+
+def _remainder(total: Operator, in_lobes: Operator, energy: Array, basis: Basis, *solved: Any) -> Array:
+    """What is reflected in no lobe, by mode and node. That of brushed interfaces is that of isotropic ones of the mean
+    roughness, with the energy that it has on average over azimuths.
+    """
+    if isinstance(basis, Relative):
+        return np.asarray((total.columns - in_lobes.columns)[..., -len(INCIDENCES) :])
+    material, often, forward = solved
+    stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
+    found = energies(stand_in, INCIDENCES, np.zeros(len(INCIDENCES)), often, forward)
+    mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
+    return found.remainder * (mean / np.maximum(found.rest, TINY))[:, None, None]
+
+
+def _isotropic(each: LayerValues) -> LayerValues:
+    if not isinstance(each, InterfaceValues):
+        return each
+    mean = 0.5 * (each.alpha_u + each.alpha_v)
+    return replace(each, alpha_u=mean, alpha_v=mean)

@@ -1,0 +1,286 @@
+"""Rough interfaces as operators on light.
+
+Light meets visible normals on a lattice. Where it may meet several facets, what first events do is exact, with masking
+correlated to the height; what they block leaves in a way that is reciprocal and loses nothing, in the share that the
+tables of multiple scattering say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betaln
+
+from velatura import tables
+from velatura.model.transport.modes import TINY, Basis, Light
+from velatura.model.transport.operators import Layer, Operator
+from velatura.optics import fresnel, ggx
+from velatura.tables import Tables
+
+Array = NDArray[np.floating]
+
+STAND_IN = 144  # normals of interfaces that stand in for brushed ones
+GRAZING = 1e-4  # least cosine of light that meets an interface
+ALPHA_MIN = 1e-3
+BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
+
+
+@dataclass(frozen=True)
+class Facets:
+    """An interface between indices `above` and `below`, by colour (C,); `k` is None for a dielectric, and `below` too
+    for a mirror. Roughnesses, and a rotation in radians.
+    """
+
+    above: Array
+    below: Array | None
+    k: Array | None
+    alpha_u: float
+    alpha_v: float
+    rotation: float = 0.0
+
+    @property
+    def opaque(self) -> bool:
+        return self.below is None or self.k is not None
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether it changes no direction."""
+        stepless = self.below is not None and self.k is None and bool((self.above == self.below).all())
+        return max(self.alpha_u, self.alpha_v) < ALPHA_MIN or stepless
+
+    def smooth(self, p: Array, transmitted: bool) -> Array:
+        """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
+        n = float(np.mean(self.above))
+        cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, GRAZING**2))
+        r = self.reflectance(cosine)
+        return 1 - r if transmitted else r
+
+    def reversed(self) -> Facets:
+        assert self.below is not None
+        return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation)
+
+    def reflectance(self, cosine: Array) -> Array:
+        """Fresnel reflectance (C, ...) of facets."""
+        shape = (-1, *(1,) * np.ndim(cosine))
+        if self.below is None:
+            return np.ones((1, *np.shape(cosine)))
+        eta = (self.below / self.above).reshape(shape)
+        if self.k is None:
+            cos_t = fresnel.cos_transmitted(cosine, float(np.mean(self.below) / np.mean(self.above)))
+            return np.asarray(fresnel.dielectric_between(cosine, cos_t, eta))
+        return np.asarray(fresnel.conductor(cosine, eta, (self.k / self.above).reshape(shape)))
+
+
+@cache
+def lattice(count: int) -> tuple[Array, Array]:
+    """A Fibonacci lattice of at least `count` points in the unit square."""
+    a, b = 1, 1
+    while b < count:
+        a, b = b, a + b
+    i = np.arange(b)
+    return (i * a / b + 0.5 / b) % 1, (i + 0.5) / b
+
+
+@dataclass(frozen=True)
+class _Events:
+    """What first events make of light: reflected and refracted samples, by colour, and what they block of either.
+
+    Weights are (C, sources, samples), blocked shares (C, sources); `whole` is what would be blocked if all light were
+    reflected.
+    """
+
+    reflected: Light
+    refracted: Light | None
+    blocked_reflected: Array
+    blocked_refracted: Array
+    whole: Array
+
+
+def _events(facets: Facets, p: Array, psi: Array, samples: int, often: bool) -> _Events:
+    """First events for light of momenta of length p at azimuths psi (sources,), in the frame of the interface's axes.
+
+    Momenta are of the direction of travel, which a mirror leaves alone. `often` correlates masking with the height of
+    facets, as what follows needs (Heitz et al. 2016); otherwise masking is separable.
+    """
+    n = float(np.mean(facets.above))
+    alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
+    u_1, u_2 = lattice(samples)
+    sin = np.minimum(p / n, np.sqrt(1 - GRAZING**2))[:, None]
+    # Light comes from wi, and travels to -wi
+    wi = (-sin * np.cos(psi)[:, None], -sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin))
+    h = ggx.sample_visible(wi, *alpha, u_2[None], u_1[None])
+    cosine = np.minimum(ggx.dot(wi, h), 1.0)
+    share = 1 / u_1.size
+
+    def escape(w: tuple[Array, Array, Array], out: Array, through: bool) -> Array:
+        towards = (w[0], w[1], np.abs(w[2]))
+        if not often:
+            return np.where(out, ggx.masking(towards, *alpha), 0)
+        there, here = _smith(towards, alpha), _smith(wi, alpha)
+        both = np.exp(np.log1p(here) + betaln(1 + here, 1 + there)) if through else (1 + here) / (1 + here + there)
+        return np.where(out, both, 0)
+
+    o = ggx.reflect(wi, h)
+    if facets.below is None or facets.k is not None:
+        reflectance = facets.reflectance(cosine)
+        kept = escape(o, o[2] > 0, False)
+        blocked = (reflectance * (1 - kept)).sum(axis=-1) * share
+        light = Light(n * o[0], n * o[1], reflectance * kept * share)
+        return _Events(light, None, blocked, np.zeros_like(blocked), (1 - kept).sum(axis=-1)[None] * share)
+    below = float(np.mean(facets.below))
+    eta = below / n
+    cos_t = fresnel.cos_transmitted(cosine, eta)
+    reflectance = facets.reflectance(cosine)
+    along = cosine / eta - cos_t
+    t = tuple(along * a - b / eta for a, b in zip(h, wi))
+    reflected, refracted = escape(o, o[2] > 0, False), escape(t, t[2] < 0, True)
+    return _Events(
+        Light(n * o[0], n * o[1], reflectance * reflected * share),
+        Light(below * t[0], below * t[1], (1 - reflectance) * refracted * share),
+        (reflectance * (1 - reflected)).sum(axis=-1) * share,
+        ((1 - reflectance) * (1 - refracted)).sum(axis=-1) * share,
+        (1 - reflected).sum(axis=-1)[None] * share,
+    )
+
+
+def _smith(w: tuple[Array, Array, Array], alpha: tuple[float, float]) -> Array:
+    """Smith's Lambda."""
+    x, y = alpha[0] * w[0], alpha[1] * w[1]
+    z = np.maximum(w[2], GRAZING * 0.1)
+    return 0.5 * (np.sqrt(1 + (x * x + y * y) / (z * z)) - 1)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How light is described: its basis, beams of momenta of length p at azimuths phi (M,), and how finely facets are
+    sampled. With the tables of multiple scattering facets are met often, else once.
+    """
+
+    basis: Basis
+    p: Array
+    phi: Array
+    samples: int
+    often: Tables | None = None
+
+
+def interface(facets: Facets, setting: Setting) -> Layer:
+    """An interface as a layer; what is opaque lets nothing through, and has no other side."""
+    nothing = Operator.nothing(setting.basis.size, len(setting.p))
+    if facets.is_smooth:
+        r, t = (scaled(partial(facets.smooth, transmitted=side), setting) for side in (False, True))
+        if facets.opaque:
+            return Layer(r, nothing, nothing, nothing)
+        back = facets.reversed()
+        return Layer(r, t, *(scaled(partial(back.smooth, transmitted=side), setting) for side in (False, True)))
+    above = _Side.of(facets, setting)
+    if facets.opaque:
+        return Layer(above.r + _again(above.to_r, above.to_r, setting), nothing, nothing, nothing)
+    below = _Side.of(facets.reversed(), setting)
+    return Layer(
+        above.r + _again(above.to_r, above.to_r, setting),
+        above.t + _again(above.to_t, below.to_t, setting),
+        below.r + _again(below.to_r, below.to_r, setting),
+        below.t + _again(below.to_t, above.to_t, setting),
+    )
+
+
+def scaled(share: Callable[[Array], Array], setting: Setting) -> Operator:
+    """An operator that changes no direction, but scales light by shares (C, ...) for lengths of momentum."""
+    nodes = setting.basis.diagonal(share(setting.basis.nodes.p))
+    return Operator(nodes, np.zeros((1, 1, nodes.shape[-1], len(setting.p))), share(setting.p)[:, None, None])
+
+
+@dataclass(frozen=True)
+class _Blocked:
+    """Shares of light that meets further facets, and in the end is reflected, or passes.
+
+    Those of light from the nodes as functionals (C, modes, N), those of beams (C, M); `emitted` is light of one unit
+    that leaves in such directions, by reciprocity those in which light is blocked.
+    """
+
+    nodes: Array
+    beams: Array
+    emitted: Array
+
+
+@dataclass(frozen=True)
+class _Side:
+    """What becomes of light from one side of an interface at first events, and what they block."""
+
+    r: Operator
+    t: Operator
+    to_r: _Blocked | None
+    to_t: _Blocked | None
+
+    @classmethod
+    def of(cls, facets: Facets, setting: Setting) -> _Side:
+        basis, turn = setting.basis, facets.rotation
+        p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
+        often = setting.often is not None
+        at_nodes = _events(facets, p, psi, setting.samples, often)
+        of_beams = _events(facets, setting.p, basis.relative(setting.phi, turn), setting.samples, often)
+
+        def operator(nodes: Light | None, beams: Light | None) -> Operator:
+            if nodes is None or beams is None:
+                return Operator.nothing(basis.size, len(setting.p))
+            return Operator.of(basis.operators(nodes, turn), basis.columns(beams, turn))
+
+        r, t = operator(at_nodes.reflected, of_beams.reflected), operator(at_nodes.refracted, of_beams.refracted)
+        if setting.often is None:
+            return cls(r, t, None, None)
+        blocked = [_again_shares(facets, setting.often, q, e) for q, e in ((p, at_nodes), (setting.p, of_beams))]
+        weights = basis.nodes.weights(float(np.mean(facets.above)))
+        found = []
+        for nodes, beams in zip(*blocked):
+            rows = basis.rows(nodes, turn)
+            emitted = rows * weights
+            found.append(_Blocked(rows, beams, emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)))
+        return cls(r, t, found[0], found[1])
+
+
+def _again(taken: _Blocked | None, there: _Blocked | None, setting: Setting) -> Operator:
+    """Light that is blocked at first, and leaves in the directions in which light is blocked `there`."""
+    if taken is None or there is None:
+        return Operator.nothing(setting.basis.size, len(setting.p))
+    outer = setting.basis.outer
+    return Operator.of(outer(there.emitted, taken.nodes), outer(there.emitted, taken.beams))
+
+
+def _again_shares(facets: Facets, known: Tables, p: Array, events: _Events) -> tuple[Array, Array]:
+    """Shares (C, sources) of light of lengths p that first events block and that in the end is reflected, or passes.
+
+    Of blocked light, it is reflected in the share that an isotropic interface of the mean roughness reflects: by the
+    tables over any number of events, less what first events reflect.
+    """
+    if facets.below is None:
+        return events.whole, np.zeros_like(events.whole)
+    mean = float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
+    cosine = np.sqrt(np.maximum(1 - (p / np.mean(facets.above)) ** 2, GRAZING**2))
+    ratio = (facets.below / facets.above)[:, None]
+    if facets.k is None:
+        row = tables.dielectric_row(known, ratio, True, True)
+    else:
+        row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
+    often = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean))).reshape(len(ratio), -1)
+    stand_in = events
+    if facets.alpha_u != facets.alpha_v:
+        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, STAND_IN, True)
+    once = stand_in.reflected.weight.sum(axis=-1)
+    blocked: Array
+    little: Array
+    if facets.k is None:
+        blocked = stand_in.blocked_reflected + stand_in.blocked_refracted
+        little = np.where(ratio < 1, 0.9, 0.15)
+    else:
+        blocked, little = stand_in.whole, often * often
+    # Little that is blocked has a share that the tables do not resolve
+    seen = np.clip((blocked - BLOCKED[0]) / (BLOCKED[1] - BLOCKED[0]), 0, 1)
+    share = seen * np.clip((often - once) / np.maximum(blocked, BLOCKED[0]), 0, 1) + (1 - seen) * little
+    if facets.k is not None:
+        return events.whole * share, np.zeros_like(once)
+    blocked = events.blocked_reflected + events.blocked_refracted
+    return blocked * share, blocked * (1 - share)

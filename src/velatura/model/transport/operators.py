@@ -1,0 +1,64 @@
+"""Operators on light: matrices on the nodes, and beside them single directions, exactly.
+
+A beam is light of one direction that no rough interface has met, and no medium has scattered. Its length lies between
+nodes, and so it is kept apart: what an operator makes of it is a share that stays in the beam and a column of light at
+the nodes. That is an algebra of block triangular matrices, one for each beam, that share the block of the nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+
+TRAPPED = 1e-9  # share that is lost at each bounce
+
+
+@dataclass(frozen=True)
+class Operator:
+    """`nodes` (C, F, n, n), what becomes of light at the nodes; of beams, `columns` (C, F, n, M) and `beams` (C, 1, 1,
+    M), for C colours, or 1 for all, and F independent families of modes.
+    """
+
+    nodes: Array
+    columns: Array
+    beams: Array
+
+    @classmethod
+    def nothing(cls, n: int, beams: int) -> Operator:
+        return cls.of(np.zeros((1, 1, n, n)), np.zeros((1, 1, n, beams)))
+
+    @classmethod
+    def of(cls, nodes: Array, columns: Array) -> Operator:
+        """An operator that leaves nothing in a beam."""
+        return cls(nodes, columns, np.zeros((1, 1, 1, columns.shape[-1])))
+
+    def __matmul__(self, first: Operator) -> Operator:
+        columns = self.nodes @ first.columns + self.columns * first.beams
+        return Operator(self.nodes @ first.nodes, columns, self.beams * first.beams)
+
+    def __add__(self, other: Operator) -> Operator:
+        return Operator(self.nodes + other.nodes, self.columns + other.columns, self.beams + other.beams)
+
+    def repeated(self) -> Operator:
+        """The sum of all of its powers, (1 - A)^-1."""
+        # What smooth interfaces trap for ever no light reaches
+        inverse = np.linalg.inv((1 + TRAPPED) * np.eye(self.nodes.shape[-1]) - self.nodes)
+        beams = 1 / np.maximum(1 - self.beams, TRAPPED)
+        return Operator(inverse, (inverse @ self.columns) * beams, beams)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What a layer, or a stack of layers, does to light from above (`r`, `t`) and to light from below."""
+
+    r: Operator
+    t: Operator
+    r_below: Operator
+    t_below: Operator
+
+    def reversed(self) -> Layer:
+        return Layer(self.r_below, self.t_below, self.r, self.t)
