@@ -1,0 +1,380 @@
+"""Light that passes a stack without bouncing inside: a mixture of refractions, one for each interface.
+
+Tails of GGX come from one steep facet. So component j takes the whole step of tangential momentum, from p_i to p_o, at
+a facet of interface j, crosses all interfaces above smoothly at p_i and all below at p_o, and is as wide as all
+together: the widths |w_l| a_l that interfaces give to momentum add as their powers of `EXPONENT`, as tensors where
+interfaces are brushed. Its weight is its share of the squared widths. With d = p_o - p_i, cosines
+c_l(p) = sqrt(1 - p^2 / n_l^2) in slabs 0 to K, and w_j = n_{j-1} c_{j-1}(p_i) - n_j c_j(p_o), light of direction wi
+passes to wo as
+
+    f |cos_o| = n_K^2 cos_o sum_j t_j P(d / w_j; a_j) / w_j^2 v_i v_o G1_j(i) G1_j(o) (1 - F_j) S_j(p_i) S_j(p_o)
+
+where P is the density of slopes s of GGX of the width seen at interface j, v_i and v_o the cosines to the facet over
+those to the interface (1 - p.s / (n c)), G1_j Smith's masking of interface j by itself, F_j Fresnel's reflectance at
+the facet, and S_j what the smooth interfaces and the media above j and below it let pass.
+
+For one interface that is microfacet refraction (Walter 2007, Eq. 21) as it stands. It is reciprocal: f / n^2 is the
+same from the other side. Its integral comes close to the energy that passes straight through, which it is normalised
+to in the end.
+
+A sample draws a visible normal of one component, and Fresnel's reflectance decides: light that does not pass is
+reflected about the same normal, as at a rough dielectric. Indices are relative to the outside, that of wi; light from
+below is light from above a material that is turned over (`Material.reversed`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.mixture import ALPHA_MIN
+from velatura.model.roughness_maps import RoughnessMap
+from velatura.model.variance import Covariance, Roughness, Variance
+from velatura.ops import Value
+from velatura.optics import fresnel, ggx
+from velatura.optics.ggx import Direction
+from velatura.stack import InterfaceValues, Material, MediumValues
+
+EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
+WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
+COS_MIN = 0.02  # in slabs that light crosses, and in those that it cannot enter
+GRAZING = 1e-4  # cosine outside
+NODES = (16, 24)  # of the quadrature
+EDGE = 0.98  # of the disc of momenta that can leave, where light from beyond it is looked for
+WEIGHT_MIN = 1e-12  # squared width that decides the shares where no interface has any
+
+#: Widths in the space where they add; they have no upper bound.
+WIDTHS = RoughnessMap(lambda a, _: ops.power(a, EXPONENT), lambda s, _: ops.power(s, 1 / EXPONENT))
+
+Momentum = tuple[Value, Value]
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Crossing(ops.Named):
+    """An interface between media of mean indices n_1 and n_2; `eta` is the lower over the upper one, by colour.
+
+    `width` is the roughness in the space of `WIDTHS`, `area` its product over the axes, `sign` that of n_1 - n_2, and
+    `least` the step of momentum that it counts for at least.
+    """
+
+    n_1: Value
+    n_2: Value
+    eta: Value
+    roughness: Roughness
+    width: Variance
+    area: Value
+    sign: Value
+    least: Value
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Interfaces from the top, and the optical depths (colours) of the slabs 0 to K above, between and below them."""
+
+    crossings: tuple[Crossing, ...]
+    depths: tuple[Value, ...]
+
+    @property
+    def indices(self) -> list[Value]:
+        """Those of the slabs."""
+        return [self.crossings[0].n_1, *(crossing.n_2 for crossing in self.crossings)]
+
+
+def passage(material: Material, kind: type[Variance]) -> Passage:
+    """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`."""
+    above, n = material.exterior, 1.0
+    depth: Value = 0.0
+    crossings: list[Crossing] = []
+    depths: list[Value] = []
+    for layer in material.solid().layers:
+        if isinstance(layer, MediumValues):
+            depth = depth + (layer.sigma_a + layer.sigma_s) * layer.depth
+            continue
+        assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
+        crossings.append(_crossing(layer, above, n, kind))
+        depths.append(depth)
+        above, n, depth = layer.eta, crossings[-1].n_2, 0.0
+    return Passage(tuple(crossings), (*depths, depth))
+
+
+def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance]) -> Crossing:
+    u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
+    roughness = Roughness(u, v, layer.rotation * (pi / 180) if kind is Covariance else 0.0)
+    eta = layer.eta / above
+    ratio = ops.mean(layer.eta) / ops.mean(above)  # and so its inverse from the other side
+    sign = ops.select(ratio > 1, -1.0, ops.select(ratio < 1, 1.0, 0.0))
+    least = WIDTH_MIN * n_1 * ops.sqrt(ratio / (u * v))
+    return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least)
+
+
+@dataclass(frozen=True)
+class _Crossed(ops.Named):
+    """A momentum p in all slabs: its cosines there, 0 where it cannot be, and the same bounded; for interfaces, the
+    steps w_l, and the shares (colours) of light that they let pass; the latter for slabs, too."""
+
+    p: Momentum
+    p2: Value
+    n: list[Value]
+    cosines: list[Value]
+    bounded: list[Value]
+    steps: list[Value]
+    passes: list[Value]
+    slabs: list[Value]
+
+
+def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -> _Crossed:
+    """With the cosines above and below all interfaces, as far as they are known better."""
+    p2 = p[0] * p[0] + p[1] * p[1]
+    cosines = [ops.sqrt(1 - p2 / (n * n)) for n in passage.indices]
+    bounded = [ops.maximum(c, COS_MIN) for c in cosines]
+    for l, known in ((0, above), (-1, below)):
+        if known is not None:
+            cosines[l], bounded[l] = known, ops.maximum(known, GRAZING)
+    crossings = passage.crossings
+    steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(crossings)]
+    passes = [1 - fresnel.dielectric_between(cosines[l], cosines[l + 1], c.eta) for l, c in enumerate(crossings)]
+    slabs = [1.0 if _is_clear(depth) else ops.exp(-depth / c) for depth, c in zip(passage.depths, bounded)]
+    return _Crossed(p, p2, passage.indices, cosines, bounded, steps, passes, slabs)
+
+
+def _is_clear(depth: Value) -> bool:
+    return isinstance(depth, float) and depth == 0.0
+
+
+def _smooth(crossed: _Crossed, interfaces: slice, slabs: slice) -> Value:
+    """Share (a colour) of light that passes smooth interfaces and slabs."""
+    return reduce(lambda a, b: a * b, [*crossed.passes[interfaces], *crossed.slabs[slabs]], 1.0)
+
+
+@dataclass(frozen=True)
+class _Component(ops.Named):
+    """Interface j as the one that takes the step: that step, bounded, the roughness seen there, and its weight."""
+
+    step: Value
+    roughness: Roughness
+    weight: Value
+
+
+def _component(passage: Passage, j: int, steps: Sequence[Value]) -> _Component:
+    """For the steps that light makes at all interfaces; a single one has its own roughness, and all the weight."""
+    own = passage.crossings[j]
+    size = ops.maximum(own.sign * steps[j], own.least)
+    if len(steps) == 1:
+        return _Component(size, own.roughness, 1.0)
+    width, weight = own.width, _weight(own, steps[j])
+    total = weight
+    for l, (step, other) in enumerate(zip(steps, passage.crossings)):
+        if l != j:
+            width = width + other.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY) / size, EXPONENT)
+            total = total + _weight(other, step)
+    return _Component(size, width.roughness(WIDTHS), weight / total)
+
+
+def _weight(crossing: Crossing, step: Value) -> Value:
+    return step * step * crossing.area + WEIGHT_MIN * crossing.n_1 * crossing.n_2
+
+
+def _drawn(passage: Passage, i: _Crossed) -> tuple[list[_Component], list[Value]]:
+    """The components as they are sampled, as wide as at p_o = p_i, and their probabilities."""
+    count = len(passage.crossings)
+    components = [_component(passage, j, i.steps) for j in range(count)]
+    if count == 1:
+        return components, [1.0]
+    # Leave out what light does not reach; the first interface, it always does
+    shares = [c.weight * ops.mean(_smooth(i, slice(j), slice(0))) for j, c in enumerate(components)]
+    shares[0] = shares[0] + WEIGHT_MIN
+    total = sum(shares[1:], shares[0])
+    return components, [share / total for share in shares]
+
+
+def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o|, a colour, of light that passes straight through; the density of `sample` on both sides.
+
+    wi lies above. Radiance is not scaled by the index. The value is 0 for wo above.
+    """
+    n = passage.indices
+    below, cos_o = wo[2] < 0, ops.absolute(wo[2])
+    n_out = ops.select(below, n[-1], n[0])
+    p_i, p_o = (-n[0] * wi[0], -n[0] * wi[1]), (n_out * wo[0], n_out * wo[1])
+    i = _crossed(passage, p_i, ops.maximum(wi[2], 0.0), None)
+    o = _crossed(passage, p_o, cos_o, cos_o)  # no part reads the cosine on the side of wi and that beyond
+    drawn, shares = _drawn(passage, i)
+    value: Value = 0.0
+    density: Value = 0.0
+    for j, (crossing, sampled, share) in enumerate(zip(passage.crossings, drawn, shares)):
+        with ops.block(f"Pass by a facet of interface {j}"):
+            own = crossing.n_1 * i.bounded[j] - crossing.n_2 * o.bounded[j + 1]
+            component = _component(passage, j, [*i.steps[:j], own, *o.steps[j + 1 :]])
+            facet = _facet(crossing, i, o, j, component.step)
+            alone = _masking(crossing.roughness, i, j) * _masking(crossing.roughness, o, j + 1)
+            smooth = _smooth(i, slice(j), slice(j + 1)) * _smooth(o, slice(j + 1, None), slice(j + 1, None))
+            seen = component.weight * _slopes(component.roughness, facet.slope) * alone
+            value = value + smooth * facet.passes * seen
+            visible = _slopes(sampled.roughness, facet.slope) * _masking(sampled.roughness, i, j)
+            goes_on = o.p2 < _lowest2(n[j + 1 :])
+            through = ops.select(goes_on, ops.mean(facet.passes) * visible, 0.0)
+        with ops.block("Or be reflected by it"):
+            density = density + share * ops.select(below, through, _reflected(passage, i, o, j, sampled.roughness))
+    # From momentum to solid angle
+    lit, scale = wi[2] > 0, n_out * n_out * cos_o
+    return ops.select(lit & below, value * scale, 0.0), ops.select(lit, density * scale, 0.0)
+
+
+def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction wo from uniform numbers, on either side of the material.
+
+    It lies in the surface where light of the facet drawn would stay inside; `eval_pdf` is 0 there.
+    """
+    n = passage.indices
+    i = _crossed(passage, (-n[0] * wi[0], -n[0] * wi[1]), ops.maximum(wi[2], 0.0), None)
+    components, shares = _drawn(passage, i)
+    with ops.block("Choose an interface"):
+        every = []
+        begin: Value = 0.0
+        for j, (c, component, share) in enumerate(zip(passage.crossings, components, shares)):
+            bounds = _lowest2(n[: j + 1]), _lowest2(n[j + 1 :])
+            every.append([c.n_1, c.n_2, c.eta, i.bounded[j], *component.roughness, *bounds, share, begin])
+            begin = begin + share
+        chosen = every[0]
+        for fields in every[1:]:
+            chosen = [b if a is b else ops.select(u > fields[-1], a, b) for a, b in zip(fields, chosen)]
+        n_1, n_2, eta, cosine, alpha_u, alpha_v, rotation, up2, down2, share, begin = chosen
+        u = (u - begin) / share
+    with ops.block("Draw a normal"):
+        w = i.p[0] / -n_1, i.p[1] / -n_1, cosine
+        h = _turned(ggx.sample_visible(_turned(w, rotation), alpha_u, alpha_v, u1, u2), -rotation)
+    with ops.block("Refract or reflect"):
+        p, passes = _refracted(n_1, n_2, eta, i.p, w, h, down2)
+        below = u < passes
+        turned = 2 * ggx.dot(w, h)
+        back = i.p[0] + n_1 * turned * h[0], i.p[1] + n_1 * turned * h[1]
+        leaves = (turned * h[2] > cosine) & (back[0] * back[0] + back[1] * back[1] < up2)
+    n_out = ops.select(below, n[-1], n[0])
+    x, y = (ops.select(below, a, b) / n_out for a, b in zip(p, back))
+    z = ops.sqrt(1 - x * x - y * y)
+    return x, y, ops.select(below, -z, ops.select(leaves, z, 0.0))
+
+
+@dataclass(frozen=True)
+class _Facet(ops.Named):
+    """The facet that refracts light: its slope, up to a sign, and (1 - F) v_i v_o / w^2 (a colour; 0 without one)."""
+
+    slope: Momentum
+    passes: Value
+
+
+def _facet(crossing: Crossing, i: _Crossed, o: _Crossed, j: int, step: Value) -> _Facet:
+    """Of interface j, for its step as `_component` bounds it."""
+    n_1, n_2, c_1, c_2 = crossing.n_1, crossing.n_2, i.bounded[j], o.bounded[j + 1]
+    slope = (o.p[0] - i.p[0]) / step, (o.p[1] - i.p[1]) / step
+    v_i = 1 - crossing.sign * (i.p[0] * slope[0] + i.p[1] * slope[1]) / (n_1 * c_1)
+    v_o = 1 - crossing.sign * (o.p[0] * slope[0] + o.p[1] * slope[1]) / (n_2 * c_2)
+    height = 1 / ops.sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1])
+    # As good as no step has no direction
+    made = n_1 * c_1 - n_2 * c_2
+    faces = (v_i > 0) & (v_o > 0) & ((crossing.sign * made > 0) | (ops.absolute(made) < crossing.least))
+    v_i, v_o = ops.maximum(v_i, 0.0), ops.maximum(v_o, 0.0)
+    reflectance = fresnel.dielectric_between(v_i * c_1 * height, v_o * c_2 * height, crossing.eta)
+    return _Facet(slope, ops.select(faces, (1 - reflectance) * (v_i * v_o / (step * step)), 0.0))
+
+
+def _refracted(
+    n_1: Value, n_2: Value, eta: Value, p: Momentum, w: Direction, h: Direction, lowest2: Value
+) -> tuple[Momentum, Value]:
+    """Momentum p, of direction w above, after refraction about a normal h, and the probability that light takes it:
+    none unless it crosses all slabs below."""
+    cos_1 = ggx.dot(w, h)
+    cos_2 = ops.sqrt(1 - (1 - cos_1 * cos_1) * (n_1 * n_1) / (n_2 * n_2))
+    step = n_1 * cos_1 - n_2 * cos_2
+    x, y = p[0] + step * h[0], p[1] + step * h[1]
+    crosses = (cos_1 > 0) & (cos_2 > 0) & (n_1 * w[2] > step * h[2]) & (x * x + y * y < lowest2)
+    passes = 1 - ops.mean(fresnel.dielectric_between(cos_1, cos_2, eta))
+    return (x, y), ops.select(crosses, passes, 0.0)
+
+
+def _reflected(passage: Passage, i: _Crossed, o: _Crossed, j: int, roughness: Roughness) -> Value:
+    """Density of the momentum o, of light reflected by the facets of interface j that it does not pass."""
+    n, c = passage.indices, passage.crossings[j]
+    cos_i, cos_o = i.bounded[j], o.bounded[j]
+    w = i.p[0] / -c.n_1, i.p[1] / -c.n_1, cos_i
+    h = ggx.normalize((w[0] + o.p[0] / c.n_1, w[1] + o.p[1] / c.n_1, cos_i + cos_o))
+    _, passes = _refracted(c.n_1, c.n_2, c.eta, i.p, w, h, _lowest2(n[j + 1 :]))
+    visible = ggx.ndf(_turned(h, roughness.rotation), roughness.alpha_u, roughness.alpha_v)
+    density = visible * _masking(roughness, i, j) * (1 - passes) / (4 * cos_i * cos_o * c.n_1 * c.n_1)
+    return ops.select(o.p2 < _lowest2(n[: j + 1]), density, 0.0)
+
+
+def _slopes(roughness: Roughness, slope: Momentum) -> Value:
+    """Density of slopes of GGX."""
+    alpha_u, alpha_v, rotation = roughness
+    x, y, _ = _turned((*slope, 1.0), rotation)
+    x, y = x / alpha_u, y / alpha_v
+    q = 1 + x * x + y * y
+    return 1 / (pi * alpha_u * alpha_v * q * q)
+
+
+def _masking(roughness: Roughness, crossed: _Crossed, slab: int) -> Value:
+    """Smith's G1 in a slab; the side from which light comes, and its length, make no difference."""
+    p, z = crossed.p, crossed.n[slab] * crossed.bounded[slab]
+    return ggx.masking(_turned((p[0], p[1], z), roughness.rotation), roughness.alpha_u, roughness.alpha_v)
+
+
+def _turned(w: Direction, rotation: Value) -> Direction:
+    return w if isinstance(rotation, float) and rotation == 0.0 else ggx.rotate(w, rotation)
+
+
+def _lowest2(indices: Sequence[Value]) -> Value:
+    """Square of the momentum that light has at most in all of some slabs."""
+    lowest = reduce(ops.minimum, indices)
+    return lowest * lowest
+
+
+# The integral, in NumPy
+
+
+def integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int] = NODES) -> tuple[Array, Array]:
+    """Energy (3, N) that `eval_pdf` passes from directions wi, (N,) each, and the share (N,) of samples that pass.
+
+    By quadrature on rays of p_o from p_i, or from the point next to it that can leave, with nodes that crowd as the
+    tails of GGX do; their numbers are those along a ray, and of rays.
+    """
+    n = passage.indices
+    i = _crossed(passage, (-n[0] * wi[0], -n[0] * wi[1]), wi[2], None)
+    widths = [c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(passage.crossings, i.steps)]
+    u, v, rotation = (np.asarray(x)[..., None, None] for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
+    # Cast rays from the middle
+    x, weight = np.polynomial.legendre.leggauss(nodes[0])
+    share, weight = 0.5 * (x + 1), 0.5 * weight
+    phi = (np.arange(nodes[1]) + 0.5) * (2 * pi / nodes[1])
+    n_out = np.asarray(n[-1])
+    length = np.sqrt(np.maximum(i.p2, ops.TINY))
+    bound = np.where(length < n_out, np.minimum(1, (1 - WIDTH_MIN) * n_out / length), EDGE * n_out / length)
+    p = [(bound * x)[:, None, None] for x in i.p]
+    gap = ((1 - bound) * length)[:, None, None]
+    u, v = (np.sqrt(width**2 + gap**2 + WIDTH_MIN**2) for width in (u, v))
+    ray = u * np.cos(phi)[:, None], v * np.sin(phi)[:, None]
+    cosine, sine = np.cos(rotation), np.sin(rotation)
+    ray = cosine * ray[0] - sine * ray[1], sine * ray[0] + cosine * ray[1]
+    # Follow each to the rim of the disc, where the distribution r^2 / (1 + r^2) of widths has come to `most`
+    length2, along = ray[0] ** 2 + ray[1] ** 2, ray[0] * p[0] + ray[1] * p[1]
+    inside = n_out * n_out - p[0] ** 2 - p[1] ** 2
+    rim = (np.sqrt(along**2 + length2 * inside) - along) / length2
+    most = rim**2 / (1 + rim**2)
+    odds = share * most / (1 - share * most)
+    r = np.sqrt(odds)
+    area = weight * most * (pi / nodes[1]) * (1 + odds) ** 2 * u * v
+    x, y = (p[0] + r * ray[0]) / n_out, (p[1] + r * ray[1]) / n_out
+    z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-12))
+    area = area / (n_out * n_out * z)
+    shape = x.shape
+    spread = [np.broadcast_to(w[:, None, None], shape).ravel() for w in wi]
+    value, density = eval_pdf(passage, (spread[0], spread[1], spread[2]), (x.ravel(), y.ravel(), -z.ravel()))
+    energy = np.sum(value.reshape(-1, *shape) * area, axis=(-2, -1))
+    return energy, np.sum(density.reshape(shape) * area, axis=(-2, -1))
