@@ -13,9 +13,8 @@ import velatura as vt
 from velatura import kernel
 from velatura.model import straight_through
 from velatura.model.prepare import variance_kind
-from velatura.model.stack_lobes import number
 from velatura.model.straight_through import Passage
-from velatura.stack import Material
+from velatura.stack import Material, number
 
 Array = NDArray[np.floating]
 Direction = tuple[Array, Array, Array]
