@@ -16,7 +16,7 @@ import numpy as np
 from velatura.checks.probe import Array
 
 CELLS = 32  # along each axis
-NODES = 6  # of integration, along each axis of a cell
+NODES = 8  # of integration, along each axis of a cell
 
 _SCALES = 4.0 ** np.arange(1, 11)  # by which the distance of samples from their middle is stretched, to reach the tail
 

@@ -22,7 +22,7 @@ FEW = 2e-3  # samples that may be off, where single precision is at its end
 DARK = 1e-8  # light between two directions that rounding makes
 ONE_WAY = 1e-2  # relative error of reciprocity, weighted by the light
 CHANGE = 5e-3  # of energy, between a BSDF and the one that it should equal
-BLURRED = 4e-3  # relative standard error of the integral of a pdf that the cells do not resolve
+BLURRED = 2e-3  # relative standard error of the integral of a pdf that the cells do not resolve
 CROWD = 10.0  # samples expected in a cell of a chi-square test, else it is pooled with others
 
 
