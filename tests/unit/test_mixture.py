@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import qmc
 
 import velatura as vt
 from velatura.model import MODELS, bsdf, named
@@ -74,12 +75,13 @@ def test_both_forms_agree_where_the_normal_is_halfway() -> None:
 
 
 def test_the_symmetric_form_of_velatura_keeps_the_energy_of_a_furnace() -> None:
-    """Within 0.5 %; without its factors it loses 4 % at cosine 0.5 and gains 15 % at 0.1. Standard errors are 0.1 %."""
+    """Within 0.5 %; without its factors it loses 4 % at cosine 0.5 and gains 15 % at 0.1. Over seeds the sums scatter
+    by 0.02 %."""
     body = body_of(vt.preset("furnace-rough"), "velatura", form="symmetric")
-    rng, n = np.random.default_rng(8), 400_000
+    n = 2**15
     for cos_theta in (1.0, 0.5, 0.1):
         wi = (np.full(n, np.sqrt(1 - cos_theta**2)), np.zeros(n), np.full(n, cos_theta))
-        wo, _ = bsdf.sample(body, wi, *rng.random((3, n)))
+        wo, _ = bsdf.sample(body, wi, *qmc.Sobol(3, seed=8).random(n).T)
 
         def albedo(some: bsdf.Body, wi: tuple[Array, Array, Array] = wi, wo: Any = wo) -> float:
             value, pdf = bsdf.eval_pdf(some, wi, wo)
