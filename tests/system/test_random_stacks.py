@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from fuzzing import checking, lobes, plugin
-from fuzzing.stacks import BASES, random_stack
+from fuzzing import checking, lobes, pictures, plugin
+from fuzzing.models import random_model
+from fuzzing.stacks import BASES, random_stack, textured
 
 from velatura import MODELS
 from velatura.model.models import named
@@ -32,7 +35,18 @@ def test_the_lobes_of_any_stack() -> None:
     assert not [failure for _ in range(300) for failure in lobes.trial(rng)]
 
 
-def test_the_laws_of_any_stack() -> None:
+@pytest.mark.parametrize("base", BASES)
+def test_the_laws_of_any_stack(base: str) -> None:
     """No law is broken that is not declared; `vt.check` gives a false alarm in one of 1000 reports."""
-    rng = np.random.default_rng(1)
-    assert not [failure for _ in range(2) for failure in checking.trial(rng)]
+    rng = np.random.default_rng((1, *base.encode()))
+    assert not checking.tried(random_stack(rng, base=base), random_model(rng, changed=0, keep=["channels"]))
+
+
+@pytest.mark.parametrize(("form", "base"), [("forward", "thin"), ("symmetric", "metal")])
+def test_the_bsdf_of_a_textured_stack(tmp_path: Path, form: str, base: str) -> None:
+    """As for any stack, with values from an image in colour."""
+    image = tmp_path / "texture.png"
+    image.write_bytes(pictures.png())
+    rng = np.random.default_rng(3)
+    stack = textured(random_stack(rng, most=1, base=base), rng, str(image))
+    assert not plugin.tried(stack, named("bati2021", form=form), rng)
