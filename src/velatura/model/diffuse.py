@@ -25,6 +25,7 @@ from velatura.tables import Tables, diffuse_nodes
 
 Settle = Callable[[Value], Value]
 Row = Sequence[Value]  # of values at the nodes of a medium
+Media = Sequence[tuple[PreparedMedium, Value]]  # with their optical depths along the normal
 
 SWEEPS = 6  # down the stack and up; what is missing then follows from how fast they converge
 SLOWEST = 0.95  # ratio of the last two sweeps
@@ -99,7 +100,7 @@ def _through(prepared: Prepared, wi: Direction) -> Value:
     """Share of light from wi that reaches the base, before it scatters there."""
     assert prepared.base is not None
     inside = _Inside.of(prepared)
-    kept = _passed(inside.depth_above, wi[2])
+    kept = _passed(inside.media_above, wi[2])
     if not inside.interfaces:
         return kept
     # Parts may be negative, and so may their sum be by a little where next to nothing enters
@@ -116,35 +117,36 @@ def _entered(prepared: Prepared, wi: Direction) -> Row:
 
 @dataclass(frozen=True)
 class _Inside:
-    """A stack as diffuse light sees it: its interfaces, and the media below each by index and optical depth."""
+    """A stack as diffuse light sees it: its interfaces, and what is below each, by index and media with their optical
+    depths."""
 
     tables: Tables
-    depth_above: Value
+    media_above: Media
     interfaces: Sequence[PreparedInterface]
     indices: Sequence[Value]
-    depths: Sequence[Value]
+    media: Sequence[Media]
 
     @classmethod
     def of(cls, prepared: Prepared) -> _Inside:
         interfaces: list[PreparedInterface] = []
         indices: list[Value] = [1.0]
-        depths: list[Value] = [0.0]
+        media: list[list[tuple[PreparedMedium, Value]]] = [[]]
         for layer in prepared.layers:
             if isinstance(layer, PreparedMedium):
-                depths[-1] = depths[-1] + layer.tau - layer.tau_s * phase.forwards(layer.g)
+                media[-1].append((layer, layer.tau - layer.tau_s * phase.forwards(layer.g)))
             else:
                 interfaces.append(layer)
                 indices.append(indices[-1] * layer.n12)
-                depths.append(0.0)
-        return cls(prepared.tables, depths[0], interfaces, indices[1:], depths[1:])
+                media.append([])
+        return cls(prepared.tables, media[0], interfaces, indices[1:], media[1:])
 
     def solved(self, leaves: Row, settle: Settle) -> tuple[Row, Value]:
         """Worth of the nodes below the first interface, and the share of diffuse light that returns to the base.
 
         `leaves` is what leaves the stack of the light at each of these nodes.
         """
-        media = zip(self.indices, self.depths)
-        kept = [[_passed(depth, c) for c in diffuse_nodes.node_cosines(n)] for n, depth in media]
+        below = zip(self.indices, self.media)
+        kept = [[_passed(media, c) for c in diffuse_nodes.node_cosines(n)] for n, media in below]
         exchanges = [self._exchange(k, settle) for k in range(1, len(self.interfaces))]
         back = diffuse_nodes.returning(self.tables, _roughness(self.interfaces[0]), self.indices[0])
         back = settle(_balanced(back, leaves))
@@ -237,8 +239,8 @@ def _sum(values: Iterable[Value]) -> Value:
     return sum(others, first)
 
 
-def _passed(depth: Value, cosine: Value) -> Value:
-    return ops.exp(-1 * depth / ops.maximum(cosine, operators.COS_MIN))
+def _passed(media: Media, cosine: Value) -> Value:
+    return ops.exp(sum((layer.along(-1 * depth, cosine) for layer, depth in media), 0 * cosine))
 
 
 def _roughness(layer: PreparedInterface) -> Value:

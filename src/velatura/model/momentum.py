@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from velatura import ops, tables
 from velatura.model.adding import Lobe
 from velatura.model.calibration import Calibration
-from velatura.model.operators import COS_MIN, G_MIN
-from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
+from velatura.model.operators import G_MIN
+from velatura.model.prepare import COS_MIN, Prepared, PreparedInterface, PreparedMedium
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, phase
@@ -165,7 +165,7 @@ def _through(above: State, medium: PreparedMedium) -> State:
     with ops.block("Sort out what goes on"):
         forwards = phase.forwards(medium.g)
         depth = medium.tau - medium.tau_s * forwards
-        path = 1 / ops.maximum(above.cos_theta, COS_MIN)
+        path = medium.along(1, above.cos_theta)
         t = ops.exp(-depth * path)
         ops.names(forwards=forwards, depth=depth, path=path, t=t)
 

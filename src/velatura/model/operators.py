@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from velatura import ops
-from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
+from velatura.model.prepare import COS_MIN, Prepared, PreparedInterface, PreparedMedium
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction, masking, rotate
 
 PreparedLayer: TypeAlias = PreparedInterface | PreparedMedium
 
-COS_MIN = 1e-4  # keeps Snell's factors finite at grazing
 G_MIN = 1e-3  # keeps the variance of a phase function finite where it scatters evenly
 
 
@@ -95,7 +94,7 @@ def _transmitted(prepared: Prepared, roughness: Roughness, ratio: Value, passes:
 
 def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) -> Operator:
     """Absorption and forward scattering by a medium (Belcour 2018, Eqs. 15-17, 21-24)."""
-    path = 1 / ops.maximum(cos_theta, COS_MIN)
+    path = layer.along(1, cos_theta)
     g = ops.clip(layer.g, G_MIN, 1.0)
     scattered = ops.select(layer.g > 0, layer.tau_s * path, 0.0)
     t = (1 + scattered) * ops.exp(-layer.tau * path)

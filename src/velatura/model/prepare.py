@@ -25,6 +25,9 @@ if TYPE_CHECKING:  # a lobe may hold the interface that it is drawn with
     from velatura.model.adding import Lobe
 
 
+COS_MIN = 1e-4  # keeps ways through media, and Snell's factors, finite at grazing
+
+
 @dataclass(frozen=True)
 class PreparedInterface(ops.Named):
     """An interface between media of indices eta_1 above and eta_2 below (colours; kappa None for a dielectric).
@@ -63,6 +66,10 @@ class PreparedMedium(ops.Named):
     tau: Value
     tau_s: Value
     g: Value
+
+    def along(self, depth: Value, cosine: Value) -> Value:
+        """A depth along the normal, as light at this cosine goes through it."""
+        return depth / ops.maximum(cosine, COS_MIN)
 
 
 @dataclass(frozen=True)
@@ -135,22 +142,22 @@ def prepare(
     n: Value = 1.0  # index so far, and the lowest of those above, over that outside
     lowest: Value = 1.0
     for layer in material.layers:
-        if isinstance(layer, MediumValues):
-            layers.append(_medium(layer))
-        elif isinstance(layer, DiffuseValues):
-            base = PreparedBase(layer.albedo, n)
-        else:
+        if isinstance(layer, InterfaceValues):
             layers.append(_interface(layer, eta_1, n_leaving, averages, variance))
             if layer.kind == "dielectric":
                 lowest, n = ops.minimum(lowest, n), n * ops.mean(layer.eta / eta_1)
                 n_leaving = lowest / n if model.recursion.from_lowest else ops.mean(eta_1 / layer.eta)
                 ops.names(n_leaving=n_leaving)
                 eta_1 = layer.eta
+        elif isinstance(layer, DiffuseValues):
+            base = PreparedBase(layer.albedo, n)
+        else:
+            layers.append(_medium(layer))
     prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], context.tables, base)
     if not model.recursion.has_gain:
         return prepared
     # A pane under a medium is drawn alike from both sides, or a lobe could not be chosen by the side that light is on
-    first = layers[0] if layers and material.kinds[-1] != "medium" else None
+    first = layers[0] if layers and len(material.layers) - 1 in material.surfaces else None
     once = averages.once(first.eta, first.kappa) if isinstance(first, PreparedInterface) else None
     return replace(prepared, once=once)
 

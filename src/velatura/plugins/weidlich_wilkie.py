@@ -109,8 +109,7 @@ def evaluate(material: Material, wi: Direction, wo: Direction, asked: Sequence[i
     for k, layer in enumerate(material.layers):
         # Absorb on both ways through a medium
         if isinstance(layer, MediumValues):
-            tau = layer.sigma_a * layer.depth
-            passed = passed * ops.exp(-tau * (ops.divide(1.0, i[2]) + ops.divide(1.0, o[2])))
+            passed = passed * _absorbed(layer, ops.divide(1.0, i[2]) + ops.divide(1.0, o[2]))
             continue
         if isinstance(layer, DiffuseValues):
             total = total + passed * layer.albedo * ((k in asked) / pi)
@@ -187,8 +186,7 @@ def _energies(material: Material, cosine: Value) -> dict[int, Value]:
     n, left = material.exterior, 1.0
     for k, layer in enumerate(material.layers):
         if isinstance(layer, MediumValues):
-            tau = layer.sigma_a * layer.depth
-            left = left * ops.exp(-2 * tau * ops.divide(1.0, cosine))
+            left = left * _absorbed(layer, 2 * ops.divide(1.0, cosine))
             continue
         if isinstance(layer, DiffuseValues):
             energies[k] = left * layer.albedo
@@ -200,6 +198,11 @@ def _energies(material: Material, cosine: Value) -> dict[int, Value]:
             left, n = left * (1 - reflectance) * (1 - reflectance), layer.eta
             cosine = fresnel.cos_transmitted(cosine, eta)
     return energies
+
+
+def _absorbed(layer: MediumValues, ways: Value) -> Value:
+    """What a medium leaves of light that goes through it and back; `ways` is the sum of both ways, in depths."""
+    return ops.exp(-layer.sigma_a * layer.depth * ways)
 
 
 def _reflectance(layer: InterfaceValues, n: Value, cosine: Value) -> Value:
