@@ -17,9 +17,10 @@ from velatura.editor.messages import LOBES, Answer, Body, Verb, document, materi
 from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
 from velatura.inverse.coats import with_albedo
+from velatura.inverse.drag import Bound, DraggedStack, plain, seen
 from velatura.inverse.explain import REASONS
 from velatura.inverse.figure_targets import FIGURES
-from velatura.inverse.local_solver import Bound, Nearby, plain, seen
+from velatura.inverse.interface import conductor_tint
 from velatura.inverse.target import BLUR
 from velatura.model import Model, named
 from velatura.model.roughness_maps import MAPS
@@ -51,10 +52,10 @@ def lobe_of(body: Body, target: Target) -> int:
     return lobe
 
 
-def held(material: Answer, target: Target, model: Model) -> Nearby | None:
+def held(material: Answer, target: Target, model: Model) -> DraggedStack | None:
     """A material as what can be moved, None where it does not have the form of the target."""
     try:
-        return Nearby.of(Stack.from_dict(material), target, model)
+        return DraggedStack.of(Stack.from_dict(material), target, model)
     except InvalidInput:
         return None
 
@@ -80,9 +81,9 @@ def appearance(body: Body) -> Answer:
         return _shown(stack, model, str(error))
 
     # Share the interfaces out among lobes
-    each = Nearby.of(stack, _target(stack, parts, [1] * len(parts)), model)
+    each = DraggedStack.of(stack, _target(stack, parts, [1] * len(parts)), model)
     assert each is not None
-    counts: list[int] = body.get("interfaces") or _counts(each.known.reading[3 * len(parts) :])
+    counts: list[int] = body.get("interfaces") or _counts(each.variances)
     if sum(counts) != len(parts) or not set(counts) <= {1, 2}:
         raise InvalidInput(f"interfaces: must be 1 or 2 for each lobe, {len(parts)} in all, got {counts}")
     target = seen(stack, _target(stack, parts, counts), model)
@@ -137,8 +138,6 @@ def _target(stack: Stack, parts: list[Any], counts: list[int]) -> Target:
 
 
 def _tint(part: Any, eta_1: Any) -> float:
-    from velatura.inverse.interface import conductor_tint
-
     return float(np.mean(conductor_tint(part.eta / eta_1, part.kappa / eta_1)))
 
 
@@ -201,7 +200,7 @@ def invert(body: Body) -> Answer:
     return answered(found, says)
 
 
-def answered(found: Nearby, snapped: str | None) -> Answer:
+def answered(found: DraggedStack, snapped: str | None) -> Answer:
     """A stack as an answer, what was asked for or, `snapped` for that reason, the nearest to it."""
     return _answer(_under(found), found.target, found.model, snapped)
 
@@ -218,7 +217,7 @@ def _answer(stack: Stack, target: Target, model: Model, snapped: str | None) -> 
     }
 
 
-def _under(found: Nearby) -> Stack:
+def _under(found: DraggedStack) -> Stack:
     """The material; where it has a diffuse base, that keeps its energy."""
     base = found.tail[-1] if found.tail else None
     if not isinstance(base, Diffuse) or isinstance(base.albedo, Varying) or found.diffuse is None:
@@ -226,10 +225,10 @@ def _under(found: Nearby) -> Stack:
     return with_albedo(found.stack, np.array(found.diffuse), found.model)
 
 
-def _elsewhere(wish: Target, near: Nearby) -> Nearby | None:
+def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
     """The stack that has the lobes, found without regard to what there is."""
     found = stacks.search(wish, near.model.in_closed_form, EFFORT)
-    fresh = Nearby.of(found.stack, wish, near.model) if found else None
+    fresh = DraggedStack.of(found.stack, wish, near.model) if found else None
     if fresh is None:
         return None
     fresh = dataclasses.replace(fresh, tail=near.tail, name=near.name, diffuse=near.diffuse)
@@ -237,7 +236,7 @@ def _elsewhere(wish: Target, near: Nearby) -> Nearby | None:
     return moved if bound is None else None
 
 
-def _approached(wish: Target, near: Nearby) -> tuple[Nearby, Bound | None]:
+def _approached(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound | None]:
     """As near to a wish that is far and cannot be met as halves of the way lead, and then what is kept allows."""
     t, found = 0.0, near
     for n in range(1, HALVES + 1):
@@ -247,7 +246,7 @@ def _approached(wish: Target, near: Nearby) -> tuple[Nearby, Bound | None]:
     return found.towards(wish)
 
 
-def _further(wish: Target, found: Nearby) -> Nearby:
+def _further(wish: Target, found: DraggedStack) -> DraggedStack:
     """As far towards the wished blurs as the energies that there are allow, and then the other way round."""
     for key in ("alpha", "energy"):
         part = found.now(wish)
@@ -261,7 +260,7 @@ def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
     for start in _starts(wish):
         found = stacks.search(start, model.in_closed_form, EFFORT)
-        fresh = Nearby.of(found.stack, start, model) if found else None
+        fresh = DraggedStack.of(found.stack, start, model) if found else None
         if fresh is not None:
             moved, bound = fresh.towards(fresh.achromatic(wish))
             if bound is None or start is not wish:

@@ -11,8 +11,9 @@ from velatura.editor.appearance import answered, held, lobe_of, reader_of
 from velatura.editor.messages import Answer, Body, Verb, array
 from velatura.errors import InvalidInput
 from velatura.inverse import EquivalenceClass, Target, interface, stacks
-from velatura.inverse.interface import conductor_index
-from velatura.inverse.local_solver import Nearby
+from velatura.inverse.drag import DraggedStack
+from velatura.inverse.interface import conductor_extinction, conductor_index
+from velatura.optics import fresnel
 
 Array = NDArray[np.float64]
 
@@ -34,12 +35,12 @@ def class_(body: Body) -> Answer:
     size = body.get("size", 48)
     if not isinstance(size, int) or not SIZES[0] <= size <= SIZES[1]:
         raise InvalidInput(f"size: must be a number from {SIZES[0]} to {SIZES[1]}, got {size!r}")
-    place = next(n for n, place in enumerate(near.places) if place.lobe == lobe)
+    place = next(n for n, place in enumerate(near.interfaces) if place.lobe == lobe)
     seen = near.in_closed_form()
     wanted = seen.target.lobes[lobe]
     members = stacks.class_of(seen.above(place), wanted, seen.target, first=lobe == 0)
     if wanted.interfaces == 2:
-        members = dataclasses.replace(members, tau=near.places[place].kept)
+        members = dataclasses.replace(members, tau=near.interfaces[place].kept)
     axis = np.geomspace(1.0, target.eta_max, size)
     answer: Answer = {"member": near.point_of(lobe)}
     if wanted.interfaces == 2 and wanted.base == "dielectric":
@@ -62,7 +63,7 @@ def member(body: Body) -> Answer:
     if not point:
         raise InvalidInput(f"point: must be a list of numbers, got {point!r}")
     if wanted.base == "conductor" and (wanted.interfaces == 1 or body.get("map") == "conductor") and len(point) == 2:
-        last = max(n for n, place in enumerate(near.places) if place.lobe == lobe)
+        last = max(n for n, place in enumerate(near.interfaces) if place.lobe == lobe)
         point = [*near.point_of(lobe)[:-1], _nearest_tint(near, last, point)]
     here = near.point_of(lobe)
     if len(point) != len(here):
@@ -77,7 +78,7 @@ def member(body: Body) -> Answer:
     return answered(found, bound.why(target) if bound else None)
 
 
-def _held(body: Body) -> tuple[Target, Nearby, int]:
+def _held(body: Body) -> tuple[Target, DraggedStack, int]:
     """The target, the material that has it, and the lobe that is meant."""
     target = Target.from_dict(body.get("target"))
     near = held(body.get("material") or {}, target, reader_of(body, target))
@@ -133,7 +134,7 @@ def _line(members: EquivalenceClass, axis: Array, tinted: bool) -> Answer:
     }
 
 
-def _conductor(near: Nearby, n: int) -> Answer:
+def _conductor(near: DraggedStack, n: int) -> Answer:
     """eta against k of a metal, over its tint."""
     eta, kappa = _curves(near, n, np.linspace(0, 1, TINTS))
     here = [x[:, 0] for x in _metal(near, n)]
@@ -148,28 +149,27 @@ def _conductor(near: Nearby, n: int) -> Answer:
         ],
         "member": [float(np.mean(x)) for x in here],
         "members": np.stack(here, axis=1).tolist(),
-        "tint": near.point_of(near.places[n].lobe)[-1],
+        "tint": near.point_of(near.interfaces[n].lobe)[-1],
     }
 
 
-def _metal(near: Nearby, n: int) -> tuple[Array, Array]:
+def _metal(near: DraggedStack, n: int) -> tuple[Array, Array]:
     """Absolute eta and k of a metal, (3, 1) each."""
     eta, kappa = near.indices(n)
     assert kappa is not None
     return np.broadcast_to(eta, (3, 1)), np.broadcast_to(kappa, (3, 1))
 
 
-def _curves(near: Nearby, n: int, tint: Array) -> tuple[Array, Array]:
+def _curves(near: DraggedStack, n: int, tint: Array) -> tuple[Array, Array]:
     """eta and k, (3, N), of metals that reflect as much when smooth."""
     eta, kappa = _metal(near, n)
     eta_1 = near.index_above(n)
-    a, b = eta / eta_1, kappa / eta_1
-    u = ((a - 1) ** 2 + b * b) / ((a + 1) ** 2 + b * b)
+    u = fresnel.normal_incidence(eta / eta_1, kappa / eta_1)
     along = conductor_index(u, tint)
-    return along * eta_1, np.sqrt(np.maximum(u * (along + 1) ** 2 - (along - 1) ** 2, 0) / (1 - u)) * eta_1
+    return along * eta_1, conductor_extinction(u, along) * eta_1
 
 
-def _nearest_tint(near: Nearby, n: int, point: list[float]) -> float:
+def _nearest_tint(near: DraggedStack, n: int, point: list[float]) -> float:
     """The mean tint with which some channel comes nearest to a point (eta, k)."""
     tints = np.linspace(0, 1, 8 * TINTS)
     eta, kappa = _curves(near, n, tints)

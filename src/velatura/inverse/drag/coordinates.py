@@ -1,0 +1,383 @@
+"""A stack as coordinates: numbers that move while its lobes are dragged, their bounds, and how a model reads them.
+
+Of the last interface of a lobe, the reflectance at normal incidence that it has when smooth, per channel; of every
+interface, a variance; these are free. The index between two interfaces and absorption that no reflectance needs are
+coordinates, too, that are kept as long as they can be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from velatura.errors import InvalidInput
+from velatura.inverse.explain import REASONS
+from velatura.inverse.interface import (
+    CONDUCTOR_MAX,
+    CONDUCTOR_MIN,
+    ENERGY_MIN,
+    conductor_extinction,
+    conductor_index,
+    conductor_tint,
+)
+from velatura.inverse.partial_stack import NORMAL, Array, Layers, whole
+from velatura.inverse.target import Target
+from velatura.model import Model, lobes, prepare
+from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
+from velatura.model.variance import Isotropic, Roughness
+from velatura.ops import Value
+from velatura.optics import fresnel
+from velatura.stack import InterfaceValues, Kind, Material, MediumValues, Stack, number
+
+SLACK = 1e-8  # by which a bound may be broken
+STEP = 1e-5  # of a coordinate, to see how the lobes change
+SAME = 1e-6  # difference of tints that count as equal
+SMOOTH = 1e-10  # variance below which an interface is smooth
+REFLECTANCE_MAX = 0.95  # of a dielectric
+
+
+@dataclass(frozen=True)
+class InterfaceCoordinates:
+    """One interface, and the indices of its coordinates.
+
+    side: 1 denser, -1 rarer than what is above. tint: of a conductor, (3, 1). kept: optical depths (3, 1) of the medium
+    above that its reflectances do not need. absorbs: whether that medium takes away what its reflectances need.
+    variance, depth, reflectances, log_index: indices of the variance, of the factor on `kept` (None where that is
+    pinned), of the reflectances by channel or the one of all (None where the index itself is a coordinate), and of the
+    logarithm of the index.
+    """
+
+    kind: Kind
+    lobe: int
+    side: int
+    tint: Array
+    kept: Array
+    absorbs: bool
+    variance: int
+    depth: int | None = None
+    reflectances: slice | None = None
+    log_index: int | None = None
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A bound on a coordinate, or on the logarithm of an interface's index: `sign` times it is at least `sign * at`.
+
+    lobe, reason: the lobe that cannot be given beyond the bound, and why, a key of `REASONS`.
+    """
+
+    lobe: int
+    reason: str
+    sign: int
+    at: float
+    coordinate: int | None = None
+    interface: int | None = None
+
+    def why(self, target: Target) -> str:
+        """In words, why a target is not met."""
+        return f"lobe {self.lobe + 1}: {REASONS[self.reason].format(eta_max=target.eta_max)}"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Energies of all lobes, then variances of all interfaces, (3 K + I,), and their derivatives (3 K + I, free)."""
+
+    value: Array
+    slopes: Array
+
+
+@dataclass(frozen=True)
+class Space:
+    """The space of coordinates of stacks of one form, below an index `exterior`, as a model reads them.
+
+    Points x have shape (D,), or (D, N) for N stacks.
+    """
+
+    model: Model
+    exterior: float
+    interfaces: tuple[InterfaceCoordinates, ...]
+    bounds: tuple[Bound, ...]
+
+    # Points as layers, and as the model reads them -------------------------------------------------------------------
+
+    def layers(self, x: Array) -> list[Layers]:
+        """The interfaces of N points."""
+        eta_1 = np.full((1, x.shape[1]), self.exterior)
+        found = []
+        for own in self.interfaces:
+            tau = own.kept if own.depth is None else own.kept * x[own.depth]
+            s = np.where(x[own.variance] < SMOOTH, 0.0, np.maximum(x[own.variance], 0.0))
+            alpha = MAPS[self.model.map].roughness(s)
+            kappa = None
+            if own.log_index is not None:
+                eta = np.exp(x[own.log_index][None])
+            elif own.kind == "conductor":
+                eta, kappa, absorbed = _conductor(own, x[own.reflectances])
+                eta, kappa, tau = eta * eta_1, kappa * eta_1, tau + absorbed
+            else:
+                eta, absorbed = _dielectric(own, x[own.reflectances])
+                eta, tau = eta * eta_1, tau + absorbed
+            found.append(Layers(own.kind, eta, kappa, Roughness(alpha, alpha, np.zeros_like(alpha)), tau))
+            if own.kind == "dielectric":
+                eta_1 = eta
+        return found
+
+    def read(self, x: Array) -> Array:
+        """Of N points energies of all lobes, then variances of all interfaces, (3 K + I, N)."""
+        material = whole(self.layers(x), self.exterior)
+        reflected, _ = lobes(prepare(material, self.model, Isotropic), NORMAL)
+        energy = np.zeros((3 * self.lobes, x.shape[1]))
+        variance = np.empty((len(self.interfaces), x.shape[1]))
+        for n, (own, lobe) in enumerate(zip(self.interfaces, reflected)):
+            energy[3 * own.lobe : 3 * own.lobe + 3] += lobe.energy
+            variance[n] = self._brightest(own, x, MAPS[self.model.map].variance(lobe.roughness.alpha_u))
+        return np.vstack([energy, np.minimum(variance, VARIANCE_MAX)])
+
+    def reading(self, x: Array, free: Array) -> tuple[Reading, Array]:
+        """The reading at a point, by differences along some coordinates, and the points (D, 1 + free) of these."""
+        points = np.repeat(x[:, None], len(free) + 1, axis=1)
+        steps = STEP * (np.abs(x[free]) + 0.01)
+        points[free, 1 + np.arange(len(free))] += steps
+        read = self.read(points)
+        return Reading(read[:, 0], (read[:, 1:] - read[:, :1]) / steps), points
+
+    def _brightest(self, own: InterfaceCoordinates, x: Array, s: Array) -> Array:
+        """Where every channel has a variance of its own, that of the one in which the lobe must reflect most."""
+        if np.ndim(s) < 2 or len(s) == 1:
+            return np.ravel(s) if np.ndim(s) > 1 else s
+        of_lobe = next(o.reflectances for o in self.interfaces if o.lobe == own.lobe and o.reflectances is not None)
+        brightest = np.argmax(np.round(x[of_lobe], 9), axis=0)
+        return np.take_along_axis(s, np.broadcast_to(brightest, (1, x.shape[1])), axis=0)[0]
+
+    # Coordinates -----------------------------------------------------------------------------------------------------
+
+    @property
+    def lobes(self) -> int:
+        """How many lobes there are."""
+        return self.interfaces[-1].lobe + 1
+
+    @cached_property
+    def free(self) -> Array:
+        """Indices of the coordinates that always move: reflectances, then variances."""
+        spans = [own.reflectances for own in self.interfaces if own.reflectances is not None]
+        reflectances = [n for span in spans for n in range(span.start, span.stop)]
+        return np.array([*reflectances, *(own.variance for own in self.interfaces)])
+
+    @cached_property
+    def counted(self) -> Array:
+        """Which readings count: of energies one channel where nothing absorbs, and all variances."""
+        found = []
+        for own in self.interfaces:
+            if own.reflectances is not None:
+                found += [3 * own.lobe + c for c in range(own.reflectances.stop - own.reflectances.start)]
+        return np.array([*found, *(3 * self.lobes + n for n in range(len(self.interfaces)))])
+
+    # Bounds ----------------------------------------------------------------------------------------------------------
+
+    def clipped(self, x: Array) -> Array:
+        """The point (D,) within the bounds on coordinates."""
+        return np.clip(x, *self._box)
+
+    @cached_property
+    def _box(self) -> tuple[Array, Array]:
+        size = 1 + max(bound.coordinate for bound in self.bounds if bound.coordinate is not None)
+        low, high = np.full(size, -np.inf), np.full(size, np.inf)
+        for bound in self.bounds:
+            if bound.coordinate is not None:
+                (low if bound.sign > 0 else high)[bound.coordinate] = bound.at
+        return low, high
+
+    def margin(self, bound: Bound, x: Array) -> Array:
+        """How far within a bound N points are, negative outside, (N,)."""
+        if bound.coordinate is not None:
+            return bound.sign * (x[bound.coordinate] - bound.at)
+        assert bound.interface is not None
+        return bound.sign * (np.log(self.layers(x)[bound.interface].eta[0]) - bound.at)
+
+    def broken(self, x: Array, met: Bound | None) -> Bound | None:
+        """The bound that a point breaks most, but for the one that it lies on; None where all hold."""
+        others = [bound for bound in self.bounds if bound != met]
+        margins = [float(self.margin(bound, x[:, None])[0]) for bound in others]
+        worst = int(np.argmin(margins))
+        return others[worst] if margins[worst] < -SLACK else None
+
+    def bound_at(self, coordinate: int, x: Array) -> Bound:
+        """The bound on a coordinate that a point breaks."""
+        return next(b for b in self.bounds if b.coordinate == coordinate and b.sign * (x[coordinate] - b.at) < 0)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A stack: a point x, (D,), of a space. known: how the model reads it, where that is known already."""
+
+    space: Space
+    x: Array
+    known: Reading | None = None
+
+    @cached_property
+    def reading(self) -> Reading:
+        """How the model reads it."""
+        return self.known or self.space.reading(self.x, self.space.free)[0]
+
+    @cached_property
+    def layers(self) -> list[Layers]:
+        """Its interfaces, each with the medium above it."""
+        return self.space.layers(self.x[:, None])
+
+
+def _conductor(own: InterfaceCoordinates, reflectances: Array) -> tuple[Array, Array, Value]:
+    """Relative eta and kappa of conductors, and what absorbs where they cannot reflect as little."""
+    u = np.clip(reflectances, CONDUCTOR_MIN + 1e-12, CONDUCTOR_MAX)
+    n = conductor_index(u, own.tint)
+    return n, np.maximum(conductor_extinction(u, n), n), 0.5 * np.log(u / np.minimum(reflectances, u))
+
+
+def _dielectric(own: InterfaceCoordinates, reflectances: Array) -> tuple[Array, Value]:
+    """Relative indices of dielectrics, and what absorbs in the channels that reflect less than the most."""
+    most = np.clip(np.max(reflectances, axis=0, keepdims=True), 0.0, REFLECTANCE_MAX)
+    root = np.sqrt(most)
+    eta = ((1 + root) / (1 - root)) ** own.side
+    if not own.absorbs:
+        return eta, 0.0
+    least = np.clip(reflectances, ENERGY_MIN, most + ENERGY_MIN)
+    return eta, 0.5 * np.log(np.maximum(most, ENERGY_MIN) / least)
+
+
+# From a stack --------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Reader:
+    """The coordinates of interfaces, from the top."""
+
+    target: Target
+    model: Model
+    interfaces: list[InterfaceCoordinates] = field(default_factory=list)
+    bounds: list[Bound] = field(default_factory=list)
+    x: list[float] = field(default_factory=list)
+    eta_1: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.eta_1 = self.target.exterior
+
+    @property
+    def space(self) -> Space:
+        """The space of the interfaces so far."""
+        return Space(self.model, self.target.exterior, tuple(self.interfaces), tuple(self.bounds))
+
+    def add(self, k: int, n: int, part: Layers) -> None:
+        """The n-th interface of the k-th lobe."""
+        lobe, first, last = self.target.lobes[k], not self.interfaces, n == self.target.lobes[k].interfaces - 1
+        pinned = lobe.fixed.of("tau", n)
+        tau = np.broadcast_to(np.reshape(part.tau if pinned is None else pinned, (-1, 1)).astype(float), (3, 1))
+        ratio = np.asarray(part.eta, float) / self.eta_1
+        values: dict[str, Any] = {
+            "kind": part.kind,
+            "lobe": k,
+            "side": -1 if float(np.mean(ratio)) < 1 else 1,
+            "tint": np.full((3, 1), lobe.tint),
+            "kept": tau,
+            "absorbs": last and not first,
+            "variance": self._coordinate(k, float(MAPS[self.model.map].variance(float(part.alpha))), "blur", 0.0),
+        }
+        if not last:
+            own = self._upper(k, float(np.mean(ratio)), values)
+        elif part.kind == "dielectric":
+            own = self._dielectric(k, float(np.mean(ratio)), values)
+        else:
+            own = self._conductor(k, ratio, np.asarray(part.kappa, float) / self.eta_1, values)
+        self.interfaces.append(own)
+        if own.log_index is not None:
+            self.eta_1 = float(np.exp(self.x[own.log_index]))
+        elif own.kind == "dielectric":
+            self.eta_1 = self.eta_1 * float(np.mean(ratio))
+
+    def _upper(self, k: int, ratio: float, values: dict[str, Any]) -> InterfaceCoordinates:
+        """Of a pair the upper interface."""
+        pinned, top = self.target.lobes[k].fixed.of("eta", 0), float(np.log(self.target.eta_max))
+        index = self._coordinate(k, float(np.log(pinned or self.eta_1 * ratio)), "index", 0.0, top)
+        return InterfaceCoordinates(**values, log_index=index)
+
+    def _dielectric(self, k: int, ratio: float, values: dict[str, Any]) -> InterfaceCoordinates:
+        """The last interface of a lobe, a dielectric: what all channels absorb alike is kept."""
+        tau, most, depth = values["kept"], fresnel.normal_incidence(ratio), None
+        reflectances = [most]
+        if values["absorbs"]:
+            least = float(tau.min())
+            reflectances = (most * np.exp(-2 * (tau - least)))[:, 0].tolist()
+        span = self._colour(k, reflectances, "upper", 0.0)
+        if values["absorbs"]:
+            depth, values["kept"] = self._coordinate(k, least, "absorption", 0.0), np.ones((3, 1))
+        for sign, at in ((1, 0.0), (-1, float(np.log(self.target.eta_max)))):
+            self.bounds.append(Bound(k, "energy", sign, at, interface=len(self.interfaces)))
+        return InterfaceCoordinates(**values, depth=depth, reflectances=span)
+
+    def _conductor(self, k: int, ratio: Array, kappa: Array, values: dict[str, Any]) -> InterfaceCoordinates:
+        """The last interface of a lobe, a conductor: all that absorbs is kept."""
+        reflectance = np.broadcast_to(fresnel.normal_incidence(ratio, kappa), (3, 1))
+        tint = conductor_tint(ratio, kappa)
+        tint = retinted(tint, float(np.mean(tint)), self.target.lobes[k].tint)
+        low, why = (ENERGY_MIN, "upper") if values["absorbs"] else (float(CONDUCTOR_MIN), "metal")
+        reflectances = np.maximum(reflectance[:, 0], CONDUCTOR_MIN).tolist()
+        span = self._colour(k, reflectances, why, low, float(CONDUCTOR_MAX))
+        depth = self._coordinate(k, 1.0, "absorption", 0.0, 1.0) if values["absorbs"] else None
+        values["tint"] = np.broadcast_to(tint, (3, 1))
+        return InterfaceCoordinates(**values, depth=depth, reflectances=span)
+
+    def _coordinate(self, lobe: int, value: float, reason: str, low: float, high: float | None = None) -> int:
+        n = len(self.x)
+        self.x.append(value)
+        self.bounds.append(Bound(lobe, reason, 1, low, n))
+        if high is not None:
+            self.bounds.append(Bound(lobe, "energy" if reason != "index" else reason, -1, high, n))
+        return n
+
+    def _colour(self, lobe: int, values: Sequence[float], reason: str, low: float, high: float | None = None) -> slice:
+        first = len(self.x)
+        for value in values:
+            self._coordinate(lobe, float(value), reason, low, high)
+        return slice(first, len(self.x))
+
+
+def retinted(tint: Array, now: float, then: float) -> Array:
+    """Tints of all channels moved, within 0..1, as from one value to another."""
+    if abs(now - then) < SAME:
+        return tint
+    return tint * (then / now) if then < now else 1 - (1 - tint) * ((1 - then) / (1 - now))
+
+
+def plain(stack: Stack) -> list[Layers]:
+    """The interfaces of a stack, each with the medium above it; a dielectric has one index for all channels.
+
+    Raises:
+        InvalidInput: a layer that no target can have, in one line.
+    """
+    if stack.thin:
+        raise InvalidInput("thin: a pane ends in the index outside; a target has no such last index")
+    found: list[Layers] = []
+    tau: Array | float = 0.0
+    base = len(stack.layers) - 1 if stack.base else None
+    material = Material.of(stack, lambda at, value: value if at.layer == base else number(at, value))
+    for n, layer in enumerate(material.layers[:base]):
+        where = f"layer {n} ({layer.kind})"
+        if isinstance(layer, MediumValues):
+            if np.any(layer.sigma_s > 0):
+                raise InvalidInput(f"{where}: scatters light; the media of a target only absorb")
+            tau = np.broadcast_to(layer.sigma_a * layer.depth, (3, 1))
+            continue
+        if not isinstance(layer, InterfaceValues):
+            raise InvalidInput(f"{where}: a target has interfaces and media only")
+        if layer.kind == "mirror":
+            raise InvalidInput(f"{where}: reflects all light whatever its index; a target has a conductor there")
+        if layer.alpha_u != layer.alpha_v:
+            raise InvalidInput(f"{where}: is brushed; the lobes of a target are round")
+        eta = layer.eta if layer.kind == "conductor" else np.full((1, 1), np.mean(layer.eta))
+        found.append(Layers(layer.kind, eta, layer.k, Roughness(layer.alpha_u, layer.alpha_u, 0.0), tau))
+        tau = 0.0
+    if not found:
+        raise InvalidInput("layers: no interface; without one there is no lobe")
+    return found

@@ -1,0 +1,325 @@
+"""A stack that is dragged: towards other lobes, or to another member of the class of a lobe."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from velatura.inverse.coats import scattered
+from velatura.inverse.drag.coordinates import SLACK, Bound, InterfaceCoordinates, Point, Reader, Space, plain, retinted
+from velatura.inverse.drag.newton import Compromise, Problem, Solution
+from velatura.inverse.interface import ENERGY_MIN
+from velatura.inverse.partial_stack import Above, Array, Layers
+from velatura.inverse.target import Fixed, Target, TargetLobe
+from velatura.model import Model
+from velatura.model.roughness_maps import MAPS
+from velatura.optics import fresnel
+from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
+
+ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
+FAR = 0.1  # share of a wish that is a long way
+
+
+@dataclass(frozen=True)
+class DraggedStack:
+    """A stack as a point in the space of its coordinates, and the target whose lobes it has.
+
+    tail: layers below the last interface, which are kept. diffuse: energy of a diffuse base among them, None where
+    there is none, or it has a texture.
+    """
+
+    point: Point
+    target: Target
+    tail: tuple[Layer, ...] = ()
+    name: str = ""
+    diffuse: tuple[float, ...] | None = None
+
+    # From and to materials -------------------------------------------------------------------------------------------
+
+    @classmethod
+    def of(cls, stack: Stack, target: Target, model: Model) -> DraggedStack | None:
+        """The stack, its interfaces shared out among the lobes of a target; None where these do not fit together.
+
+        Raises:
+            InvalidInput: a layer that no target can have.
+        """
+        layers = plain(stack)
+        if len(layers) != sum(lobe.interfaces for lobe in target.lobes) or any(
+            _pinned(lobe, n == 0) for n, lobe in enumerate(target.lobes)
+        ):
+            return None
+        reader = Reader(target, model)
+        for k, lobe in enumerate(target.lobes):
+            own, layers = layers[: lobe.interfaces], layers[lobe.interfaces :]
+            if [part.kind for part in own] != ["dielectric"] * (lobe.interfaces - 1) + [lobe.base]:
+                return None
+            for n, part in enumerate(own):
+                reader.add(k, n, part)
+        last = max(n for n, layer in enumerate(stack.layers) if isinstance(layer, Interface))
+        tail = stack.layers[last + 1 :]
+        diffuse = None
+        if tail and isinstance(tail[-1], Diffuse) and not isinstance(tail[-1].albedo, Varying):
+            diffuse = tuple(scattered(stack, model).tolist())
+        return cls(Point(reader.space, np.array(reader.x)), target, tail, stack.name, diffuse)
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The material."""
+        layers = [layer for part in map(self._rounded, self.point.layers) for layer in part.written(0)]
+        return Stack([*layers, *self.tail], name=self.name, exterior=self.space.exterior)
+
+    def _rounded(self, part: Layers) -> Layers:
+        """With an index that only rounding takes out of bounds."""
+        within = np.clip(part.eta, 1.0, self.target.eta_max)
+        near = part.kind == "dielectric" and np.abs(np.log(part.eta / within)).max() <= SLACK
+        return dataclasses.replace(part, eta=within) if near else part
+
+    def renamed(self, target: Target) -> DraggedStack:
+        """With all of a target that it has, and no more than that."""
+        return dataclasses.replace(self, target=target)
+
+    def in_closed_form(self) -> DraggedStack:
+        """The same stack, and its lobes, as the model reads them that has a closed form."""
+        model = self.model.in_closed_form
+        if model == self.model:
+            return self
+        point = Point(dataclasses.replace(self.space, model=model), self.point.x)
+        seen = dataclasses.replace(self, point=point)
+        return seen.renamed(seen.now(self.target))
+
+    # What it is, and what the model reads ----------------------------------------------------------------------------
+
+    @property
+    def space(self) -> Space:
+        """The space of its coordinates."""
+        return self.point.space
+
+    @property
+    def model(self) -> Model:
+        """The model that reads it."""
+        return self.space.model
+
+    @property
+    def interfaces(self) -> tuple[InterfaceCoordinates, ...]:
+        """The interfaces from the top."""
+        return self.space.interfaces
+
+    @property
+    def variances(self) -> Array:
+        """The variances of the interfaces' lobes, as the model reads them."""
+        return self.point.reading.value[3 * self.space.lobes :]
+
+    def now(self, wish: Target) -> Target:
+        """The lobes that are, in the form of a target."""
+        return self._target_of(self.point.reading.value, wish)
+
+    def between(self, wish: Target, t: float) -> Target:
+        """A target on the way from the lobes that are to those that are wished for, in energies and variances."""
+        now = self.point.reading.value
+        return self._target_of(now + t * (self._wanted(wish) - now), wish)
+
+    def indices(self, n: int) -> tuple[Array, Array | None]:
+        """Absolute eta and k of the n-th interface, (3, 1) or (1, 1)."""
+        part = self.point.layers[n]
+        return part.eta, part.kappa
+
+    def index_above(self, n: int) -> float:
+        """Index of the medium above the n-th interface."""
+        return float(self.indices(n - 1)[0][0, 0]) if n else self.space.exterior
+
+    def above(self, n: int) -> Above:
+        """The layers above the n-th interface."""
+        above = Above.nothing(self.model, self.space.exterior)
+        for part in self.point.layers[:n]:
+            above, _ = above.below(part)
+        return above
+
+    def _target_of(self, reading: Array, form: Target) -> Target:
+        """The target of a form with lobes as they are read."""
+        count = self.space.lobes
+        for k in range(count):
+            s = np.mean([reading[3 * count + n] for n, own in enumerate(self.interfaces) if own.lobe == k])
+            alpha, energy = float(MAPS[self.model.map].roughness(s)), tuple(reading[3 * k : 3 * k + 3].tolist())
+            form = form.with_lobe(k, energy=energy, alpha=alpha, variance=None)
+        return form
+
+    def _wanted(self, wish: Target) -> Array:
+        """What the model must read, for a target to be met."""
+        s = [MAPS[self.model.map].variance(wish.lobes[own.lobe].roughness) for own in self.interfaces]
+        return np.array([*(max(e, ENERGY_MIN) for lobe in wish.lobes for e in lobe.colour), *s])
+
+    # Towards other lobes ---------------------------------------------------------------------------------------------
+
+    def towards(self, wish: Target) -> tuple[DraggedStack, Bound | None]:
+        """The stack with the lobes of a target of the same form, or of one on the way there, and the bound that is met.
+
+        None for the bound where the target is met.
+        """
+        problem = self._problem(self._wanted(wish))
+        found = self._met(problem)
+        if isinstance(found, Solution):
+            return self._at(found).renamed(wish), None
+        return self._part_of_the_way(wish, problem, found)
+
+    def far(self, wish: Target) -> bool:
+        """Whether it is a long way to the lobes of a target."""
+        return float(np.max(np.abs(self._problem(self._wanted(wish)).way))) > FAR
+
+    def achromatic(self, wish: Target) -> Target:
+        """A wish, its first lobe without the colours that need absorption where nothing may absorb."""
+        first = self.interfaces[0]
+        if first.reflectances is None or first.absorbs or first.kind != "dielectric":
+            return wish
+        passes = np.exp(-2 * np.broadcast_to(first.kept, (3, 1))[:, 0])
+        own = np.array(wish.lobes[0].colour)
+        possible = passes * np.mean(own / passes)
+        return wish if np.max(np.abs(possible - own)) < SLACK else wish.with_lobe(0, energy=tuple(possible.tolist()))
+
+    def _problem(self, goal: Array) -> Problem:
+        return Problem(self.point, goal)
+
+    def _at(self, solution: Solution) -> DraggedStack:
+        return dataclasses.replace(self, point=solution.point)
+
+    def _met(self, problem: Problem, held: Sequence[int] = ()) -> Solution | Bound:
+        """The stack that meets the goal; where a bound is in the way, what is kept gives way, if it can."""
+        found = problem.solve()
+        if isinstance(found, Solution):
+            return found
+        for coordinate in self._giving(found, held):
+            other = problem.solve(Compromise(found, coordinate))
+            if isinstance(other, Solution):
+                return other
+        return found
+
+    def _part_of_the_way(self, wish: Target, problem: Problem, bound: Bound) -> tuple[DraggedStack, Bound]:
+        """As far towards a wish as one bound after the other allows."""
+        for _ in range(ATTEMPTS):
+            found = problem.solve(Compromise(bound))
+            if isinstance(found, Solution):
+                return self._at(found).renamed(self.between(wish, found.part)), bound
+            if found == bound:
+                break
+            bound = found
+        return self.renamed(self.now(wish)), bound
+
+    def _giving(self, bound: Bound, held: Sequence[int]) -> list[int]:
+        """Coordinates that are kept, and may yet give way to a bound: those of the nearest lobe first."""
+        found = []
+        for own in reversed([own for own in self.interfaces if own.lobe <= bound.lobe]):
+            if own.depth is not None and self.point.x[own.depth] > 0 and np.any(own.kept):
+                found.append(own.depth)
+            if own.log_index is not None and self.target.lobes[own.lobe].fixed.of("eta", 0) is None:
+                found.append(own.log_index)
+        return [coordinate for coordinate in found if coordinate not in held]
+
+    # To other members of a class -------------------------------------------------------------------------------------
+
+    def member(self, k: int, point: Sequence[float]) -> tuple[DraggedStack, Bound | None]:
+        """The stack with another member of a lobe's class, or the nearest to it, and then the bound that is met.
+
+        point: as `point_of` gives it: free indices of dielectrics from the top, then a conductor's tint.
+        """
+        here, there = np.array(self.point_of(k)), np.array(point, float)
+        found, met, why = self, 0.0, None
+        for step in (1.0, *(0.5**n for n in range(1, ATTEMPTS))):
+            share = met + step
+            if share > 1:
+                continue
+            moved = found._moved(k, here + share * (there - here))
+            if isinstance(moved, Bound):
+                why = why or moved
+            else:
+                found, met = moved, share
+            if met == 1:
+                return found, None
+        return found, why
+
+    def point_of(self, k: int) -> list[float]:
+        """Where in the class of a lobe its member is."""
+        point = []
+        for own, part in zip(self.interfaces, self.point.layers):
+            if own.lobe == k:
+                point.append(float(part.eta[0, 0]) if own.kind == "dielectric" else float(np.mean(own.tint)))
+        return point
+
+    def tint_by(self, n: int, channel: int, tint: float) -> float:
+        """The mean tint of the n-th interface when one channel has this one."""
+        own = self.interfaces[n].tint
+        return float(np.mean(retinted(own, float(own[channel, 0]), tint)))
+
+    def _moved(self, k: int, point: Array) -> DraggedStack | Bound:
+        """With the member of a class at a point; where there is none, the bound that is in the way."""
+        moved, held, level = self._placed(k, point)
+        problem = moved._problem(self._wanted(self.target))
+        if level is not None:
+            # Hold the index of the last dielectric, while what absorbs above it gives way, or is clear
+            found = problem.solve(level)
+            if isinstance(found, Solution):
+                return moved._at(found)
+            if found.reason != "absorption":
+                return found
+            assert level.coordinate is not None
+            x = moved.point.x.copy()
+            x[level.coordinate] = 0.0
+            moved = dataclasses.replace(moved, point=Point(moved.space, x))
+            problem, held = moved._problem(problem.goal), [*held, level.coordinate]
+        met = moved._met(problem, held)
+        return moved._at(met) if isinstance(met, Solution) else met
+
+    def _placed(self, k: int, point: Array) -> tuple[DraggedStack, list[int], Compromise | None]:
+        """With the indices and the tint of a member, its lobes not yet met.
+
+        Returns the coordinates that these hold, too, and how the index of a last dielectric is held where something
+        absorbs above it.
+        """
+        x, interfaces, level = self.point.x.copy(), list(self.interfaces), None
+        held: list[int] = []
+        eta_1 = self.space.exterior
+        for n, (own, part) in enumerate(zip(interfaces, self.point.layers)):
+            if own.lobe == k:
+                wanted = float(point[len(held)])
+                if own.log_index is not None:
+                    x[own.log_index] = np.log(wanted)
+                    held.append(own.log_index)
+                elif own.kind == "conductor":
+                    interfaces[n] = dataclasses.replace(own, tint=retinted(own.tint, float(np.mean(own.tint)), wanted))
+                else:
+                    assert own.reflectances is not None
+                    interfaces[n] = dataclasses.replace(own, side=-1 if wanted < eta_1 else 1)
+                    x[own.reflectances] = _scaled_to(x[own.reflectances], fresnel.normal_incidence(wanted / eta_1))
+                    if own.depth is not None:
+                        bound = Bound(k, "absorption", 1, float(np.log(wanted)), interface=n)
+                        level = Compromise(bound, own.depth)
+            if own.kind == "dielectric":
+                eta_1 = float(np.exp(x[own.log_index]) if own.log_index is not None else part.eta[0, 0])
+        space = dataclasses.replace(self.space, interfaces=tuple(interfaces))
+        return dataclasses.replace(self, point=Point(space, x)), held, level
+
+
+def seen(stack: Stack, target: Target, model: Model) -> Target:
+    """A target with the energies and blurs that a stack of its form has."""
+    form = target
+    for k in range(len(target.lobes)):
+        form = form.with_lobe(k, fixed=Fixed())
+    dragged = DraggedStack.of(stack, form, model)
+    assert dragged is not None
+    return dragged._target_of(dragged.space.read(dragged.point.x[:, None])[:, 0], target)
+
+
+def _scaled_to(reflectances: Array, most: float) -> Array:
+    """Reflectances with another largest one, no channel without any."""
+    now = np.max(reflectances)
+    return max(most, ENERGY_MIN) * (reflectances / now if now > 0 else np.ones_like(reflectances))
+
+
+def _pinned(lobe: TargetLobe, first: bool) -> bool:
+    """Whether more is fixed of a lobe than what is a constant here: media above the first and of pairs, their index."""
+    last = lobe.interfaces - 1
+    pins = [("eta", last), ("k", last), *(("alpha", n) for n in range(lobe.interfaces))]
+    pins += [("tau", last)] if last or not first else []
+    return any(lobe.fixed.of(key, n) is not None for key, n in pins)

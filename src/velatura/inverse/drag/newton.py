@@ -1,0 +1,122 @@
+"""Newton's method from a stack to one that has given lobes, within the bounds on its coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from velatura.inverse.drag.coordinates import SLACK, Bound, Point, Reading
+from velatura.inverse.partial_stack import Array
+
+ROUNDS = 8
+ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
+
+
+@dataclass(frozen=True)
+class Compromise:
+    """A bound that the solution lies on, and what gives way: a coordinate that is kept, or (None) the goal."""
+
+    bound: Bound
+    coordinate: int | None = None
+
+    @property
+    def of_goal(self) -> bool:
+        """Whether only a part of the way to the goal is asked for, as far as the bound allows."""
+        return self.coordinate is None
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A point, and which part of the way to the goal it is."""
+
+    point: Point
+    part: float
+
+
+@dataclass(frozen=True)
+class Problem:
+    """From a point to one where the model reads the energies and variances `goal`."""
+
+    start: Point
+    goal: Array
+
+    def solve(self, compromise: Compromise | None = None) -> Solution | Bound:
+        """The stack that meets the goal; where there is none, the bound that is in the way."""
+        space, bound = self.start.space, compromise.bound if compromise else None
+        free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
+        x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, set[int]()
+        for n in range(ROUNDS):
+            # See what is missing, and how that changes
+            known = n == 0 and bound is None
+            reading, points = (self.start.reading, x[:, None]) if known else space.reading(x, free)
+            missing, slopes = self._missing(reading, part), self._scaled(reading.slopes)
+            if compromise:
+                missing, slopes = self._on_bound(compromise, missing, slopes, points, free)
+            if not np.all(np.isfinite(slopes)):
+                break
+
+            # Move, within bounds
+            moved = np.linalg.lstsq(slopes, -missing, rcond=1e-12)[0]
+            full, full_part = x.copy(), part + float(np.sum(moved[len(free) :]))
+            full[free] += np.clip(moved[: len(free)], -self._reach[free], self._reach[free])
+            x, part = space.clipped(full), min(max(full_part, 0.0), 1.0)
+            outside = {int(c) for c in free if abs(full[c] - x[c]) > SLACK}
+
+            # End where nothing is missing, or where a coordinate meets its bound for the second time
+            met = n > 0 and np.max(np.abs(missing)) < (ENOUGH if bound else ALMOST)
+            if met and not outside and abs(full_part - part) <= SLACK:
+                found = Reading(self._on_the_way(part), reading.slopes[:, : len(space.free)])
+                return space.broken(x, bound) or Solution(Point(space, x, found), part)
+            if outside & blocked:
+                return space.bound_at(min(outside & blocked), full)
+            blocked = outside
+        return space.broken(x, bound) or bound or space.bounds[0]
+
+    @cached_property
+    def way(self) -> Array:
+        """The way to the goal, in units of the goal."""
+        return self._scaled(self.goal - self.start.reading.value)
+
+    def _on_bound(
+        self, compromise: Compromise, missing: Array, slopes: Array, points: Array, free: Array
+    ) -> tuple[Array, Array]:
+        """The equations with one more, that the point lies on a bound, and one more unknown if the goal gives way."""
+        margins = self.start.space.margin(compromise.bound, points)
+        change = (margins[1:] - margins[0]) / (points[free, 1 + np.arange(len(free))] - points[free, 0])
+        if compromise.of_goal:
+            slopes, change = np.c_[slopes, -self.way], np.r_[change, 0.0]
+        return np.r_[missing, margins[0]], np.vstack([slopes, change])
+
+    def _on_the_way(self, part: float) -> Array:
+        """The reading after a part of the way."""
+        if part == 1:
+            return self.goal
+        here = self.start.reading.value
+        return here + part * (self.goal - here)
+
+    def _missing(self, reading: Reading, part: float) -> Array:
+        return self._scaled(reading.value - self._on_the_way(part))
+
+    def _scaled(self, x: Array) -> Array:
+        """Of readings, or their slopes, those that count, in units of the goal."""
+        return (x[self.start.space.counted].T / self._scale).T
+
+    @cached_property
+    def _scale(self) -> Array:
+        """Energies are seen against the brightest channel of their lobe."""
+        k = 3 * self.start.space.lobes
+        brightest = np.repeat(self.goal[:k].reshape(-1, 3).max(axis=1), 3)
+        return np.r_[np.maximum(brightest, 1e-3), self.goal[k:] + 0.01][self.start.space.counted]
+
+    @cached_property
+    def _reach(self) -> Array:
+        """The longest step of every coordinate in one round."""
+        reach = np.full(len(self.start.x), np.inf)
+        for own in self.start.space.interfaces:
+            if own.reflectances is not None:
+                reach[own.reflectances] = np.maximum(0.5 * self.start.x[own.reflectances], 0.05)
+            if own.log_index is not None:
+                reach[own.log_index] = 0.2
+        return reach
