@@ -297,10 +297,10 @@ LAWS: tuple[Law, ...] = (
         normalisation,
     ),
     Law("chi-square", "Samples fall where the pdf says.", chi_square),
-    Law("agreement", "`sample`, `pdf`, `eval` and `eval_pdf` say the same of the same direction.", agreement),
+    Law("agreement", "`sample`, `pdf`, `eval` and `eval_pdf` agree about every direction.", agreement),
     Law("weights", "The weight of a sample is its value over its density.", weights),
     Law("reciprocity", "f(wi, wo) is f(wo, wi), with the squared index on either side.", reciprocity),
-    Law("limit", "In a limit the BSDF is the one that it should be there.", limit),
+    Law("limit", "In a limiting case the BSDF equals the one that is expected.", limit),
 )
 
 
