@@ -1,0 +1,136 @@
+"""What a stack reflects in no lobe: scattered light, facets met often, a diffuse base, as one reciprocal polynomial.
+
+For z the cosines outside and s = -(x_i x_o + y_i y_o), positive on the side of the mirror direction,
+
+    pi f(wi, wo) = sum_ab C_ab u_a(z_i) u_b(z_o) + B s + A (2 s^2 - |p_i|^2 |p_o|^2),    C_ab = C_ba,
+
+where u = (1, z, (1 - z)^4), whose last falls off as what an interface lets out does, and |p|^2 = 1 - z^2; it is clipped
+at 0. The first term is its mean over azimuths, the others vary as cos(phi) and cos(2 phi). It is fitted to what leaves
+a stack at nodes of the length of momentum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.transport.nodes import QUADRATURE, Nodes
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+
+Array = NDArray[np.floating]
+
+MOMENTS = (1.0, 2 / 3, 1 / 15)  # means of u over the projected disc
+PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # a and b, of C_ab
+EXACT = 3.0  # weight of the energy of a direction beside that of nodes
+DARK = 1e-6  # albedo
+
+
+@dataclass(frozen=True)
+class Remainder(ops.Named):
+    """The polynomial by its numbers, colours: C_ab, then B and A."""
+
+    c_00: Value
+    c_01: Value
+    c_02: Value
+    c_11: Value
+    c_12: Value
+    c_22: Value
+    b: Value
+    a: Value
+
+    def value(self, wi: Direction, wo: Direction) -> Value:
+        """f(wi, wo) |cos theta_o|, a colour; 0 unless both are above the surface."""
+        above = (wi[2] > 0) & (wo[2] > 0)
+        z = wo[2]
+        k = self._at(wi[2])
+        s = -1 * (wi[0] * wo[0] + wi[1] * wo[1])
+        both = (1 - wi[2] * wi[2]) * (1 - z * z)
+        ops.names(k=[*k], s=s, both=both)
+        mean = k[0] + z * k[1] + _grazing(z) * k[2]
+        polynomial = mean + self.b * s + self.a * (2 * s * s - both)
+        return ops.select(above, ops.maximum(polynomial, 0.0) * z * (1 / pi), 0.0)
+
+    def albedo(self, cos_theta: Value) -> Value:
+        """Energy for light from a cosine, a colour; as if nothing were clipped."""
+        return sum(k * moment for k, moment in zip(self._at(cos_theta), MOMENTS))
+
+    def _at(self, z: Value) -> tuple[Value, Value, Value]:
+        """Coefficients of u at the other cosine."""
+        w = _grazing(z)
+        return (
+            self.c_00 + z * self.c_01 + w * self.c_02,
+            self.c_01 + z * self.c_11 + w * self.c_12,
+            self.c_02 + z * self.c_12 + w * self.c_22,
+        )
+
+
+def density(wo: Direction) -> Value:
+    """Of `sample`: the cosine over pi."""
+    return ops.maximum(wo[2], 0.0) * (1 / pi)
+
+
+def sample(u1: Value, u2: Value) -> Direction:
+    """A direction from uniform numbers, as likely as its cosine is large."""
+    radius, phi = ops.sqrt(u1), 2 * pi * u2
+    return radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1)
+
+
+def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remainder:
+    """The polynomial closest to the light that leaves a stack, by colour (C,).
+
+    Args:
+        measures: (C, 3, N, M) of light from M directions: its energy at the nodes, and its means of cos(phi) and
+            cos(2 phi), phi being 0 on the side of the mirror direction.
+        cosines: of the directions, (M,).
+        albedos: of the stack for these, (C, M); errors count relative to them.
+    """
+    outside = np.flatnonzero(nodes.p <= 1 + 1e-9)
+    even = 1 / np.sqrt(np.maximum(nodes.weights(1.0)[outside], 1 / QUADRATURE))
+    sine = np.sqrt(1 - cosines * cosines)[:, None]
+    u, deposits = _basis(cosines)[..., None], [_deposited(nodes, 0, a)[outside] for a in range(3)]
+    # Columns (M, N) of each mode, and what their energies are (M,)
+    mean = [(u[a] * deposits[b] + u[b] * deposits[a]) / (1 + (a == b)) for a, b in PAIRS]
+    energy = [(u[a, :, 0] * MOMENTS[b] + u[b, :, 0] * MOMENTS[a]) / (1 + (a == b)) for a, b in PAIRS]
+    once = [0.5 * sine * _deposited(nodes, 1, 0)[outside]]
+    twice = [0.5 * sine * sine * _deposited(nodes, 2, 0)[outside]]
+
+    numbers = []
+    for light, albedo in zip(measures, albedos):
+        weight = even / np.maximum(albedo, DARK)[:, None]
+        exact = EXACT / np.maximum(albedo, DARK)
+        seen = light[:, outside].swapaxes(-1, -2)
+        rows = np.concatenate([_rows(mean, weight), _rows(energy, exact)])
+        target = np.concatenate([(weight * seen[0]).ravel(), exact * light[0].sum(axis=0)])
+        parts = [(rows, target)]
+        parts += [(_rows(each, weight), (weight * mode).ravel()) for each, mode in zip((once, twice), seen[1:])]
+        numbers.append(np.concatenate([np.linalg.lstsq(*part, rcond=None)[0] for part in parts]))
+    return Remainder(*np.stack(numbers, axis=-1))
+
+
+def _rows(columns: Sequence[Array], weight: Array) -> Array:
+    return np.stack([(weight * column).ravel() for column in columns], axis=-1)
+
+
+def _deposited(nodes: Nodes, mode: int, a: int) -> Array:
+    """Integral over p^2 in [0, 1] of p^mode u_a, shared among the nodes, (N,)."""
+    p = np.sqrt((np.arange(QUADRATURE) + 0.5) / QUADRATURE)
+    index, shares, beyond = nodes.shares(p)
+    if mode % 2:
+        shares = np.where(beyond, -shares, shares)
+    function = p**mode * _basis(np.sqrt(1 - p * p))[a] / QUADRATURE
+    return np.asarray(np.bincount(index.ravel(), (shares * function).ravel(), nodes.count))
+
+
+def _basis(z: Array) -> Array:
+    return np.stack([np.ones_like(z), z, _grazing(z)])
+
+
+def _grazing(z: Value) -> Value:
+    squared = (1 - z) * (1 - z)
+    return squared * squared

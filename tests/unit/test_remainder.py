@@ -1,0 +1,138 @@
+"""The remainder: its fit against light that is known, its energy, and what a BSDF must keep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from evaluation import evaluate
+from numpy.typing import NDArray
+
+from velatura import Interface, Medium, Stack, kernel, tables
+from velatura.model import remainder
+from velatura.model.remainder import Remainder
+from velatura.model.transport.energies import INCIDENCES, energies
+from velatura.model.transport.nodes import Nodes
+from velatura.optics import fresnel
+from velatura.shader import symbol
+from velatura.stack import Material
+
+Array = NDArray[np.floating]
+Direction = tuple[Any, Any, Any]
+
+NODES = Nodes.of([1.0, 1.5], 24)
+COSINES = np.sqrt((np.arange(8) + 0.5) / 8)
+SOME = Remainder(0.1, 0.2, -0.05, 0.3, -0.1, 0.05, 0.1, 0.05)
+
+
+def random_directions(count: int, seed: int) -> Direction:
+    rng = np.random.default_rng(seed)
+    z, phi = rng.uniform(0.01, 1, count), rng.uniform(0, 2 * np.pi, count)
+    radius = np.sqrt(1 - z * z)
+    return radius * np.cos(phi), radius * np.sin(phi), z
+
+
+def incident(cosine: float, count: int) -> Direction:
+    return np.full(count, np.sqrt(1 - cosine**2)), np.zeros(count), np.full(count, cosine)
+
+
+def measures(f: Callable[[Direction, Direction], Array], count: int = 2000) -> Array:
+    """Light of a BSDF from the directions, at the nodes by mode, (1, 3, N, M): a sum over the projected disc."""
+    p, phi = np.meshgrid(
+        np.sqrt((np.arange(count) + 0.5) / count), (np.arange(16) + 0.5) * (2 * np.pi / 16), indexing="ij"
+    )
+    wo = p * np.cos(phi), p * np.sin(phi), np.sqrt(1 - p * p)
+    index, shares, beyond = NODES.shares(p)
+    found = np.zeros((1, 3, NODES.count, len(COSINES)))
+    for i, cosine in enumerate(COSINES):
+        light = f(incident(cosine, 1), wo) * (np.pi / p.size)
+        for m in range(3):
+            odd = np.where(beyond, -1.0, 1.0) if m == 1 else 1.0
+            # The mirror direction of wi lies at the azimuth pi
+            spread = shares * odd * (light * np.cos(m * (phi - np.pi)))
+            found[0, m, :, i] = np.bincount(index.ravel(), spread.ravel(), NODES.count)
+    return found
+
+
+def test_what_is_a_polynomial_is_found_again() -> None:
+    """A diffuse reflection among them, whose only number is its albedo."""
+    known = [(0.6, *[0.0] * 7), tuple(vars(SOME).values())]
+    for numbers in known:
+
+        def polynomial(wi: Direction, wo: Direction, numbers: Any = numbers) -> Any:
+            return Remainder(*numbers).value(wi, wo) / wo[2]
+
+        light = measures(polynomial)
+        found = remainder.fit(NODES, light, COSINES, np.ones((1, 8)))
+        np.testing.assert_allclose(np.concatenate(list(vars(found).values())), numbers, atol=2e-3)
+
+
+def test_a_diffuse_base_under_a_smooth_coat_is_close_to_a_polynomial() -> None:
+    """To a hundredth; Fresnel's transmittance is no polynomial."""
+
+    def coated(wi: Direction, wo: Direction) -> Any:
+        return (1 - fresnel.dielectric(wi[2], 1.5)) * (1 - fresnel.dielectric(wo[2], 1.5)) / np.pi
+
+    light = measures(coated)
+    found = remainder.fit(NODES, light, COSINES, light[:, 0].sum(axis=1))
+    z = np.sqrt((np.arange(1000) + 0.5) / 1000)
+    mean = np.mean(1 - fresnel.dielectric(z, 1.5))
+    for cosine in (1.0, 0.7, 0.35):
+        energy = (1 - fresnel.dielectric(cosine, 1.5)) * mean
+        assert found.albedo(cosine)[0] == pytest.approx(energy, rel=0.01)
+    wi, wo = incident(0.7, 1000), (z * 0, np.sqrt(1 - z * z), z)
+    apart = found.value(wi, wo) / z - coated(wi, wo)
+    assert np.mean(np.abs(apart)) < 0.02 * np.mean(coated(wi, wo))
+
+
+def test_it_takes_what_media_and_facets_scatter() -> None:
+    """At cosines that it was not fitted to, to .005 of all light; forwards goes towards the mirror direction."""
+    cosines = np.array([1.0, 0.8, 0.5, 0.25])
+    paint = [Interface(eta=1.5, alpha=0.2), Medium(sigma_s=2.0, sigma_a=0.1, g=0.8), Interface(conductor="mirror")]
+    rough = [Interface(eta=1.5, alpha=0.5), Interface(conductor="mirror", alpha=0.4)]
+    for layers, often in ((paint, None), (rough, tables.load())):
+        solved = energies(Material.of(Stack(layers)), cosines, 0 * cosines, often, lambda g: 0.0)
+        found = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.ones((1, len(INCIDENCES))))
+        np.testing.assert_allclose(found.albedo(cosines), solved.rest[0], atol=5e-3)
+        assert found.b > 0 or often
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.7, 0.2])
+def test_samples_give_the_albedo(cosine: float) -> None:
+    """Within 4 standard errors; nothing of `SOME` is clipped."""
+    n = 100_000
+    wo = remainder.sample(*np.random.default_rng(2).random((2, n)))
+    weights = SOME.value(incident(cosine, n), wo) / remainder.density(wo)
+    assert abs(weights.mean() - SOME.albedo(cosine)) < 4 * weights.std() / np.sqrt(n) + 1e-9
+    np.testing.assert_allclose(np.mean(wo[2] ** 2), 0.5, atol=0.01)
+
+
+def test_it_is_reciprocal_positive_and_turns() -> None:
+    wi, wo = random_directions(500, 3), random_directions(500, 4)
+    dark = Remainder(0.1, -0.3, 0.0, 0.1, 0.0, 0.0, 0.4, -0.2)
+    there, back = dark.value(wi, wo) / wo[2], dark.value(wo, wi) / wi[2]
+    np.testing.assert_allclose(there, back, atol=1e-15)
+    assert there.min() == 0 and there.max() > 0
+    turned = [(0.6 * w[0] - 0.8 * w[1], 0.8 * w[0] + 0.6 * w[1], w[2]) for w in (wi, wo)]
+    np.testing.assert_allclose(dark.value(*turned), dark.value(wi, wo), atol=1e-12)
+    assert not dark.value(wi, (wo[0], wo[1], -wo[2])).any()
+
+
+def test_all_dialects_agree() -> None:
+    kernel.require_llvm()
+    import drjit.llvm as llvm
+
+    numbers = [np.array([x, 0.5 * x, -0.1 * x]) for x in vars(SOME).values()]
+    values = [*random_directions(200, 5), *random_directions(200, 6)]
+
+    def value(colours: Any, values: Any) -> Any:
+        return Remainder(*colours).value(values[:3], values[3:])
+
+    known = value([x[:, None] for x in numbers], values)
+    names = [f"v{i}" for i in range(6)]
+    recorded = value(numbers, [symbol.number(name) for name in names])
+    jit = value([llvm.Array3f(*x.tolist()) for x in numbers], [llvm.Float(x) for x in values])
+    np.testing.assert_allclose(evaluate([recorded], dict(zip(names, values)))[0], known, rtol=1e-9)
+    np.testing.assert_allclose(np.array(jit), known, rtol=1e-4, atol=1e-6)
