@@ -41,7 +41,7 @@ from velatura.checks.probe import Probe
 from velatura.comparison.evaluated_lobes import Light, distribution
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named
-from velatura.stack import Material, Stack, dumps
+from velatura.stack import Material, Stack, as_described, dumps
 
 Array = NDArray[np.floating]
 
@@ -62,6 +62,9 @@ GOALS: dict[str, tuple[float, float, float | None]] = {
     "passing, once": (0.055, 0.010, None),
     "passing, often": (0.055, 0.010, None),
     "passing scattering, often": (0.075, 0.010, None),
+    "passing, once: from inside": (0.055, 0.010, None),
+    "passing, often: from inside": (0.055, 0.010, None),
+    "passing scattering, often: from inside": (0.075, 0.010, None),
     "passing, once: beyond the critical angle": (0.10, 0.05, None),
     "passing, often: beyond the critical angle": (0.10, 0.05, None),
 }
@@ -149,7 +152,7 @@ def seen(probe: Probe, incidence: Incidence) -> tuple[Array, Array]:
 
 def symmetric(stack: Stack, cosine: float, grids: Array) -> Array:
     """Grids (..., bins, bins) with the symmetries that those of the stack have."""
-    interfaces = Material.of(stack).interfaces
+    interfaces = Material.of(stack, as_described).interfaces
     isotropic = all(i.alpha_u == i.alpha_v for i in interfaces)
     if isotropic or all(i.alpha_u == i.alpha_v or i.rotation % 90 == 0 for i in interfaces):
         grids = (grids + grids[..., ::-1]) / 2
@@ -182,7 +185,9 @@ def _row(kind: Kind, incidence: Incidence, side: str) -> str | None:
         return back if kind.passes else kind.name
     if not kind.passes:
         return None
-    return f"{kind.name}: beyond the critical angle" if incidence.momentum > 1 else kind.name
+    if not incidence.inside:
+        return kind.name
+    return f"{kind.name}: {'beyond the critical angle' if incidence.momentum > 1 else 'from inside'}"
 
 
 def _distances(halves: Array, walked: Array, faint: float) -> dict[str, Any]:

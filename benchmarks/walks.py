@@ -23,7 +23,7 @@ from rich.progress import track
 
 import velatura as vt
 from velatura import files
-from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, dumps
+from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, as_described, dumps
 
 Array = NDArray[np.floating]
 
@@ -198,7 +198,7 @@ def incidences(kind: Kind, stack: Stack) -> tuple[Incidence, ...]:
     """Every direction that a stack of that kind is lit from."""
     found = [Incidence(c, False, float(np.sqrt(1 - c * c))) for c in COSINES]
     if kind.passes and not stack.thin:
-        index = Material.of(stack).below
+        index = Material.of(stack, as_described).below
         momenta = sorted({*MOMENTA, 1 + DEEP * (index - 1)})
         found += [Incidence(float(np.sqrt(1 - (p / index) ** 2)), True, p) for p in momenta]
     return tuple(found)
@@ -223,7 +223,7 @@ def walked(kind: Kind, stack: Stack, paths: int) -> Walks:
 
 def _reversed(stack: Stack) -> Stack:
     """A solid as it is from inside, mirrored, so that x and y stay."""
-    turned = Material.of(stack).reversed()
+    turned = Material.of(stack, as_described).reversed()
     return Stack.from_flat(turned.kinds, turned.flat())
 
 
