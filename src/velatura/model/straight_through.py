@@ -75,11 +75,25 @@ class Crossing(ops.Named):
 
 
 @dataclass(frozen=True)
+class Slab(ops.Named):
+    """What lies between two interfaces: optical depths along the normal (colours), in all and for scattering, and the
+    asymmetry g."""
+
+    depth: Value = 0.0
+    scattering: Value = 0.0
+    g: Value = 0.0
+
+    @property
+    def is_clear(self) -> bool:
+        return isinstance(self.depth, float) and self.depth == 0.0
+
+
+@dataclass(frozen=True)
 class Passage:
-    """Interfaces from the top, and the optical depths (colours) of the slabs 0 to K above, between and below them."""
+    """Interfaces from the top, and the slabs 0 to K above, between and below them."""
 
     crossings: tuple[Crossing, ...]
-    depths: tuple[Value, ...]
+    slabs: tuple[Slab, ...]
 
     @property
     def indices(self) -> list[Value]:
@@ -90,18 +104,18 @@ class Passage:
 def passage(material: Material, kind: type[Variance]) -> Passage:
     """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`."""
     above, n = material.exterior, 1.0
-    depth: Value = 0.0
     crossings: list[Crossing] = []
-    depths: list[Value] = []
+    slabs = [Slab()]
     for layer in material.solid().layers:
         if isinstance(layer, MediumValues):
-            depth = depth + (layer.sigma_a + layer.sigma_s) * layer.depth
+            tau_s = layer.sigma_s * layer.depth
+            slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, tau_s, ops.mean(layer.g))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
         crossings.append(_crossing(layer, above, n, kind))
-        depths.append(depth)
-        above, n, depth = layer.eta, crossings[-1].n_2, 0.0
-    return Passage(tuple(crossings), (*depths, depth))
+        slabs.append(Slab())
+        above, n = layer.eta, crossings[-1].n_2
+    return Passage(tuple(crossings), tuple(slabs))
 
 
 def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance]) -> Crossing:
@@ -115,7 +129,7 @@ def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Varia
 
 
 @dataclass(frozen=True)
-class _Crossed(ops.Named):
+class Crossed(ops.Named):
     """A momentum p in all slabs: its cosines there, 0 where it cannot be, and the same bounded; for interfaces, the
     steps w_l, and the shares (colours) of light that they let pass; the latter for slabs, too."""
 
@@ -129,7 +143,13 @@ class _Crossed(ops.Named):
     slabs: list[Value]
 
 
-def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -> _Crossed:
+def entered(passage: Passage, wi: Direction) -> Crossed:
+    """The momentum of light from wi, above."""
+    n = passage.indices[0]
+    return _crossed(passage, (-n * wi[0], -n * wi[1]), ops.maximum(wi[2], 0.0), None)
+
+
+def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -> Crossed:
     """With the cosines above and below all interfaces, as far as they are known better."""
     p2 = p[0] * p[0] + p[1] * p[1]
     cosines = [ops.sqrt(1 - p2 / (n * n)) for n in passage.indices]
@@ -140,15 +160,11 @@ def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -
     crossings = passage.crossings
     steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(crossings)]
     passes = [1 - fresnel.dielectric_between(cosines[l], cosines[l + 1], c.eta) for l, c in enumerate(crossings)]
-    slabs = [1.0 if _is_clear(depth) else ops.exp(-depth / c) for depth, c in zip(passage.depths, bounded)]
-    return _Crossed(p, p2, passage.indices, cosines, bounded, steps, passes, slabs)
+    slabs = [1.0 if slab.is_clear else ops.exp(-slab.depth / c) for slab, c in zip(passage.slabs, bounded)]
+    return Crossed(p, p2, passage.indices, cosines, bounded, steps, passes, slabs)
 
 
-def _is_clear(depth: Value) -> bool:
-    return isinstance(depth, float) and depth == 0.0
-
-
-def _smooth(crossed: _Crossed, interfaces: slice, slabs: slice) -> Value:
+def _smooth(crossed: Crossed, interfaces: slice, slabs: slice) -> Value:
     """Share (a colour) of light that passes smooth interfaces and slabs."""
     return reduce(lambda a, b: a * b, [*crossed.passes[interfaces], *crossed.slabs[slabs]], 1.0)
 
@@ -181,7 +197,7 @@ def _weight(crossing: Crossing, step: Value) -> Value:
     return step * step * crossing.area + WEIGHT_MIN * crossing.n_1 * crossing.n_2
 
 
-def _drawn(passage: Passage, i: _Crossed) -> tuple[list[_Component], list[Value]]:
+def _drawn(passage: Passage, i: Crossed) -> tuple[list[_Component], list[Value]]:
     """The components as they are sampled, as wide as at p_o = p_i, and their probabilities."""
     count = len(passage.crossings)
     components = [_component(passage, j, i.steps) for j in range(count)]
@@ -202,9 +218,10 @@ def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Val
     n = passage.indices
     below, cos_o = wo[2] < 0, ops.absolute(wo[2])
     n_out = ops.select(below, n[-1], n[0])
-    p_i, p_o = (-n[0] * wi[0], -n[0] * wi[1]), (n_out * wo[0], n_out * wo[1])
-    i = _crossed(passage, p_i, ops.maximum(wi[2], 0.0), None)
-    o = _crossed(passage, p_o, cos_o, cos_o)  # no part reads the cosine on the side of wi and that beyond
+    i = entered(passage, wi)
+    o = _crossed(
+        passage, (n_out * wo[0], n_out * wo[1]), cos_o, cos_o
+    )  # no part reads the cosine on the side of wi and that beyond
     drawn, shares = _drawn(passage, i)
     value: Value = 0.0
     density: Value = 0.0
@@ -233,7 +250,7 @@ def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> D
     It lies in the surface where light of the facet drawn would stay inside; `eval_pdf` is 0 there.
     """
     n = passage.indices
-    i = _crossed(passage, (-n[0] * wi[0], -n[0] * wi[1]), ops.maximum(wi[2], 0.0), None)
+    i = entered(passage, wi)
     components, shares = _drawn(passage, i)
     with ops.block("Choose an interface"):
         every = []
@@ -270,7 +287,7 @@ class _Facet(ops.Named):
     passes: Value
 
 
-def _facet(crossing: Crossing, i: _Crossed, o: _Crossed, j: int, step: Value) -> _Facet:
+def _facet(crossing: Crossing, i: Crossed, o: Crossed, j: int, step: Value) -> _Facet:
     """Of interface j, for its step as `_component` bounds it."""
     n_1, n_2, c_1, c_2 = crossing.n_1, crossing.n_2, i.bounded[j], o.bounded[j + 1]
     slope = (o.p[0] - i.p[0]) / step, (o.p[1] - i.p[1]) / step
@@ -299,7 +316,7 @@ def _refracted(
     return (x, y), ops.select(crosses, passes, 0.0)
 
 
-def _reflected(passage: Passage, i: _Crossed, o: _Crossed, j: int, roughness: Roughness) -> Value:
+def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roughness) -> Value:
     """Density of the momentum o, of light reflected by the facets of interface j that it does not pass."""
     n, c = passage.indices, passage.crossings[j]
     cos_i, cos_o = i.bounded[j], o.bounded[j]
@@ -320,7 +337,7 @@ def _slopes(roughness: Roughness, slope: Momentum) -> Value:
     return 1 / (pi * alpha_u * alpha_v * q * q)
 
 
-def _masking(roughness: Roughness, crossed: _Crossed, slab: int) -> Value:
+def _masking(roughness: Roughness, crossed: Crossed, slab: int) -> Value:
     """Smith's G1 in a slab; the side from which light comes, and its length, make no difference."""
     p, z = crossed.p, crossed.n[slab] * crossed.bounded[slab]
     return ggx.masking(_turned((p[0], p[1], z), roughness.rotation), roughness.alpha_u, roughness.alpha_v)
@@ -346,7 +363,7 @@ def integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int
     tails of GGX do; their numbers are those along a ray, and of rays.
     """
     n = passage.indices
-    i = _crossed(passage, (-n[0] * wi[0], -n[0] * wi[1]), wi[2], None)
+    i = entered(passage, wi)
     widths = [c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(passage.crossings, i.steps)]
     u, v, rotation = (np.asarray(x)[..., None, None] for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
     # Cast rays from the middle

@@ -1,0 +1,163 @@
+"""Light that passes a stack after it has bounced between its interfaces, or has been scattered by its media.
+
+Like reflected light, it is drawn in a medium of its own: a GGX reflection about the momentum p_i of light from wi, in
+the slab where light last bounced or was scattered, let out through the smooth interfaces below. In that slab, of index
+m and cosine c, the widths of all that light meets on its way add as in `straight_through`: of refractions |w_l| a_l,
+as seen at a reflection, 2 m c; a share `BOUNCES` of both faces of the last slab for light that bounces; and for
+scattered light, of optical depth x = tau_s / c, the width of N = x / (1 - exp(-x)) scatterings of asymmetry g^N in all,
+whose median angle theta follows from a fit, as that of a mirror with facets of alpha = tan(theta / 2).
+
+Scattering that is wider than GGX can be, and what facets met often add, is diffuse: even over all momenta that can
+leave. All that is seen here is in the frame of the outside below: directions are turned up, indices relative to it.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model import own_medium
+from velatura.model.own_medium import OwnMediumLobe
+from velatura.model.straight_through import EXPONENT, WIDTHS, Crossed, Passage, Slab, entered
+from velatura.model.variance import Roughness, Variance
+from velatura.ops import Value
+from velatura.optics import fresnel
+from velatura.optics.ggx import Direction
+
+BOUNCES = 0.3  # of the two faces of the slab that light bounces in
+COS_MIN = 0.22  # at which slabs are crossed, for widths
+ALPHA_MAX = 1.5
+DIFFUSE = 0.75  # roughness of scattering that is diffuse
+THIN = 1e-4  # optical depth of scattering that no light meets twice
+NO_LOBE = 1e-6  # asymmetry
+NODES = 48
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Light that is scattered: a lobe, None without one, with a diffuse share of `diffuse` over momenta up to `bound`,
+    relative to the index below, of which the smooth interfaces below let `leaving` pass."""
+
+    lobe: OwnMediumLobe | None
+    diffuse: Value
+    bound: Value
+    leaving: Callable[[Value], Value]
+
+
+def bounced(passage: Passage, wi: Direction) -> OwnMediumLobe | None:
+    """The lobe of light from wi, above, that bounces between interfaces; None for a single one."""
+    count = len(passage.crossings)
+    if count == 1:
+        return None
+    faces = passage.crossings[-2].width + passage.crossings[-1].width
+    return _lobe(passage, entered(passage, wi), count - 1, faces * BOUNCES)
+
+
+def rest(passage: Passage, wi: Direction) -> Rest:
+    """The light from wi, above, that is scattered by media, or often by facets."""
+    count = len(passage.crossings)
+    cloudy = [l for l, slab in enumerate(passage.slabs) if not _is_none(slab.scattering)]
+    last = min(cloudy[-1], count - 1) if cloudy else count - 1
+    n = passage.indices
+    bound, leaving = reduce(ops.minimum, n[last:]) / n[-1], _leaving(passage, last)
+    if not cloudy:
+        return Rest(None, 1.0, bound, leaving)
+    i = entered(passage, wi)
+    alpha = _turned([(passage.slabs[l], i.bounded[l]) for l in cloudy])
+    diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
+    width = type(passage.crossings[0].width).uniform(WIDTHS.variance(alpha))
+    return Rest(_lobe(passage, i, last, width), diffuse, bound, leaving)
+
+
+def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
+    """Roughness of the mirror that would turn light as all scattering does, in slabs with their cosines."""
+    depths = [ops.mean(slab.scattering) / ops.maximum(cosine, COS_MIN) for slab, cosine in slabs]
+    total = reduce(operator.add, depths)
+    g = ops.divide(reduce(operator.add, (depth * slab.g for depth, (slab, _) in zip(depths, slabs))), total)
+    x = ops.maximum(total, THIN)
+    g = ops.exp(x / (1 - ops.exp(-x)) * ops.log(ops.clip(g, NO_LOBE, 1.0)))
+    cos_theta = ops.minimum(0.5 * g * (3 - g * g), 1.0)
+    return ops.sqrt((1 - cos_theta) / (1 + cos_theta))
+
+
+def _lobe(passage: Passage, i: Crossed, slab: int, inside: Variance) -> OwnMediumLobe:
+    """The lobe in a slab, of the widths of refractions and those that light takes on inside."""
+    n = passage.indices
+    scale = 1 / (2 * n[slab] * ops.maximum(i.bounded[slab], COS_MIN))
+    for crossing, step in zip(passage.crossings, i.steps):
+        inside = inside + crossing.width * ops.power(ops.maximum(ops.absolute(step) * scale, ops.TINY), EXPONENT)
+    u, v, rotation = inside.roughness(WIDTHS)
+    roughness = Roughness(ops.minimum(u, ALPHA_MAX), ops.minimum(v, ALPHA_MAX), rotation)
+    return OwnMediumLobe(1.0, roughness, n[slab] / n[-1], leaving=_leaving(passage, slab))
+
+
+def _leaving(passage: Passage, slab: int) -> Callable[[Value], Value]:
+    """Share (a colour) that smooth interfaces below a slab let pass, by the cosine below all of them."""
+    n, crossings = passage.indices, passage.crossings
+
+    def leaving(cos_o: Value) -> Value:
+        p2 = 1 - cos_o * cos_o
+        ratios = [x / n[-1] for x in n[slab:-1]]
+        cosines = [*(ops.sqrt(1 - p2 / (ratio * ratio)) for ratio in ratios), cos_o]
+        pairs = zip(cosines, cosines[1:], crossings[slab:])
+        passes = [1 - fresnel.dielectric_between(above, below, c.eta) for above, below, c in pairs]
+        return reduce(lambda a, b: a * b, passes)
+
+    return leaving
+
+
+def _is_none(x: Value) -> bool:
+    return isinstance(x, float | np.ndarray) and not np.any(x)
+
+
+def seen_below(passage: Passage, wi: Direction) -> Direction:
+    """The direction below, turned up, of light that a smooth stack would mirror into it: at most a horizontal one."""
+    n = passage.indices
+    x, y = (wi[k] * (n[0] / n[-1]) for k in (0, 1))
+    scale = 1 / ops.sqrt(ops.maximum(x * x + y * y, 1.0))
+    x, y = scale * x, scale * y
+    return x, y, ops.maximum(ops.sqrt(1 - x * x - y * y), own_medium.COS_MIN)
+
+
+def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value]:
+    """f |cos theta_o|, a colour, and the density of `sample_rest`, in the frame of `seen_below`."""
+    cos_o = ops.maximum(o[2], 0.0)
+    even = cos_o / (pi * found.bound * found.bound)
+    reached = o[0] * o[0] + o[1] * o[1] < found.bound * found.bound
+    density = ops.select(reached, found.diffuse * even, 0.0)
+    value = density * found.leaving(cos_o)
+    if found.lobe:
+        also, density_of_lobe = own_medium.eval_pdf(found.lobe, i, o)
+        value, density = (1 - found.diffuse) * also + value, (1 - found.diffuse) * density_of_lobe + density
+    return value, density
+
+
+def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction, in the frame of `seen_below`, from uniform numbers."""
+    r, phi = found.bound * ops.sqrt(u1), 2 * pi * u2
+    even = r * ops.cos(phi), r * ops.sin(phi), ops.sqrt(1 - r * r)
+    if not found.lobe:
+        return even
+    other = own_medium.sample(found.lobe, i, u1, u2)
+    x, y, z = (ops.select(u < found.diffuse, a, b) for a, b in zip(even, other))
+    return x, y, z
+
+
+def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
+    """Energy (3, N) of `eval_pdf_rest` from directions (N,) each."""
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    # Even over p^2; nodes crowd at grazing directions
+    r2 = (np.asarray(found.bound)[..., None] ** 2) * (1 - (0.5 * (x + 1)) ** 2)
+    diffuse = np.sum(found.leaving(np.sqrt(1 - r2)) * (weight * 0.5 * (x + 1)), axis=-1)[..., None]
+    if not found.lobe:
+        return np.asarray(diffuse + np.zeros(len(i[2])))
+    return np.asarray((1 - found.diffuse) * own_medium.integral(found.lobe, i) + found.diffuse * diffuse)
