@@ -162,8 +162,7 @@ def _shown(stack: Stack, model: Model, says: str) -> Answer:
         return {"target": None, "variances": [], "haze": [], "layers": [], "says": says}
     energies = [np.clip(energy[:, 0], 0, None).tolist() for energy in read.energy]
     alphas = [float(np.sqrt(np.prod(np.reshape(alpha, (-1, 2)).mean(axis=0)))) for alpha in read.alpha]
-    kinds = [kind for layer, kind in zip(stack.layers, stack.kinds) if isinstance(layer, Interface)]
-    bases = ["dielectric" if kind == "dielectric" else "conductor" for kind in kinds]
+    bases = ["conductor" if layer.opaque else "dielectric" for layer in stack.interfaces]
     lobes = [{"energy": e, "alpha": min(a, 1.0), "base": base} for e, a, base in zip(energies, alphas, bases)]
     target = Target(lobes) if lobes else None
     return {

@@ -63,8 +63,7 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
             values[address.name] = _STRETCHED[address.key]
         elif address.declared.typical is not None:
             values[address.name] = address.declared.typical
-    mirrors = {f"layer{i}_conductor": "mirror" for i, kind in enumerate(stack.kinds) if kind == "mirror"}
-    return Stack.from_flat(stack.kinds, {**values, **mirrors})
+    return Stack.from_flat(stack.kinds, values)
 
 
 @functools.lru_cache(64)

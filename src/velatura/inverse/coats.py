@@ -15,8 +15,7 @@ from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_tint
 from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, join
 from velatura.inverse.stacks import Partial, pruned
-from velatura.model import Model, lobes, named, prepare, variance_kind
-from velatura.model.diffuse import under, with_means
+from velatura.model import Model, bsdf, lobes, named, prepare, variance_kind
 from velatura.model.stack_lobes import StackLobes, stack_lobes, with_axes_named
 from velatura.model.variance import Roughness
 from velatura.stack import (
@@ -26,7 +25,6 @@ from velatura.stack import (
     Layer,
     Material,
     MaterialLike,
-    Medium,
     MediumValues,
     Stack,
     load,
@@ -95,12 +93,12 @@ def coat(
         )
     else:
         below = stack.layers
-        if isinstance(below[0], Medium):
-            raise InvalidInput("layer 0 (medium): is above all interfaces; a coat goes below it, not on it")
-    coated = Stack([top, *below], name=f"{stack.name or 'material'}, coated", exterior=stack.exterior, thin=stack.thin)
+        if not below[0].surface:
+            raise InvalidInput(f"layer 0 ({below[0].kind}): is above all interfaces; a coat goes below it, not on it")
+    coated = stack.with_layers([top, *below], f"{stack.name or 'material'}, coated")
     before, after = (stack_lobes(one, 1.0, model=chosen) for one in (stack, coated))
     diffuse = None
-    if isinstance(stack.layers[-1], Diffuse):
+    if stack.base:
         wanted = scattered(stack, chosen)
         if keep_appearance:
             coated = with_albedo(coated, wanted, chosen)
@@ -140,7 +138,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Laye
     axes = [np.radians(values.rotation) for values in material.interfaces]
     kept = [replace(x, roughness=with_axes_named(x.roughness, axis)) for x, axis in zip(best.layers, axes)]
     solved = [layer for layers in kept for layer in layers.written(0)]
-    return (*solved, *(layer for layer in stack.layers if isinstance(layer, Diffuse)))
+    return (*solved, *([stack.base] if stack.base else []))
 
 
 def scattered(stack: Stack, model: Model) -> Array:
@@ -153,8 +151,7 @@ def _scattered(stack: Stack, model: Model, *albedos: float) -> Array:
     material = Material.of(stack)
     if albedos:
         material = material.with_layer(-1, albedo=np.tile(albedos, (3, 1)))
-    prepared = with_means(prepare(material, model))
-    base = under(prepared, NORMAL)
+    base = bsdf.body(material, model.with_switches(form="forward")).base(NORMAL)
     assert base is not None
     return np.broadcast_to(base.energy, (3, max(len(albedos), 1)))
 
@@ -168,7 +165,7 @@ def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
     q = (white - 2 * half) / (white - half)
     p = white * (1 - q)
     albedo = np.clip(wanted / (p + q * wanted), 0, 1)
-    return stack.replace(**{f"layer{len(stack.layers) - 1}_albedo": written(albedo)})
+    return stack.with_layers([*stack.layers[:-1], Diffuse(albedo=written(albedo))])
 
 
 def _choices(material: Material, n: int, eta_max: float) -> Sequence[Choice]:

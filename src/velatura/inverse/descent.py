@@ -107,9 +107,11 @@ class Descent:
 
     @cached_property
     def free(self) -> list[Free]:
-        return [
-            free for n, layer in enumerate(self.material.layers) for free in FREE[type(layer)](n, layer, self.eta_max)
-        ]
+        found: list[Free] = []
+        for n, layer in enumerate(self.material.layers):
+            if type(layer) in FREE:
+                found += FREE[type(layer)](n, layer, self.eta_max)
+        return found
 
     @cached_property
     def wanted(self) -> Array:
@@ -169,8 +171,8 @@ class Descent:
         changed = {(free.layer, key) for free in self.free for key in free.keys}
         values = _metals(material, lambda layer: layer.k * layer.eta).values()
         found = self.start.replace(**{at.name: written(x) for at, x in values if (at.layer, at.key) in changed})
-        layers = [layer for layer, own in zip(found.layers, Material.of(found).layers) if not _clear(own)]
-        return Stack(layers, name=found.name, exterior=found.exterior, thin=found.thin)
+        pairs = zip(found.layers, Material.of(found).layers)
+        return found.with_layers(layer for layer, values in pairs if not _clear(values))
 
     def _first(self, free: Free) -> float:
         value = np.ravel(getattr(self.material.layers[free.layer], free.keys[0]))
@@ -202,7 +204,7 @@ def _of_interface(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
     return found
 
 
-#: What may change, by the layer.
+#: What may change, by the layer; all else stays.
 FREE: dict[type, Callable[..., list[Free]]] = {
     DiffuseValues: _of_base,
     MediumValues: _of_medium,

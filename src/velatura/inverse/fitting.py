@@ -97,6 +97,8 @@ def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
         if isinstance(layer, Medium):
             media.append(layer)
             continue
+        if not layer.surface:
+            raise InvalidInput(f"layers: no {layer.kind} is simplified; interfaces, media and a base are")
         n += isinstance(layer, Interface)
         if isinstance(layer, Diffuse) or n in kept:
             # What lay above the first one that is kept, below one that is not, goes below it
@@ -104,7 +106,7 @@ def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
                 layers.append(_merged(media))
                 media = []
             layers.append(layer)
-    return Stack(layers, name=stack.name, exterior=stack.exterior, thin=stack.thin)
+    return stack.with_layers(layers)
 
 
 def _merged(media: Sequence[Medium]) -> Medium:

@@ -80,6 +80,10 @@ class Stack(Record):
         """Whether light passes: no layer is opaque."""
         return not self.layers[-1].opaque
 
+    def with_layers(self, layers: Iterable[Layer], name: str | None = None) -> Stack:
+        """Other layers under the same index, by the same name unless given."""
+        return Stack(layers, name=self.name if name is None else name, exterior=self.exterior, thin=self.thin)
+
     # As a file holds it ----------------------------------------------------------------------------------------------
 
     @classmethod
