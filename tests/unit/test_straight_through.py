@@ -127,7 +127,7 @@ def test_the_integral_is_the_mean_of_samples(name: str) -> None:
         assert abs(share[0] - np.mean(wo[2] < 0)) < 4 * 0.5 / np.sqrt(count) + 0.003
 
 
-@pytest.mark.parametrize(("brushed", "most"), [(False, 2), (True, 8)])
+@pytest.mark.parametrize(("brushed", "most"), [(False, 2), (True, 6)])
 def test_few_samples_weigh_much(brushed: bool, most: float) -> None:
     """Of 1 to 4 interfaces, from both sides: 199 of 200 at most 1.5 times what was spent on them."""
     rng = np.random.default_rng(5)
@@ -136,7 +136,7 @@ def test_few_samples_weigh_much(brushed: bool, most: float) -> None:
             wi = directions(rng, 2000)
             wo = straight_through.sample(passage, wi, *rng.random((3, 2000)))
             value, density = straight_through.eval_pdf(passage, wi, wo)
-            assert np.mean(value > 1.5 * density) < 0.005 * (1 + brushed)
+            assert np.mean(value > 1.5 * density) < 0.005
             assert np.all(value <= most * density)
 
 

@@ -3,7 +3,8 @@
 Tails of GGX come from one steep facet. So component j takes the whole step of tangential momentum, from p_i to p_o, at
 a facet of interface j, crosses all interfaces above smoothly at p_i and all below at p_o, and is as wide as all
 together: the widths |w_l| a_l that interfaces give to momentum add as their powers of `EXPONENT`, as tensors where
-interfaces are brushed. Its weight is its share of the squared widths. With d = p_o - p_i, cosines
+interfaces are brushed. Its weight is its share of the squared widths, and far out its share of the tails there, which
+for brushed interfaces depends on the direction. With d = p_o - p_i, cosines
 c_l(p) = sqrt(1 - p^2 / n_l^2) in slabs 0 to K, and w_j = n_{j-1} c_{j-1}(p_i) - n_j c_j(p_o), light of direction wi
 passes to wo as
 
@@ -24,6 +25,7 @@ below is light from above a material that is turned over (`Material.reversed`).
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -35,7 +37,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model.mixture import ALPHA_MIN
 from velatura.model.roughness_maps import RoughnessMap
-from velatura.model.variance import Covariance, Roughness, Variance
+from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
@@ -178,23 +180,38 @@ class _Component(ops.Named):
     weight: Value
 
 
-def _component(passage: Passage, j: int, steps: Sequence[Value]) -> _Component:
-    """For the steps that light makes at all interfaces; a single one has its own roughness, and all the weight."""
+def _component(passage: Passage, j: int, steps: Sequence[Value], d: Momentum | None = None) -> _Component:
+    """For the steps that light makes at all interfaces, and the sum d of what it moves there; None for little. A single
+    interface has its own roughness, and all the weight."""
     own = passage.crossings[j]
     size = ops.maximum(own.sign * steps[j], own.least)
     if len(steps) == 1:
         return _Component(size, own.roughness, 1.0)
-    width, weight = own.width, _weight(own, steps[j])
-    total = weight
+    width = own.width
     for l, (step, other) in enumerate(zip(steps, passage.crossings)):
         if l != j:
             width = width + other.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY) / size, EXPONENT)
-            total = total + _weight(other, step)
-    return _Component(size, width.roughness(WIDTHS), weight / total)
+    weights = [_weight(crossing, step) for crossing, step in zip(passage.crossings, steps)]
+    if d is not None:
+        total = reduce(operator.add, weights)
+        weights = [weight * _tail(crossing, d, total) for weight, crossing in zip(weights, passage.crossings)]
+    return _Component(size, width.roughness(WIDTHS), weights[j] / reduce(operator.add, weights))
 
 
 def _weight(crossing: Crossing, step: Value) -> Value:
+    """Square of the width of a step."""
     return step * step * crossing.area + WEIGHT_MIN * crossing.n_1 * crossing.n_2
+
+
+def _tail(crossing: Crossing, d: Momentum, width2: Value) -> Value:
+    """Density of an interface's tail in the direction of d, over that of one that is isotropic; 1 within the width of
+    all."""
+    alpha_u, alpha_v, rotation = crossing.roughness
+    if isinstance(crossing.width, Isotropic):
+        return 1.0
+    x, y, _ = _turned((*d, 0.0), rotation)
+    near = (x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v) + width2) / (x * x + y * y + width2)
+    return 1 / (near * near)
 
 
 def _drawn(passage: Passage, i: Crossed) -> tuple[list[_Component], list[Value]]:
@@ -222,13 +239,14 @@ def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Val
     o = _crossed(
         passage, (n_out * wo[0], n_out * wo[1]), cos_o, cos_o
     )  # no part reads the cosine on the side of wi and that beyond
+    d = o.p[0] - i.p[0], o.p[1] - i.p[1]
     drawn, shares = _drawn(passage, i)
     value: Value = 0.0
     density: Value = 0.0
     for j, (crossing, sampled, share) in enumerate(zip(passage.crossings, drawn, shares)):
         with ops.block(f"Pass by a facet of interface {j}"):
             own = crossing.n_1 * i.bounded[j] - crossing.n_2 * o.bounded[j + 1]
-            component = _component(passage, j, [*i.steps[:j], own, *o.steps[j + 1 :]])
+            component = _component(passage, j, [*i.steps[:j], own, *o.steps[j + 1 :]], d)
             facet = _facet(crossing, i, o, j, component.step)
             alone = _masking(crossing.roughness, i, j) * _masking(crossing.roughness, o, j + 1)
             smooth = _smooth(i, slice(j), slice(j + 1)) * _smooth(o, slice(j + 1, None), slice(j + 1, None))
