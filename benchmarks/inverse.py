@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from velatura.inverse import Above, Choice, EquivalenceClass, interface, invert_stack, pair
-from velatura.inverse.partial_stack import Layers
+from velatura.inverse.partial_stack import Layers, take
 from velatura.model import MODELS, Model, named
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic
@@ -61,7 +61,7 @@ class Inverted:
 
     def take(self, index: np.ndarray) -> Inverted:
         energies, variances = [e[:, index] for e in self.energies], [s[index] for s in self.variances]
-        return Inverted(self.kinds, energies, variances, [part.take(index) for part in self.layers])
+        return Inverted(self.kinds, energies, variances, [take(part, index, len(self)) for part in self.layers])
 
 
 def draw(kinds: Sequence[str], model: Model, count: int, rng: np.random.Generator) -> Inverted:

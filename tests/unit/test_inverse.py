@@ -19,6 +19,7 @@ from velatura.inverse import (
     smooth_pair,
 )
 from velatura.inverse.interface import DENSER, RARER
+from velatura.inverse.partial_stack import join, take
 from velatura.inverse.roots import false_position
 from velatura.model import MODELS, Model, named
 from velatura.model.roughness_maps import MAPS
@@ -335,3 +336,21 @@ def test_every_model_is_met_by_its_own_reading(model: Model) -> None:
         assert found.layers.feasible.all(), found.layers.margins
         assert np.abs(found.energy - wanted).max() < 1e-6
         assert np.abs(found.variance.matrix()[0] - 0.12).max() < 1e-6
+
+
+def test_some_of_one_stack_are_as_many_as_are_taken() -> None:
+    """A single stack is no different from one that all others are alike to; a number stays a number."""
+    one = Layers("dielectric", np.full((3, 1), 1.5), None, Roughness(np.full(1, 0.1), 0.2, 0.0), 0.0)
+    for index, count in ((np.array([0, 0, 0]), 3), (np.array([], int), 0), (np.array([False]), 0)):
+        taken = take(one, index, 1)
+        assert (taken.eta.shape, taken.alpha.shape, taken.roughness.alpha_v) == ((3, count), (count,), 0.2)
+    many = take(dataclasses.replace(one, tau=np.arange(4.0)), np.array([2, 1]), 4)
+    assert (many.eta.shape, many.tau.tolist()) == ((3, 1), [2, 1])
+    with pytest.raises(ValueError):
+        take(many, np.array([0]), 3)
+
+
+def test_joined_stacks_keep_numbers_that_differ() -> None:
+    parts = [Layers("dielectric", 1.5, None, Roughness(0.1, 0.1, 0.0), tau) for tau in (0.0, 0.3)]
+    joined = join(parts, [1, 2])
+    assert (joined.eta, joined.tau.tolist()) == (1.5, [0, 0.3, 0.3])

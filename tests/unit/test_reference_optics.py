@@ -49,8 +49,9 @@ def test_jacobian_by_differences(eta: float) -> None:
 
 
 def test_deflection_has_the_angle_asked_for() -> None:
-    w = directions(1000)
-    cosine, phi = RNG.uniform(-1, 1, 1000), RNG.uniform(0, 2 * np.pi, 1000)
+    any_way, along = directions(1000), ggx.normalize((1e-6 * RNG.normal(size=1000), 0.0, RNG.choice([-1.0, 1.0], 1000)))
+    w = tuple(np.concatenate([x, np.broadcast_to(y, 1000)]) for x, y in zip(any_way, along))
+    cosine, phi = RNG.uniform(-1, 1, 2000), RNG.uniform(0, 2 * np.pi, 2000)
     turned = phase.deflect(w, cosine, phi)
     np.testing.assert_allclose(ggx.dot(turned, turned), 1, rtol=1e-9)
     np.testing.assert_allclose(ggx.dot(turned, w), cosine, atol=1e-9)
@@ -96,3 +97,16 @@ def test_visible_normals_are_drawn_as_their_density_says(z: float) -> None:
     assert density.sum() == pytest.approx(1, rel=1e-3)
     mean = [(density * x).sum() for x in h]
     assert np.all(np.abs(drawn.mean(axis=1) - mean) < 4.5 * drawn.std(axis=1) / np.sqrt(N) + 1e-3)
+
+
+def test_flights_along_the_surface_and_straight_up_are_finite() -> None:
+    for z in (-1e-310, 0.0, 1e-310):
+        assert np.isfinite(microsurface.smith_lambda((1.0, 0.0, z), 0.5, 0.3))
+    assert microsurface.fly((0.0, 0.0, 1.0), 0.6, 0.5, 0.3, 0.0) == 0.6
+    assert microsurface.fly((0.0, 0.0, 1.0), 0.6, 0.5, 0.3, 1e-3) > 1
+
+
+def test_no_facet_faces_down() -> None:
+    w, h = (0.6, 0.0, -0.8), ggx.normalize((0.6, 0.1, -0.1))
+    assert ggx.dot(w, h) > 0
+    assert microsurface.visible(w, h, 0.5, 0.3) == 0

@@ -124,7 +124,8 @@ def radiance(seen: bsdf.Body, directions: Directions) -> Value:
         return bsdf.eval_pdf(seen, wi, wo, bsdf.Asked(transmission=False))[0]
     # The lobes depend on wi alone, which many pairs have in common
     lit = bsdf.scattered(seen, tuple(directions.lit))
-    return mixture.eval_pdf(take(tuple(lit.reflected), directions.which), take(lit.base, directions.which), wi, wo)[0]
+    reflected, base = take((tuple(lit.reflected), lit.base), directions.which, directions.lit.shape[-1])
+    return mixture.eval_pdf(reflected, base, wi, wo)[0]
 
 
 def report(wanted: ReflectanceTable, found: ReflectanceTable) -> list[dict[str, float]]:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from velatura.inverse import interface, pair, smooth_pair
 from velatura.inverse.interface import DENSER, DIELECTRIC, RARER, Choice
-from velatura.inverse.partial_stack import Above, Array, Layers, Mask, mapped, take
+from velatura.inverse.partial_stack import Above, Array, Batch, Layers, Mask, mapped, take
 from velatura.inverse.roots import intervals
 from velatura.inverse.smooth_pair import Interval
 from velatura.model.variance import Isotropic, Roughness
@@ -78,7 +78,9 @@ class EquivalenceClass:
         some = np.flatnonzero(possible.any(axis=0))
         if not len(some):
             return depths
-        columns, of_columns = (mapped(take(x, some), lambda x: x[..., None]) for x in (below, rest))
+        columns, of_columns = (
+            mapped(take(x, some, len(eta_1)), lambda x: x[..., None]) for x in (below, rest)
+        )
         depths[:, some] = _depth(columns, of_columns, np.broadcast_to(eta_2, (len(some), len(eta_2))))
         depths[~np.broadcast_to(possible, depths.shape[:2])] = np.nan
         return depths
@@ -195,7 +197,7 @@ class EquivalenceClass:
                 above = (self.above.eta, *(part.eta for part in layers))
                 cost = np.where(ok, sum(dislike(eta, part) for eta, part in zip(above, layers)), np.inf)
                 best = np.array([np.argmin(cost)])
-                found.append((float(cost[best[0]]), tuple(part.take(best) for part in layers)))
+                found.append((float(cost[best[0]]), take(layers, best, len(cost))))
         return min(found, key=lambda entry: entry[0])[1] if found else None
 
     def to_dict(self) -> dict[str, Any]:
@@ -265,7 +267,8 @@ class EquivalenceClass:
         some = self._channels(channel)
         ok: Mask = np.all(possible[some], axis=0)
         if self.choice.kind != "dielectric" or self.choice.eta is not None or self._clear:
-            ok[ok] = interface.solve(below.take(ok), take(rest, ok).energy, self._blur, self.choice).layers.feasible
+            above, energy = take((below, rest.energy), ok, len(ok))
+            ok[ok] = interface.solve(above, energy, self._blur, self.choice).layers.feasible
             return ok
         ends = [_depth(below, rest, np.full(len(eta_1), eta))[some] for eta in (1.0, self.choice.eta_max)]
         return np.asarray(ok & (np.max(np.min(ends, axis=1), axis=0) >= -interface.NEGLIGIBLE))
@@ -293,7 +296,7 @@ class EquivalenceClass:
 
 
 @dataclass(frozen=True)
-class _Rest:
+class _Rest(Batch):
     """Demands on last interfaces: energy of the lobe, reflectance and roughness of their own, margin of that."""
 
     energy: Array

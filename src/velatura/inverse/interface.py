@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura import ops
-from velatura.inverse.partial_stack import Above, Array, Layers, take
+from velatura.inverse.partial_stack import Above, Array, Batch, Layers
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import BLUR
 from velatura.model import Model, named
@@ -57,17 +57,13 @@ DIELECTRIC = Choice()
 
 
 @dataclass(frozen=True)
-class Found:
+class Found(Batch):
     """N interfaces, the stacks that they complete, and the lobes that these read of them."""
 
     layers: Layers
     below: Above
     energy: Array
     variance: Variance
-
-    def take(self, index: Any) -> Found:
-        """Some of the N."""
-        return take(self, index)
 
 
 def invert_interface(

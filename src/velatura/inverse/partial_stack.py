@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
 from velatura.model import Model, adding, lobes, operators, prepare
+from velatura.model.diffuse import Base
 from velatura.model.prepare import Prepared, PreparedInterface
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.stack import Interface, InterfaceValues, Kind, Layer, LayerValues, Material, Medium, MediumValues
-from velatura.tables import Tables, load
+from velatura.tables import load
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -31,8 +33,12 @@ CLEAR = 1e-9  # an optical depth below this is written as no medium at all
 SAME = 1e-9  # share of a colour by which channels of a grey differ
 
 
+class Batch:
+    """A record of N stacks, or of a part of each: its arrays have a last axis of N, or of 1 where all are alike."""
+
+
 @dataclass(frozen=True)
-class Layers:
+class Layers(Batch):
     """N interfaces of one kind ("dielectric", "conductor" or "mirror"), each with the medium above it.
 
     eta, kappa: absolute indices below, (1, N) or (C, N), kappa None for a dielectric. roughness: GGX, each (N,).
@@ -57,10 +63,6 @@ class Layers:
         """Whether all constraints hold, (N,) of bool."""
         return reduce(np.logical_and, (margin >= 0 for margin in self.margins.values()))
 
-    def take(self, index: Any) -> Layers:
-        """Some of the N."""
-        return take(self, index)
-
     def with_margins(self, **margins: Array) -> Layers:
         """With further constraints."""
         return dataclasses.replace(self, margins={**self.margins, **margins})
@@ -77,7 +79,7 @@ class Layers:
 
 
 @dataclass(frozen=True)
-class Above:
+class Above(Batch):
     """N stacks that end in a medium of absolute index eta, (1, N) or a number.
 
     `over` is the index above their last interface, which total internal reflection depends on; None where there is no
@@ -130,7 +132,8 @@ class Above:
         if np.size(layers.eta) > MANY and np.shape(layers.eta) == (1, *np.shape(layers.alpha)):
             rarer = np.broadcast_to(layers.eta < self.eta, layers.eta.shape)[0]
             if rarer.any() and not rarer.all():
-                parts = [(side, self.take(side)._reflectance(layers.take(side))) for side in (rarer, ~rarer)]
+                sides = ((side, take((self, layers), side, rarer.size)) for side in (rarer, ~rarer))
+                parts = [(side, above._reflectance(part)) for side, (above, part) in sides]
                 found = np.empty((max(part.shape[0] for _, part in parts), len(rarer)))
                 for side, part in parts:
                     found[:, side] = part
@@ -179,9 +182,9 @@ class Above:
             return PerAxis(xx, yy)
         return self.variance.of(roughness, self.f)
 
-    def take(self, index: Any) -> Above:
-        """Some of the N."""
-        return take(self, index)
+
+#: Records in which `take` and `join` look for arrays.
+RECORDS: tuple[Any, ...] = (Batch, Base, ops.Named)
 
 
 def whole(path: Sequence[Layers], exterior: Value) -> Material:
@@ -200,13 +203,25 @@ def _interface(layers: Layers) -> InterfaceValues:
     return InterfaceValues(layers.kind, u, v, rotation * (180 / np.pi), eta, layers.kappa)
 
 
-def take(value: Any, index: Any) -> Any:
-    """Some of the N of all arrays in a record; what is the same for all stays."""
-    return mapped(value, lambda x: x[..., index] if x.ndim and x.shape[-1] != 1 else x)
+def take(value: Any, index: Any, count: int) -> Any:
+    """Some of the `count` stacks of a record; what is the same for all stays.
+
+    Raises:
+        ValueError: an array that is neither for all stacks nor the same for all.
+    """
+
+    def some(x: np.ndarray) -> np.ndarray:
+        if x.ndim and x.shape[-1] == count:
+            return x[..., index]
+        if x.ndim and x.shape[-1] != 1:
+            raise ValueError(f"an array of shape {x.shape} in a record of {count} stacks")
+        return x
+
+    return mapped(value, some)
 
 
 def mapped(value: Any, change: Callable[[np.ndarray], np.ndarray]) -> Any:
-    """A record with all its arrays changed."""
+    """A record with all its arrays changed; what is no array, tuple, dictionary or record of values stays."""
     if isinstance(value, np.ndarray):
         return change(value)
     if isinstance(value, Roughness):
@@ -215,10 +230,31 @@ def mapped(value: Any, change: Callable[[np.ndarray], np.ndarray]) -> Any:
         return tuple(mapped(entry, change) for entry in value)
     if isinstance(value, dict):
         return {key: mapped(entry, change) for key, entry in value.items()}
-    if dataclasses.is_dataclass(value) and not isinstance(value, Model | Tables | type):
-        fields = {f.name: mapped(getattr(value, f.name), change) for f in dataclasses.fields(value)}
-        return dataclasses.replace(value, **fields)
+    if isinstance(value, RECORDS):
+        return dataclasses.replace(value, **{key: mapped(entry, change) for key, entry in vars(value).items()})
     return value
+
+
+def join(parts: Sequence[Any], counts: Sequence[int]) -> Any:
+    """One record of the N1, N2, ... stacks of records of the same kind."""
+    first = parts[0]
+    if isinstance(first, int | float | np.ndarray):
+        if all(not isinstance(part, np.ndarray) and part == first for part in parts):
+            return first
+        parts = [np.atleast_1d(part) for part in parts]
+        lead = np.broadcast_shapes(*(np.shape(x)[:-1] for x in parts))
+        return np.concatenate([np.broadcast_to(x, (*lead, count)) for x, count in zip(parts, counts)], axis=-1)
+    if isinstance(first, Roughness):
+        return Roughness(*(join(entries, counts) for entries in zip(*parts)))
+    if isinstance(first, tuple):
+        return tuple(join(entries, counts) for entries in zip(*parts))
+    if isinstance(first, dict):
+        unbounded = np.full(1, np.inf)  # a constraint that only some parts have
+        return {key: join([part.get(key, unbounded) for part in parts], counts) for key in set().union(*parts)}
+    if isinstance(first, RECORDS):
+        fields = {key: join([getattr(part, key) for part in parts], counts) for key in vars(first)}
+        return dataclasses.replace(first, **fields)
+    return first
 
 
 def _plain(value: Value | None, n: int) -> Any:
@@ -228,23 +264,3 @@ def _plain(value: Value | None, n: int) -> Any:
     colour = np.atleast_2d(value)
     numbers = tuple(float(x) for x in colour[:, n if colour.shape[-1] > 1 else 0])
     return numbers[0] if max(numbers) - min(numbers) <= SAME * max(map(abs, numbers)) else numbers
-
-
-def join(parts: list[Any], counts: list[int]) -> Any:
-    """One record of the N1, N2, ... stacks of records of the same kind; a number must be the same in all."""
-    first = next((part for part in parts if isinstance(part, np.ndarray)), parts[0])
-    if isinstance(first, np.ndarray):
-        parts = [np.atleast_1d(part) for part in parts]
-        lead = np.broadcast_shapes(*(np.shape(x)[:-1] for x in parts))
-        return np.concatenate([np.broadcast_to(x, (*lead, count)) for x, count in zip(parts, counts)], axis=-1)
-    if isinstance(first, Roughness):
-        return Roughness(*(join(list(entries), counts) for entries in zip(*parts)))
-    if isinstance(first, tuple):
-        return tuple(join(list(entries), counts) for entries in zip(*parts))
-    if isinstance(first, dict):
-        unbounded = np.full(1, np.inf)  # a constraint that only some parts have
-        return {key: join([part.get(key, unbounded) for part in parts], counts) for key in set().union(*parts)}
-    if dataclasses.is_dataclass(first) and not isinstance(first, Model | Tables | type):
-        fields = {f.name: join([getattr(p, f.name) for p in parts], counts) for f in dataclasses.fields(first)}
-        return dataclasses.replace(first, **fields)
-    return first

@@ -18,7 +18,7 @@ import numpy as np
 from velatura.inverse import interface, pair
 from velatura.inverse.equivalence import EquivalenceClass, dislike
 from velatura.inverse.interface import DENSER, MODEL, RARER, Choice
-from velatura.inverse.partial_stack import Above, Array, Layers, take
+from velatura.inverse.partial_stack import Above, Array, Batch, Layers, take
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import Target, TargetLobe, read
 from velatura.model import Model, named
@@ -32,7 +32,7 @@ ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that i
 
 
 @dataclass(frozen=True)
-class Partial:
+class Partial(Batch):
     """N partial stacks: their layers, what is below them, how far they are from what is preferred."""
 
     above: Above
@@ -43,7 +43,8 @@ class Partial:
         """Some of the N."""
         if np.array_equal(index, np.arange(len(self.cost))):
             return self
-        return Partial(self.above.take(index), tuple(layers.take(index) for layers in self.layers), self.cost[index])
+        above, layers = take((self.above, self.layers), index, len(self.cost))
+        return Partial(above, layers, self.cost[index])
 
 
 @dataclass(frozen=True)
@@ -244,7 +245,7 @@ def extended(paths: Partial, lobe: TargetLobe, target: Target, spread: int, firs
     if choice.kind == "dielectric" and choice.eta is None:
         count = len(paths.cost)
         index = np.tile(np.arange(count), 2)
-        paths, energy = paths.take(index), take(energy, index)
+        paths, energy = paths.take(index), take(energy, index, count)
         choice = dataclasses.replace(choice, side=np.repeat([DENSER, RARER], count))
     lower = interface.solve(paths.above, energy, variance, choice)
     layers = _held(lower.layers, lobe, lobe.interfaces - 1)
@@ -259,7 +260,7 @@ def _of_fixed_roughness(
     count = len(paths.cost)
 
     def apart(index: np.ndarray, eta: Array) -> Array:
-        above = paths.above.take(index)
+        above = take(paths.above, index, count)
         _, lower = pair.solve(above, energy, variance, eta[None], 0.0 if tau is None else tau, choice)
         return np.broadcast_to(lower.layers.alpha, eta.shape) - alpha
 
