@@ -226,6 +226,7 @@ def _follow_variants() -> None:
     mi.detail.add_variant_callback(lambda old, new: _register_missing(mi))
 
 
+@exclusive  # whichever thread sets a variant
 def _register_missing(mi: Any) -> None:
     for name, factory in _factories.items():
         if (name, mi.variant()) not in _registered:

@@ -16,7 +16,6 @@ from velatura.inverse import (
     invert_interface,
     invert_pair,
     pair,
-    smooth_pair,
 )
 from velatura.inverse.interface import DENSER, RARER
 from velatura.inverse.partial_stack import join, take
@@ -210,12 +209,21 @@ def test_first_indices_of_smooth_pairs(energy, eta_0: float, spans) -> None:
     assert np.ravel(searched) == pytest.approx(np.ravel(members.indices_1()), abs=1e-6)
 
 
+def second_indices(eta_0: float, eta_1: float, energy: float, eta_max: float) -> list[tuple[float, float]]:
+    """All indices below a smooth pair whose index between the interfaces is eta_1."""
+    c = 2 / (1 - energy) - np.cosh(np.log(eta_1 / eta_0))
+    if c < 1:
+        return []
+    factor = np.exp(np.arccosh(c))
+    return [(a, b) for a, b in [(1.0, eta_1 / factor), (eta_1 * factor, eta_max)] if a <= b]
+
+
 def test_second_indices_of_smooth_pairs() -> None:
     members = pair_class([0.15] * 3)
     for eta_1 in (1.5, 2.2):
-        smooth = np.ravel(smooth_pair.indices_2(1.0, eta_1, 0.15, 4.0))
+        smooth = np.ravel(second_indices(1.0, eta_1, 0.15, 4.0))
         assert np.ravel(members.indices_2(eta_1)) == pytest.approx(smooth, abs=1e-7)
-    assert len(smooth_pair.indices_2(1.0, 2.2, 0.15, 4.0)) == 2
+    assert len(second_indices(1.0, 2.2, 0.15, 4.0)) == 2
     assert members.indices_2(2.5) == []
 
 

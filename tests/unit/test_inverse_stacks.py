@@ -14,9 +14,12 @@ import pytest
 import velatura as vt
 from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Solution, Target, alternatives, coat, grazing, invert_stack, load_target
-from velatura.inverse.figure_targets import FIGURES, INFEASIBLE
+from velatura.inverse.figure_targets import FIGURES
 from velatura.model import MODELS, Model, named
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, loads, preset
+
+#: By directional albedo there is no stack: 2e-5 of variance is missing.
+INFEASIBLE = ("21 left",)
 
 PLAIN = named("bati2021", reflectance="fresnel")
 AVERAGED = named("bati2021")

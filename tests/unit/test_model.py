@@ -120,7 +120,7 @@ def test_bottom_lobe_of_dielectrics_over_a_mirror(indices, alphas, belcour, weie
         assert abs(stack_lobes(stack, 1.0, map=name, **PLAIN).alpha[-1][0, 0] - expected) < 1e-3
 
 
-DECORRELATED = sorted(name for name, f_map in MAPS.items() if f_map.decorrelated)
+DECORRELATED = sorted(set(MAPS) - {"weier-2d"})  # in which each axis is by itself, and the inverse exact
 
 
 @given(st.floats(0, 0.9999), st.floats(0.05, 1), st.sampled_from(DECORRELATED))

@@ -43,6 +43,3 @@ FIGURES: dict[str, list[dict[str, Any]]] = {
     "23": [_lobe([0.09, 0.09, 0.15], 0, 2)],
     "24": [_lobe([0.03, 0.06, 0.09], 0.05, 2)],
 }
-
-#: By directional albedo there is no stack: 2e-5 of variance is missing.
-INFEASIBLE = ("21 left",)

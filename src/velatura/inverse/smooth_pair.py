@@ -28,16 +28,6 @@ def indices_1(eta_0: float, low: float, high: float, eta_max: float) -> list[Int
     return [(exp(a), exp(b)) for a, b in found if a <= b]
 
 
-def indices_2(eta_0: float, eta_1: float, high: float, eta_max: float) -> list[Interval]:
-    """All indices below a smooth pair whose index between the interfaces is eta_1."""
-    c = 2 / (1 - high) - cosh(log(eta_1 / eta_0))
-    if c < 1:
-        return []
-    factor = exp(acosh(c))
-    found = union([(1.0, eta_1 / factor), (eta_1 * factor, eta_max)])
-    return [(a, b) for a, b in found if a <= b]
-
-
 def highest(eta_0: float, eta_max: float) -> float:
     """The largest energy of a smooth pair."""
     last, y_0 = log(eta_max), log(eta_0)

@@ -21,13 +21,11 @@ EXPONENT_MAX = 60.0  # whose exponential single precision holds
 class RoughnessMap:
     """f and its inverse, along one axis.
 
-    Both take the value along this axis and that across; where `decorrelated`, the second makes no difference, and the
-    inverse is exact.
+    Both take the value along this axis and that across, which makes a difference to one map only.
     """
 
     forward: Callable[[Value, Value], Value]
     backward: Callable[[Value, Value], Value]
-    decorrelated: bool = True
 
     def variance(self, alpha: Value, across: Value | None = None) -> Value:
         """Variance f(alpha) of a roughness alpha >= 0; `across` that along the other axis, None for the same."""
@@ -89,7 +87,7 @@ def weier_2d(there: Sequence[float], back: Sequence[float]) -> RoughnessMap:
         own, other = ops.power(_log_sigmoid(along, b), 1 / a), ops.power(_log_sigmoid(across, c), 1 / d)
         return ops.minimum(own * other * ops.exp(e * apart), 1.0)
 
-    return RoughnessMap(forward, backward, decorrelated=False)
+    return RoughnessMap(forward, backward)
 
 
 def _log_sigmoid(s: Value, b: Value) -> Value:

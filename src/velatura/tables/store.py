@@ -36,18 +36,21 @@ class Table:
 
     def texture(self, dialect: Any) -> Any:
         """The table as a texture of a Dr.Jit module (`drjit.llvm.ad`, say), made at first use."""
-        if dialect not in self._textures:
-            import drjit as dr
+        with _uploading:
+            if dialect not in self._textures:
+                self._textures[dialect] = self._uploaded(dialect)
+            return self._textures[dialect]
 
-            kind = getattr(dialect, f"Texture{self.data.ndim - 1}f")
-            tensor = dialect.TensorXf(self.data)
-            self._textures[dialect] = kind(
-                tensor,
-                use_accel=False,  # a GPU's own filter keeps eight bits of the position
-                filter_mode=dr.FilterMode.Linear,
-                wrap_mode=dr.WrapMode.Clamp,
-            )
-        return self._textures[dialect]
+    def _uploaded(self, dialect: Any) -> Any:
+        import drjit as dr
+
+        kind = getattr(dialect, f"Texture{self.data.ndim - 1}f")
+        return kind(
+            dialect.TensorXf(self.data),
+            use_accel=False,  # a GPU's own filter keeps eight bits of the position
+            filter_mode=dr.FilterMode.Linear,
+            wrap_mode=dr.WrapMode.Clamp,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +100,7 @@ def load() -> Tables:
         return _loaded()
 
 
-_loading = Lock()
+_loading, _uploading = Lock(), Lock()
 
 
 @cache
