@@ -53,7 +53,7 @@ async (material) => {
   await viewport.setEnvironment('studio');
   const shader = await answer('shader', { material });
   await viewport.setMaterial('a', shader);
-  while (!viewport.frames.length) await new Promise((resolve) => setTimeout(resolve, 5));
+  while (!viewport.schedule.frames.length) await new Promise((resolve) => setTimeout(resolve, 5));
   return performance.now() - start;
 }
 """
@@ -62,22 +62,22 @@ async (kind) => {
   const { viewport } = velatura, { key } = viewport.slots.a.shader, start = performance.now();
   document.querySelector(`[data-add=${kind}]`).click();
   while (viewport.slots.a.shader.key === key) await new Promise((resolve) => setTimeout(resolve, 2));
-  viewport.frames = [];
-  while (!viewport.frames.length) await new Promise((resolve) => setTimeout(resolve, 2));
-  return (viewport.frames[0] - start) / 1000;
+  viewport.schedule.frames = [];
+  while (!viewport.schedule.frames.length) await new Promise((resolve) => setTimeout(resolve, 2));
+  return (viewport.schedule.frames[0] - start) / 1000;
 }
 """
 DRAG = """
 async (key) => {
   const { values } = viewport.slots.a;
   viewport.moving(true);
-  viewport.frames = [];
+  viewport.schedule.frames = [];
   for (let k = 0, end = performance.now() + 3000; performance.now() < end; k++) {
     viewport.setValues('a', { ...values, [key]: 0.05 + 0.3 * ((k % 50) / 50) });
     await new Promise((resolve) => requestAnimationFrame(resolve));
   }
   viewport.moving(false);
-  return viewport.framesPerSecond;
+  return viewport.schedule.framesPerSecond;
 }
 """
 SAMPLE = """
@@ -136,7 +136,7 @@ async (material) => {
   const slot = viewport.slots.a, { values } = slot, uniforms = viewport.uniforms();
   const ours = (quick, alpha) => () => {
     slot.setValues({ ...values, layer0_alpha_u: alpha, layer0_alpha_v: alpha });
-    slot.drawPreview(viewport.preview, uniforms, quick);
+    slot.drawPreview(viewport.gbuffer, uniforms, quick);
     viewport.paint();
   };
   const theirs = (roughness) => () => {

@@ -4,7 +4,8 @@ import { render } from 'lit-html';
 import { Offline } from './connection.js';
 import { readPicture } from './render/environment.js';
 import { loadObject } from './render/load.js';
-import { Viewport, partsOf } from './render/viewport.js';
+import { objectOf } from './render/loader.js';
+import { Viewport } from './render/viewport.js';
 import { lookAhead } from './state/ahead.js';
 import * as commands from './state/commands.js';
 import { documentOf, enabled } from './state/material.js';
@@ -294,7 +295,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   const files = {
     object: async (name) => {
       if (!name.startsWith(DROPPED)) return name;
-      const { parts } = partsOf(await call('object', { name: session.objects[0] }));
+      const { parts } = objectOf(await call('object', { name: session.objects[0] }));
       return loadObject(await droppedFile(name), parts.filter(({ role }) => role !== 'object'));
     },
     environment: async (name) => {

@@ -3,40 +3,54 @@
 import { Tape } from './tape.js';
 
 export class Bake {
+  width; // of the texture: cosines
+  height;
+  #baked;
+  #tables;
+  #turns; // azimuths
+  #fine; // grids
+  #coarse;
+  #texels;
+  #tape = null;
+
   /** `baked` as call("shader") has it; `tables` by name, each {array, shape}. */
   constructor(baked, tables) {
     const [width, turns = 1] = baked.nodes;
-    Object.assign(this, { baked, tables, sides: baked.sides, nodes: width * turns, width, turns });
+    this.#baked = baked;
+    this.#tables = tables;
+    this.#turns = turns;
+    this.width = width;
     this.height = (baked.outputs.length / 4) * baked.sides * turns;
-    this.fine = grid(width, turns, 1);
-    this.coarse = turns > 1 ? grid(width, turns, 2) : this.fine;
-    this.texels = new Float32Array(4 * this.width * this.height);
+    this.#fine = grid(width, turns, 1);
+    this.#coarse = turns > 1 ? grid(width, turns, 2) : this.#fine;
+    this.#texels = new Float32Array(4 * this.width * this.height);
   }
 
   /**
-   * The texels for the values of a material, by their place in its struct: of each, all nodes side by side. A `quick`
+   * The texels for the values of a material, by their place in its struct: of each, all nodes side by side. A `coarse`
    * answer takes half of the cosines and of the azimuths, and what is between them from these.
    */
-  draw(values, quick = false) {
-    const { nodes, sides, texels } = this, { at, place } = quick ? this.coarse : this.fine;
+  draw(values, coarse = false) {
+    const texels = this.#texels, nodes = this.width * this.#turns, { sides } = this.#baked;
+    const { at, place } = coarse ? this.#coarse : this.#fine;
     const inputs = Object.fromEntries(Object.entries(values).map(([name, value]) => [`m.${name}`, value]));
     for (let side = 0; side < sides; side++) {
       const given = { ...inputs, ...place, 'place.z': side };
-      this.tape ??= new Tape(this.baked, this.tables, given);
-      this.tape.run(given, (columns, first, end) => {
+      this.#tape ??= new Tape(this.#baked, this.#tables, given);
+      this.#tape.run(given, (columns, first, end) => {
         columns.forEach((column, k) => {
           const step = column.length > 1 ? 1 : 0, begin = 4 * nodes * ((k >> 2) * sides + side) + (k & 3);
           for (let i = first, p = 0; i < end; i++, p += step) texels[begin + 4 * at[i]] = column[p];
         });
       });
     }
-    if (at.length < nodes) this.fill();
+    if (at.length < nodes) this.#fill();
     return texels;
   }
 
   /** Fills what lies between every second node: first along lines, then between lines. */
-  fill() {
-    const { texels, turns } = this, line = 4 * this.width;
+  #fill() {
+    const texels = this.#texels, turns = this.#turns, line = 4 * this.width;
     const between = (first, end, by) => {
       for (let i = first; i < end; i++) texels[i] = 0.5 * (texels[i - by] + texels[i + by]);
     };

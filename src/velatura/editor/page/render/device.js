@@ -6,6 +6,12 @@ void main() {
 }`;
 
 export class Device {
+  gl;
+  soft; // the format of pictures between whose texels the device interpolates: the quickest that it can
+  parallel; // the extension by which programs compile beside other work, if any
+  empty; // array of vertices
+  programs; // promises of them, by their text
+
   /** Raises Error where the browser lacks what is needed. */
   constructor(canvas) {
     const options = { antialias: false, alpha: false, powerPreference: 'high-performance' };
@@ -22,7 +28,6 @@ export class Device {
   restore() {
     const { gl } = this;
     gl.getExtension('EXT_color_buffer_float');
-    /** The format of pictures between whose texels the device interpolates: the quickest that it can. */
     this.soft = gl.getExtension('OES_texture_float_linear') ? 'RGBA32F' : 'RGBA16F';
     this.parallel = gl.getExtension('KHR_parallel_shader_compile');
     this.empty = gl.createVertexArray();
@@ -225,7 +230,7 @@ export class Device {
 
   // Time
 
-  /** Settles when the device has done what it was told, and gives the time. */
+  /** Settles when the device has done all work it was given, and returns the time. */
   async done() {
     const { gl } = this;
     const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

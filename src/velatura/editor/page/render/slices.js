@@ -21,30 +21,45 @@ export function partsOf({ shown, lobes }) {
 
 /**
  * All slices for light from one direction: `angle` degrees from the normal, at an `azimuth` in degrees, from
- * above or `below`. They are drawn by the code that the picture is drawn with.
+ * above or `below`. They are drawn by the code that the picture is drawn with; `state` is that of the page whose
+ * values are drawn.
  */
 export class Slices {
-  constructor(slot, { angle, azimuth, below }) {
-    const { device, shader } = slot;
-    Object.assign(this, {
-      device,
-      shader,
-      values: slot.values,
-      angle,
-      azimuth,
-      parts: partsOf(shader),
-      kept: new Map(),
-    });
-    this.below = below && shader.transmitted;
+  slot;
+  state;
+  shader;
+  angle;
+  azimuth;
+  below;
+  parts;
+  polar = null; // f cos in the plane of incidence, as drawnPolar has it
+  #device;
+  #values; // of the material
+  #uniforms;
+  #lobesProgram = null;
+  #valuesProgram = null;
+  #table = null; // lobes over the angle of incidence, as drawnTable has them
+  #kept = new Map();
+
+  constructor(slot, { angle, azimuth, below }, state) {
+    this.slot = slot;
+    this.state = state;
+    this.shader = slot.shader;
+    this.angle = angle;
+    this.azimuth = azimuth;
+    this.below = below && slot.shader.transmitted;
+    this.parts = partsOf(slot.shader);
+    this.#device = slot.device;
+    this.#values = slot.values;
     const incidence = { vt_angle: angle, vt_azimuth: radians(azimuth), vt_side: this.below ? -1 : 1 };
-    this.uniforms = { ...slot.uniforms(), ...incidence, vt_shown: this.only(null) };
+    this.#uniforms = { ...slot.uniforms(), ...incidence, vt_shown: this.only(null) };
   }
 
   /** Waits for the programs, and for what most plots show; a disc is drawn when it is asked for. */
   async ready() {
     const texts = [lobesProgram(this.shader, this.parts), valuesProgram(this.shader)];
-    [this.lobes, this.values_] = await Promise.all(texts.map((text) => this.device.program(text)));
-    [this.table, this.polar] = await Promise.all([this.drawnTable(), this.drawnPolar()]);
+    [this.#lobesProgram, this.#valuesProgram] = await Promise.all(texts.map((text) => this.#device.program(text)));
+    [this.#table, this.polar] = await Promise.all([this.drawnTable(), this.drawnPolar()]);
     return this;
   }
 
@@ -59,13 +74,13 @@ export class Slices {
   curves() {
     return {
       angles: Array.from({ length: DEGREES }, (_, i) => i),
-      parts: this.table.map((part) => sliced(part, 0, -1)),
+      parts: this.#table.map((part) => sliced(part, 0, -1)),
     };
   }
 
   /** For the angle that is chosen, of each part the same and its `rotation` in radians. */
   chosen() {
-    return this.table.map((part) => {
+    return this.#table.map((part) => {
       const { energy, alpha, rotation } = sliced(part, -1);
       return { energy: energy[0], alpha: alpha?.map(([value]) => value), rotation: rotation?.[0] };
     });
@@ -73,13 +88,13 @@ export class Slices {
 
   /** What was made once already under this key, or is now. */
   once(key, make) {
-    if (!this.kept.has(key)) this.kept.set(key, make());
-    return this.kept.get(key);
+    if (!this.#kept.has(key)) this.#kept.set(key, make());
+    return this.#kept.get(key);
   }
 
   async drawnTable() {
     const width = DEGREES + 1;
-    const pixels = await this.drawn(this.lobes, width, 2 * this.parts.length, [{}]);
+    const pixels = await this.drawn(this.#lobesProgram, width, 2 * this.parts.length, [{}]);
     const at = (x, y, channel) => pixels[4 * (y * width + x) + channel];
     const row = (value) => Array.from({ length: width }, (_, x) => value(x));
     return this.parts.map(({ kind }, k) => ({
@@ -99,7 +114,7 @@ export class Slices {
   async drawnPolar() {
     const { angles } = this.directions();
     const rows = [null, ...this.parts.keys()].map((part) => ({ vt_disc: 0, vt_shown: this.only(part) }));
-    const pixels = await this.drawn(this.values_, angles.length, rows.length, rows);
+    const pixels = await this.drawn(this.#valuesProgram, angles.length, rows.length, rows);
     const length = 4 * angles.length;
     const [all, ...parts] = rows.map((_, k) => colours(pixels.subarray(k * length, (k + 1) * length)));
     return { angles, all, parts };
@@ -111,7 +126,7 @@ export class Slices {
       const angles = this.spread();
       return {
         angles,
-        texture: this.device.texture('R32F', angles.length, 1, Float32Array.from(angles, radians)),
+        texture: this.#device.texture('R32F', angles.length, 1, Float32Array.from(angles, radians)),
       };
     });
   }
@@ -137,8 +152,8 @@ export class Slices {
   relativeIndex() {
     if (this.shader.thin) return 1;
     const last = this.shader.lobes.flatMap(({ layers }) => layers).reduce((a, b) => Math.max(a, b), 0);
-    const index = [this.values[`layer${last}_eta`]].flat();
-    return index.reduce((sum, value) => sum + value, 0) / index.length / this.values.exterior;
+    const index = [this.#values[`layer${last}_eta`]].flat();
+    return index.reduce((sum, value) => sum + value, 0) / index.length / this.#values.exterior;
   }
 
   /**
@@ -148,9 +163,9 @@ export class Slices {
   disc(size, reflected, part = null) {
     const uniforms = { vt_disc: reflected ? 1 : -1, vt_size: size, vt_shown: this.only(part) };
     return this.once(`disc ${size} ${reflected} ${part}`, () => {
-      const target = this.target(this.values_, size, size, [uniforms]);
-      const pixels = this.device.read(target);
-      this.device.free(target);
+      const target = this.target(this.#valuesProgram, size, size, [uniforms]);
+      const pixels = this.#device.read(target);
+      this.#device.free(target);
       return pixels;
     });
   }
@@ -158,22 +173,22 @@ export class Slices {
   /** As many bands of rows as there are uniforms. */
   async drawn(program, width, height, bands) {
     const target = this.target(program, width, height, bands);
-    const pixels = await this.device.readLater(target);
-    this.device.free(target);
+    const pixels = await this.#device.readLater(target);
+    this.#device.free(target);
     return pixels;
   }
 
   target(program, width, height, bands) {
-    const known = { ...this.uniforms, vt_directions: this.directions().texture };
-    const target = this.device.target(width, height, ['RGBA32F']), rows = height / bands.length;
+    const known = { ...this.#uniforms, vt_directions: this.directions().texture };
+    const target = this.#device.target(width, height, ['RGBA32F']), rows = height / bands.length;
     bands.forEach((uniforms, k) =>
-      this.device.draw(program, { ...known, ...uniforms }, target, { rows: [k * rows, (k + 1) * rows] }),
+      this.#device.draw(program, { ...known, ...uniforms }, target, { rows: [k * rows, (k + 1) * rows] }),
     );
     return target;
   }
 
   dispose() {
-    this.device.free(this.kept.get('directions')?.texture);
+    this.#device.free(this.#kept.get('directions')?.texture);
   }
 }
 

@@ -1,129 +1,177 @@
 // A material on the stage: its programs, its parameters, its lobes, and the light that was added up.
 
 import { Bake } from './bake.js';
-import { preview } from './glsl/preview.glsl.js';
+import { adding, learning } from './glsl/display.glsl.js';
+import { lighting } from './glsl/preview.glsl.js';
 import { tracer } from './glsl/tracer.glsl.js';
 import { sobol } from './sobol.js';
 
 const SHOWN = 8; // lobes that may be shown alone
 
 export class Slot {
-  /**
-   * `load` gives what a shader names: tables(key) -> texture, table(name) -> {array, shape},
-   * image(name, encoding) -> texture.
-   */
-  constructor(device, load) {
-    Object.assign(this, { device, load, shader: null, lobe: null, samples: 0 });
+  device;
+  shader = null; // the answer of call("shader")
+  values = null; // by flat name
+  lobe = null; // the one that is shown alone, by its number
+  samples = 0;
+  preview = null; // the target that it is drawn to
+  pass = null; // the target of the sample that is traced
+  shades = null; // two targets: by how much paths make the preview darker, and a spare one
+  #loader;
+  #asked = null; // the shader that was set last, which may be compiling
+  #tracing = null;
+  #lighting = null;
+  #adding = null;
+  #learning = null;
+  #textures = {}; // by the names of their samplers
+  #bake = null;
+  #placed = {}; // values by their places in the shader's struct
+  #outdated = true; // whether the bake is of other values
+  #coarse = false; // whether it is a coarse one
+  #surrounded = false; // whether the preview has what is around the object
+  #sums = null; // two targets: light added up, and a spare one
+
+  /** `loader` gives what a shader names, as that of loader.js does. */
+  constructor(device, loader) {
+    this.device = device;
+    this.#loader = loader;
+  }
+
+  /** What all materials have in common. */
+  async compile() {
+    const texts = [adding, learning];
+    [this.#adding, this.#learning] = await Promise.all(texts.map((text) => this.device.program(text)));
   }
 
   /** Takes a material; compiles where its code is new. The one before stays until all is ready. */
   async setMaterial(shader, values) {
     const { device } = this;
     if (this.shader?.key !== shader.key) {
-      const asked = (this.asked = shader);
-      const [traced, previewed, tables, looked, ...maps] = await Promise.all([
+      this.#asked = shader;
+      const baked = shader.baked?.tables ?? [];
+      const [tracing, lit, tables, looked, maps] = await Promise.all([
         device.program(tracer(shader)),
-        device.program(preview(shader)),
-        shader.tables && this.load.tables(shader.tables),
-        Promise.all((shader.baked?.tables ?? []).map((name) => this.load.table(name))),
-        ...(shader.maps ?? []).map(({ texture, encoding }) => this.load.image(texture, encoding)),
+        device.program(lighting(shader)),
+        shader.tables && this.#loader.tables(shader.tables),
+        Promise.all(baked.map((name) => this.#loader.table(name))),
+        Promise.all((shader.maps ?? []).map(({ texture, encoding }) => this.#loader.image(texture, encoding))),
+        this.compile(),
       ]);
-      if (this.asked !== asked) return;
-      device.free(this.textures?.vt_baked);
-      Object.assign(this, { shader, traced, previewed, textures: { vt_tables: tables } });
-      shader.maps?.forEach(({ sampler }, i) => (this.textures[sampler] = maps[i]));
-      this.setBaked(Object.fromEntries((shader.baked?.tables ?? []).map((name, k) => [name, looked[k]])));
+      if (this.#asked !== shader) return;
+      device.free(this.#textures.vt_baked);
+      this.shader = shader;
+      this.#tracing = tracing;
+      this.#lighting = lit;
+      this.#textures = { vt_tables: tables };
+      shader.maps?.forEach(({ sampler }, i) => (this.#textures[sampler] = maps[i]));
+      this.#setBake(Object.fromEntries(baked.map((name, k) => [name, looked[k]])));
     }
     this.setValues(values);
   }
 
-  setBaked(tables) {
+  #setBake(tables) {
     const { device, shader } = this;
-    this.bake = shader.baked && new Bake(shader.baked, tables);
-    if (this.bake) this.textures.vt_baked = device.texture('RGBA32F', this.bake.width, this.bake.height);
+    this.#bake = shader.baked && new Bake(shader.baked, tables);
+    if (this.#bake) this.#textures.vt_baked = device.texture('RGBA32F', this.#bake.width, this.#bake.height);
   }
 
   setValues(values) {
     this.values = values;
-    this.placed = {};
+    this.#placed = {};
     for (const [name, place] of Object.entries(this.shader.uniforms)) {
-      if (name in values) this.placed[place] = values[name];
+      if (name in values) this.#placed[place] = values[name];
     }
-    this.outdated = true;
+    this.#outdated = true;
   }
 
   setLobe(lobe) {
     this.lobe = lobe;
   }
 
-  /** All that the code of the material reads; lobes are worked out anew where values have changed, maybe `quick`. */
-  uniforms(quick = false) {
-    if (this.bake && (this.outdated || (this.rough && !quick))) {
-      this.device.fill(this.textures.vt_baked, this.bake.draw(this.placed, quick));
-      this.rough = quick;
+  /** All that the code of the material reads; lobes are worked out anew where values have changed, maybe `coarse`. */
+  uniforms(coarse = false) {
+    if (this.#bake && (this.#outdated || (this.#coarse && !coarse))) {
+      this.device.fill(this.#textures.vt_baked, this.#bake.draw(this.#placed, coarse));
+      this.#coarse = coarse;
     }
-    this.outdated = false;
+    this.#outdated = false;
     const shown = Array.from({ length: SHOWN }, (_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
-    const parameters = Object.entries(this.placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
-    return { ...Object.fromEntries(parameters), ...this.textures, vt_shown: shown };
+    const parameters = Object.entries(this.#placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
+    return { ...Object.fromEntries(parameters), ...this.#textures, vt_shown: shown };
   }
 
   // The picture
 
   setSize(width, height) {
     const { device } = this;
-    device.free(this.pass, this.preview, ...(this.sums ?? []), ...(this.shades ?? []));
+    device.free(this.pass, this.preview, ...(this.#sums ?? []), ...(this.shades ?? []));
     this.pass = device.target(width, height, ['RGBA32F']);
-    this.sums = [0, 1].map(() => device.target(width, height, ['RGBA32F']));
+    this.#sums = [0, 1].map(() => device.target(width, height, ['RGBA32F']));
     this.preview = device.target(width, height, ['RGBA16F']);
     this.shades = [0, 1].map(() => device.target(width, height, ['RGBA16F']));
     this.forget();
   }
 
   /** Keeps by how much paths make the preview darker, for the previews to come of the same view. */
-  learn(learning, seen) {
+  learn(normals) {
     const [before, shade] = this.shades;
     const uniforms = {
       sum: this.sum.textures[0],
       picture: this.preview.textures[0],
       shade: before.textures[0],
     };
-    this.device.draw(learning, { ...uniforms, seen_normal: seen }, shade);
+    this.device.draw(this.#learning, { ...uniforms, seen_normal: normals }, shade);
     this.shades.reverse();
-    this.surrounded = false;
+    this.#surrounded = false;
   }
 
-  /** Draws the preview of a `view`; all around the object stays as it is until the view changes. */
-  drawPreview(view, uniforms, quick) {
+  /** Draws the preview of what a G-buffer holds; all around the object stays as it is until the view changes. */
+  drawPreview(gbuffer, uniforms, coarse) {
     const shade = this.shades[0].textures[0];
-    if (!this.surrounded) view.drawSurroundings({ ...uniforms, shade }, this.preview);
-    this.surrounded = true;
-    if (this.outdated) view.warm(this.previewed, { ...this.textures, ...uniforms, shade });
-    view.drawObject(this.previewed, { ...this.uniforms(quick), ...uniforms, shade }, this.preview, quick);
+    if (!this.#surrounded) gbuffer.drawSurroundings({ ...uniforms, shade }, this.preview);
+    this.#surrounded = true;
+    if (this.#outdated) this.warm(gbuffer, { ...uniforms, shade });
+    gbuffer.drawObject(this.#lighting, { ...this.uniforms(coarse), ...uniforms, shade }, this.preview, coarse);
+  }
+
+  /** Draws a pixel of the object, where this was never done by the same program. */
+  warm(gbuffer, uniforms) {
+    gbuffer.warm(this.#lighting, { ...this.#textures, ...uniforms });
   }
 
   forget() {
     this.samples = 0;
-    this.surrounded = false;
+    this.#surrounded = false;
     this.device.clear(this.shades[0], 1);
   }
 
-  /** Adds the pass that was drawn to the light before. */
-  add(adding) {
-    const [before, sum] = this.sums;
+  /** Traces the next sample, or a `band` of its rows. */
+  trace(uniforms, band) {
+    const sample = { ...this.uniforms(), ...uniforms, ...sobol(this.samples), sample_number: this.samples };
+    this.device.draw(this.#tracing, sample, this.pass, band && { rows: [band.first, band.end] });
+  }
+
+  /** Adds the sample that was traced to the light before. */
+  add() {
+    const [before, sum] = this.#sums;
     const uniforms = {
       before: before.textures[0],
       added: this.pass.textures[0],
       within: sobol(this.samples).within,
     };
     if (this.samples === 0) this.device.clear(before, 0);
-    this.device.draw(adding, uniforms, sum);
-    this.sums.reverse();
+    this.device.draw(this.#adding, uniforms, sum);
+    this.#sums.reverse();
     this.samples++;
   }
 
   /** Light added up, and its weight in A. */
   get sum() {
-    return this.sums[0];
+    return this.#sums[0];
+  }
+
+  /** A target that is free until the next sample is added. */
+  get spare() {
+    return this.#sums[1];
   }
 }

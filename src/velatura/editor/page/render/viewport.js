@@ -1,26 +1,50 @@
 // A material on the stage, seen in a canvas: a preview at once, then paths that are added up.
 
-import { decode } from '../arrays.js';
-import { cameraUniforms, listen, orbited } from './camera.js';
+import { listen, orbited } from './camera.js';
 import { Device } from './device.js';
-import { prepare, readPicture } from './environment.js';
-import { adding, blending, display, learning } from './glsl/display.glsl.js';
-import { Preview } from './preview.js';
-import { NODES_WIDTH, TRIANGLES_WIDTH, buildScene } from './scene.js';
+import { prepare } from './environment.js';
+import { GBuffer } from './gbuffer.js';
+import { Loader } from './loader.js';
+import { buildScene } from './scene.js';
+import { Bands, Schedule } from './schedule.js';
+import { Screen, isTrusted } from './screen.js';
 import { Slot } from './slot.js';
-import { sobol } from './sobol.js';
+import { Stage } from './stage.js';
+import { Thumbnails, radianceOf } from './stills.js';
 
-const QUIET = 150; // milliseconds without a change, after which paths are traced
-const SLOW = 100; // milliseconds for a preview, from which on a quicker one comes before it
-const SLICE = 40; // milliseconds that the device may be busy without a break
-const FIRST = 4; // samples from which on they are shown
-const TRUSTED = 16; // samples from which on the preview shows through no more
-const MOST_SAMPLES = 64; // at once, however quick they are
 const REFRESH = 100; // milliseconds between two pictures while paths are added up
+const RETRY = 1000; // milliseconds until the next look after an error, and while something is missing
 const MOST_PIXELS = 1_000_000;
 const defaultFetch = (address) => fetch(address);
 
 export class Viewport {
+  canvas;
+  camera = { origin: [0, 2.6, 7.2], target: [0, 1, 0], fov: 19.5 };
+  settings = { rotation: 0, exposure: 0, mode: 'single', split: 0.5, lobe: null };
+  schedule = new Schedule();
+  sources = {}; // of object and light: {parts, environment, name}, from which a lost device gets them again
+
+  // On the device, and lost with it
+  device;
+  loader;
+  gbuffer;
+  stage;
+  screen;
+  slots;
+  coming; // the slot of a material that may come
+  thumbnails;
+  ready; // when all is compiled that no material changes
+
+  #services;
+  #onError;
+  #listeners = new Set(); // to the camera
+  #stopped = new AbortController();
+  #bands = new Bands();
+  #slice = null; // of paths that the device is at work on
+  #asked = false; // whether the canvas is to be drawn in the next frame of the page
+  #painted = 0; // when it was
+  #wake = () => {};
+
   /**
    * Raises Error, in words, where the browser cannot draw.
    *
@@ -29,59 +53,33 @@ export class Viewport {
    *   where textures lie.
    */
   constructor(canvas, { call, fetch = defaultFetch, files = '/files/', onError = console.error }) {
-    Object.assign(this, { canvas, call, fetch, files, onError });
+    this.canvas = canvas;
+    this.#services = { call, fetch, files };
+    this.#onError = onError;
     this.device = new Device(canvas);
-    this.load = this.loading();
-    this.slots = { a: new Slot(this.device, this.load), b: new Slot(this.device, this.load) };
-    this.preview = new Preview(this.device);
-    this.truth = null; // in the place of slot b
-    this.settings = { rotation: 0, exposure: 0, mode: 'single', split: 0.5, lobe: null };
-    this.camera = { origin: [0, 2.6, 7.2], target: [0, 1, 0], fov: 19.5 };
-    this.budget = { samples: 1024, milliseconds: Infinity };
-    this.sources = {};
-    this.listeners = new Set();
-    this.frames = [];
-    this.held = false;
-    this.took = Infinity; // milliseconds, the last preview with all pixels
-    this.rows = 8;
-    this.row = 0;
-    this.stopped = new AbortController();
-    this.ready = this.compile();
+    this.#build();
     this.setSize(canvas.width, canvas.height);
-    this.watch();
-    this.run();
+    this.#watch();
+    this.#run();
   }
 
   // What is shown
 
   /** A name that call("object") knows, or {parts, view}; the camera goes where its view says. */
   async setObject(object) {
-    const named = typeof object === 'string';
-    const { parts, view } = named ? partsOf(await this.call('object', { name: object })) : object;
+    const { parts, view } = typeof object === 'string' ? await this.loader.object(object) : object;
     this.sources.parts = parts;
-    this.view = view;
-    this.stage();
+    this.#placeObject();
     this.setCamera(view);
   }
 
   /** A name that call("environment") knows, the address of an .exr or .hdr file, or {width, height, data}. */
   async setEnvironment(environment) {
-    this.sources.environment = prepare(await this.picture(environment));
+    const named = typeof environment === 'string';
+    this.sources.environment = prepare(named ? await this.loader.environment(environment) : environment);
     this.sources.name = environment;
-    this.light();
-    if (this.sources.parts) this.stage();
-  }
-
-  async picture(environment) {
-    if (typeof environment !== 'string') return environment;
-    if (/\.(exr|hdr)$/i.test(environment)) {
-      const answer = await this.fetch(environment);
-      if (!answer.ok) throw new Error(`${environment}: not found`);
-      return readPicture(environment, await answer.arrayBuffer());
-    }
-    const { picture } = await this.call('environment', { name: environment });
-    const { array, shape } = decode(picture);
-    return { width: shape[1], height: shape[0], data: array };
+    this.#placeLight();
+    if (this.sources.parts) this.#placeObject();
   }
 
   /** A material in slot "a" or "b": the answer of call("shader"), and values by flat name. */
@@ -89,17 +87,17 @@ export class Viewport {
     const known = this.slots[slot].shader?.key === shader.key;
     await this.slots[slot].setMaterial(shader, values);
     if (!known) this.forget(slot);
-    this.changed();
+    this.#changed();
   }
 
   /** Makes ready for a material that may come: compiles its programs, and draws a pixel, which some devices wait for. */
   async prepare(shader) {
-    const slot = (this.coming ??= new Slot(this.device, this.load));
+    const slot = (this.coming ??= new Slot(this.device, this.loader));
     await slot.setMaterial(shader, shader.values);
-    this.preview.warm(slot.previewed, { ...slot.textures, ...this.uniforms() });
+    slot.warm(this.gbuffer, this.uniforms());
   }
 
-  /** What paths have told of one material holds for no other. */
+  /** Shadows that were learnt from paths of one material hold for no other. */
   forget(slot) {
     this.slots[slot].forget();
   }
@@ -107,7 +105,7 @@ export class Viewport {
   /** Other values of the same material: nothing is compiled. */
   setValues(slot, values) {
     this.slots[slot].setValues(values);
-    this.changed();
+    this.#changed();
   }
 
   /** Some of {rotation (degrees), exposure (stops), mode, split, lobe (its number, or null for all)}. */
@@ -117,9 +115,9 @@ export class Viewport {
     this.settings = { ...before, ...view };
     const { rotation, mode, lobe } = this.settings;
     if (lobe !== before.lobe) Object.values(this.slots).forEach((slot) => slot.setLobe(lobe));
-    if (rotation !== before.rotation) this.moved();
-    else if (mode !== before.mode || lobe !== before.lobe) this.changed();
-    else this.show();
+    if (rotation !== before.rotation) this.#moved();
+    else if (mode !== before.mode || lobe !== before.lobe) this.#changed();
+    else this.#show();
   }
 
   /**
@@ -127,376 +125,258 @@ export class Viewport {
    * null.
    */
   setTruth(truth) {
-    this.device.free(this.truth?.texture);
-    const { width, height } = this.canvas;
-    const texture =
-      truth?.data && this.device.texture('RGBA32F', width, height, stretched(truth, width, height));
-    this.truth = truth && { ...truth, texture };
-    this.wake?.();
-    this.show();
+    this.screen.setTruth(truth, this.canvas);
+    this.#wake();
+    this.#show();
   }
 
   setCamera(camera) {
     this.camera = { ...this.camera, ...camera };
-    this.preview.outdated = true;
-    this.moved();
+    this.gbuffer.outdate();
+    this.#moved();
   }
 
   /** Calls f with every camera that hands have moved to. Returns a function that ends this. */
   onCamera(f) {
-    this.listeners.add(f);
-    return () => this.listeners.delete(f);
+    this.#listeners.add(f);
+    return () => this.#listeners.delete(f);
   }
 
   setBudget(budget) {
-    this.budget = { ...this.budget, ...budget };
-    this.wake?.();
+    this.schedule.budget = { ...this.schedule.budget, ...budget };
+    this.#wake();
   }
 
-  /**
-   * Whether something is being dragged: until it is let go, previews in fewer pixels are all that is drawn.
-   */
+  setSize(width, height) {
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.#fit();
+    this.#changed();
+  }
+
+  /** Whether something is being dragged: until it is let go, coarse previews are all that is drawn. */
   moving(held) {
-    if (this.held && !held) this.outdate();
-    this.held = held;
-    this.lastChange = performance.now();
-    this.wake?.();
+    this.schedule.hold(held, performance.now());
+    this.#wake();
   }
 
-  // What is told
+  // Where it stands
 
   /** Whether the browser has taken the graphics device away; it comes back by itself. */
   get lost() {
     return this.device.gl.isContextLost();
   }
 
+  get truth() {
+    return this.screen.truth;
+  }
+
   get samples() {
-    return Math.min(...this.seen().map((slot) => slot.samples));
+    return Math.min(...this.#seen().map((slot) => slot.samples));
+  }
+
+  get budget() {
+    return this.schedule.budget;
+  }
+
+  get held() {
+    return this.schedule.held;
+  }
+
+  /** The time from which on there is a preview of what is to be shown; 0 where there is none yet. */
+  get previewed() {
+    return this.schedule.previewed;
   }
 
   /** Whether there is nothing to do but to trace paths. */
   get idle() {
-    return this.previewed > 0 && !this.held && this.budget.samples > 0;
+    return this.schedule.idle;
   }
 
   /** Whether the preview has been there, as it is, for so many milliseconds. */
   rested(milliseconds) {
-    return this.previewed > 0 && performance.now() - this.previewed > milliseconds;
-  }
-
-  /** Of previews, over the last second in which there were any. */
-  get framesPerSecond() {
-    const last = this.frames.at(-1);
-    const recent = this.frames.filter((time) => time > last - 1000);
-    return recent.length < 2 ? 0 : (1000 * (recent.length - 1)) / (last - recent[0]);
+    return this.schedule.rested(milliseconds, performance.now());
   }
 
   /** Mean light of slot "a", or another: {width, height, data: RGBA, linear, from the upper left}. */
   radiance(slot = 'a') {
-    const { sum } = this.slots[slot];
-    const { width, height } = sum;
-    const pixels = this.device.read(sum);
-    const data = new Float32Array(pixels.length);
-    for (let y = 0; y < height; y++) {
-      data.set(pixels.subarray(4 * y * width, 4 * (y + 1) * width), 4 * (height - 1 - y) * width);
-    }
-    for (let i = 0; i < data.length; i += 4) {
-      const weight = data[i + 3] || 1;
-      data.set([data[i] / weight, data[i + 1] / weight, data[i + 2] / weight, 1], i);
-    }
-    return { width, height, data };
+    return radianceOf(this.device, this.slots[slot].sum);
   }
 
   /** A small square picture of another material on the same object, from here; an ImageData. */
-  async thumbnail(shader, values, size, samples) {
-    const slot = (this.small ??= new Slot(this.device, this.load));
-    if (slot.pass?.width !== size) slot.setSize(size, size);
-    await slot.setMaterial(shader, values);
-    slot.samples = 0;
+  thumbnail(shader, values, size, samples) {
     const uniforms = this.uniforms({ width: size, height: size });
-    while (slot.samples < samples) {
-      const sample = { ...slot.uniforms(), ...uniforms, ...sobol(slot.samples), sample_number: slot.samples };
-      this.device.draw(slot.traced, sample, slot.pass);
-      slot.add(this.adding);
-      await this.device.done();
-    }
-    const shown = this.device.target(size, size, ['RGBA32F']);
-    const [picture] = slot.sum.textures;
-    const { exposure } = this.settings;
-    this.device.draw(
-      this.display,
-      { picture_a: picture, picture_b: picture, exposure, split: 1, difference: false },
-      shown,
-    );
-    const pixels = this.device.read(shown);
-    this.device.free(shown);
-    const image = new ImageData(size, size);
-    for (let y = 0; y < size; y++) {
-      const row = pixels.subarray(4 * y * size, 4 * (y + 1) * size);
-      image.data.set(
-        row.map((value) => 255 * value),
-        4 * (size - 1 - y) * size,
-      );
-    }
-    return image;
+    return this.thumbnails.draw(shader, values, { size, samples, exposure: this.settings.exposure, uniforms });
+  }
+
+  /** What the shaders read of object, light and camera, for a picture of a size. */
+  uniforms(size = this.canvas) {
+    return this.stage.uniforms(this.camera, size, this.settings.rotation);
   }
 
   dispose() {
-    this.stopped.abort();
-    this.wake?.();
+    this.#stopped.abort();
+    this.#wake();
     this.device.gl.getExtension('WEBGL_lose_context')?.loseContext();
   }
 
   // On the device
 
-  async compile() {
+  /** All that lives on the device, empty. */
+  #build() {
     const { device } = this;
-    [this.adding, this.blending, this.learning, this.display] = await Promise.all(
-      [adding, blending, learning, display].map((text) => device.program(text)),
-    );
-    await this.preview.compile();
+    this.loader = new Loader(device, this.#services);
+    this.gbuffer = new GBuffer(device);
+    this.stage = new Stage(device);
+    this.screen = new Screen(device);
+    this.slots = { a: new Slot(device, this.loader), b: new Slot(device, this.loader) };
+    this.coming = null;
+    this.thumbnails = new Thumbnails(device, this.loader, this.screen);
+    this.ready = Promise.all([this.screen, this.gbuffer, this.slots.a].map((part) => part.compile()));
   }
 
-  stage() {
-    const { device, sources } = this;
-    const scene = buildScene(sources.parts.filter(({ role }) => stands(role, sources.name)));
-    this.preview.setScene(scene);
-    device.free(this.nodes, this.triangles);
-    this.nodes = device.texture('RGBA32UI', NODES_WIDTH, scene.nodes.length / (4 * NODES_WIDTH), scene.nodes);
-    this.triangles = device.texture(
-      'RGBA32F',
-      TRIANGLES_WIDTH,
-      scene.packed.length / (4 * TRIANGLES_WIDTH),
-      scene.packed,
-    );
-    this.traversal = {
-      scene_nodes: this.nodes,
-      scene_triangles: this.triangles,
-      scene_count: scene.count,
-      grid_origin: scene.grid.origin,
-      grid_scale: scene.grid.scale,
-    };
-    this.moved();
+  /** All that the lost context held, from what the page has kept. */
+  async #restore() {
+    const { slots, truth, sources } = this;
+    this.device.restore();
+    this.#build();
+    this.#fit();
+    if (truth) this.setTruth(truth);
+    await this.ready;
+    for (const [name, { shader, values, lobe }] of Object.entries(slots)) {
+      this.slots[name].setLobe(lobe);
+      if (shader) await this.slots[name].setMaterial(shader, values);
+    }
+    if (sources.environment) this.#placeLight();
+    if (sources.parts) this.#placeObject();
   }
 
-  light() {
-    const { device, sources } = this;
-    const { width, height, light, steps: sums, blurred } = sources.environment;
-    device.free(this.light_, this.steps, this.blurred);
-    this.light_ = device.texture('RGBA32F', width, height, light);
-    this.steps = device.texture('R32F', width + 1, height - 1, sums);
-    const soft = { filter: 'LINEAR', wrap: 'REPEAT', mipmaps: true };
-    this.blurred = device.texture(device.soft, width, height, blurred, soft);
-    this.moved();
-  }
-
-  loading() {
-    const kept = new Map();
-    const once = (key, load) => {
-      const tried = () =>
-        load().catch((error) => {
-          kept.delete(key);
-          throw error;
-        });
-      if (!kept.has(key)) kept.set(key, tried());
-      return kept.get(key);
-    };
-    return {
-      tables: (key) =>
-        once(key, async () => {
-          const { array, shape } = decode((await this.call('tables', { key })).texture);
-          return this.device.texture('RGBA32F', shape[1], shape[0], array);
-        }),
-      table: (name) => once(`table ${name}`, async () => decode((await this.call('table', { name })).table)),
-      image: (name, encoding) => once(`${encoding} ${name}`, () => this.image(name, encoding)),
-    };
-  }
-
-  async image(name, encoding) {
-    const answer = await this.fetch(this.files + encodeURIComponent(name));
-    if (!answer.ok) throw new Error(`${name}: no such texture`);
-    const bitmap = await createImageBitmap(await answer.blob(), {
-      colorSpaceConversion: 'none',
-      premultiplyAlpha: 'none',
-    });
-    return this.device.image(bitmap, encoding);
-  }
-
-  setSize(width, height) {
-    Object.assign(this.canvas, { width, height });
-    this.preview.setSize(width, height);
+  /** Gives everything the size of the canvas. */
+  #fit() {
+    const { width, height } = this.canvas;
+    this.gbuffer.setSize(width, height);
     for (const slot of Object.values(this.slots)) slot.setSize(width, height);
     if (this.truth) this.setTruth(this.truth);
-    this.changed();
   }
 
-  uniforms({ width, height } = this.canvas) {
-    const turn = (this.settings.rotation * Math.PI) / 180;
-    return {
-      ...cameraUniforms(this.camera, width, height),
-      environment_picture: this.light_,
-      environment_steps: this.steps,
-      environment_blurred: this.blurred,
-      environment_turn: [Math.cos(turn), Math.sin(turn)],
-      irradiance: this.sources.environment.irradiance,
-      ...this.traversal,
-    };
+  #placeObject() {
+    const { parts, name } = this.sources;
+    const scene = buildScene(parts.filter(({ role }) => stands(role, name)));
+    this.gbuffer.setScene(scene);
+    this.stage.setObject(scene);
+    this.#moved();
   }
 
-  seen() {
-    return this.settings.mode === 'single' || this.truth ? [this.slots.a] : [this.slots.a, this.slots.b];
+  #placeLight() {
+    this.stage.setLight(this.sources.environment);
+    this.#moved();
+  }
+
+  #seen() {
+    const { a, b } = this.slots;
+    return this.settings.mode === 'single' || this.truth ? [a] : [a, b];
   }
 
   // Over time
 
-  /** Other values: what paths have told about shadows may stay. */
-  changed() {
+  /** Other values: shadows that were learnt from paths may stay. */
+  #changed() {
     for (const slot of Object.values(this.slots)) {
-      if (slot.samples >= TRUSTED) slot.learn(this.learning, this.preview.seen.textures[0]);
+      if (isTrusted(slot)) slot.learn(this.gbuffer.normals);
       slot.samples = 0;
     }
-    this.row = 0;
-    this.outdate();
-    this.lastChange = this.started = performance.now();
-    this.wake?.();
-  }
-
-  /** Asks for another preview. */
-  outdate() {
-    this.previewed = 0; // the time from which on there is a preview
-    this.quick = false;
-    this.drawing = null;
+    this.#bands.restart();
+    this.schedule.change(performance.now());
+    this.#wake();
   }
 
   /** Another view, or other light. */
-  moved() {
+  #moved() {
     for (const slot of Object.values(this.slots)) slot.forget();
-    this.changed();
+    this.#changed();
   }
 
-  async run() {
-    await this.ready.catch(this.onError);
-    while (!this.stopped.signal.aborted) {
+  async #run() {
+    await this.ready.catch(this.#onError);
+    while (!this.#stopped.signal.aborted) {
       try {
-        await this.step();
+        await this.#step();
       } catch (error) {
-        this.onError(error);
-        await this.sleep(1000);
+        this.#onError(error);
+        await this.#sleep(RETRY);
       }
     }
   }
 
-  async step() {
-    if (!this.nodes || !this.light_ || this.seen().some((slot) => !slot.shader)) return this.sleep(1000);
-    if (!this.previewed) return this.drawPreview();
-    const quiet = performance.now() - this.lastChange;
-    if (this.held || quiet < QUIET) return this.sleep(this.held ? 1000 : QUIET - quiet);
-    const { samples, milliseconds } = this.budget;
-    if (this.samples >= samples || performance.now() - this.started > milliseconds) return this.sleep(1000);
-    return this.trace();
+  async #step() {
+    const { hasObject, hasLight } = this.stage;
+    if (!hasObject || !hasLight || this.#seen().some((slot) => !slot.shader)) return this.#sleep(RETRY);
+    const { act, milliseconds } = this.schedule.next(performance.now(), this.samples);
+    if (act === 'preview') return this.#drawPreview();
+    return act === 'trace' ? this.#trace() : this.#sleep(milliseconds);
   }
 
   /** Until so much time has gone, or something has changed. */
-  sleep(milliseconds) {
+  #sleep(milliseconds) {
     return new Promise((resolve) => {
       const timer = setTimeout(resolve, milliseconds);
-      this.wake = () => {
+      this.#wake = () => {
         clearTimeout(timer);
         resolve();
       };
     });
   }
 
-  /** In fewer pixels while something is dragged, and at first, where the last one with all of them took long. */
-  async drawPreview() {
-    const quick = this.held || (!this.quick && this.took > SLOW);
-    const drawing = (this.drawing = {});
-    const uniforms = this.uniforms(), start = performance.now();
-    this.preview.update(uniforms.camera_projection);
-    for (const slot of this.seen()) slot.drawPreview(this.preview, uniforms, quick);
-    this.show();
-    const time = await this.device.done();
-    if (!quick) this.took = time - start;
-    this.frames = [...this.frames.slice(-100), time];
-    if (this.drawing !== drawing) return; // for something has changed
-    this.quick = quick && !this.held;
-    this.previewed = this.quick ? 0 : time;
+  async #drawPreview() {
+    const uniforms = this.uniforms(), drawing = this.schedule.beginPreview(performance.now());
+    this.gbuffer.update(uniforms.camera_projection);
+    for (const slot of this.#seen()) slot.drawPreview(this.gbuffer, uniforms, drawing.coarse);
+    this.#show();
+    this.schedule.endPreview(drawing, await this.device.done());
   }
 
-  /**
-   * A few rows of a sample of all slots that are seen, or several samples: as many as fit into a slice of
-   * time. The device works on them while we wait for those before.
-   */
-  async trace() {
-    const uniforms = this.uniforms();
+  /** A slice of paths, in all slots that are seen. The device works on it while we wait for the one before. */
+  async #trace() {
+    const uniforms = this.uniforms(), { height } = this.canvas, before = this.#slice;
     let rows = 0;
-    while (rows < this.rows && this.samples < this.budget.samples) {
-      const left = this.canvas.height - this.row;
-      const parts = Math.ceil(left / (this.rows - rows));
-      rows += this.traceRows(uniforms, Math.ceil(left / parts));
+    for (let band; this.samples < this.budget.samples && (band = this.#bands.next(height, rows)); ) {
+      for (const slot of this.#seen()) slot.trace(uniforms, band);
+      if (this.#bands.advance(band, height)) this.#add();
+      rows += band.end - band.first;
     }
-    const before = this.slice;
-    this.slice = { rows, start: performance.now(), done: this.device.done() };
-    if (before) this.pace(before.rows, (await before.done) - before.start);
-    this.slice.start = performance.now();
+    const slice = (this.#slice = { rows, begun: performance.now(), done: this.device.done() });
+    if (before) this.#bands.pace(before.rows, (await before.done) - before.begun, height);
+    slice.begun = performance.now(); // when the device is free for it
   }
 
-  traceRows(uniforms, rows) {
-    const slots = this.seen();
-    for (const slot of slots) {
-      const sample = { ...slot.uniforms(), ...uniforms, ...sobol(slot.samples), sample_number: slot.samples };
-      this.device.draw(slot.traced, sample, slot.pass, { rows: [this.row, this.row + rows] });
-    }
-    this.row = (this.row + rows) % this.canvas.height;
-    if (this.row === 0) {
-      for (const slot of slots) slot.add(this.adding);
-      if (performance.now() - (this.lastShown ?? 0) > REFRESH) this.show();
-    }
-    return rows;
-  }
-
-  /** Takes more rows next time, or fewer, after some have taken so many milliseconds. */
-  pace(rows, took) {
-    const scale = Math.min(Math.max(SLICE / Math.max(took, 1), 0.25), 2);
-    this.rows = Math.min(Math.max(Math.round(rows * scale), 1), MOST_SAMPLES * this.canvas.height);
+  /** A sample is traced, in all slots that are seen. */
+  #add() {
+    for (const slot of this.#seen()) slot.add();
+    if (performance.now() - this.#painted > REFRESH) this.#show();
   }
 
   /** Draws the canvas, once for all that was asked since the last frame of the page. */
-  show() {
-    this.asked ??= requestAnimationFrame(() => {
-      this.asked = null;
-      this.lastShown = performance.now();
+  #show() {
+    if (this.#asked) return;
+    this.#asked = true;
+    requestAnimationFrame(() => {
+      this.#asked = false;
+      this.#painted = performance.now();
       this.paint();
     });
   }
 
   paint() {
-    if (!this.display || !this.nodes) return;
-    const { mode, split, exposure } = this.settings;
-    const [a, b = this.truth?.texture ?? a] = this.seen().map((slot) => this.blended(slot));
-    const uniforms = { picture_a: a, picture_b: b, exposure, split: mode === 'split' ? split : 1 };
-    this.device.draw(this.display, { ...uniforms, difference: mode === 'difference' }, null);
-  }
-
-  /** The texture that stands for a slot: the preview, the sum of paths, or in between both. */
-  blended(slot) {
-    if (slot.samples < FIRST) return slot.preview.textures[0];
-    if (slot.samples >= TRUSTED) return slot.sum.textures[0];
-    const [, spare] = slot.sums;
-    const trust = slot.samples / (slot.samples + 2);
-    const uniforms = { picture: slot.preview.textures[0], sum: slot.sum.textures[0], trust };
-    this.device.draw(this.blending, uniforms, spare);
-    return spare.textures[0];
+    if (this.screen.ready && this.stage.hasObject) this.screen.paint(this.#seen(), this.settings);
   }
 
   // From outside
 
-  watch() {
-    const { canvas, stopped } = this;
-    const { signal } = stopped;
+  #watch() {
+    const { canvas } = this, { signal } = this.#stopped;
     const orbit = (...by) => {
       this.setCamera(orbited(this.camera, ...by));
-      this.listeners.forEach((f) => f(this.camera));
+      this.#listeners.forEach((f) => f(this.camera));
     };
     listen(canvas, { move: orbit, begin: () => this.moving(true), end: () => this.moving(false) }, signal);
 
@@ -512,54 +392,11 @@ export class Viewport {
 
     const lost = (event) => {
       event.preventDefault();
-      this.nodes = null;
+      this.stage.lose();
     };
     canvas.addEventListener('webglcontextlost', lost, { signal });
-    canvas.addEventListener('webglcontextrestored', () => this.restore().catch(this.onError), { signal });
+    canvas.addEventListener('webglcontextrestored', () => this.#restore().catch(this.#onError), { signal });
   }
-
-  /** All that the lost context held, from what the page has kept. */
-  async restore() {
-    this.device.restore();
-    this.small = this.coming = null;
-    this.load = this.loading();
-    const { width, height } = this.canvas;
-    this.preview = new Preview(this.device);
-    this.preview.setSize(width, height);
-    this.ready = this.compile();
-    await this.ready;
-    for (const [name, { shader, values, lobe }] of Object.entries(this.slots)) {
-      this.slots[name] = new Slot(this.device, this.load);
-      this.slots[name].lobe = lobe;
-      this.slots[name].setSize(width, height);
-      if (shader) await this.slots[name].setMaterial(shader, values);
-    }
-    if (this.truth) this.setTruth(this.truth);
-    if (this.sources.environment) this.light();
-    if (this.sources.parts) this.stage();
-  }
-}
-
-/** {parts, view} of an answer of call("object"), as setObject takes it. */
-export function partsOf({ parts, view }) {
-  const decoded = parts.map(({ role, ...arrays }) => ({
-    role,
-    ...Object.fromEntries(Object.entries(arrays).map(([key, value]) => [key, decode(value).array])),
-  }));
-  return { parts: decoded, view };
-}
-
-/** An RGB picture as RGBA of another size, from the lower row on; pixels stay pixels. */
-function stretched({ width, height, data }, columns, rows) {
-  const found = new Float32Array(4 * columns * rows);
-  for (let y = 0; y < rows; y++) {
-    const row = Math.floor(((rows - 1 - y) * height) / rows);
-    for (let x = 0; x < columns; x++) {
-      const from = 3 * (row * width + Math.floor((x * width) / columns));
-      found.set([data[from], data[from + 1], data[from + 2], 1], 4 * (y * columns + x));
-    }
-  }
-  return found;
 }
 
 /** Only the sky ends at a horizon, and in a furnace the object floats alone. */

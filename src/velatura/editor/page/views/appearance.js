@@ -1,6 +1,7 @@
 // The material by what is seen of it: lobes under the hand, and the stack that has them.
 
 import { html, nothing, render } from 'lit-html';
+import { Recent } from '../recent.js';
 import { addCoat, setAppearance, setView } from '../state/commands.js';
 import { documentOf } from '../state/material.js';
 import './appearance.css';
@@ -31,7 +32,7 @@ const BASES = [
 export function mountAppearance(element, app) {
   const { store } = app;
   const ask = asker(app);
-  const known = new Map(); // by material: what was said of it
+  const known = new Recent(KEPT); // answers, by material
   let read = { target: null, haze: [], says: 'The lobes are being read.' };
   let text = ''; // of the material that was read, or is asked about
   let asked = null; // target that was wished for, where it could not be had, or not yet
@@ -53,12 +54,6 @@ export function mountAppearance(element, app) {
     return { material: documentOf(store.get()), model, switches };
   };
 
-  function remember(key, answer) {
-    known.delete(key);
-    known.set(key, answer);
-    if (known.size > KEPT) known.delete(known.keys().next().value);
-  }
-
   /** Reads the material anew where it is another one. */
   async function follow() {
     if (!element.getClientRects().length || now() === text) return paint();
@@ -69,7 +64,7 @@ export function mountAppearance(element, app) {
     try {
       const answer = known.get(key) ?? (await ask('appearance', question()));
       if (!answer || key !== text) return;
-      remember(key, answer);
+      known.set(key, answer);
       show(answer);
     } catch (error) {
       if (key !== text) return;
@@ -107,7 +102,7 @@ export function mountAppearance(element, app) {
     if (!material) return paint();
     read = { target, haze, snapped, says: null };
     text = textOf(material, store.get());
-    remember(text, read);
+    known.set(text, read);
     app.drag('appearance', command, material);
     paint();
   }
@@ -344,7 +339,7 @@ export function mountAppearance(element, app) {
       return !held && !wishes.busy && !reading;
     },
     /** Says beforehand which target a material has, by a model. */
-    know: (material, model, answer) => remember(textOf(material, { model, switches: {} }), { says: null, ...answer }),
+    know: (material, model, answer) => known.set(textOf(material, { model, switches: {} }), { says: null, ...answer }),
     destroy() {
       stop();
       stopListening?.();

@@ -90,9 +90,9 @@ export function mountInspector(element, app) {
     making[name] = true;
     const state = app.given(name);
     try {
-      const made = await new Slices(slot, local).ready();
+      const made = await new Slices(slot, local, state).ready();
       if (viewport.lost || slot !== viewport.slots[name]) changed[name] = true;
-      else replace(name, Object.assign(made, { slot, state }));
+      else replace(name, made);
     } catch (error) {
       problem = error.message;
       paint();

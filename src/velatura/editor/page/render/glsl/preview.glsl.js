@@ -11,7 +11,7 @@ const FEWER = 2; // where pixels are fewer, too
 const LARGE = 0.2; // share of the energy up to which one sample of a lobe is enough
 
 /** What lights the object of a material, as call("shader") has it. */
-export const preview = (shader) => `#version 300 es
+export const lighting = (shader) => `#version 300 es
 ${shader.text}
 ${camera}
 ${blurredEnvironment}
@@ -41,7 +41,7 @@ uniform highp sampler2D seen_normal;
 uniform highp sampler2D seen_tangent;
 uniform highp sampler2D seen_uv;
 uniform int seen_every; // how many pixels of the picture, along both axes, are one that is seen
-uniform highp sampler2D shade; // what paths of the same view have told of shadows
+uniform highp sampler2D shade; // shadows, as learnt from paths of the same view
 out vec4 radiance;
 
 void main() {

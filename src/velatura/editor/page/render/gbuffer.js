@@ -1,5 +1,5 @@
-// The preview: surfaces drawn once for a view, all around them lit once, and lit again whenever a value
-// changes.
+// The G-buffer of the preview: surfaces drawn once for a view, all around the object lit once, and the object lit
+// again whenever a value changes.
 
 import { Box3, Matrix4, Vector3, Vector4 } from 'three';
 
@@ -10,30 +10,50 @@ import { OBJECT } from './scene.js';
 const SEEN = ['RGBA16F', 'RGBA16F', 'RG32F'];
 
 /** What a camera sees of a scene; kept until either changes. */
-export class Preview {
+export class GBuffer {
+  #device;
+  #raster = null; // programs
+  #surroundings = null;
+  #coarsening = null;
+  #spreading = null;
+  #array = null; // of vertices
+  #buffers = [];
+  #count = 0; // of vertices
+  #corners = []; // of the box around the object
+  #bounds = null; // of the object in the picture
+  #seen = null; // targets
+  #coarse = null;
+  #coarseLight = null;
+  #outdated = true;
+
   constructor(device) {
-    this.device = device;
+    this.#device = device;
+  }
+
+  /** The texture of the normals that are seen. */
+  get normals() {
+    return this.#seen.textures[0];
   }
 
   async compile() {
-    const { device } = this;
-    [this.program, this.surroundings, this.coarsening, this.spreading] = await Promise.all([
+    const device = this.#device;
+    [this.#raster, this.#surroundings, this.#coarsening, this.#spreading] = await Promise.all([
       device.program(raster, rasterVertex),
       ...[surroundings, coarsening, spreading].map((text) => device.program(text)),
     ]);
   }
 
   setScene(scene) {
-    const { gl } = this.device;
-    this.delete();
-    this.array = gl.createVertexArray();
-    gl.bindVertexArray(this.array);
+    const { gl } = this.#device;
+    this.#delete();
+    this.#array = gl.createVertexArray();
+    gl.bindVertexArray(this.#array);
     const tangents = new Float32Array((4 * scene.tangents.length) / 3);
     scene.materials.forEach((material, i) => {
       tangents.set(scene.tangents.subarray(3 * i, 3 * i + 3), 4 * i);
       tangents[4 * i + 3] = material;
     });
-    this.buffers = [
+    this.#buffers = [
       [scene.positions, 3],
       [scene.normals, 3],
       [tangents, 4],
@@ -50,73 +70,78 @@ export class Preview {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, indices);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, scene.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
-    this.buffers.push(indices);
-    this.count = scene.triangles.length;
-    this.corners = corners(scene);
-    this.outdated = true;
+    this.#buffers.push(indices);
+    this.#count = scene.triangles.length;
+    this.#corners = corners(scene);
+    this.#outdated = true;
   }
 
   setSize(width, height) {
-    const { device } = this;
-    device.free(this.seen, this.coarse, this.coarseLight);
-    this.seen = device.target(width, height, SEEN, { depth: true });
+    const device = this.#device;
+    device.free(this.#seen, this.#coarse, this.#coarseLight);
+    this.#seen = device.target(width, height, SEEN, { depth: true });
     const size = [width, height].map((length) => Math.ceil(length / COARSE));
-    this.coarse = device.target(...size, SEEN);
-    this.coarseLight = device.target(...size, ['RGBA16F'], { filter: 'LINEAR' });
-    this.outdated = true;
+    this.#coarse = device.target(...size, SEEN);
+    this.#coarseLight = device.target(...size, ['RGBA16F'], { filter: 'LINEAR' });
+    this.#outdated = true;
   }
 
-  /** Draws what is seen, after `outdated` was set. */
+  /** The camera is another one now. */
+  outdate() {
+    this.#outdated = true;
+  }
+
+  /** Draws what is seen, where that has changed. */
   update(projection) {
-    if (!this.outdated) return;
-    this.outdated = false;
-    this.bounds = projected(this.corners, projection);
-    this.draw(projection);
-    this.device.draw(this.coarsening, named(this.seen), this.coarse);
+    if (!this.#outdated) return;
+    this.#outdated = false;
+    this.#bounds = projected(this.#corners, projection);
+    this.#draw(projection);
+    this.#device.draw(this.#coarsening, named(this.#seen), this.#coarse);
   }
 
   /** Draws all around the object. */
   drawSurroundings(uniforms, target) {
-    this.device.draw(this.surroundings, { ...uniforms, ...named(this.seen) }, target);
+    this.#device.draw(this.#surroundings, { ...uniforms, ...named(this.#seen) }, target);
   }
 
-  /** Draws the object by a program into its surroundings; in fewer pixels where it has to be `quick`. */
-  drawObject(program, uniforms, target, quick) {
-    const { device, seen, coarse, coarseLight } = this;
-    const draw = (program, uniforms, target) => device.draw(program, uniforms, target, within(this.bounds, target));
-    if (!quick) return draw(program, { ...uniforms, ...named(seen), seen_every: 1 }, target);
-    device.clear(coarseLight, 0);
-    draw(program, { ...uniforms, ...named(coarse), seen_every: COARSE }, coarseLight);
-    return draw(this.spreading, { coarse_light: coarseLight.textures[0], ...named(seen) }, target);
+  /** Draws the object by a program into its surroundings, by `coarse` pixels where it has to be quick. */
+  drawObject(program, uniforms, target, coarse) {
+    const device = this.#device;
+    const draw = (program, uniforms, target) => device.draw(program, uniforms, target, within(this.#bounds, target));
+    if (!coarse) return draw(program, { ...uniforms, ...named(this.#seen), seen_every: 1 }, target);
+    device.clear(this.#coarseLight, 0);
+    draw(program, { ...uniforms, ...named(this.#coarse), seen_every: COARSE }, this.#coarseLight);
+    return draw(this.#spreading, { coarse_light: this.#coarseLight.textures[0], ...named(this.#seen) }, target);
   }
 
   /** Draws a pixel by a program that is to draw the object, once: some devices compile only then, beside other work. */
   warm(program, uniforms) {
-    const { device, coarse } = this;
+    const device = this.#device;
     if (program.warm) return;
     program.warm = true;
     const pixel = device.target(1, 1, ['RGBA16F']);
-    device.draw(program, { ...uniforms, ...named(coarse), seen_every: COARSE }, pixel);
+    device.draw(program, { ...uniforms, ...named(this.#coarse), seen_every: COARSE }, pixel);
     device.free(pixel);
     device.gl.flush();
   }
 
-  draw(projection) {
-    const { gl } = this.device;
-    this.device.use(this.program, { camera_projection: projection });
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.seen.handle);
-    gl.viewport(0, 0, this.seen.width, this.seen.height);
+  #draw(projection) {
+    const { gl } = this.#device;
+    this.#device.use(this.#raster, { camera_projection: projection });
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.#seen.handle);
+    gl.viewport(0, 0, this.#seen.width, this.#seen.height);
     gl.enable(gl.DEPTH_TEST);
     [0, 1, 2].forEach((i) => gl.clearBufferfv(gl.COLOR, i, [0, 0, 0, 0]));
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
-    gl.bindVertexArray(this.array);
-    gl.drawElements(gl.TRIANGLES, this.count, gl.UNSIGNED_INT, 0);
+    gl.bindVertexArray(this.#array);
+    gl.drawElements(gl.TRIANGLES, this.#count, gl.UNSIGNED_INT, 0);
   }
 
-  delete() {
-    const { gl } = this.device;
-    this.buffers?.forEach((buffer) => gl.deleteBuffer(buffer));
-    if (this.array) gl.deleteVertexArray(this.array);
+  #delete() {
+    const { gl } = this.#device;
+    this.#buffers.forEach((buffer) => gl.deleteBuffer(buffer));
+    if (this.#array) gl.deleteVertexArray(this.#array);
   }
 }
 

@@ -1,0 +1,113 @@
+// What to draw when: a preview at once after a change, then paths in slices of time, until there are enough.
+// Times are in milliseconds, of the clock that gives `now`.
+
+const QUIET = 150; // without a change, after which paths are traced
+const SLOW = 100; // for a preview, from which on a coarse one comes before it
+const LOOK = 1000; // until the next look where nothing is to be done
+const SLICE = 40; // that the device may be busy without a break
+const MOST_SAMPLES = 64; // in a slice, however quick they are
+const FRAMES = 100; // that are remembered
+
+export class Schedule {
+  held = false; // whether something is being dragged
+  budget = { samples: 1024, milliseconds: Infinity };
+  previewed = 0; // since when the preview shows the present state; 0 where it does not yet
+  frames = []; // when previews were there
+  #coarse = false; // whether a coarse preview shows the present state
+  #fineTook = Infinity; // the last preview with all pixels
+  #drawing = null; // the preview on its way, unless it is of a state that has gone
+  #touched = 0; // when a value, or the hand on it, last changed
+  #changed = 0; // when the state last changed
+
+  /** The state is another one now. */
+  change(now) {
+    this.outdate();
+    this.#touched = this.#changed = now;
+  }
+
+  /** Asks for another preview of the same state. */
+  outdate() {
+    this.previewed = 0;
+    this.#coarse = false;
+    this.#drawing = null;
+  }
+
+  /** Something is dragged from now on, or no more. */
+  hold(held, now) {
+    if (this.held && !held) this.outdate();
+    this.held = held;
+    this.#touched = now;
+  }
+
+  /** What to do now that there are so many samples: {act: 'preview' | 'trace' | 'wait', milliseconds}. */
+  next(now, samples) {
+    if (!this.previewed) return { act: 'preview' };
+    if (this.held) return { act: 'wait', milliseconds: LOOK };
+    const quiet = now - this.#touched;
+    if (quiet < QUIET) return { act: 'wait', milliseconds: QUIET - quiet };
+    const isEnough = samples >= this.budget.samples || now - this.#changed > this.budget.milliseconds;
+    return isEnough ? { act: 'wait', milliseconds: LOOK } : { act: 'trace' };
+  }
+
+  /** Begins a preview: `coarse` while something is dragged, and at first where the last fine one took long. */
+  beginPreview(now) {
+    this.#drawing = { coarse: this.held || (!this.#coarse && this.#fineTook > SLOW), begun: now };
+    return this.#drawing;
+  }
+
+  endPreview(drawing, now) {
+    if (!drawing.coarse) this.#fineTook = now - drawing.begun;
+    this.frames = [...this.frames.slice(-FRAMES), now];
+    if (this.#drawing !== drawing) return; // the state has changed meanwhile
+    this.#coarse = drawing.coarse && !this.held;
+    this.previewed = this.#coarse ? 0 : now;
+  }
+
+  /** Whether there is nothing to do but to trace paths. */
+  get idle() {
+    return this.previewed > 0 && !this.held && this.budget.samples > 0;
+  }
+
+  /** Whether the preview has shown the present state for that long. */
+  rested(milliseconds, now) {
+    return this.previewed > 0 && now - this.previewed > milliseconds;
+  }
+
+  /** Of previews, over the last second in which there were any. */
+  get framesPerSecond() {
+    const last = this.frames.at(-1);
+    const recent = this.frames.filter((time) => time > last - 1000);
+    return recent.length < 2 ? 0 : (1000 * (recent.length - 1)) / (last - recent[0]);
+  }
+}
+
+/** Divides samples into bands of rows, as many in a slice as the device gets done in its time. */
+export class Bands {
+  #rows = 8; // of a slice
+  #first = 0; // row of the next band
+
+  /** The next band {first, end} of a picture, in a slice that has so many rows already; null where it is full. */
+  next(height, rows) {
+    if (rows >= this.#rows) return null;
+    const left = height - this.#first;
+    const parts = Math.ceil(left / (this.#rows - rows));
+    return { first: this.#first, end: this.#first + Math.ceil(left / parts) };
+  }
+
+  /** A band is drawn; whether a sample of the whole picture is. */
+  advance({ end }, height) {
+    this.#first = end % height;
+    return this.#first === 0;
+  }
+
+  /** Begins a sample anew. */
+  restart() {
+    this.#first = 0;
+  }
+
+  /** Takes more rows into the next slice, or fewer, after some have taken so many milliseconds. */
+  pace(rows, took, height) {
+    const scale = Math.min(Math.max(SLICE / Math.max(took, 1), 0.25), 2);
+    this.#rows = Math.min(Math.max(Math.round(rows * scale), 1), MOST_SAMPLES * height);
+  }
+}

@@ -1,0 +1,71 @@
+// The canvas: one picture or two, each a preview, a sum of paths or in between; and the truth in the place of one.
+
+import { blending, display } from './glsl/display.glsl.js';
+
+const FIRST = 4; // samples from which on they are shown
+const TRUSTED = 16; // samples from which on the preview shows through no more
+
+/** Whether a slot has paths enough to be judged by them alone. */
+export const isTrusted = ({ samples }) => samples >= TRUSTED;
+
+export class Screen {
+  truth = null; // in the place of slot b: {width, height, data, samples, texture}
+  #device;
+  #blending = null;
+  #display = null;
+
+  constructor(device) {
+    this.#device = device;
+  }
+
+  async compile() {
+    const texts = [blending, display];
+    [this.#blending, this.#display] = await Promise.all(texts.map((text) => this.#device.program(text)));
+  }
+
+  get ready() {
+    return this.#display !== null;
+  }
+
+  /** Takes a picture {width, height, data: RGB, linear, from the upper left, samples}, stretched to a size; or null. */
+  setTruth(truth, { width, height }) {
+    this.#device.free(this.truth?.texture);
+    const texels = truth?.data && stretched(truth, width, height);
+    this.truth = truth && { ...truth, texture: texels && this.#device.texture('RGBA32F', width, height, texels) };
+  }
+
+  /** Draws the slots that are seen, by the settings of the view. */
+  paint(slots, { mode, split, exposure }) {
+    const [a, b = this.truth?.texture ?? a] = slots.map((slot) => this.#textureOf(slot));
+    const shown = { exposure, split: mode === 'split' ? split : 1, difference: mode === 'difference' };
+    this.#device.draw(this.#display, { picture_a: a, picture_b: b, ...shown }, null);
+  }
+
+  /** Draws one picture as the canvas would show it. */
+  expose(texture, exposure, target) {
+    const shown = { exposure, split: 1, difference: false };
+    this.#device.draw(this.#display, { picture_a: texture, picture_b: texture, ...shown }, target);
+  }
+
+  #textureOf(slot) {
+    const [preview, sum] = [slot.preview.textures[0], slot.sum.textures[0]];
+    if (slot.samples < FIRST) return preview;
+    if (isTrusted(slot)) return sum;
+    const trust = slot.samples / (slot.samples + 2);
+    this.#device.draw(this.#blending, { picture: preview, sum, trust }, slot.spare);
+    return slot.spare.textures[0];
+  }
+}
+
+/** An RGB picture as RGBA of another size, from the lower row on; pixels stay pixels. */
+function stretched({ width, height, data }, columns, rows) {
+  const found = new Float32Array(4 * columns * rows);
+  for (let y = 0; y < rows; y++) {
+    const row = Math.floor(((rows - 1 - y) * height) / rows);
+    for (let x = 0; x < columns; x++) {
+      const from = 3 * (row * width + Math.floor((x * width) / columns));
+      found.set([data[from], data[from + 1], data[from + 2], 1], 4 * (y * columns + x));
+    }
+  }
+  return found;
+}
