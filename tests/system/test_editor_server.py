@@ -442,6 +442,16 @@ def live(port: int, origin: str | None = None, token: str = TOKEN) -> Iterator[C
         yield socket
 
 
+def test_a_live_line_stays_open_though_nothing_is_said(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: it has no head to wait for any more."""
+    monkeypatch.setattr(guard, "HEAD_TIME", 0.3)
+    with served() as port, live(port) as socket:
+        with pytest.raises(TimeoutError):
+            socket.recv(timeout=0.9)
+        socket.send(json.dumps({"id": 1, "verb": "list", "body": {}}))
+        assert "answer" in json.loads(socket.recv(timeout=10))
+
+
 def test_live_calls_are_answered(port: int) -> None:
     with live(port, f"http://127.0.0.1:{port}") as socket:
         for body, field in [({"text": "layers: [{interface: {eta: 1.5}}]"}, "answer"), ({"text": "["}, "error")]:

@@ -154,8 +154,12 @@ class Connection(H11Protocol):
         self._stop()
 
     def _watch(self) -> None:
-        """Wait for a head, since the first byte of it or the connection's beginning; a request at work has its own."""
-        if self.cycle is not None and not self.cycle.response_complete:
+        """Wait for a head, since the first byte of it or the connection's beginning.
+
+        A request at work has a limit of its own, and a connection that has become a WebSocket has none.
+        """
+        upgraded = self.transport.get_protocol() is not self
+        if upgraded or (self.cycle is not None and not self.cycle.response_complete):
             self._stop()
         elif self.waiting is None:
             self.waiting = self.loop.call_later(HEAD_TIME, self.transport.close)
