@@ -88,7 +88,8 @@ def test_a_tape_runs_as_numpy_does(k: int) -> None:
 @pytest.mark.parametrize("name", presets())
 def test_flat_values_are_those_of_the_stack(name: str) -> None:
     found = answered()[0]["values"][presets().index(name)]
-    expected = {key: value for key, value in vt.preset(name).flat().items() if not isinstance(value, Varying)}
+    expected = {address.name: (address, value) for address, value in vt.preset(name).values()}
+    expected = {key: pair for key, pair in expected.items() if not isinstance(pair[1], Varying)}
     assert set(found) == {key for key in expected if not key.endswith("_conductor")}
     for key, value in found.items():
-        np.testing.assert_allclose(value, np.ravel(material.constant(key, expected[key])), rtol=1e-6, err_msg=key)
+        np.testing.assert_allclose(value, np.ravel(material.constant(*expected[key])), rtol=1e-6, err_msg=key)
