@@ -7,9 +7,11 @@ material's own values.
 
 from __future__ import annotations
 
+import functools
+import operator
 import textwrap
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,12 +108,23 @@ class Field:
 def plugin_class(mi: Any) -> type:
     """The base class of all layered plugins in the variant that is set: what they answer about their values.
 
-    Theirs is a `binding`, and `facts` by name, which `to_string` begins with.
+    Theirs is a `binding`, `facts` by name, which `to_string` begins with, and `eval_pdf`.
     """
 
     class MaterialBSDF(mi.BSDF):
         binding: Binding
         facts: dict[str, str]
+
+        def has_components(self, components: Sequence[Any]) -> None:
+            """Declare the flags of each component."""
+            self.m_components = list(components)
+            self.m_flags = functools.reduce(operator.or_, self.m_components)
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval_pdf(ctx, si, wo, active)[1]
 
         def traverse(self, callback: Any) -> None:
             self.binding.traverse(callback)

@@ -78,9 +78,7 @@ class EquivalenceClass:
         some = np.flatnonzero(possible.any(axis=0))
         if not len(some):
             return depths
-        columns, of_columns = (
-            mapped(take(x, some, len(eta_1)), lambda x: x[..., None]) for x in (below, rest)
-        )
+        columns, of_columns = (mapped(take(x, some, len(eta_1)), lambda x: x[..., None]) for x in (below, rest))
         depths[:, some] = _depth(columns, of_columns, np.broadcast_to(eta_2, (len(some), len(eta_2))))
         depths[~np.broadcast_to(possible, depths.shape[:2])] = np.nan
         return depths

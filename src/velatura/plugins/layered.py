@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import operator
 import sys
 from typing import Any
 
@@ -110,14 +108,14 @@ def make(mi: Any) -> type:
             one_way = flags.NonSymmetric if self.model.form == "forward" and not self.delta else flags.Empty
             lobes = len(merging(self.model, len(binding.stack.interfaces)))
             self.kinds = [flags.DeltaReflection if self.delta else flags.GlossyReflection] * lobes
-            self.m_components = [kind | common | one_way for kind in self.kinds]
+            components = [kind | common | one_way for kind in self.kinds]
             if self.transmits:
                 self.kinds += [flags.DeltaTransmission if self.delta else flags.GlossyTransmission]
-                self.m_components += [self.kinds[-1] | common | flags.NonSymmetric]
+                components += [self.kinds[-1] | common | flags.NonSymmetric]
             if based:
                 self.kinds += [flags.DiffuseReflection]
-                self.m_components += [self.kinds[-1] | common]
-            self.m_flags = functools.reduce(operator.or_, self.m_components)
+                components += [self.kinds[-1] | common]
+            self.has_components(components)
 
         def _prepared(self, material: Material, context: Context) -> bsdf.Body:
             return bsdf.body(material, self.model, self.variance, context)
@@ -160,12 +158,6 @@ def make(mi: Any) -> type:
             last = bs.sampled_component == len(self.kinds) - 1
             bs.sampled_type = dr.select(last, mi.UInt32(+self.kinds[-1]), mi.UInt32(+self.kinds[0]))
             return bs, mi.depolarizer(dr.select(active & (bs.pdf > 0), spectral.carried(mi, weight), 0))
-
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.eval_pdf(ctx, si, wo, active)[0]
-
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             if self.delta:

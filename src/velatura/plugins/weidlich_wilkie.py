@@ -7,8 +7,6 @@ with both directions refracted about their half-vector, and f_2 layered in turn.
 
 from __future__ import annotations
 
-import functools
-import operator
 from collections.abc import Iterator, Sequence
 from math import pi
 from typing import Any
@@ -56,8 +54,7 @@ def make(mi: Any) -> type:
                 self.types[-1] = flags.DiffuseReflection
             glossy = flags.GlossyReflection | flags.Anisotropic
             each = [glossy if kind == flags.GlossyReflection else kind for kind in self.types]
-            self.m_components = [common | kind for kind in each]
-            self.m_flags = functools.reduce(operator.or_, self.m_components)
+            self.has_components([common | kind for kind in each])
             self.facts = {"kinds": ", ".join(stack.kinds)}
 
         def parameters_changed(self, keys: list[str]) -> None:
@@ -71,12 +68,6 @@ def make(mi: Any) -> type:
             bs.sampled_type = dr.select(last, mi.UInt32(+self.types[-1]), mi.UInt32(+self.types[0]))
             value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
             return bs, value / dr.maximum(bs.pdf, 1e-30) & (bs.pdf > 0)
-
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.eval_pdf(ctx, si, wo, active)[0]
-
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.eval_pdf(ctx, si, wo, active)[1]
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             material, asked = self.binding.at(si, active), self._asked(ctx)

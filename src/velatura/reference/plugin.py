@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import operator
 import struct
 from typing import Any
 
@@ -99,8 +97,7 @@ def make(mi: Any) -> type:
             self.kinds = [kind for kind, is_there in there.items() if is_there]
             passing = (flags.GlossyTransmission, flags.DeltaTransmission)
             one_way = [flags.NonSymmetric if kind in passing else flags.Empty for kind in self.kinds]
-            self.m_components = [kind | common | extra for kind, extra in zip(self.kinds, one_way)]
-            self.m_flags = functools.reduce(operator.or_, self.m_components)
+            self.has_components([kind | common | extra for kind, extra in zip(self.kinds, one_way)])
             options = {"microsurface": str(self.microsurface).lower(), "max_depth": str(self.max_depth)}
             self.facts = {**options, "seed": str(self.seed), "kinds": ", ".join(binding.stack.kinds)}
 
