@@ -27,7 +27,8 @@ from velatura.optics.ggx import Direction
 from velatura.sampling import low_discrepancy
 
 COS_MIN = 1e-3  # inside; what refraction does not reach meets the interface at this one
-NORMALS, STEP = 987, 610  # of the quadrature's lattice; Fibonacci numbers
+NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
+GOLDEN = 0.5 * (5**0.5 - 1)  # of one to the next
 
 Reflectance = Callable[[Value], Value]
 
@@ -98,14 +99,15 @@ def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Directio
     return w if _is_straight(lobe.roughness) else ggx.rotate(w, -lobe.roughness.rotation)
 
 
-def integral(lobe: OwnMediumLobe, wi: Direction) -> Value:
+def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Value:
     """Albedo of a lobe, for directions wi of NumPy, (N,) each, as its roughness may be: (N,), or (3, N) of a colour.
 
-    A mean over visible normals on a lattice of Fibonacci's numbers; within .3 % on average.
+    A mean over visible normals on a lattice of a Fibonacci number of them; within .3 % on average.
     """
-    k = np.arange(NORMALS)
-    x, y, z, *roughness = (low_discrepancy.repeated(value, NORMALS) for value in (*wi, *lobe.roughness))
-    u1, u2 = (np.tile(u % 1, len(wi[2])) for u in ((k * STEP + 0.5) / NORMALS, (k + 0.5) / NORMALS))
+    k = np.arange(normals)
+    x, y, z, *roughness = (low_discrepancy.repeated(value, normals) for value in (*wi, *lobe.roughness))
+    step = round(normals * GOLDEN)
+    u1, u2 = (np.tile(u % 1, len(wi[2])) for u in ((k * step + 0.5) / normals, (k + 0.5) / normals))
     alpha_u, alpha_v, n, i = _inside(replace(lobe, roughness=Roughness(*roughness)), (x, y, z))
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     o = ggx.reflect(i, h)
@@ -115,7 +117,7 @@ def integral(lobe: OwnMediumLobe, wi: Direction) -> Value:
         value = value * lobe.facets(ops.clip(ggx.dot(i, h), 0.0, 1.0))
     if lobe.leaving:
         value = value * lobe.leaving(ops.sqrt(1 - p2))
-    return lobe.weight * low_discrepancy.averaged(value, NORMALS)
+    return lobe.weight * low_discrepancy.averaged(value, normals)
 
 
 def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Value, Direction]:

@@ -1,0 +1,153 @@
+"""Widths of lobes: exact limits, turning, and random walks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import velatura as vt
+from velatura import Interface, Medium, Stack, kernel
+from velatura.model import own_medium, widths
+from velatura.model.own_medium import OwnMediumLobe
+from velatura.model.transport.adding import Part, parts
+from velatura.model.variance import Roughness
+from velatura.optics import fresnel
+from velatura.stack import Material
+
+Array = NDArray[np.floating]
+
+COSINES = np.array([1.0, 0.7, 0.35])
+
+
+def found(*layers: Any) -> list[Part]:
+    return parts(Material.of(Stack(list(layers))))
+
+
+def smooth_energies(*layers: Any) -> Array:
+    """Of lobes of interfaces that are smooth, without what goes back and forth, (K, 3)."""
+    share, energies = np.ones(3), []
+    n = 1.0
+    for layer in layers:
+        cosine = np.sqrt(1 - (1 - COSINES**2) / n**2)
+        eta = layer.eta / n
+        r = fresnel.dielectric(cosine, eta) if layer.k is None else fresnel.conductor(cosine, eta, layer.k / n)
+        energies.append(share * r)
+        share, n = share * (1 - r) ** 2, layer.eta
+    return np.array(energies)
+
+
+def test_the_first_lobe_has_the_roughness_of_its_interface() -> None:
+    only = found(Interface(eta=1.5, alpha=(0.1, 0.4), rotation=25))
+    (lobe,) = widths.roughnesses(only, COSINES, np.array([0.0, 1.0, 2.0]), np.full((1, 3), 0.1))
+    np.testing.assert_allclose([lobe.alpha_u, lobe.alpha_v], np.array([[0.4], [0.1]]).repeat(3, 1), rtol=1e-9)
+    np.testing.assert_allclose(np.cos(2 * (lobe.rotation - np.radians(115))), 1)
+
+
+@pytest.mark.parametrize("coat", [Interface(eta=1.0, alpha=0.4), Interface(eta=1.0001, alpha=0.4)])
+def test_a_coat_of_the_index_outside_changes_nothing(coat: Interface) -> None:
+    layers = coat, Interface(eta=0.2, k=3.0, alpha=(0.3, 0.1), rotation=70)
+    _, lobe = widths.roughnesses(found(*layers), COSINES, 0 * COSINES, smooth_energies(*layers))
+    np.testing.assert_allclose(lobe.alpha_u, 0.3, rtol=3e-3)
+    np.testing.assert_allclose(lobe.alpha_v, 0.1, rtol=3e-3)
+    np.testing.assert_allclose(np.cos(2 * (lobe.rotation - np.radians(70))), 1)
+
+
+def test_turning_all_layers_turns_all_lobes() -> None:
+    """At the normal too, where lobes do not depend on the azimuth from which they are lit."""
+
+    def tensors(turn: float, phi: float) -> Array:
+        coat = Interface(eta=1.5, alpha=(0.1, 0.3), rotation=20 + turn)
+        base = Interface(eta=0.2, k=3.0, alpha=(0.4, 0.05), rotation=-50 + turn)
+        azimuths = np.full(3, np.radians(phi))
+        lobe = widths.roughnesses(found(coat, base), COSINES, azimuths, np.array([[0.05] * 3, [0.6] * 3]))[1]
+        tensor = widths.Tensor.turned(lobe.alpha_u, lobe.alpha_v, lobe.rotation - np.radians(turn))
+        return np.array([tensor.xx, tensor.xy, tensor.yy])
+
+    np.testing.assert_allclose(tensors(0, 0), tensors(33, 33), rtol=1e-9)
+    np.testing.assert_allclose(tensors(0, 0)[:, 0], tensors(0, 40)[:, 0], rtol=1e-9)
+    assert np.abs(tensors(0, 0)[:, 2] - tensors(0, 40)[:, 2]).max() > 1e-3
+
+
+def test_widths_are_finite_at_the_ends() -> None:
+    """Smooth and rough, equal indices, total reflection, an air gap, grazing and normal, no energy."""
+    cosines = np.array([1.0, 0.5, 1e-4])
+    for alpha in (0.0, 0.3, 1.0):
+        for eta in (1.0, 0.7, 2.5):
+            layers = found(
+                Interface(eta=1.6, alpha=alpha), Interface(eta=eta, alpha=alpha), Interface(eta=1.6, alpha=0.0)
+            )
+            for energy in (0.0, 0.3):
+                for lobe in widths.roughnesses(layers, cosines, 0 * cosines, np.full((3, 3), energy)):
+                    assert all(np.isfinite(x).all() for x in lobe)
+                    assert np.all(np.maximum(lobe.alpha_u, lobe.alpha_v) <= 1)
+
+
+def test_events_of_a_veil_are_those_that_turn_light_by_little() -> None:
+    """Shares and half the median angle of draws from Henyey and Greenstein's function."""
+    u = (np.arange(100_000) + 0.5) / 100_000
+    for g in (0.5, 0.9, 0.98):
+        s = (1 - g * g) / (1 - g + 2 * g * u)
+        angle = np.arccos((1 + g * g - s * s) / (2 * g))
+        assert widths.nearly_straight(g) == pytest.approx(np.mean(angle < widths.NEARLY_STRAIGHT), abs=2e-4)
+        layers = found(Interface(eta=1.5), Medium(sigma_s=0.1, g=g), Interface(conductor="mirror"))
+        narrow = widths.Tensor(*(np.full(3, x) for x in (1e-8, 0.0, 1e-8)))
+        veil = widths.veil(layers, 1, COSINES, narrow)
+        events = 2 * widths.nearly_straight(g) * 0.1 / np.sqrt(1 - (1 - COSINES**2) / 1.5**2)
+        median = np.median(angle[angle < widths.NEARLY_STRAIGHT])
+        np.testing.assert_allclose(veil.size, 0.5 * median * events / (1 - np.exp(-events)), rtol=5e-3)
+    assert widths.nearly_straight(0.0) == widths.nearly_straight(-0.5) == 0
+
+
+WALKED = {
+    "rough base": [Interface(eta=1.6, alpha=0.15), Interface(eta=0.3, k=3.0, alpha=0.35)],
+    "rough coat": [Interface(eta=1.4, alpha=0.35), Interface(eta=0.3, k=3.0, alpha=0.05)],
+    "two coats": [Interface(eta=1.8, alpha=0.2), Interface(eta=1.3, alpha=0.2), Interface(eta=0.3, k=3.0, alpha=0.2)],
+    "brushed": [Interface(eta=1.5, alpha=(0.05, 0.3), rotation=30), Interface(eta=0.3, k=3.0, alpha=(0.3, 0.1))],
+    "glass": [Interface(eta=1.5, alpha=0.2), Interface(eta=2.0, alpha=0.2)],
+}
+
+
+def binned(lobe: OwnMediumLobe, cosine: float, bins: int) -> Array:
+    """Light of a lobe on a grid over the projected disc, of energy 1."""
+    fine = 8
+    x, y = np.meshgrid(*[(np.arange(bins * fine) + 0.5) / (0.5 * bins * fine) - 1] * 2, indexing="ij")
+    z = np.sqrt(np.maximum(1 - x * x - y * y, 0))
+    wi = np.full(x.shape, np.sqrt(1 - cosine**2)), np.zeros(x.shape), np.full(x.shape, cosine)
+    value, _ = own_medium.eval_pdf(lobe, wi, (x, y, z))
+    light = np.where(z > 0, value / np.maximum(z, 1e-6), 0).reshape(bins, fine, bins, fine).sum(axis=(1, 3))
+    return np.asarray(light / light.sum())
+
+
+@pytest.mark.parametrize("name", WALKED)
+def test_lobes_are_as_wide_as_walks(name: str) -> None:
+    """Total variation over 20 x 20 bins, with energies as walked: .05, brushed .065, of which walks make .01."""
+    kernel.require_llvm()
+    layers, bins, cosines = WALKED[name], 20, COSINES[1:]
+    walked = vt.reference.statistics(Stack(layers), cosines, 0.0, 100_000, 1)
+    truth = vt.reference.distribution(Stack(layers), cosines, 0.0, 400_000, 1, bins=bins).reflected.mean(axis=0)
+    energies = np.array([energy.mean(axis=0) for energy in walked.energy])
+    layers_found = found(*layers)
+    shapes = widths.roughnesses(layers_found, cosines, 0 * cosines, energies)
+    for i, cosine in enumerate(cosines):
+        light = np.zeros((bins, bins))
+        n = 1.0
+        for k, (layer, shape) in enumerate(zip(layers, shapes)):
+            eta = float(np.mean(layer.eta)) / n
+
+            def facets(c: Any, eta: float = eta) -> Any:
+                return fresnel.dielectric(c, eta)
+
+            def leaving(c: Any) -> Any:
+                return 1 - fresnel.dielectric(c, layers[0].eta)
+
+            roughness = Roughness(*(np.broadcast_to(x, cosines.shape)[i] for x in shape))
+            lobe = OwnMediumLobe(1.0, roughness, n, None if layer.k else facets, leaving if k else None)
+            light += energies[k, i] * binned(lobe, cosine, bins)
+            n *= eta
+        if name != "brushed":
+            truth[i] = 0.5 * (truth[i] + truth[i][:, ::-1])
+        worst = 0.065 if name == "brushed" else 0.05
+        assert 0.5 * np.abs(light - truth[i]).sum() < worst * truth[i].sum()
