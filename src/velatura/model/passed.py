@@ -1,0 +1,120 @@
+"""Light that passes a stack, whole: straight through, bounced inside, and scattered; each with its own energy.
+
+Once for a direction, `parts` has the energies over the integrals of the lobes, and the probabilities of sampling them.
+A share `OF_BOUNCED` of what facets met often add goes with light that bounces, the rest with what is scattered. So does
+what a lobe lacks that would have to be drawn more than `MOST` times as bright for its energy.
+
+A sample of light that goes straight through is that of a rough dielectric: it may be reflected. So nothing else has to
+be sampled of a single interface whose facets are met once; elsewhere reflected lobes are sampled by their energies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model import bounced, own_medium, straight_through
+from velatura.model.straight_through import Passage
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+
+OF_BOUNCED = 0.5
+MOST = 2.0  # energy over integral
+LEAST = 0.05  # share of samples of what passes that are scattered, for what all others miss
+
+PASSES_MIN = 0.05  # share of facets that let light pass, where samples are shared
+BELOW_ONE = 1 - 2**-24
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Parts(ops.Named):
+    """Light from one direction that passes: weights (colours) of what goes straight through, of what bounces, and of
+    what is scattered, and the probabilities of sampling them; reflected lobes are sampled else."""
+
+    straight: Value
+    bounced: Value
+    rest: Value
+    of_straight: Value
+    of_bounced: Value
+    of_rest: Value
+
+    @property
+    def share(self) -> Value:
+        """Of all samples."""
+        return self.of_straight + self.of_bounced + self.of_rest
+
+
+def parts(
+    passage: Passage, wi: tuple[Array, Array, Array], straight: Array, bounces: Array, passed: Array, reflected: Array
+) -> Parts:
+    """In NumPy, for directions wi above, (N,) each, and energies (C, N): of light that passes straight through and
+    after bounces, where it meets facets once and is not scattered; of all that passes; and of what is reflected, but
+    for the facets of a single interface."""
+    i, lobe, found = bounced.seen_below(passage, wi), bounced.bounced(passage, wi), bounced.rest(passage, wi)
+    straight = np.minimum(straight, passed)
+    bounces = np.minimum(bounces, passed - straight)
+    if found.lobe is None:
+        bounces = bounces + OF_BOUNCED * (passed - straight - bounces)
+    # Divide energies by integrals, and hand over what they lack
+    of_straight, passes = straight_through.integrals(passage, wi)
+    of_bounced = own_medium.integral(lobe, i) if lobe else np.zeros_like(of_straight)
+    weight_straight = np.minimum(ops.divide(straight, of_straight), MOST)
+    bounces = bounces + straight - weight_straight * of_straight
+    weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MOST)
+    energies = weight_straight * of_straight, weight_bounced * of_bounced
+    rest = np.maximum(passed - energies[0] - energies[1], 0)
+    weight_rest = rest / bounced.integral_rest(found, i)
+    # Share samples; of the facets that are drawn, some reflect
+    straightly, bouncing, scattered, back = (np.mean(x, axis=0) for x in (*energies, rest, reflected))
+    if lobe:
+        scattered = np.maximum(scattered, LEAST * (straightly + bouncing))
+    drawn = ops.divide(straightly, np.clip(passes, PASSES_MIN, 1.0))
+    total = np.maximum(drawn + bouncing + scattered + back, ops.TINY)
+    return Parts(weight_straight, weight_bounced, weight_rest, drawn / total, bouncing / total, scattered / total)
+
+
+def eval_pdf(passage: Passage, of: Parts, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o|, a colour, of light that passes, and the density of `sample` times `Parts.share`, on both
+    sides; wi lies above. Radiance is not scaled by the index."""
+    i, o = bounced.seen_below(passage, wi), (wo[0], wo[1], -wo[2])
+    value, density = straight_through.eval_pdf(passage, wi, wo)
+    value, density = of.straight * value, of.of_straight * density
+    lobe = bounced.bounced(passage, wi)
+    also = [(of.rest, of.of_rest, bounced.eval_pdf_rest(bounced.rest(passage, wi), i, o))]
+    if lobe:
+        also.append((of.bounced, of.of_bounced, own_medium.eval_pdf(lobe, i, o)))
+    passes = (wi[2] > 0) & (wo[2] < 0)
+    for weight, probability, (more, density_of_more) in also:
+        value = value + ops.select(passes, weight * more, 0.0)
+        density = density + ops.select(passes, probability * density_of_more, 0.0)
+    return value, density
+
+
+def sample(passage: Passage, of: Parts, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction wo on either side, from uniform numbers; where light is lost, `eval_pdf` is 0."""
+    i = bounced.seen_below(passage, wi)
+    share = ops.maximum(of.share, ops.TINY)
+    probability = of.of_straight / share
+    begin = probability + of.of_bounced / share
+    wo = straight_through.sample(passage, wi, ops.minimum(ops.divide(u, probability), BELOW_ONE), u1, u2)
+    lobe = bounced.bounced(passage, wi)
+    if lobe:
+        wo = _chosen(u < probability, wo, _down(own_medium.sample(lobe, i, u1, u2)))
+    again = ops.clip(ops.divide(u - begin, 1 - begin), 0.0, BELOW_ONE)
+    scattered = _down(bounced.sample_rest(bounced.rest(passage, wi), i, again, u1, u2))
+    return _chosen(u < begin, wo, scattered)
+
+
+def _down(w: Direction) -> Direction:
+    """A direction turned down; what lies below the surface already is lost in it."""
+    return w[0], w[1], -ops.maximum(w[2], 0.0)
+
+
+def _chosen(where: Value, a: Direction, b: Direction) -> Direction:
+    x, y, z = (ops.select(where, p, q) for p, q in zip(a, b))
+    return x, y, z
