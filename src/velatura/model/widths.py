@@ -41,35 +41,36 @@ ALPHA_MAX = 1.0
 NEARLY_STRAIGHT = 0.2  # radians; by how much light of a veil is turned at most, in one event
 ASYMMETRY_MIN = 0.05  # of media that have a veil
 COARSE = 144  # normals
+AXES = (0.0, 0.5 * np.pi)  # of a tensor
 LARGEST = 1.5  # logarithm of a correction
 FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade
-# Pairs of features; of their product, what it adds to the logarithm of both widths, and by what share of sin^2 more to
-# that in the plane and less to that across it
+# Pairs of features; of their product, what it adds to the logarithm of the width along an axis, and what, times sin^2,
+# it adds to that of the width in the plane and takes from that across it
 CORRECTION: tuple[tuple[tuple[str, str], float, float], ...] = (
-    (("rarer", "lost"), 0.586, -0.263),
-    (("brighter", "size"), -0.155, 0.0807),
-    (("size", "size"), 0.00031, 0.00203),
-    (("rough", "rough"), -1.07, 0.762),
-    (("reflected", "rarer"), -1.02, 1.94),
-    (("size", "rough"), -0.423, 0.3),
-    (("rough", "near"), -4.09, 2.51),
-    (("coats", "falling"), 0.358, 0.0544),
-    (("brighter", "reflected"), 0.413, 1.05),
-    (("1", "rough"), -1.46, -1.07),
-    (("1", "brighter"), -0.355, -1.21),
-    (("brighter", "near"), -0.0749, 0.832),
-    (("brighter", "brighter"), 0.146, 0.106),
-    (("slant", "coats"), 0.000531, -0.32),
-    (("rough", "reflected"), 0.0734, 1.15),
-    (("rough", "rarer"), 1.34, -1.72),
+    (("rarer", "lost"), 0.592, -0.27),
+    (("brighter", "size"), -0.152, 0.081),
+    (("size", "size"), 0.000246, 0.00192),
+    (("rough", "rough"), -1.06, 0.657),
+    (("reflected", "rarer"), -1, 2.03),
+    (("size", "rough"), -0.414, 0.357),
+    (("rough", "near"), -4.1, 2.44),
+    (("coats", "falling"), 0.357, 0.0547),
+    (("brighter", "reflected"), 0.412, 1.05),
+    (("1", "rough"), -1.46, -1.01),
+    (("1", "brighter"), -0.354, -1.2),
+    (("brighter", "near"), -0.0709, 0.84),
+    (("brighter", "brighter"), 0.145, 0.103),
+    (("slant", "coats"), 0.00013, -0.328),
+    (("rough", "reflected"), 0.0687, 1.13),
+    (("rough", "rarer"), 1.33, -1.65),
     (("coats", "rarer"), 0.202, 0.435),
-    (("rough", "index"), 0.593, -0.0612),
-    (("falling", "lost"), 0.172, 0.257),
-    (("brighter", "coats"), -0.0343, 0.338),
-    (("coats", "coats"), -0.203, 0.198),
-    (("1", "coats"), 0.22, -0.0398),
-    (("brighter", "rarer"), 0.695, -0.563),
-    (("1", "reflected"), 0.0237, 0.0406),
+    (("rough", "index"), 0.595, -0.0434),
+    (("falling", "lost"), 0.171, 0.25),
+    (("brighter", "rarer"), 0.691, -0.571),
+    (("brighter", "coats"), -0.0305, 0.323),
+    (("coats", "coats"), -0.204, 0.18),
+    (("1", "coats"), 0.224, -0.0153),
+    (("1", "reflected"), 0.0243, 0.0415),
 )
 
 
@@ -116,7 +117,7 @@ class Tensor:
 
     def roughness(self, phi: Array) -> Roughness:
         """In the frame of the stack; `phi` is the azimuth of the plane."""
-        u, v = (np.minimum(self.width(self.angle + turn), ALPHA_MAX) for turn in (0, np.pi / 2))
+        u, v = (np.minimum(self.width(self.angle + turn), ALPHA_MAX) for turn in AXES)
         return Roughness(u, v, self.angle + phi)
 
 
@@ -124,7 +125,7 @@ def _sum(parts: Sequence[Tensor]) -> Tensor:
     """Along the axes of the sum of all, powers q of widths add."""
     squares = Tensor(*(np.sum([getattr(part, entry) for part in parts], axis=0) for entry in ("xx", "xy", "yy")))
     angle = squares.angle
-    u, v = (np.sum([part.width(angle + turn) ** Q for part in parts], axis=0) ** (1 / Q) for turn in (0, np.pi / 2))
+    u, v = (np.sum([part.width(angle + turn) ** Q for part in parts], axis=0) ** (1 / Q) for turn in AXES)
     return Tensor.turned(u, v, angle)
 
 
@@ -177,7 +178,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
         if coats:
             first = _first_order(own, coats, n, cosine)
             seen = features(part, first, own, coats, cos_theta, share, energies[len(result)])
-            result.append(first.stretched(*_correction(seen)))
+            result.append(_corrected(first, seen))
         else:
             result.append(own)
         if not part.opaque:
@@ -202,7 +203,7 @@ def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -
 def features(
     part: Facets, first: Tensor, own: Tensor, coats: Sequence[_Coat], cos_theta: Array, share: Array, energy: Array
 ) -> dict[str, Array]:
-    """What the correction is made of, (M,) each."""
+    """What the correction is made of, (M,) each, or (2, M) for the axes."""
     n, n_top = coats[-1].n_below, coats[0].n_below
     cosine = _cosine(cos_theta, n)
     sin2 = 1 - cos_theta * cos_theta
@@ -218,13 +219,14 @@ def features(
         reflected = both / let_out
     brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(reflected * let_out * share, 1e-9))
     moved = max((coat.tensor.size * coat.contrast for coat in coats), key=np.max)
+    axes = np.array([first.width(first.angle + turn) for turn in AXES])
     return {
         "1": np.ones_like(sin2),
         "steps": np.full_like(sin2, sum(coat.contrast for coat in coats)),
         "brighter": np.clip(brighter, -1.5, 2.0),
         "slant": sin2,
-        "size": np.log(first.size),
-        "coats": 1 - (own.size / first.size) ** Q,
+        "size": np.log(axes),
+        "coats": 1 - np.minimum(np.array([own.width(first.angle + turn) for turn in AXES]) / axes, 1) ** Q,
         "rough": moved,
         "falling": np.full_like(sin2, np.log(max(coat.n_below for coat in coats) / n)),
         "index": np.full_like(sin2, n - 1),
@@ -236,15 +238,17 @@ def features(
     }
 
 
-def _correction(seen: dict[str, Array]) -> tuple[Array, Array]:
-    """Factors of widths in the plane and across it."""
-    mean, apart = np.zeros_like(seen["slant"]), np.zeros_like(seen["slant"])
-    for (a, b), to_both, to_difference in CORRECTION:
-        product = seen[a] * seen[b]
-        mean, apart = mean + to_both * product, apart + to_difference * product * seen["slant"]
+def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
+    """With its axes scaled, and then what lies in the plane and across it."""
+    axes, apart = np.zeros((2, *first.xx.shape)), np.zeros_like(first.xx)
+    for (a, b), along, to_difference in CORRECTION:
+        product = np.broadcast_to(seen[a] * seen[b], axes.shape)
+        axes = axes + along * product
+        apart = apart + to_difference * product.mean(axis=0) * seen["slant"]
     fading = seen["steps"] / (seen["steps"] + FADE)
-    x, y = (np.exp(np.clip(fading * each, -LARGEST, LARGEST)) for each in (mean + apart, mean - apart))
-    return x, y
+    u, v, x = (np.exp(np.clip(fading * each, -LARGEST, LARGEST)) for each in (*axes, apart))
+    scaled = Tensor.turned(u * first.width(first.angle), v * first.width(first.angle + AXES[1]), first.angle)
+    return scaled.stretched(x, 1 / x)
 
 
 def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Tensor:
