@@ -195,7 +195,7 @@ class Binding:
         values = {address: objects.get(address.name, value) for address, value in self.stack.values()}
         self.addresses = {address.name: address for address in values}
         for address, value in values.items():
-            first = next(at for at in values if (at.layer, at.declared) == (address.layer, address.declared))
+            first = next(at for at in values if at.layer == address.layer and at.declared is address.declared)
             if first != address and first.name in self.images and value == values[first]:
                 self.images[address.name] = self.images[first.name]  # so that the interface stays isotropic
             else:
@@ -275,19 +275,21 @@ class Binding:
         """The material of values that are the same everywhere; spectra are at fixed wavelengths."""
         return self.material({**self._colours(), **self.steering})
 
-    def looked_at(self, symbolic: bool = False) -> Material:
-        """The material with constants as plain numbers where they are numbers, and images as they are.
-
-        With `symbolic`, what is being differentiated stays as it is, and so never equals another value.
-        """
+    def looked_at(self) -> Material:
+        """The material with constants as plain numbers where they are numbers, and images as they are."""
         import drjit as dr
 
         def plain(value: Any) -> Any:
-            if isinstance(value, float) or dr.size_v(value) > 1 or (symbolic and dr.grad_enabled(value)):
-                return value
-            return float(value[0])
+            return value if isinstance(value, float) or dr.size_v(value) > 1 else float(value[0])
 
         return self.material({**{name: plain(value) for name, value in self.constants.items()}, **self.images})
+
+    def symbolic(self, looked_at: Material) -> Material:
+        """The same with what is being differentiated as it is, so that it never equals another value."""
+        import drjit as dr
+
+        apart = {name: value for name, value in self.constants.items() if dr.grad_enabled(value)}
+        return looked_at.each(lambda address, value: apart.get(address.name, value))
 
     def _at(self, si: Any, active: Any) -> dict[str, Any]:
         found = {name: image.at(si, active) for name, image in self.images.items()}

@@ -87,7 +87,8 @@ def make(mi: Any) -> type:
             self.binding.update()
             binding, based = self.binding, self.binding.stack.base is not None
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
-            self.variance = variance_kind(binding.looked_at(symbolic=True))
+            seen = binding.looked_at()
+            self.variance = variance_kind(binding.symbolic(seen))
             self.body: bsdf.Body | None = None
             if binding.uniform:
                 self.body = self._prepared(binding.uniform_material(), self._sampled())
@@ -100,7 +101,7 @@ def make(mi: Any) -> type:
                 self.spectra = spectral.sample(mi, fixed, self._at_wavelengths)
                 dr.eval(self.spectra.above, self.spectra.below, self.spectra.means)
             # Say how light leaves
-            self.delta = not binding.varies and not any(layer.spreads for layer in binding.looked_at().layers)
+            self.delta = not binding.varies and not any(layer.spreads for layer in seen.layers)
             self.transmits = binding.stack.transmits
             common = flags.FrontSide | (flags.SpatiallyVarying if binding.varies else flags.Empty)
             common |= flags.Empty if self.variance is Isotropic else flags.Anisotropic

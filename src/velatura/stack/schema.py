@@ -8,6 +8,7 @@ Schema and the manual's table are all read off that declaration.
 from __future__ import annotations
 
 import difflib
+import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,7 +126,8 @@ def plain(value: Any) -> Any:
     return value
 
 
-def parameters(model: type[Record]) -> dict[str, Parameter]:
+@functools.cache
+def parameters(model: type[Record]) -> Mapping[str, Parameter]:
     """The declared parameters of a model, in order."""
     return {
         key: declaration
