@@ -325,3 +325,14 @@ def test_all_figures_are_saved_states() -> None:
     assert [state["name"] for state in states if state["snapped"]] == ["bati2021-21-left"]
     for state in states:
         assert deviation(state["material"], state["target"], state["model"]) < EXACT
+
+
+def test_absorption_over_a_metal_gives_way_to_a_brighter_wish() -> None:
+    stack = copy.deepcopy(COATED)
+    stack["layers"][2] = {"interface": {"eta": 0.02, "k": 8, "alpha": 0.2}}
+    here = appearance.appearance({"material": stack, "model": "bati2021"})
+    wish = copy.deepcopy(here["target"])
+    wish["lobes"][1]["energy"] = [e * 1.1 for e in wish["lobes"][1]["energy"]]
+    answer = appearance.invert({"target": wish, "material": stack, "model": "bati2021"})
+    assert answer["snapped"] is None
+    assert deviation(answer["material"], wish, "bati2021") < EXACT

@@ -362,3 +362,57 @@ def test_joined_stacks_keep_numbers_that_differ() -> None:
     parts = [Layers("dielectric", 1.5, None, Roughness(0.1, 0.1, 0.0), tau) for tau in (0.0, 0.3)]
     joined = join(parts, [1, 2])
     assert (joined.eta, joined.tau.tolist()) == (1.5, [0, 0.3, 0.3])
+
+
+def test_the_sets_of_one_interface_are_those_of_each_channel() -> None:
+    """Below an absorbing medium, indices that reflect at least as much, by the closed form of Fresnel."""
+    energy = np.array([0.04, 0.06, 0.1])
+    members = EquivalenceClass(Above.nothing(PLAIN, 1.6), energy[:, None], 0.0, 1)
+    for channel, r in ((0, 0.04), (1, 0.06), (2, 0.1), (None, 0.1)):
+        root = (1 + np.sqrt(r)) / (1 - np.sqrt(r))
+        spans = [(low, high) for low, high in ((1.0, 1.6 / root), (1.6 * root, 4.0)) if low < high]
+        np.testing.assert_allclose(members.indices_1(channel), spans, rtol=1e-6)
+
+
+def test_the_boundary_of_a_channel_is_its_own() -> None:
+    members = pair_class([0.05, 0.1, 0.15], eta_0=1.3)
+    for channel, energy in enumerate((0.05, 0.1, 0.15)):
+        for eta_1, eta_2 in np.concatenate(members.boundary(32, channel)):
+            r_1, r_2 = fresnel.normal_incidence(eta_1 / 1.3), fresnel.normal_incidence(eta_2 / eta_1)
+            assert r_1 + (1 - r_1) ** 2 * r_2 / (1 - r_1 * r_2) == pytest.approx(energy, abs=1e-6)
+
+
+def test_first_indices_of_a_pair_over_a_conductor() -> None:
+    """Those of which a member is feasible, on a dense grid."""
+    members = pair_class([0.5, 0.4, 0.3], 0.01, model=AVERAGED, kind="conductor")
+    spans, axis = members.indices_1(), np.geomspace(1, 4, 400)
+    within = np.logical_or.reduce([(low <= axis) & (axis <= high) for low, high in spans])
+    assert within.any() and not members.empty
+    feasible = np.logical_and.reduce(np.broadcast_arrays(*(part.feasible for part in members.member(axis))))
+    assert np.mean(within != feasible) < 0.01
+
+
+def test_members_are_drawn_from_all_parts_of_a_class() -> None:
+    """Evenly over the logarithms of two intervals of one length: binomial at 4.5 standard errors."""
+    members = EquivalenceClass(Above.nothing(PLAIN, 2.0), np.full((3, 1), 0.02), 0.0, 1)
+    (low, a), (b, high) = members.indices_1()
+    drawn = members.sample(4000, 0)[:, 0]
+    share = np.log(a / low) / np.log(a / low * high / b)
+    assert abs(np.mean(drawn <= a) - share) < 4.5 * np.sqrt(share * (1 - share) / 4000)
+    assert np.all((drawn <= a * (1 + 1e-9)) | (drawn >= b * (1 - 1e-9)))
+
+
+def test_the_nearest_of_one_interface() -> None:
+    members = EquivalenceClass(Above.nothing(PLAIN, 2.0), np.full((3, 1), 0.02), 0.0, 1)
+    (_, a), (b, _) = members.indices_1()
+    assert members.nearest(1.2).tolist() == [1.2]
+    assert members.nearest(0.999 * np.sqrt(a * b)).tolist() == [a]
+    assert members.nearest(1.001 * np.sqrt(a * b)).tolist() == [b]
+    assert members.nearest(9.0).tolist() == [4.0]
+    assert pair_class([0.9] * 3).nearest(1.2, 1.5).shape == (0,)
+
+
+def test_a_pair_of_given_indices_has_them() -> None:
+    found = invert_pair([[0.06]] * 3, 0.01, 1.3, eta_2=2.2, exterior=1.1)
+    np.testing.assert_allclose(found.lower.eta, 2.2)
+    np.testing.assert_allclose(found.upper.eta, 1.3)

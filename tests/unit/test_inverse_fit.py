@@ -10,6 +10,7 @@ import pytest
 
 from velatura.errors import InvalidInput
 from velatura.inverse import Directions, Infeasible, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
+from velatura.inverse.fitting import _merged
 from velatura.model import Model, named
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, loads
 
@@ -168,3 +169,10 @@ def test_no_such_table_and_no_such_stack(tmp_path: Path) -> None:
         load_table(tmp_path / "none.csv")
     with pytest.raises(Infeasible):
         fit_target(table_of(COATED, Directions.about_lobes(False), AVERAGED), [{"energy": 0.6}])
+
+
+def test_media_that_become_one_keep_their_depths_and_mean_angle() -> None:
+    media = [Medium(depth=1.0, sigma_s=1.0, g=0.8), Medium(depth=3.0, sigma_s=1.0, sigma_a=(0.1, 0.2, 0.3), g=0.0)]
+    one = _merged(media)
+    assert (one.depth, one.sigma_s, one.g) == (1.0, 4.0, pytest.approx(0.2))
+    np.testing.assert_allclose(one.sigma_a, [0.3, 0.6, 0.9])

@@ -381,3 +381,46 @@ def test_a_key_that_would_be_ignored_is_refused(target: dict[str, object], messa
 def test_a_roughness_that_no_index_gives_is_infeasible() -> None:
     with pytest.raises(Infeasible, match="a fixed roughness is not the one that gives that blur"):
         found({**PAIR, "energy": [0.09, 0.09, 0.15], "fixed": {"alpha": [None, 0.09]}})
+
+
+def test_too_much_energy_is_shared_out_alike() -> None:
+    lobes = [{"energy": 0.2}, {"energy": [0.9, 0.7, 0.5], "base": "conductor"}]
+    with pytest.raises(Infeasible) as error:
+        invert_stack(lobes)
+    (way,) = error.value.directions
+    scale = np.exp(-way.change)
+    assert (error.value.constraint, way.what, way.words) == ("sum", "energy", f"all energies times {scale:.3g}")
+    for lobe, asked in zip(way.target.lobes, ((0.2, 0.2, 0.2), (0.9, 0.7, 0.5))):
+        np.testing.assert_allclose(lobe.colour, scale * np.array(asked))
+    assert all(part.feasible.all() for part in invert_stack(way.target).layers)
+
+
+def test_a_way_out_names_the_lobe_that_it_blurs() -> None:
+    lobes = [{"energy": 0.04, "variance": 0.02}, {"energy": 0.5, "variance": 0.004, "base": "conductor"}]
+    with pytest.raises(Infeasible) as error:
+        invert_stack(lobes)
+    way = next(way for way in error.value.directions if way.what == "lobe 2 variance")
+    variance = way.target.lobes[1].variance
+    assert variance is not None and variance > 0.004
+    assert way.words == f"lobe 2 variance {variance:.4g}"
+    assert way.change == pytest.approx(np.log(variance / 0.004))
+    assert max(read(way.target, invert_stack(way.target).stack, AVERAGED)) < 1e-4
+
+
+def test_a_member_of_a_class_below_a_fixed_depth_is_in_it() -> None:
+    lobe = {"energy": [0.06, 0.05, 0.04], "variance": 0.01, "interfaces": 2, "fixed": {"tau": [0.2, None]}}
+    solution = invert_stack([{"energy": 0.04}, lobe])
+    first, second = (part.eta[0] for part in solution.layers[1:])
+    assert solution.classes[1].contains(first, second).all()
+
+
+def test_a_coat_that_is_not_there_changes_nothing() -> None:
+    """Nor the tint of a metal, which a lobe alone leaves open."""
+    metal = Interface(eta=(0.5, 0.8, 1.4), k=(3.0, 2.4, 1.9), alpha=0.2)
+    kept = coat(Stack([metal]), 1.0, keep_appearance=True).stack.interfaces[-1]
+    np.testing.assert_allclose(np.array([kept.eta, kept.k]), [metal.eta, metal.k], rtol=1e-3)
+
+
+def test_a_mirror_cannot_be_as_bright_under_a_coat() -> None:
+    with pytest.raises(NoSolution, match=r"^layer 0 \(interface\): cannot keep its appearance"):
+        coat(Stack([Interface(conductor="mirror", alpha=0.2)]), keep_appearance=True)
