@@ -387,7 +387,10 @@ def integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int
     # Cast rays from the middle
     x, weight = np.polynomial.legendre.leggauss(nodes[0])
     share, weight = 0.5 * (x + 1), 0.5 * weight
-    phi = (np.arange(nodes[1]) + 0.5) * (2 * pi / nodes[1])
+    # Both sides of the plane of incidence are alike where interfaces have no axes
+    alike = all(isinstance(crossing.width, Isotropic) for crossing in passage.crossings)
+    phi = (np.arange(nodes[1]) + 0.5) * ((pi if alike else 2 * pi) / nodes[1])
+    rotation = np.arctan2(i.p[1], i.p[0])[:, None, None] if alike else rotation
     n_out = np.asarray(n[-1])
     length = np.sqrt(np.maximum(i.p2, ops.TINY))
     bound = np.where(length < n_out, np.minimum(1, (1 - WIDTH_MIN) * n_out / length), EDGE * n_out / length)
