@@ -15,6 +15,7 @@ from velatura.model.passed import Parts
 from velatura.model.prepare import variance_kind
 from velatura.model.straight_through import Passage
 from velatura.optics import fresnel, ggx
+from velatura.shader import symbol
 from velatura.stack import Material
 from velatura.stack.flat_names import Address
 
@@ -156,3 +157,19 @@ def test_drjit_agrees_with_numpy() -> None:
     expected = passed.eval_pdf(ours, of, wi, wo)
     for a, b in zip(passed.eval_pdf(theirs, of_theirs, wi_theirs, tuple(mi.Float(x) for x in wo)), expected):
         np.testing.assert_allclose(np.array(a), b, rtol=5e-3, atol=1e-4)
+
+
+def test_it_is_recorded_for_shaders() -> None:
+    """Value, density and a sample of a brushed and scattering pane, from symbols; evaluated, they are checked with the
+    shaders that read them."""
+
+    def value_of(address: Address, value: Any) -> Any:
+        return symbol.colour(address.name) if address.colour else symbol.number(address.name)
+
+    passage = straight_through.passage(Material.of(MILK, value_of), variance_kind(Material.of(MILK)))
+    colours, numbers = ([make(f"of.{make.__name__}{k}") for k in range(3)] for make in (symbol.colour, symbol.number))
+    wi, wo, u = (tuple(symbol.number(f"{name}.{axis}") for axis in "xyz") for name in ("wi", "wo", "u"))
+    of = Parts(*colours, *numbers)
+    value, density = passed.eval_pdf(passage, of, wi, wo)
+    drawn = passed.sample(passage, of, wi, *u)
+    assert all(isinstance(x, symbol.Symbol) for x in (value, density, *drawn))

@@ -314,7 +314,8 @@ def _facet(crossing: Crossing, i: Crossed, o: Crossed, j: int, step: Value) -> _
     height = 1 / ops.sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1])
     # As good as no step has no direction
     made = n_1 * c_1 - n_2 * c_2
-    faces = (v_i > 0) & (v_o > 0) & ((crossing.sign * made > 0) | (ops.absolute(made) < crossing.least))
+    forwards = ops.maximum(crossing.sign * made, crossing.least - ops.absolute(made))
+    faces = (v_i > 0) & (v_o > 0) & (forwards > 0)
     v_i, v_o = ops.maximum(v_i, 0.0), ops.maximum(v_o, 0.0)
     reflectance = fresnel.dielectric_between(v_i * c_1 * height, v_o * c_2 * height, crossing.eta)
     return _Facet(slope, ops.select(faces, (1 - reflectance) * (v_i * v_o / (step * step)), 0.0))
