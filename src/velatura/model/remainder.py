@@ -85,8 +85,8 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
     """The polynomial closest to the light that leaves a stack, by colour (C,).
 
     Args:
-        measures: (C, 3, N, M) of light from M directions: its energy at the nodes, and its means of cos(phi) and
-            cos(2 phi), phi being 0 on the side of the mirror direction.
+        measures: (C, modes, N, M) of light from M directions: its energy at the nodes, and its means of cos(phi) and
+            cos(2 phi), as far as it has any; phi is 0 on the side of the mirror direction.
         cosines: of the directions, (M,).
         albedos: of the stack for these, (C, M); errors count relative to them.
     """
@@ -109,6 +109,7 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
         target = np.concatenate([(weight * seen[0]).ravel(), exact * light[0].sum(axis=0)])
         parts = [(rows, target)]
         parts += [(_rows(each, weight), (weight * mode).ravel()) for each, mode in zip((once, twice), seen[1:])]
+        parts += [(np.eye(1), np.zeros(1))] * (3 - len(parts))
         numbers.append(np.concatenate([np.linalg.lstsq(*part, rcond=None)[0] for part in parts]))
     return Remainder(*np.stack(numbers, axis=-1))
 
