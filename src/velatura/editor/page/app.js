@@ -46,7 +46,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   const { signal } = ending;
   let settling = null;
   let keeping = null;
-  let telling = null;
+  let announcing = null;
   let note = '';
   let picture = null;
 
@@ -316,8 +316,8 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
       app.complain(about, text, { layer: number && enabled(store.get())[number]?.id });
     },
     onBaked(slot) {
-      telling ??= window.requestAnimationFrame(() => {
-        telling = null;
+      announcing ??= window.requestAnimationFrame(() => {
+        announcing = null;
         for (const listener of lobeListeners) listener(slot);
       });
     },
@@ -364,7 +364,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
   root.addEventListener('drop', (event) => onDrop(app, event), { signal });
   signal.addEventListener('abort', () => stopListening?.());
-  const ticking = window.setInterval(() => tell(app), 250);
+  const ticking = window.setInterval(() => showSamples(app), 250);
   signal.addEventListener('abort', () => window.clearInterval(ticking));
   app.update();
   return app;
@@ -441,7 +441,7 @@ function onDrop(app, event) {
 }
 
 /** The count of samples, which changes too often to draw the page for it. */
-function tell(app) {
+function showSamples(app) {
   const place = app.element.querySelector('.samples');
   const { samples, truth } = app.viewport;
   const shown = Number.isFinite(samples) && samples > 0 ? `${samples} samples` : 'preview';

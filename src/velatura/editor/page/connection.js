@@ -1,4 +1,4 @@
-// Talking to the server: calls over HTTP, and a WebSocket that tells whether it is there.
+// Talking to the server: calls over HTTP, and a WebSocket that shows whether it is there.
 
 /** An error that the user can mend, in one line; `status` 409 is a conflict. */
 export class Refused extends Error {
@@ -65,7 +65,7 @@ export function liveConnection(address) {
   let count = 0;
   let timer = null;
 
-  function tell(online) {
+  function become(online) {
     if (connection.online === online) return;
     connection.online = online;
     for (const listener of listeners) listener(online);
@@ -75,11 +75,11 @@ export function liveConnection(address) {
     socket = new WebSocket(address);
     socket.onopen = () => {
       pause = SHORTEST;
-      tell(true);
+      become(true);
     };
     socket.onmessage = ({ data }) => settle(JSON.parse(data));
     socket.onclose = () => {
-      tell(false);
+      become(false);
       for (const { reject } of sent.values()) reject(new Offline());
       sent.clear();
       timer = setTimeout(open, pause);

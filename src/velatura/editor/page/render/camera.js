@@ -47,7 +47,7 @@ export function orbited({ origin, target, fov }, azimuth, elevation, distance = 
   };
 }
 
-/** Tells `move(azimuth, elevation, distance)` what hands do on a canvas, and when they `begin` and `end`. */
+/** Calls `move(azimuth, elevation, distance)` for what hands do on a canvas, and `begin` and `end` around it. */
 export function listen(canvas, { move, begin, end }, signal) {
   const on = (name, act) => canvas.addEventListener(name, act, { signal, passive: false });
   const fingers = new Map();

@@ -53,7 +53,7 @@ function part(mesh) {
   };
 }
 
-/** The numbers of an attribute, be they interleaved or normalised integers. */
+/** The numbers of an attribute, which may be interleaved or normalised integers. */
 function numbers(attribute, size) {
   const found = new Float32Array(size * attribute.count);
   for (let i = 0; i < found.length; i++) found[i] = attribute.getComponent(Math.floor(i / size), i % size);

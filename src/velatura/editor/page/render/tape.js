@@ -87,7 +87,7 @@ export class Tape {
    */
   constructor({ inputs, constants, steps, outputs }, tables, given) {
     this.tables = tables;
-    this.spare = []; // arrays of a block that nobody reads any more
+    this.spare = []; // arrays of a block that are no longer read
     this.inputs = inputs.map((name) => [name, valueOf(given[name])]);
     this.values = [...this.inputs.map(([, value]) => value), ...constants.map(valueOf)];
     this.first = this.values.length;
@@ -124,7 +124,7 @@ export class Tape {
     }
   }
 
-  /** The calls for every block, without those for what is not chosen, whatever the number. */
+  /** The calls for every block, without those for branches that no number chooses. */
   needed() {
     const { steps, values, first } = this;
     const chosen = steps.map(({ op, args, value }) => {

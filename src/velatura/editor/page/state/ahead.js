@@ -1,4 +1,4 @@
-// Makes ready what may come next, while nobody does anything: all for one more layer of either kind.
+// Makes ready what may come next, while there is no input: all for one more layer of either kind.
 
 import { addLayer } from './commands.js';
 import { documentOf, pattern } from './material.js';
@@ -6,7 +6,7 @@ import { documentOf, pattern } from './material.js';
 const PAUSE = 500; // milliseconds between two looks at whether there is time
 const KINDS = ['interface', 'medium', 'diffuse'];
 
-/** Follows a store: `{quiet, stop()}`; `drawn` tells the shape that the picture has. */
+/** Follows a store: `{quiet, stop()}`; `drawn` returns the shape that the picture has. */
 export function lookAhead({ store, viewport, call, drawn }) {
   let ready = ''; // the shape that all is ready for
   let busy = false;
@@ -30,7 +30,7 @@ export function lookAhead({ store, viewport, call, drawn }) {
       const shader = await call('shader', { material: documentOf(addLayer(state, kind)), model, switches });
       if (store.get() === state) await viewport.prepare(shader);
     } catch {
-      // Whoever does add the layer is told why it cannot be
+      // The reason is shown when the layer is added
     }
   }
 

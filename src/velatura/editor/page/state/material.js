@@ -49,30 +49,21 @@ export function indices(value, part, names) {
 export function flat(state, { names, schema }) {
   const values = { exterior: state.exterior };
   enabled(state).forEach(({ kind, keys }, index) => {
-    const found =
-      kind === 'interface' ? surface(keys, names, schema) : { ...defaults(schema[kind]), ...keys };
-    for (const [key, value] of Object.entries(found)) {
-      if (typeof value === 'number' || Array.isArray(value)) values[`layer${index}_${key}`] = value;
-    }
+    for (const [key, value] of numbersOf(keys, schema[kind], names)) values[`layer${index}_${key}`] = value;
   });
   return values;
 }
 
-function surface(keys, names, schema) {
-  const variant = variantOf(keys);
-  const opaque = variant === 'metal' || variant === 'custom';
-  const [u, v] = axes(keys.alpha ?? schema.interface.alpha.default);
-  return {
-    ...(variant !== 'mirror' && { eta: indices(keys.conductor ?? keys.eta, 'eta', names) }),
-    ...(opaque && { k: indices(keys.conductor ?? keys.k, 'k', names) }),
-    alpha_u: u,
-    alpha_v: v,
-    rotation: keys.rotation ?? schema.interface.rotation.default,
-  };
+/** The numbers of a layer, as [key, value], by the kinds of its parameters in the schema. */
+function numbersOf(keys, parameters, names) {
+  const found = Object.entries(parameters).flatMap(([key, { kind, default: standard }]) => {
+    const value = keys[key] ?? standard;
+    if (kind === 'pair') return axes(value).map((one, axis) => [`${key}_${'uv'[axis]}`, one]);
+    if (kind !== 'index') return [[key, value]];
+    return keys.conductor === 'mirror' ? [] : [[key, indices(keys.conductor ?? value, key, names)]];
+  });
+  return found.filter(([, value]) => typeof value === 'number' || Array.isArray(value));
 }
-
-const defaults = (parameters) =>
-  Object.fromEntries(Object.entries(parameters).map(([key, { default: value }]) => [key, value]));
 
 /** The two of a pair; a locked one has the same twice. */
 export const axes = (pair) => (Array.isArray(pair) ? pair : [pair, pair]);

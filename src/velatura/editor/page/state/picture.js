@@ -7,15 +7,30 @@ const PAUSE = 250; // milliseconds without a change, after which Python is asked
 
 /** One material in the viewport: the state's own (`a`), or that of the other model (`b`). */
 class Slot {
-  constructor(name, { viewport, call, session, onShader, onProblem, onBaked }) {
-    Object.assign(this, { name, viewport, call, session, onShader, onProblem, onBaked });
-    this.shader = null; // what the viewport draws now
-    this.given = null; // and the state whose values it has
-    this.drawn = null; // and the pattern it was asked for
-    this.wanted = null; // what Python is to be asked next
-    this.asked = null; // what it was asked last
-    this.busy = false;
-    this.timer = null;
+  shader = null; // what the viewport draws now
+  given = null; // and the state whose values it has
+  drawn = null; // and the pattern it was asked for
+  #name;
+  #services;
+  #state = null; // to be drawn
+  #shape = null; // its pattern
+  #wanted = null; // what Python is to be asked next
+  #asked = null; // what it was asked last
+  #failed = false; // whether it refused that
+  #busy = false;
+  #timer = null;
+
+  constructor(name, services) {
+    this.#name = name;
+    this.#services = services;
+  }
+
+  get quiet() {
+    return !this.#wanted && !this.#busy;
+  }
+
+  stop() {
+    clearTimeout(this.#timer);
   }
 
   /** Brings the picture to a state. */
@@ -24,62 +39,65 @@ class Slot {
     const shape = JSON.stringify([pattern(state), model, switches]);
     const material = documentOf(state);
     const text = JSON.stringify([material, model, switches]);
-    if (this.asked === text && !this.failed) return this.rename(state);
+    if (this.#asked === text && !this.#failed) return this.#rename(state);
     const known = shape === this.drawn;
-    this.asked = text;
-    this.failed = false;
-    this.state = state;
-    this.shape = shape;
-    if (known) this.setValues();
-    this.wanted = { material, model, switches, shape };
-    clearTimeout(this.timer);
-    if (known) this.timer = setTimeout(() => this.ask(), PAUSE);
-    else this.ask();
+    this.#asked = text;
+    this.#failed = false;
+    this.#state = state;
+    this.#shape = shape;
+    if (known) this.#setValues();
+    this.#wanted = { material, model, switches, shape };
+    clearTimeout(this.#timer);
+    if (known) this.#timer = setTimeout(() => this.#ask(), PAUSE);
+    else this.#ask();
   }
 
   /** Takes a state of the same material, opened anew maybe, for the one that was asked for. */
-  rename(state) {
-    if (this.given === this.state) this.given = state;
-    this.state = state;
+  #rename(state) {
+    if (this.given === this.#state) this.given = state;
+    this.#state = state;
   }
 
-  setValues() {
-    const { name, state, shader, session, viewport } = this;
+  #setValues() {
+    const { viewport, session, onBaked } = this.#services, name = this.#name, state = this.#state;
     if (state.document !== this.given?.document) viewport.forget(name);
-    viewport.setValues(name, valuesOf(shader, state, session));
+    viewport.setValues(name, valuesOf(this.shader, state, session));
     this.given = state;
-    this.onBaked(name);
+    onBaked(name);
   }
 
   /** Asks for the shader of what is wanted, one question at a time and the latest only. */
-  async ask() {
-    if (this.busy) return;
-    this.busy = true;
-    while (this.wanted) {
-      const { shape, ...question } = this.wanted;
-      this.wanted = null;
+  async #ask() {
+    if (this.#busy) return;
+    const { call, onProblem } = this.#services;
+    this.#busy = true;
+    while (this.#wanted) {
+      const { shape, ...question } = this.#wanted;
+      this.#wanted = null;
       try {
-        const shader = await this.call('shader', question);
-        if (!this.wanted) await this.accept(shader, shape);
+        const shader = await call('shader', question);
+        if (!this.#wanted) await this.#accept(shader, shape);
       } catch (error) {
-        this.failed = true;
-        if (!this.wanted) this.onProblem(this.name, error);
+        this.#failed = true;
+        if (!this.#wanted) onProblem(this.#name, error);
         if (error instanceof Offline) break;
       }
     }
-    this.busy = false;
+    this.#busy = false;
   }
 
-  async accept(shader, shape) {
+  async #accept(shader, shape) {
+    const { viewport, session, onShader, onProblem } = this.#services;
     if (shader.key !== this.shader?.key) {
-      const { state } = this;
-      await this.viewport.setMaterial(this.name, shader, valuesOf(shader, state, this.session));
-      Object.assign(this, { shader, given: state });
+      const state = this.#state;
+      await viewport.setMaterial(this.#name, shader, valuesOf(shader, state, session));
+      this.shader = shader;
+      this.given = state;
     }
     this.drawn = shape;
-    if (shape === this.shape) this.setValues();
-    this.onProblem(this.name, null);
-    this.onShader(this.name, shader);
+    if (shape === this.#shape) this.#setValues();
+    onProblem(this.#name, null);
+    onShader(this.#name, shader);
   }
 }
 
@@ -155,12 +173,12 @@ export function follow({ store, viewport, call, session, files, onProblem, onBak
     drawn: (slot) => slots[slot].drawn,
     given: (slot) => slots[slot].given,
     get quiet() {
-      return Object.values(slots).every((slot) => !slot.wanted && !slot.busy);
+      return Object.values(slots).every((slot) => slot.quiet);
     },
     again: () => update(store.get()),
     stop() {
       unsubscribe();
-      for (const slot of Object.values(slots)) clearTimeout(slot.timer);
+      for (const slot of Object.values(slots)) slot.stop();
     },
   };
 }

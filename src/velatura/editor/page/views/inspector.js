@@ -148,7 +148,7 @@ export function mountInspector(element, app) {
     const { plot, read } = PLOTS[local.tab]();
     return html`${directions()}
       <div class="plot">${plot}</div>
-      <div class="told">${legend(read)}</div>`;
+      <div class="readout">${legend(read)}</div>`;
   }
 
   const directions = () => html`<div class="chosen">
@@ -359,8 +359,8 @@ export function mountInspector(element, app) {
               ${swatch(look)}${name}
             </button>`}
       </th>
-      <td>${told(value)}</td>
-      ${other ? html`<td class="second">${told(second)}</td>` : nothing}
+      <td>${coloured(value)}</td>
+      ${other ? html`<td class="second">${coloured(second)}</td>` : nothing}
     </tr>`;
     return html`<table class="legend">
       <thead>
@@ -387,7 +387,7 @@ export function mountInspector(element, app) {
   };
 }
 
-const told = (value) => (value ? shownColour(value) : '');
+const coloured = (value) => (value ? shownColour(value) : '');
 
 const colourOf = (angles, colours, place) =>
   [0, 1, 2].map((channel) => valueAt({ x: angles, y: colours.map((colour) => colour[channel]) }, place));

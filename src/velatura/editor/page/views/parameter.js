@@ -24,13 +24,14 @@ const isTexture = (value) => value?.texture !== undefined;
 const isSpectrum = (value) => value?.spectrum !== undefined;
 const isBrushing = (value) => value?.brushing !== undefined;
 
-/** Which parameters a layer shows: an interface has those of its kind only. */
+const INDICES = { dielectric: ['eta'], metal: ['conductor'], custom: ['eta', 'k'], mirror: [] };
+
+/** Which parameters a layer shows: of the indices, an interface has those of its kind only. */
 export function parametersOf({ kind, keys }, schema) {
-  if (kind !== 'interface') return Object.keys(schema[kind]);
-  const index = { dielectric: ['eta'], metal: ['conductor'], custom: ['eta', 'k'], mirror: [] }[
-    variantOf(keys)
-  ];
-  return [...index, 'alpha', 'rotation'];
+  const all = Object.keys(schema[kind]);
+  if (kind !== 'interface') return all;
+  const hidden = Object.values(INDICES).flat();
+  return [...INDICES[variantOf(keys)], ...all.filter((key) => !hidden.includes(key))];
 }
 
 export function parameter(app, layer, key) {

@@ -1,7 +1,7 @@
 // Linear radiance as the screen shows it: exposure, a soft shoulder and the sRGB curve; two materials side by
 // side.
 
-/** Luminance of the largest difference that the scale tells apart, either way. */
+/** Luminance of the largest difference that the scale resolves, either way. */
 export const LARGEST_DIFFERENCE = 0.25;
 
 export const display = /* glsl */ `#version 300 es

@@ -108,7 +108,7 @@ export function createValidations(call, paint) {
     return html`<div class="plot">
         ${chart({ label: page.title, ...axes, lines, cursor, onCursor, step: (high - low) / 50 })}
       </div>
-      <div class="told">
+      <div class="readout">
         <p class="says" aria-live="polite">${says}</p>
         <table class="legend">
           <thead>
