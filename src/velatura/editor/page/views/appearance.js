@@ -26,12 +26,13 @@ const BASES = [
  * Shows the panel in an element; it follows the store.
  *
  * @param {HTMLElement} element
- * @param {object} app
+ * @param {{store, session, call, live, viewport, edits, messages, picture, isQuiet: function}} services `isQuiet()` is
+ *   whether Python has answered all
  * @returns {{know: function, destroy: function}}
  */
-export function mountAppearance(element, app) {
-  const { store } = app;
-  const ask = asker(app);
+export function mountAppearance(element, services) {
+  const { store, session, call, live, edits, messages } = services;
+  const ask = asker({ live, call });
   const known = new Recent(KEPT); // answers, by material
   let read = { target: null, haze: [], says: 'The lobes are being read.' };
   let text = ''; // of the material that was read, or is asked about
@@ -91,9 +92,9 @@ export function mountAppearance(element, app) {
       const answer = await ask(verb, { ...body, ...question() });
       if (!answer || before !== now()) return;
       accept(answer, command);
-      app.forgive('appearance');
+      messages.forgive('appearance');
     } catch (error) {
-      app.fail('appearance', error);
+      messages.fail('appearance', error);
     }
   }, () => held || settle());
 
@@ -103,7 +104,7 @@ export function mountAppearance(element, app) {
     read = { target, haze, snapped, says: null };
     text = textOf(material, store.get());
     known.set(text, read);
-    app.drag('appearance', command, material);
+    edits.drag('appearance', command, material);
     paint();
   }
 
@@ -120,7 +121,7 @@ export function mountAppearance(element, app) {
 
   function settle() {
     if (!refused) asked = null;
-    app.settle();
+    edits.settle();
     classes.follow();
     paint();
   }
@@ -138,7 +139,7 @@ export function mountAppearance(element, app) {
     letGo();
   };
 
-  const classes = createClass(app, {
+  const classes = createClass(services, {
     ask,
     question,
     want,
@@ -242,7 +243,7 @@ export function mountAppearance(element, app) {
       move: (value) => wish(index, { [key]: valueOf(value) }),
       set: (value) => once(index, { [key]: valueOf(value) }),
       settle: letGo,
-      refuse: (words) => app.complain('appearance', words, { passing: true }),
+      refuse: (words) => messages.complain('appearance', words, { passing: true }),
     });
     const energy = edit('energy', (value) => withMean(lobe.energy, Math.max(value, 1e-6)).map(rounded));
     return html`
@@ -284,10 +285,10 @@ export function mountAppearance(element, app) {
       move: (value) => setCoat({ [key]: value }),
       set: (value) => setCoat({ [key]: value }),
       settle() {},
-      refuse: (words) => app.complain('appearance', words, { passing: true }),
+      refuse: (words) => messages.complain('appearance', words, { passing: true }),
     });
     const one = (name, key) => ({ label: `${name} of the coat`, value: coat[key], edit: edit(key) });
-    const { eta, alpha } = app.session.schema.interface;
+    const { eta, alpha } = session.schema.interface;
     return html`<details class="part">
       <summary>Coat</summary>
       ${line('Index', number({ ...one('Index', 'eta'), spec: eta, span: [1, 3] }))}
@@ -309,9 +310,9 @@ export function mountAppearance(element, app) {
   }
 
   async function putCoat() {
-    await app.attempt('appearance', async () => {
+    await messages.attempt('appearance', async () => {
       const before = now();
-      const answer = await app.call('coat', { ...question(), ...coat });
+      const answer = await call('coat', { ...question(), ...coat });
       if (before !== now()) return;
       if (answer.material) store.run(addCoat, answer.material);
       coatSays = answer.error ? `${capital(answer.error)}.` : '';
@@ -330,7 +331,7 @@ export function mountAppearance(element, app) {
   const unpin = () => store.run(setView, { mode: 'single' });
 
   const stop = store.subscribe(follow);
-  const stopListening = app.live?.onChange((online) => online && follow());
+  const stopListening = live?.onChange((online) => online && follow());
   follow();
   return {
     follow,

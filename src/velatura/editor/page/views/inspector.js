@@ -25,11 +25,10 @@ const CHANNELS = ['red', 'green', 'blue'];
  * Shows the inspector in an element; it follows the store and what the viewport draws.
  *
  * @param {HTMLElement} element
- * @param {{store, viewport, call, onLobes, given, pending}} app
+ * @param {{store, viewport, call, picture, onLobes}} services `onLobes(f)` calls f(slot) after its lobes have changed
  * @returns {{destroy: function}}
  */
-export function mountInspector(element, app) {
-  const { store, viewport, call, onLobes } = app;
+export function mountInspector(element, { store, viewport, call, picture, onLobes }) {
   let local = { tab: 'polar', angle: 45, azimuth: 0, below: false, logarithmic: true, cursors: {} };
   const slices = {}; // by slot
   const making = {}; // whether slices are on their way, by slot
@@ -84,11 +83,11 @@ export function mountInspector(element, app) {
   }
 
   /** Plots come after pictures; while something is dragged they follow. */
-  const isTime = () => !viewport.lost && (viewport.held || (viewport.rested(PAUSE) && !app.pending));
+  const isTime = () => !viewport.lost && (viewport.held || (viewport.rested(PAUSE) && picture.quiet));
 
   async function make(name, slot) {
     making[name] = true;
-    const state = app.given(name);
+    const state = picture.given(name);
     try {
       const made = await new Slices(slot, local, state).ready();
       if (viewport.lost || slot !== viewport.slots[name]) changed[name] = true;

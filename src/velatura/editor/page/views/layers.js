@@ -28,15 +28,21 @@ const VARIANTS = [
   ['mirror', 'Mirror'],
 ];
 
-export function layers(app) {
-  const state = app.store.get();
+/** A view of the layers of the state. */
+export function createLayers(services) {
+  const panel = { ...services, dropAt: null }; // the place where a card that is dragged would go
+  return () => layers(panel);
+}
+
+function layers(panel) {
+  const state = panel.store.get();
   return html`
-    ${top(app, state)}
+    ${top(panel, state)}
     <ol class="layers">
       ${repeat(
         state.layers,
         ({ id }) => id,
-        (layer, index) => card(app, layer, index),
+        (layer, index) => card(panel, layer, index),
       )}
     </ol>
     <div class="add" role="group" aria-label="Add a layer">
@@ -47,7 +53,7 @@ export function layers(app) {
         ['diffuse', 'Diffuse base'],
       ].map(
         ([kind, title]) =>
-          html`<button type="button" data-add=${kind} @click=${() => app.store.run(addLayer, kind)}>
+          html`<button type="button" data-add=${kind} @click=${() => panel.store.run(addLayer, kind)}>
             ${title}
           </button>`,
       )}
@@ -55,14 +61,8 @@ export function layers(app) {
   `;
 }
 
-function top(app, { name, exterior, thin }) {
-  const { store, session } = app;
-  const edit = {
-    move: (next) => app.drag('exterior', setExterior, next),
-    set: (next) => store.run(setExterior, next),
-    settle: app.settle,
-    refuse: (text) => app.complain('material', text, { passing: true }),
-  };
+function top({ store, session, edits }, { name, exterior, thin }) {
+  const edit = edits.of('exterior', (next) => [setExterior, next], 'material');
   const { material } = session.schema;
   return html`<div class="top">
     <label class="wide">
@@ -83,13 +83,13 @@ function top(app, { name, exterior, thin }) {
 
 // One layer ------------------------------------------------------------------------------------------
 
-function card(app, layer, index) {
-  const { store, session } = app;
+function card(panel, layer, index) {
+  const { store, session } = panel;
   const name = layerName(layer);
-  const problem = app.problemOf(layer.id);
+  const problem = panel.messages.problemOf(layer.id);
   const number = numberOf(store.get(), layer.id);
   return html`<li
-    class="layer ${layer.kind} ${layer.enabled ? '' : 'off'} ${app.dropAt === index ? 'drop' : ''}"
+    class="layer ${layer.kind} ${layer.enabled ? '' : 'off'} ${panel.dropAt === index ? 'drop' : ''}"
     data-layer=${layer.id}
     aria-label=${layer.enabled ? `Layer ${number}: ${name}` : `${name}, off`}
   >
@@ -99,13 +99,13 @@ function card(app, layer, index) {
         class="small grip"
         title="Drag to move; arrow keys move too"
         aria-label=${`Move ${name}: arrow keys`}
-        @keydown=${(event) => moveByKey(app, event, layer, index)}
-        @pointerdown=${(event) => moveByHand(app, event, layer)}
+        @keydown=${(event) => moveByKey(panel, event, layer, index)}
+        @pointerdown=${(event) => moveByHand(panel, event, layer)}
       >
         ${icons.grip}
       </button>
       <b class="place" title="Its number in plots and messages">${layer.enabled ? number : '–'}</b>
-      ${kindOf(app, layer)}
+      ${kindOf(panel, layer)}
       <span class="buttons">
         <input
           type="checkbox"
@@ -123,7 +123,7 @@ function card(app, layer, index) {
                 act: () => store.run(duplicateLayer, layer.id),
               })
         }
-        ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: () => remove(app, layer, index) })}
+        ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: () => remove(panel, layer, index) })}
       </span>
     </div>
     ${problem ? html`<p class="problem">${problem}</p>` : nothing}
@@ -131,7 +131,7 @@ function card(app, layer, index) {
       ${repeat(
         parametersOf(layer, session.schema),
         (key) => key,
-        (key) => parameter(app, layer, key),
+        (key) => parameter(panel, layer, key),
       )}
     </div>
   </li>`;
@@ -144,24 +144,24 @@ function kindOf({ store, session }, layer) {
   return menu({ label: 'Kind of interface', value: variantOf(layer.keys), options: VARIANTS, choose });
 }
 
-function remove(app, layer, index) {
-  app.store.run(removeLayer, layer.id);
-  const next = app.store.get().layers[Math.min(index, app.store.get().layers.length - 1)];
-  app.focus(next ? `[data-layer="${next.id}"] .grip` : '[data-add]');
+function remove(panel, layer, index) {
+  panel.store.run(removeLayer, layer.id);
+  const next = panel.store.get().layers[Math.min(index, panel.store.get().layers.length - 1)];
+  panel.focus(next ? `[data-layer="${next.id}"] .grip` : '[data-add]');
 }
 
 // Moving ---------------------------------------------------------------------------------------------
 
-function moveByKey(app, event, layer, index) {
+function moveByKey(panel, event, layer, index) {
   const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
   if (!step) return;
   event.preventDefault();
-  app.store.run(moveLayer, layer.id, index + step);
-  app.focus(`[data-layer="${layer.id}"] .grip`);
+  panel.store.run(moveLayer, layer.id, index + step);
+  panel.focus(`[data-layer="${layer.id}"] .grip`);
 }
 
 /** Follows a pointer over the list and shows where the layer would go; it moves when the pointer is let go. */
-function moveByHand(app, event, layer) {
+function moveByHand(panel, event, layer) {
   if (event.button !== 0) return;
   const grip = event.currentTarget;
   const cards = [...grip.closest('.layers').children];
@@ -173,18 +173,18 @@ function moveByHand(app, event, layer) {
   const on = (name, act) => grip.addEventListener(name, act, { signal: done.signal });
   const end = () => {
     done.abort();
-    app.dropAt = null;
-    app.update();
+    panel.dropAt = null;
+    panel.update();
   };
   grip.setPointerCapture(event.pointerId);
   on('pointermove', (moved) => {
-    app.dropAt = over(moved);
-    app.update();
+    panel.dropAt = over(moved);
+    panel.update();
   });
   on('pointerup', (moved) => {
     end();
-    app.store.run(moveLayer, layer.id, over(moved));
-    app.focus(`[data-layer="${layer.id}"] .grip`);
+    panel.store.run(moveLayer, layer.id, over(moved));
+    panel.focus(`[data-layer="${layer.id}"] .grip`);
   });
   on('pointercancel', end);
 }

@@ -3,22 +3,29 @@
 import { html, nothing } from 'lit-html';
 import { styleMap } from 'lit-html/directives/style-map.js';
 import { setView } from '../state/commands.js';
-import { layers } from './layers.js';
-import { model, view } from './settings.js';
-import { toolbar } from './toolbar.js';
 
-export function page(app) {
-  return html`
-    ${toolbar(app)}
+/**
+ * The whole page: `view()`, and `show(face)`, which turns the panel to the layers or to their appearance.
+ *
+ * @param {object} parts views `toolbar`, `layers`, `view` and `model` of what is in it, its `canvas`, and what it works on;
+ *   `onFace()` is called after the panel has turned
+ */
+export function createPage({ store, session, edits, messages, canvas, focus, update, onFace, ...parts }) {
+  let face = 'layers'; // of the panel
+
+  function show(name) {
+    face = name;
+    update();
+    onFace();
+  }
+
+  const view = () => html`
+    ${parts.toolbar()}
     <main class="stage">
       <div class="picture">
-        <canvas
-          aria-label="The material on an object; arrow keys turn it, plus and minus come closer"
-          role="img"
-        ></canvas>
-        ${divider(app)}
+        ${canvas} ${divider({ store, session, edits })}
         <span class="samples" aria-hidden="true"></span>
-        ${messages(app)}
+        ${bubbles(messages)}
       </div>
       <details class="look" open>
         <summary>Look inside</summary>
@@ -26,26 +33,28 @@ export function page(app) {
       </details>
     </main>
     <aside class="panel" aria-label="Material and view">
-      ${faces(app)}
+      ${faces({ face, show, focus })}
       <div
         id="face-layers"
         role="tabpanel"
         class="section"
         aria-labelledby="tab-layers"
-        ?hidden=${app.face !== 'layers'}
+        ?hidden=${face !== 'layers'}
       >
-        ${layers(app)}
+        ${parts.layers()}
       </div>
       <div
         id="face-appearance"
         role="tabpanel"
         class="appearance-slot"
         aria-labelledby="tab-appearance"
-        ?hidden=${app.face !== 'appearance'}
+        ?hidden=${face !== 'appearance'}
       ></div>
-      ${section('View', view(app))} ${section('Model', model(app))}
+      ${section('View', parts.view())} ${section('Model', parts.model())}
     </aside>
   `;
+
+  return { view, show };
 }
 
 const FACES = [
@@ -54,13 +63,13 @@ const FACES = [
 ];
 
 /** Two ways to the material: its layers, or what is seen of them. */
-function faces(app) {
+function faces({ face, show, focus }) {
   const onKey = (event) => {
     if (event.key !== 'ArrowLeft' && event.key !== 'ArrowRight') return;
     event.preventDefault();
-    const [other] = FACES.find(([name]) => name !== app.face);
-    app.show(other);
-    app.focus(`#tab-${other}`);
+    const [other] = FACES.find(([name]) => name !== face);
+    show(other);
+    focus(`#tab-${other}`);
   };
   return html`<div class="faces" role="tablist" aria-label="The material by" @keydown=${onKey}>
     ${FACES.map(
@@ -68,10 +77,10 @@ function faces(app) {
         type="button"
         role="tab"
         id="tab-${name}"
-        aria-selected=${name === app.face}
+        aria-selected=${name === face}
         aria-controls="face-${name}"
-        tabindex=${name === app.face ? 0 : -1}
-        @click=${() => app.show(name)}
+        tabindex=${name === face ? 0 : -1}
+        @click=${() => show(name)}
       >
         ${title}
       </button>`,
@@ -89,35 +98,35 @@ function section(title, content) {
 const MESSAGES = 3; // at once
 
 /** What is wrong, the latest last, or was done last, in words. */
-function messages(app) {
+function bubbles(messages) {
   const isNew = ({ text }, at, all) => all.findIndex((problem) => problem.text === text) === at;
-  const problems = app.problems.filter(isNew).slice(-MESSAGES);
+  const problems = messages.problems.filter(isNew).slice(-MESSAGES);
   return html`<div class="messages" role="status" aria-live="polite">
     ${problems.map(
       ({ about, text, actions }) =>
         html`<p class="problem">
           ${text}
           ${actions.map(({ title, act }) => html`<button type="button" @click=${act}>${title}</button>`)}
-          <button type="button" class="quiet" @click=${() => app.forgive(about)}>Dismiss</button>
+          <button type="button" class="quiet" @click=${() => messages.forgive(about)}>Dismiss</button>
         </p>`,
     )}
-    ${problems.length || !app.note ? nothing : html`<p>${app.note}</p>`}
+    ${problems.length || !messages.note ? nothing : html`<p>${messages.note}</p>`}
   </div>`;
 }
 
 /** The line between two models, which can be dragged, and moved by keys. */
-function divider(app) {
-  const { view } = app.store.get();
+function divider({ store, session, edits }) {
+  const { view, model } = store.get();
   if (view.mode !== 'split') return nothing;
-  const { models, default_model: standard } = app.session;
+  const { models, default_model: standard } = session;
   const titleOf = (name) => models.find((known) => known.name === name).title;
-  const move = (split) => app.drag('split', setView, { split: Math.max(0, Math.min(1, split)) });
+  const move = (split) => edits.drag('split', setView, { split: Math.max(0, Math.min(1, split)) });
   const onKey = (event) => {
     const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];
     if (!step) return;
     event.preventDefault();
     move(view.split + step);
-    app.settle();
+    edits.settle();
   };
   const byHand = (event) => {
     if (!event.buttons) return;
@@ -137,9 +146,9 @@ function divider(app) {
       @keydown=${onKey}
       @pointerdown=${(event) => event.currentTarget.setPointerCapture(event.pointerId)}
       @pointermove=${byHand}
-      @pointerup=${app.settle}
+      @pointerup=${edits.settle}
     ></div>
-    <span class="side left">${view.other?.material ? 'A' : titleOf(app.store.get().model)}</span>
+    <span class="side left">${view.other?.material ? 'A' : titleOf(model)}</span>
     <span class="side right">${view.other?.title ?? titleOf(view.other?.model ?? standard)}</span>
   `;
 }

@@ -34,18 +34,15 @@ export function parametersOf({ kind, keys }, schema) {
   return [...INDICES[variantOf(keys)], ...all.filter((key) => !hidden.includes(key))];
 }
 
-export function parameter(app, layer, key) {
-  const { store, session } = app;
+/** `services` are {session, edits, messages, choose, upload}. */
+export function parameter(services, layer, key) {
+  const { session, edits } = services;
   const spec = session.schema[layer.kind][key];
   const value = layer.keys[key] ?? spec.default;
   const label = NAMES[key] ?? key;
-  const edit = {
-    move: (next) => app.drag(`${layer.id}.${key}`, setValue, layer.id, key, next),
-    set: (next) => store.run(setValue, layer.id, key, next),
-    settle: app.settle,
-    refuse: (text) => app.complain(`layer.${layer.id}`, text, { layer: layer.id, passing: true }),
-  };
-  const context = { app, layer, key, label, spec, value, edit, records: session.schema };
+  const act = (next) => [setValue, layer.id, key, next];
+  const edit = edits.of(`${layer.id}.${key}`, act, `layer.${layer.id}`, layer.id);
+  const context = { services, layer, key, label, spec, value, edit, records: session.schema };
   const { control, extras } = FORMS[spec.kind](context);
   const takes = spec.texturable ? textureTarget(context) : {};
   return html`<div
@@ -99,10 +96,10 @@ function channelsSwitch({ label, value, edit }) {
 
 /** An index: a name of a measured material, or numbers. */
 function index(context) {
-  const { app, layer, key, label, value, edit } = context;
+  const { services, layer, key, label, value, edit } = context;
   if (isTexture(value)) return textured(context);
   if (isSpectrum(value)) return measured(context);
-  const { dielectrics, conductors } = app.session.names;
+  const { dielectrics, conductors } = services.session.names;
   const opaque = variantOf(layer.keys) === 'custom';
   const group = (title, names) => {
     const known = Object.keys(names);
@@ -116,7 +113,7 @@ function index(context) {
     ...(key === 'eta' ? [group('Dielectrics', dielectrics)] : []),
     ...(opaque ? [group('Metals', conductors)] : []),
   ];
-  const choose = (name) => edit.set(name || plainIndex(indices(value, key, app.session.names)));
+  const choose = (name) => edit.set(name || plainIndex(indices(value, key, services.session.names)));
   const menuOf = menu({ label: `${label}, by name`, value: named ? value : '', options, choose });
   const numbers = named ? { control: nothing, extras: textureButton(context) } : simple(context, colour);
   return { control: html`${menuOf}${numbers.control}`, extras: numbers.extras };
@@ -209,16 +206,16 @@ function measured({ label, value, spec, edit }) {
   };
 }
 
-function textureButton({ app, label, edit, spec }) {
+function textureButton({ services, label, edit, spec }) {
   if (!spec.texturable) return nothing;
   const act = async () => {
-    const file = await app.chooseFile('image/*,.exr,.hdr');
-    if (file) putTexture(app, file, edit);
+    const file = await services.choose('image/*,.exr,.hdr');
+    if (file) putTexture(services, file, edit);
   };
   return iconButton({ label: `${label}: take a texture`, icon: 'texture', act });
 }
 
-function textureTarget({ app, edit }) {
+function textureTarget({ services, edit }) {
   return {
     over: (event) => event.preventDefault(),
     drop(event) {
@@ -226,11 +223,11 @@ function textureTarget({ app, edit }) {
       if (!file) return;
       event.preventDefault();
       event.stopPropagation();
-      putTexture(app, file, edit);
+      putTexture(services, file, edit);
     },
   };
 }
 
-async function putTexture(app, file, edit) {
-  await app.attempt(`Texture ${file.name}`, async () => edit.set({ texture: await app.upload(file) }));
+async function putTexture({ messages, upload }, file, edit) {
+  await messages.attempt(`Texture ${file.name}`, async () => edit.set({ texture: await upload(file) }));
 }

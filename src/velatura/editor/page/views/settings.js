@@ -26,15 +26,12 @@ const choice = (label, value, options, choose) => line(label, menu({ label, valu
 
 // View -----------------------------------------------------------------------------------------------
 
-export function view(app) {
-  const { store, session } = app;
+/** A view of what the picture shows. */
+export const createView = (services) => () => view(services);
+
+function view({ store, session, edits, picture, choose, takeEnvironment }) {
   const { view } = store.get();
-  const change = (key) => ({
-    move: (value) => app.drag(`view.${key}`, setView, { [key]: value }),
-    set: (value) => store.run(setView, { [key]: value }),
-    settle: app.settle,
-    refuse: (text) => app.complain('view', text, { passing: true }),
-  });
+  const change = (key) => edits.of(`view.${key}`, (value) => [setView, { [key]: value }], 'view');
   const known = session.environments.map(({ name, title }) => [name, title]);
   /** What was dropped, among what is known. */
   const withOwn = (options, name) =>
@@ -43,6 +40,10 @@ export function view(app) {
     store.run(setView, { object });
     store.aside(setCamera, null);
   };
+  const chooseEnvironment = async () => {
+    const file = await choose('.hdr,.exr');
+    if (file) takeEnvironment(file);
+  };
   const exposure = { label: 'Exposure, in stops', spec: { low: -20, high: 20 }, span: [-4, 4] };
   const objects = session.objects.map((name) => [name, capital(name)]);
   return html`
@@ -50,26 +51,20 @@ export function view(app) {
     ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
     ${line('Turned by', dial({ label: 'Rotation of the light', value: view.rotation, edit: change('rotation') }))}
     ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
-    ${line('Lobes', lobes(app))}
+    ${line('Lobes', lobes({ store, picture }))}
     <div class="actions">
       <button type="button" @click=${() => store.aside(setCamera, null)}>Reset the camera</button>
-      <button type="button" @click=${() => chooseEnvironment(app)}>Light from a file</button>
+      <button type="button" @click=${chooseEnvironment}>Light from a file</button>
     </div>
   `;
 }
 
-async function chooseEnvironment(app) {
-  const file = await app.chooseFile('.hdr,.exr');
-  if (file) app.takeEnvironment(file);
-}
-
 /** One button for all lobes, and one for each alone. */
-function lobes(app) {
-  const { store } = app;
+function lobes({ store, picture }) {
   const { lobe } = store.get().view;
-  const shader = app.shader();
+  const shader = picture.shader('a');
   if (!shader) return nothing;
-  const all = enabled(app.given());
+  const all = enabled(picture.given('a'));
   const title = ({ kind, layers }) => {
     if (kind !== 'reflected') return capital(kind);
     return layers.map((number) => `${number} ${layerName(all[number])}`).join(', ');
@@ -89,8 +84,10 @@ function lobes(app) {
 
 // Model ----------------------------------------------------------------------------------------------
 
-export function model(app) {
-  const { store, session } = app;
+/** A view of the model, and of what it is compared with. */
+export const createModel = (services) => () => model(services);
+
+function model({ store, session }) {
   const { model, switches, view } = store.get();
   const { switches: choices, defaults } = session.models.find(({ name }) => name === model);
   const models = session.models.map(({ name, title }) => [name, title]);

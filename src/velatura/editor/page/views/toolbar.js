@@ -5,26 +5,38 @@ import { ref, createRef } from 'lit-html/directives/ref.js';
 import { isChanged, placeOf } from '../state/commands.js';
 import { iconButton } from './controls.js';
 
-export function toolbar(app) {
-  const { store } = app;
+/** `view()`, and `saveAs()` and `saveAgain()` as its buttons do. */
+export function createToolbar(services) {
+  const { store, files } = services;
+  const dialogs = { open: createRef(), save: createRef() };
+  const bar = {
+    ...services,
+    dialogs,
+    listed: null, // files of the folder
+    targets: null, // of the papers
+    saveAs: () => dialogs.save.value.showModal(),
+    saveAgain() {
+      const { file, version } = placeOf(store.get());
+      return file ? files.save(file, version) : bar.saveAs();
+    },
+  };
+  return { view: () => toolbar(bar), saveAs: bar.saveAs, saveAgain: bar.saveAgain };
+}
+
+function toolbar(bar) {
+  const { store } = bar;
   const { file } = placeOf(store.get());
   const changed = isChanged(store.get());
-  app.dialogs ??= { open: createRef(), save: createRef() };
-  app.saveAs ??= () => app.dialogs.save.value.showModal();
-  app.saveAgain ??= () => {
-    const place = placeOf(store.get());
-    return place.file ? app.save(place.file, place.version) : app.saveAs();
-  };
   return html`
     <header class="toolbar" role="toolbar" aria-label="File and history">
       <span class="brand">Velatura</span>
-      <button type="button" @click=${() => openDialog(app)}>Open</button>
-      <button type="button" @click=${app.saveAgain} title="Ctrl-S">Save</button>
-      <button type="button" @click=${app.saveAs}>Save as</button>
-      <button type="button" @click=${app.download} title="Download as YAML">Download</button>
+      <button type="button" @click=${() => openDialog(bar)}>Open</button>
+      <button type="button" @click=${bar.saveAgain} title="Ctrl-S">Save</button>
+      <button type="button" @click=${bar.saveAs}>Save as</button>
+      <button type="button" @click=${bar.files.download} title="Download as YAML">Download</button>
       ${
-        app.address
-          ? html`<button type="button" @click=${app.share} title="Copy an address that opens this material">
+        bar.address
+          ? html`<button type="button" @click=${bar.files.share} title="Copy an address that opens this material">
               Share
             </button>`
           : nothing
@@ -37,10 +49,10 @@ export function toolbar(app) {
         ${file ?? 'not in a file'}${changed ? ' · unsaved changes' : nothing}
       </span>
       <span class="rest"></span>
-      <button type="button" @click=${app.savePicture} title="As PNG">Save picture</button>
-      <span class="presence" role="status">${app.live?.online === false ? 'Offline, trying again' : ''}</span>
+      <button type="button" @click=${bar.savePicture} title="As PNG">Save picture</button>
+      <span class="presence" role="status">${bar.live?.online === false ? 'Offline, trying again' : ''}</span>
     </header>
-    ${openPanel(app)} ${savePanel(app)}
+    ${openPanel(bar)} ${savePanel(bar)}
   `;
 }
 
@@ -49,40 +61,40 @@ const step = (word, icon, act, can, title) =>
 
 // Open -----------------------------------------------------------------------------------------------
 
-async function openDialog(app) {
-  app.files = null;
-  app.update();
-  app.dialogs.open.value.showModal();
-  await app.attempt('list', async () => (app.files = (await app.call('list', {})).files));
-  app.update();
-  await app.attempt('targets', async () => (app.targets ??= (await app.call('targets', {})).targets));
-  app.update();
+async function openDialog(bar) {
+  bar.listed = null;
+  bar.update();
+  bar.dialogs.open.value.showModal();
+  await bar.messages.attempt('list', async () => (bar.listed = (await bar.call('list', {})).files));
+  bar.update();
+  await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
+  bar.update();
 }
 
-function openPanel(app) {
-  const close = () => app.dialogs.open.value.close();
+function openPanel(bar) {
+  const close = () => bar.dialogs.open.value.close();
   const entry = (title, act) =>
     html`<li>
       <button type="button" @click=${() => close() || act()}>${title}</button>
     </li>`;
   const fromHere = async () => {
-    const file = await app.chooseFile('.yaml,.yml,.json');
-    if (file) app.readFile(file);
+    const file = await bar.choose('.yaml,.yml,.json');
+    if (file) bar.files.readFile(file);
   };
-  return html`<dialog class="open" aria-label="Open a material" ${ref(app.dialogs.open)}>
+  return html`<dialog class="open" aria-label="Open a material" ${ref(bar.dialogs.open)}>
     <h2>Presets</h2>
     <ul class="names">
-      ${app.session.presets.map(({ title, material }) => entry(title, () => app.open(material)))}
+      ${bar.session.presets.map(({ title, material }) => entry(title, () => bar.files.open(material)))}
     </ul>
     <h2>From the papers</h2>
-    ${app.targets ? nothing : html`<p>On their way.</p>`}
+    ${bar.targets ? nothing : html`<p>On their way.</p>`}
     <ul class="names">
-      ${(app.targets ?? []).map((target) => entry(target.title, () => app.openTarget(target)))}
+      ${(bar.targets ?? []).map((target) => entry(target.title, () => bar.openTarget(target)))}
     </ul>
     <h2>Files of the folder</h2>
-    ${app.files?.length === 0 ? html`<p>There are none.</p>` : nothing}
+    ${bar.listed?.length === 0 ? html`<p>There are none.</p>` : nothing}
     <ul class="names">
-      ${(app.files ?? []).map((file) => entry(file, () => app.openFile(file)))}
+      ${(bar.listed ?? []).map((file) => entry(file, () => bar.files.openFile(file)))}
     </ul>
     <div class="actions">
       <button type="button" @click=${() => close() || fromHere()}>From this computer</button>
@@ -93,26 +105,26 @@ function openPanel(app) {
 
 // Save -----------------------------------------------------------------------------------------------
 
-function savePanel(app) {
-  const { file } = placeOf(app.store.get());
-  const close = () => app.dialogs.save.value.close();
+function savePanel(bar) {
+  const { file } = placeOf(bar.store.get());
+  const close = () => bar.dialogs.save.value.close();
   const submit = (event) => {
     event.preventDefault();
     const typed = event.target.elements.file.value.trim();
     const name = /\.(ya?ml|json)$/i.test(typed) ? typed : `${typed}.yaml`;
-    const place = placeOf(app.store.get());
+    const place = placeOf(bar.store.get());
     close();
-    app.save(name, name === place.file ? place.version : null);
+    bar.files.save(name, name === place.file ? place.version : null);
   };
   const suggested =
     file ??
     `${
-      app.store
+      bar.store
         .get()
         .name.toLowerCase()
         .replace(/[^a-z0-9]+/g, '-') || 'material'
     }.yaml`;
-  return html`<dialog class="save" aria-label="Save as" ${ref(app.dialogs.save)}>
+  return html`<dialog class="save" aria-label="Save as" ${ref(bar.dialogs.save)}>
     <form @submit=${submit}>
       <label
         >File name <input name="file" type="text" required spellcheck="false" .value=${suggested}

@@ -24,11 +24,12 @@ const KINDS = {
 };
 
 /**
- * @param {object} app
+ * @param {{store, session, call, viewport, picture, isQuiet: function}} services
  * @param {{target: function(): ?object, chosen: function(): number, held: function(): boolean, ask: function,
  *   question: function, want: function, letGo: function, paint: function}} panel what the panel around knows and does
  */
-export function createClass(app, panel) {
+export function createClass(services, panel) {
+  const { call, viewport } = services;
   let card = null; // the map
   let asked = ''; // what it is of
   let problem = '';
@@ -67,11 +68,11 @@ export function createClass(app, panel) {
   async function draw(question, text) {
     const drawn = pictures;
     for (const [picture, samples] of SAMPLES.flatMap((samples) => drawn.map((picture) => [picture, samples]))) {
-      if (asked !== text || panel.held() || !app.viewport.budget.samples) return;
+      if (asked !== text || panel.held() || !viewport.budget.samples) return;
       try {
-        picture.material ??= (await app.call('member', { ...question, point: picture.point })).material;
+        picture.material ??= (await call('member', { ...question, point: picture.point })).material;
         if (asked !== text) return;
-        picture.image = await small(app, picture.material, samples);
+        picture.image = await small(services, picture.material, samples);
       } catch (error) {
         picture.problem = error.message;
       }
@@ -179,14 +180,13 @@ function decoded(answer) {
 }
 
 /** A small picture of another material on the same object, from where the camera is; after the large one. */
-async function small(app, material, samples) {
-  const enough = () => app.viewport.samples >= Math.min(SEEN, app.viewport.budget.samples);
-  while (!app.quiet || !enough()) await new Promise((resolve) => setTimeout(resolve, IDLE));
-  const { store, session, viewport } = app;
+async function small({ store, session, call, viewport, picture, isQuiet }, material, samples) {
+  const enough = () => viewport.samples >= Math.min(SEEN, viewport.budget.samples);
+  while (!isQuiet() || !enough()) await new Promise((resolve) => setTimeout(resolve, IDLE));
   const state = { ...store.get(), layers: layersOf(material) };
   const { model, switches } = state;
-  const known = app.shader();
+  const known = picture.shader('a');
   const shader =
-    known && pattern(state) === pattern(store.get()) ? known : await app.call('shader', { material, model, switches });
+    known && pattern(state) === pattern(store.get()) ? known : await call('shader', { material, model, switches });
   return viewport.thumbnail(shader, valuesOf(shader, state, session), SMALL, samples);
 }

@@ -1,0 +1,140 @@
+// Materials, light, objects and textures from and to files, folders and addresses.
+
+import { readPicture } from './render/environment.js';
+import { loadObject } from './render/load.js';
+import { objectOf } from './render/loader.js';
+import * as commands from './state/commands.js';
+import { documentOf, enabled } from './state/material.js';
+import { fragmentOf, readFragment } from './state/share.js';
+
+const DROPPED = 'file:'; // before the names of environments and objects that were dropped on the page
+
+/**
+ * What can be done with files.
+ *
+ * @param {{store, session, call, storage, messages, address: string, saved: function, conflict: function, offer: function,
+ *   copy: function}} services `saved()` after the disk has changed; `conflict(file, error)` where it was changed by others;
+ *   `offer(blob, name)` hands a file to the browser, `copy(text)` to the clipboard
+ */
+export function createFiles({ store, session, call, storage, messages, address, saved, conflict, offer, copy }) {
+  const dropped = async (name) => {
+    const plain = name.slice(DROPPED.length);
+    const file = await storage.get(plain);
+    if (!file) throw new Error(`${plain}: drop this file on the page again`);
+    return file;
+  };
+
+  const files = {
+    // Materials
+
+    open(material, place) {
+      store.run(commands.openMaterial, material, place);
+      messages.say(`Opened ${material.name || 'a material'}.`);
+    },
+    openFile: (file) =>
+      messages.attempt('open', async () => {
+        const { material, version } = await call('open', { file });
+        files.open(material, { file, version });
+      }),
+    readFile: (file) =>
+      messages.attempt('open', async () => {
+        files.open((await call('read', { text: await file.text(), file: file.name })).material);
+      }),
+    async save(file, version) {
+      const material = documentOf(store.get());
+      const off = store.get().layers.length - enabled(store.get()).length;
+      try {
+        const answer = await call('save', { file, material, version });
+        store.aside(commands.saved, material, answer.file, answer.version);
+        saved();
+        messages.forgive('save');
+        messages.say(`Saved ${answer.file}${off ? `, without what is turned off (layers: ${off})` : ''}.`);
+      } catch (error) {
+        if (error.status === 409) conflict(file, error);
+        else messages.fail('save', error);
+      }
+    },
+    overwrite: (file) =>
+      messages.attempt('save', async () => files.save(file, (await call('open', { file })).version)),
+    download: () =>
+      messages.attempt('download', async () => {
+        const { text } = await call('write', { material: documentOf(store.get()) });
+        offer(new Blob([text], { type: 'application/yaml' }), files.nameOf('yaml'));
+      }),
+    /** The name of a file for what is open. */
+    nameOf(ending) {
+      const name = store.get().name.toLowerCase();
+      return `${name.replace(/[^\p{L}\p{N}]+/gu, '-').replace(/^-|-$/g, '') || 'material'}.${ending}`;
+    },
+    /** An address that opens what is shown, on the clipboard. */
+    share: () =>
+      messages.attempt('share', async () => {
+        const fragment = await fragmentOf(store.get(), documentOf(store.get()));
+        await copy(address + fragment).catch(() => {
+          throw new Error('The browser does not let the page write to the clipboard.');
+        });
+        messages.say('The address is on the clipboard; it opens this material.');
+      }),
+    openShared: (fragment) =>
+      messages.attempt('share', async () => {
+        const { material, camera, ...place } = await readFragment(fragment, session);
+        const checked = await call('read', { text: JSON.stringify(material ?? null) });
+        store.run(commands.openMaterial, checked.material, place);
+        store.aside(commands.setCamera, camera);
+        messages.say(`Opened ${checked.material.name || 'a material'} from the address.`);
+      }),
+
+    // What is around the material
+
+    /** Puts a picture into the folder; the name that it has there. */
+    upload: async (file) => (await call('texture', { file: file.name, data: await base64(file) })).file,
+    takeEnvironment: (file) =>
+      messages.attempt('environment', async () => {
+        readPicture(file.name, await file.arrayBuffer());
+        await storage.put(file.name, file);
+        store.run(commands.setView, { environment: DROPPED + file.name });
+      }),
+    takeObject: (file) =>
+      messages.attempt('object', async () => {
+        await loadObject(file);
+        await storage.put(file.name, file);
+        store.run(commands.setView, { object: DROPPED + file.name });
+        store.aside(commands.setCamera, null);
+      }),
+    /** What was dropped on the page, by its ending. */
+    take(file) {
+      if (/\.(ya?ml|json)$/i.test(file.name)) return files.readFile(file);
+      if (/\.(hdr|exr)$/i.test(file.name)) return files.takeEnvironment(file);
+      if (/\.(glb|gltf|obj)$/i.test(file.name)) return files.takeObject(file);
+      return messages.complain(
+        'drop',
+        `${file.name}: drop a material (.yaml, .json), light (.hdr, .exr) or an object (.glb, .gltf, .obj) here,` +
+          ' a texture on its value',
+        { passing: true },
+      );
+    },
+
+    // As the viewport takes them, by the names that the state has
+
+    async object(name) {
+      if (!name.startsWith(DROPPED)) return name;
+      const { parts } = objectOf(await call('object', { name: session.objects[0] }));
+      return loadObject(await dropped(name), parts.filter(({ role }) => role !== 'object'));
+    },
+    async environment(name) {
+      if (!name.startsWith(DROPPED))
+        return session.environments.find((known) => known.name === name)?.url ?? name;
+      const file = await dropped(name);
+      return readPicture(file.name, await file.arrayBuffer());
+    },
+  };
+  return files;
+}
+
+async function base64(file) {
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  let text = '';
+  for (let at = 0; at < bytes.length; at += 4096)
+    text += String.fromCharCode(...bytes.subarray(at, at + 4096));
+  return btoa(text);
+}
