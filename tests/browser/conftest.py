@@ -1,4 +1,4 @@
-"""The editor's server and a browser, for as long as the tests of a file run; pages report how a failed test left them."""
+"""The editor's server and a browser, for as long as the tests of a file run; pages tell how a failed test left them."""
 
 from __future__ import annotations
 
