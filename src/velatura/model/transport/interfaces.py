@@ -23,6 +23,7 @@ from velatura.tables import Tables
 
 Array = NDArray[np.floating]
 
+STRAIGHT = 0.09  # step of the logarithm of the index that refracted light which meets further facets still passes
 STAND_IN = 144  # normals of interfaces that stand in for brushed ones
 GRAZING = 1e-4  # least cosine of light that meets an interface
 ALPHA_MIN = 1e-3
@@ -138,6 +139,10 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, often: bool) -> 
     along = cosine / eta - cos_t
     t = tuple(along * a - b / eta for a, b in zip(h, wi))
     reflected, refracted = escape(o, o[2] > 0, False), escape(t, t[2] < 0, True)
+    if often:
+        # Facets of a small step let light pass again and again, and hardly turn it
+        passes = np.exp(-abs(np.log(eta)) / STRAIGHT)
+        refracted = np.where(t[2] < 0, refracted + passes * (1 - refracted), 0)
     return _Events(
         Light(n * o[0], n * o[1], reflectance * reflected * share),
         Light(below * t[0], below * t[1], (1 - reflectance) * refracted * share),
