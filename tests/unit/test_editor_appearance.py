@@ -15,6 +15,7 @@ from velatura.editor import appearance, class_maps
 from velatura.errors import InvalidInput
 from velatura.inverse import Target, stacks
 from velatura.inverse.coats import scattered
+from velatura.inverse.drag import DraggedStack
 from velatura.model import named
 from velatura.model.roughness_maps import MAPS
 from velatura.stack import Interface, Medium, Stack, presets
@@ -336,3 +337,32 @@ def test_absorption_over_a_metal_gives_way_to_a_brighter_wish() -> None:
     answer = appearance.invert({"target": wish, "material": stack, "model": "bati2021"})
     assert answer["snapped"] is None
     assert deviation(answer["material"], wish, "bati2021") < EXACT
+
+
+def test_the_first_lobe_has_the_colour_of_what_absorbs_above_it() -> None:
+    tau = np.array([0.1, 0.2, 0.3])
+    stack = {"layers": [{"medium": {"sigma_a": tau.tolist()}}, {"interface": {"eta": 1.5, "alpha": 0.1}}]}
+    wish = appearance.appearance({"material": stack, "model": "bati2021"})["target"]
+    wish["lobes"][0]["energy"] = [0.03, 0.03, 0.03]
+    answer = appearance.invert({"target": wish, "material": stack, "model": "bati2021"})
+    energy = np.array(answer["target"]["lobes"][0]["energy"])
+    np.testing.assert_allclose(energy / energy[0], np.exp(-2 * (tau - tau[0])), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("interface", "energy", "reason", "reached"),
+    [
+        ({"eta": 3.8, "alpha": 0.02}, 0.37, "energy", 0.36),
+        ({"conductor": "Cu", "alpha": 0.02}, 0.1, "metal", 3 - 2 * 2**0.5),
+    ],
+)
+def test_a_part_of_the_way_ends_on_the_bound_that_is_named(
+    interface: dict[str, Any], energy: float, reason: str, reached: float
+) -> None:
+    model, material = named("bati2021", reflectance="fresnel"), {"layers": [{"interface": interface}]}
+    here = appearance.appearance({"material": material, "model": "bati2021"})["target"]
+    stack = DraggedStack.of(Stack.from_dict(material), Target.from_dict(here), model)
+    assert stack is not None
+    found, bound = stack.towards(stack.target.with_lobe(0, energy=(energy,) * 3))
+    assert bound is not None and bound.reason == reason
+    assert np.min(np.abs(np.array(found.target.lobes[0].colour) - reached)) < 1e-6
