@@ -113,6 +113,8 @@ def main() -> None:
                 for done, failures in blocks(name, count, arguments.seed, arguments.processes):
                     found += failures
                     progress.update(task, advance=done, description=f"{name}, {len({i for i, _ in found})} failed")
+                    for index, failure in failures if progress.disable else ():
+                        print(f"{name} --index {index}: {failure.kind}; {failure.detail}", file=sys.stderr, flush=True)
         inputs = len({index for index, _ in found})
         rows.append(f"{name:10s}{count:10d}{inputs:10d}{time.perf_counter() - start:10.0f}")
         failed += inputs
