@@ -388,8 +388,14 @@ def test_where_energy_is_balanced_nothing_gains(name: str) -> None:
             "energy",
         ),
         ([vt.Interface(eta=1.36, alpha=0.06), vt.Diffuse(albedo=1.0)], 1.77, "forward", "white furnace"),
+        (
+            [vt.Interface(eta=2.9, alpha=0.137), vt.Interface(eta=1.74), vt.Diffuse(albedo=1.0)],
+            1.0,
+            "forward",
+            "white furnace",
+        ),
     ],
-    ids=["rough glass from inside", "strongly brushed", "base below a lower index"],
+    ids=["rough glass from inside", "strongly brushed", "base below a lower index", "base below two interfaces"],
 )
 def test_what_gains_declares_it(layers: list, exterior: float, form: str, declared: str) -> None:
     """Expected: `velatura` declares gain by the shape of the stack, and breaks no law beside."""
