@@ -24,7 +24,6 @@ from velatura.model.variance import Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling import low_discrepancy
 
 COS_MIN = 1e-3  # inside; what refraction does not reach meets the interface at this one
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
@@ -105,19 +104,26 @@ def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Valu
     A mean over visible normals on a lattice of a Fibonacci number of them; within .3 % on average.
     """
     k = np.arange(normals)
-    x, y, z, *roughness = (low_discrepancy.repeated(value, normals) for value in (*wi, *lobe.roughness))
-    step = round(normals * GOLDEN)
-    u1, u2 = (np.tile(u % 1, len(wi[2])) for u in ((k * step + 0.5) / normals, (k + 0.5) / normals))
+    u1, u2 = ((k * round(normals * GOLDEN) + 0.5) / normals) % 1, (k + 0.5) / normals
+    column = (-1, 1)
+    x, y, z, *roughness = (value if np.ndim(value) == 0 else value.reshape(column) for value in (*wi, *lobe.roughness))
     alpha_u, alpha_v, n, i = _inside(replace(lobe, roughness=Roughness(*roughness)), (x, y, z))
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     o = ggx.reflect(i, h)
     p2 = n * n * (o[0] * o[0] + o[1] * o[1])
     value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
+    # Of reflectances, colours are the leading axis, and light the last one
     if lobe.facets:
-        value = value * lobe.facets(ops.clip(ggx.dot(i, h), 0.0, 1.0))
+        value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h), 0.0, 1.0))
     if lobe.leaving:
-        value = value * lobe.leaving(ops.sqrt(1 - p2))
-    return lobe.weight * low_discrepancy.averaged(value, normals)
+        value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
+    return lobe.weight * np.mean(value, axis=-1)
+
+
+def _flat(reflectance: Reflectance, cosine: Value) -> Value:
+    """A reflectance at an array of cosines (N, M)."""
+    found = reflectance(cosine.ravel())
+    return found.reshape(*found.shape[:-1], *cosine.shape)
 
 
 def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Value, Direction]:
