@@ -4,7 +4,7 @@
 
 Random stacks of 1, 2, ... interfaces in turn: indices from 1.3 to 2.2, roughness from 0 to .7 (one in ten is smooth);
 below three in five a medium that absorbs, up to an optical depth of 2; albedos of the base from .1 to .95, colours
-apart. Cosines 1, .6 and .2; light bounces between facets. The table tells the means and maxima of |albedo/true - 1|, in
+apart. Cosines 1, .6 and .2; light bounces between facets. The table lists the means and maxima of |albedo/true - 1|, in
 per cent, and the mean standard error of the walks. Stacks that are more than 2 % off are listed.
 """
 

@@ -43,7 +43,7 @@ ADDED_TO = (
     "furnace",
 )
 
-FORESEEN = 5000  # milliseconds in which nobody does anything, so that the page gets ready for one more layer
+FORESEEN = 5000  # milliseconds without input, so that the page gets ready for one more layer
 
 THREE = "export * as three from 'three';"
 FIRST = """

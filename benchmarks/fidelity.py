@@ -191,7 +191,7 @@ def _row(kind: Kind, incidence: Incidence, side: str) -> str | None:
 
 
 def _distances(halves: Array, walked: Array, faint: float) -> dict[str, Any]:
-    """What a record says of energies (2, 3, bins, bins) by halves."""
+    """Distances between energies (2, 3, bins, bins) by halves: those of a model, and those of walks."""
     model, true = halves.mean(axis=0), walked.mean(axis=0)
     energy, of_halves = true.sum(axis=(1, 2)), walked.sum(axis=(2, 3))
     lit = energy > faint

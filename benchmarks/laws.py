@@ -1,7 +1,7 @@
 """The laws of `velatura check`, for every named model on every preset, in both forms, in reflection and transmission.
 
-A line for each check tells what is broken, and the numbers of what is not kept as declared. At the end stand these for
-every model and form, and what is broken; the exit status is 1 if anything is. It takes five minutes.
+A line for each check lists the broken laws, and the values of the declared ones. A summary by model and form, and the
+broken laws, come last; the exit status is 1 if anything is. It takes five minutes.
 
     python benchmarks/laws.py [--models NAME ...] [--presets NAME ...] [--forms forward symmetric]
 """

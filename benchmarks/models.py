@@ -1,8 +1,8 @@
 """Render time of models and forms against each other, as ratios of interleaved renders (`benchmarks/render.py`).
 
 A coat over gold, the same stack brushed along one axis, and brushed with axes of their own. Of a uniform stack
-the lobes are looked up, whatever made them: with two interfaces all published models run the same kernel, and cost the
-same. What `realtime` saves shows where there are more lobes to merge (`five`), and where they are worked out at every
+the lobes are looked up for every model: with two interfaces all published models run the same kernel, and cost the
+same. The savings of `realtime` show with more lobes to merge (`five`), and where lobes are worked out at every
 point (`textured`). Medians over rounds of the ratio of two renders of the same round.
 
     python benchmarks/models.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb]

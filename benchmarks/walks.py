@@ -149,7 +149,7 @@ class Kind:
     passes: bool = False
 
     def stack(self, seed: int, half: str, number: int) -> Stack:
-        """One of its stacks, whichever others are drawn."""
+        """One of its stacks, independent of the others that are drawn."""
         rng = np.random.default_rng([seed, HALVES.index(half), number, *self.name.encode()])
         return self.draw(rng, number).replace(name=f"{self.name}, {half}, {number}")
 

@@ -1,4 +1,4 @@
-"""MkDocs hooks: what the program says of itself goes into the manual, so that the two cannot disagree.
+"""MkDocs hooks: insert the program's own help and numbers into the manual, so that the two cannot disagree.
 
 `<!-- parameters -->` becomes the table of a material's parameters, `<!-- help VERB -->` the output of
 `velatura VERB --help`.

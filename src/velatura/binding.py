@@ -39,7 +39,7 @@ from velatura.stack.spectra import VISIBLE_NM
 STEERING_NM = (445.0, 525.0, 585.0, 620.0)
 
 #: Textures of Mitsuba that are the same everywhere, and those of them that are numbers in spectral variants, too. All
-#: others are taken to vary, whatever they say (`mesh_attribute` says that it does not), and may ask a shape, which is
+#: others are taken to vary, even if they report otherwise (as `mesh_attribute` does), and may query a shape, which is
 #: not known while a plugin is made.
 _NUMBERS = ("UniformSpectrum", "RawConstantTexture")
 _SPECTRA = (
@@ -165,7 +165,7 @@ class Binding:
         steering: colours of those that are the same everywhere, at `STEERING_NM`; in spectral variants.
 
     Raises:
-        InvalidInput: in one line, whatever a material file would be refused for, and unknown names.
+        InvalidInput: in one line, for anything that a material file would be refused for, and for unknown names.
     """
 
     def __init__(self, mi: Any, properties: Any, options: Collection[str] = ()) -> None:
@@ -458,7 +458,7 @@ def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
         raise InvalidInput(f"{name}: the texture {image.texture} has no texels")
     if not np.isfinite(texels).all():
         raise InvalidInput(f"{name}: the texture {image.texture} has texels that are not finite")
-    # Tell colours from opacity, which stands last
+    # Separate colours from opacity, which comes last
     texels = texels.reshape(*texels.shape[:2], -1)
     channels = {1: "r", 2: "ra", 3: "rgb", 4: "rgba"}.get(texels.shape[-1], "")
     grey = "g" not in channels

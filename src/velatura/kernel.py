@@ -91,7 +91,7 @@ def _let_go(error: BaseException | None) -> None:
             waiting += [each.__cause__, each.__context__]
 
 
-#: Held by whatever of Velatura works with Mitsuba. Hold it, as `with kernel.exclusive:` or as the decorator
+#: Held by all code of Velatura that works with Mitsuba. Hold it, as `with kernel.exclusive:` or as the decorator
 #: `@kernel.exclusive`, where other threads use Velatura while you load scenes, render, or let go of either.
 exclusive = Exclusive()
 
@@ -226,7 +226,7 @@ def _follow_variants() -> None:
     mi.detail.add_variant_callback(lambda old, new: _register_missing(mi))
 
 
-@exclusive  # whichever thread sets a variant
+@exclusive  # in any thread that sets a variant
 def _register_missing(mi: Any) -> None:
     for name, factory in _factories.items():
         if (name, mi.variant()) not in _registered:
@@ -245,7 +245,7 @@ def _built(made: type, properties: Any) -> Any:
 
 
 def reason(error: BaseException) -> str:
-    """What Mitsuba says of a failure, in one line: where, and why. Calls inside a plugin of Python are left out."""
+    """Mitsuba's message for a failure in one line: where, and why. Calls inside a Python plugin are left out."""
     while error.__cause__:
         error = error.__cause__
     where, calls, why = str(error).partition("Traceback (most recent call last):")

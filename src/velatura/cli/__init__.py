@@ -107,7 +107,7 @@ def main() -> None:
 
 
 def _open_streams() -> None:
-    """Make the standard streams UTF-8, whatever the locale. Raises OSError where standard output is closed."""
+    """Make the standard streams UTF-8 in every locale. Raises OSError if standard output is closed."""
     for number in range(3):  # a stream that is closed would give its number to the next file that is opened
         try:
             os.fstat(number)
@@ -123,7 +123,7 @@ def _open_streams() -> None:
 
 
 def _drop_output() -> None:
-    """Drop what is left to print where it cannot be, so that Python does not complain of it at exit."""
+    """Drop output that can no longer be written, so that Python reports no error at exit."""
     try:
         if sys.stdout:
             sys.stdout.flush()
@@ -141,7 +141,7 @@ def _interrupts() -> Iterator[list[int]]:
         signal.default_int_handler(number, frame)
 
     before = signal.getsignal(signal.SIGINT)
-    if before is signal.default_int_handler:  # else somebody wants interrupts ignored, or handles them
+    if before is signal.default_int_handler:  # else the caller ignores interrupts or handles them
         signal.signal(signal.SIGINT, note)
     try:
         yield noted

@@ -50,7 +50,7 @@ def check(output: Path | None) -> None:
 
 
 def show(found: Fit, output: Path | None, as_json: bool) -> None:
-    """Write the material, and tell it and how close it comes."""
+    """Write the material, and print it with its error."""
     from velatura.stack import dumps, save
 
     if output:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def bar(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Shows a bar, on a terminal only; the function that it yields is told how much is done, of how much."""
+    """Shows a bar, on a terminal only; yields the function that takes the steps done and their total."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 

@@ -126,7 +126,7 @@ def _lobe_names(stack: Stack) -> tuple[str, ...]:
 
 
 def _counter(progress: Progress | None, total: int) -> Callable[[], None]:
-    """Tells `progress` of one more step each time that it is called."""
+    """Returns a function that reports one more step to `progress` at each call."""
     steps = count(1)
 
     def advance() -> None:

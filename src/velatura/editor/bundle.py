@@ -21,7 +21,7 @@ def require() -> Path:
 
 
 def finding() -> Finding:
-    """Whether the page is there, as `velatura doctor` tells it."""
+    """Whether the page is installed, as `velatura doctor` reports it."""
     there = all((STATIC / name).is_file() for name in ("index.html", "editor.js", "widget.js"))
     # An installation has no sources, and gets the page with the package
     what = f"--editable {SOURCES.parents[3]}" if SOURCES.is_dir() else "--force-reinstall --no-deps velatura"

@@ -24,7 +24,7 @@ PICTURES = (".png", ".jpg", ".jpeg", ".exr", ".hdr")
 
 
 class Conflict(InvalidInput):
-    """A file is not as it was when it was opened: somebody else has written it meanwhile."""
+    """A file has been changed by another program since it was opened."""
 
 
 class Folder:

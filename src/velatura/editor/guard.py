@@ -18,7 +18,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from velatura.errors import InvalidInput
 
-#: Names of this machine; a foreign one leads here where somebody has rebound it, to have a browser ask on his behalf.
+#: The accepted Host headers; others are refused, since a foreign name may have been rebound here (DNS rebinding).
 HOSTS = ("127.0.0.1", "localhost")
 
 #: Holds the token where it is to outlive the server; other accounts cannot read it, as they can a command line.

@@ -78,7 +78,7 @@ def serve(material: str | None = None, port: int = 0, browse: bool = True) -> No
 
 
 def settings(app: ASGIApp) -> uvicorn.Config:
-    """How the application is run: quietly, and stopped within a second whatever is connected."""
+    """Settings of the server: it runs quietly, and stops within a second even while clients are connected."""
     return uvicorn.Config(
         app, http=guard.Connection, log_level="warning", ws_max_size=SMALL, timeout_graceful_shutdown=1
     )

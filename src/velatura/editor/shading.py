@@ -24,7 +24,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
 
     Args:
         stretched: whether any interface has a roughness for each axis, though the two may be equal now. Apart from that
-            no change of a plain value changes the code, be it to equal roughnesses or to no rotation.
+            no change of a plain value changes the code, not even to equal roughnesses or to no rotation.
 
     Raises:
         InvalidInput: a stack without an interface, or a model, that there is no shader for.

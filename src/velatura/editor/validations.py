@@ -2,8 +2,8 @@
 
 Each answers sliders with curves: those of kind `truth` are counted from random walks or evenly spread samples, with
 standard errors, those of kind `model` are what the recursion takes in their place. Lobes are shown as densities across
-the projected disc: over the sine of the outgoing angle in the plane of incidence, whatever lies beside the plane
-included.
+the projected disc: over the sine of the outgoing angle in the plane of incidence, summed over the directions beside
+that plane.
 """
 
 from __future__ import annotations

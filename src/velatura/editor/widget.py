@@ -103,8 +103,8 @@ class Editor(anywidget.AnyWidget):
     """The editor, shown in the cell whose last line it is.
 
     `stack` and `model` are synchronised both ways: set them, and the page changes, in one step that it can undo; change
-    the page, and they are changed, which `editor.observe(f, "stack")` tells. What is opened and saved in the page are
-    files of the working directory.
+    the page, and they follow, which `editor.observe(f, "stack")` reports. The page opens and saves files of the
+    working directory.
 
     Args:
         stack: a Stack, its fields as a mapping, a file or the name of a preset.

@@ -26,8 +26,8 @@ MODERATE = 1.5  # an index that many media have; members near it, clear and with
 class EquivalenceClass:
     """The interfaces that give one lobe below one stack.
 
-    A member is told by its free indices of dielectrics: (eta_1, eta_2) of a pair, eta_1 of a pair over a conductor or
-    of one dielectric, none of one conductor. Everything else follows from them.
+    A member is identified by its free indices of dielectrics: (eta_1, eta_2) of a pair, eta_1 of a pair over a
+    conductor or of one dielectric, none of one conductor. Everything else follows from them.
 
     above: the stack (N = 1). energy: (C, 1). variance: in the space of the model's map. tau: of the medium above a
     pair. choice: the last interface, and what is given of it.
@@ -53,8 +53,8 @@ class EquivalenceClass:
         Without the last index it is the one that needs least absorption, on the side of `choice`.
         """
         eta = [np.atleast_2d(np.asarray(index, float)) for index in indices]
-        told = len(eta) == self.free > 0 and self.choice.kind == "dielectric"
-        choice = dataclasses.replace(self.choice, eta=eta.pop()) if told else self.choice
+        given = len(eta) == self.free > 0 and self.choice.kind == "dielectric"
+        choice = dataclasses.replace(self.choice, eta=eta.pop()) if given else self.choice
         if self.interfaces == 1:
             return (interface.solve(self.above, self.energy, self._blur, choice).layers,)
         upper, lower = pair.solve(self.above, self.energy, self._blur, eta[0], self.tau, choice)
@@ -236,7 +236,7 @@ class EquivalenceClass:
 
     @property
     def _clear(self) -> bool:
-        """Whether nothing may absorb but what is told to."""
+        """Whether absorption is allowed only where it is given."""
         return self.choice.tau is not None or not self.choice.absorbs
 
     def _channels(self, channel: int | None) -> slice:

@@ -36,8 +36,8 @@ def fit_target(
     """The stack whose reflectance comes closest to a table, by descent from stacks that give a target.
 
     Args:
-        target: the lobes that the table may have head-on, roughly; they tell how many interfaces there are, and the
-            descents start from stacks that have them.
+        target: rough lobes of the table at normal incidence; they give the number of interfaces, and the descents start
+            from stacks that have them.
         starts: how many of these.
 
     Raises:

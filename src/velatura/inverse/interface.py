@@ -26,7 +26,7 @@ MODEL = "bati2021"
 DENSER, RARER = 1, -1
 SLACK = 1e-9  # by which a constraint may be broken: the rounding of what was solved
 NEGLIGIBLE = 1e-7  # the same for what is solved numerically
-ENERGY_MIN = 1e-9  # of a lobe in a channel; less is not told from nothing
+ENERGY_MIN = 1e-9  # of a lobe in a channel; less is taken for nothing
 CONDUCTOR_MIN = 3 - 2 * np.sqrt(2)  # a conductor (k >= eta) reflects more
 CONDUCTOR_MAX = 1 - 1e-6  # beyond which indices of a metal have no bound
 ROUNDS, ENOUGH = 40, 1e-7  # of corrections where a model's own reading differs from the closed form
@@ -132,7 +132,7 @@ def solve(above: Above, energy: Array, variance: Variance, choice: Choice) -> Fo
 
 
 def with_index(above: Above, eta: Value, tau: Value, variance: Variance, paired: Array | None = None) -> Found:
-    """The dielectrics of given index whose lobes have these variances, whatever their energy.
+    """The dielectrics of given index whose lobes have these variances, of any energy.
 
     The roughness depends on the light that bounces above, that on the reflectance, and that on the roughness.
 

@@ -54,7 +54,7 @@ def invert_pair(
         energy: of both interfaces together, colours (C, N), or (N,) or a number for one channel.
         variance: of both, (N,) or a number, in the space of Belcour's roughness map.
         eta_1: absolute index between the interfaces, (N,) or a number.
-        eta_2: absolute index below them; None for the one that needs least absorption, on the side that `choice` tells.
+        eta_2: absolute index below them; None for the one that needs least absorption, on the side given by `choice`.
         exterior: index of the medium above, where nothing else is there; (N,) or a number.
         above: the stacks above; None for the exterior medium alone.
         tau: optical depths of the medium above the pair, (C, N) or a number.

@@ -176,7 +176,7 @@ def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) 
     i_beyond, o_beyond = _beyond(stack, i, seen.eta), _down(o)
     through, density_through = mixture.eval_pdf([seen.transmitted], None, i_beyond, o_beyond, even=stack.even)
     if symmetric:
-        # In the medium below whichever way light goes
+        # In the medium below, for light in either direction
         i_below, o_below = _pair_below(stack, wi, wo)
         through, _ = mixture.eval_pdf([passed], None, i_below, o_below)
         through = through * ops.divide(o_beyond[2], o_below[2])

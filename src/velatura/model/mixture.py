@@ -20,9 +20,9 @@ ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
 
 
 def probabilities(lobes: Sequence[Lobe], base: Base | None, even: float = 0.0) -> list[Value]:
-    """Of sampling each lobe, and at last the base by the cosine: its share of the energy.
+    """Probabilities of sampling each lobe, then the base by the cosine: their shares of the energy.
 
-    A share `even` is divided equally among them, whatever their energy, and the cosine takes part without a base, too.
+    A share `even` is divided equally among them regardless of energy, and the cosine takes part even without a base.
     """
     parts: list[Lobe | Base] = [*lobes, *([base] if base else [])]
     energies = [ops.mean(part.energy) for part in parts]

@@ -1,7 +1,7 @@
 """Events of a path at one surface: scattering into a random direction, or into a given one.
 
-All directions are local: the path comes from `wi`, which points away from the surface into the upper side, whichever
-side of the stack that is. Energy is followed, not radiance: no squared index enters.
+All directions are local: the path comes from `wi`, which points away from the surface into the upper side, on either
+side of the stack. Energy is followed, not radiance: no squared index enters.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ const shared = (state) => ({
 
 const isSame = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-/** Keeps the traits and the state alike, whichever changes. Returns what ends that. */
+/** Keeps the traits and the state equal when either changes. Returns a function that stops it. */
 function synchronise(model, app) {
   const heard = {
     stack: (material) => app.drag('python', commands.setMaterial, material),

@@ -372,7 +372,7 @@ def plain(stack: Stack) -> list[Layers]:
         if not isinstance(layer, InterfaceValues):
             raise InvalidInput(f"{where}: a target has interfaces and media only")
         if layer.kind == "mirror":
-            raise InvalidInput(f"{where}: reflects all light whatever its index; a target has a conductor there")
+            raise InvalidInput(f"{where}: reflects all light at any index; a target has a conductor there")
         if layer.alpha_u != layer.alpha_v:
             raise InvalidInput(f"{where}: is brushed; the lobes of a target are round")
         eta = layer.eta if layer.kind == "conductor" else np.full((1, 1), np.mean(layer.eta))

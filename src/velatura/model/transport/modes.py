@@ -1,8 +1,8 @@
 """Modes of the azimuth of light.
 
 Stacks of isotropic interfaces treat every mode by itself, relative to the azimuth that light came with (`Relative`).
-In others (`Even`), modes 0 and 2 act on one another; odd ones do not act on energies, since nothing in a stack tells a
-direction from its opposite.
+In others (`Even`), modes 0 and 2 act on one another; odd ones do not act on energies, since a stack does not
+distinguish a direction from its opposite.
 """
 
 from __future__ import annotations

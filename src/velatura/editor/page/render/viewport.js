@@ -183,7 +183,7 @@ export class Viewport {
     return this.schedule.held;
   }
 
-  /** The time from which on there is a preview of what is to be shown; 0 where there is none yet. */
+  /** The time at which the preview of the current state was drawn; 0 before that. */
   get previewed() {
     return this.schedule.previewed;
   }
