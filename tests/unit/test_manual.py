@@ -89,3 +89,21 @@ def test_the_first_page_lists_all_pages() -> None:
     pages = {path.relative_to(docs).as_posix() for path in (*docs.glob("*.md"), *docs.glob("*.ipynb"))}
     linked = set(re.findall(r"\]\(([^)#]+)\)", (docs / "index.md").read_text()))
     assert pages - {"index.md"} <= linked
+
+
+def test_the_files_that_contributing_names_exist() -> None:
+    """Expected: each path in its table is in the package or in the root, the folder of a new one too, and each
+    `NAME` of a file stands in that file.
+    """
+    rows = [line for line in (ROOT / "CONTRIBUTING.md").read_text().splitlines() if line.startswith("| a")]
+    assert len(rows) == 11
+    package = ROOT / "src" / "velatura"
+    for row in rows:
+        paths = re.findall(r"`((?:[\w.-]+/)*[\w-]+\.(?:py|js|md|yaml))`", row)
+        assert paths, row
+        for path in paths:
+            existing = path.rpartition("/")[0] if "NAME" in path else path
+            assert (package / existing).exists() or (ROOT / existing).exists(), path
+        for name, path in re.findall(r"`(\w+)` of `([\w/.-]+)`", row):
+            file = package / path if (package / path).exists() else ROOT / path
+            assert re.search(rf"\b{name}\b", file.read_text()), (name, path)
