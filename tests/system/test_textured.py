@@ -127,9 +127,9 @@ def test_channels_and_encodings_are_those_of_the_image(tmp_path) -> None:
 def test_values_are_kept_within_their_range(tmp_path) -> None:
     texture = vt.Texture(texture=image(tmp_path, np.full((2, 2, 1), 0.5)), scale=100, offset=-200)
     bsdf = vt.bsdf(STACK.replace(layer0_alpha_u=texture, layer0_eta=texture, layer1_g=texture, layer1_depth=texture))
-    found = bsdf.binding.at(dr.zeros(mi.SurfaceInteraction3f), True)
-    assert found["layer0_alpha_u"][0] == 0 and found["layer1_depth"][0] == 0
-    assert found["layer0_eta"][0][0] > 0 and found["layer1_g"][0] > -1
+    interface, medium, *_ = bsdf.binding.at(dr.zeros(mi.SurfaceInteraction3f), True).layers
+    assert interface.alpha_u[0] == 0 and medium.depth[0] == 0
+    assert interface.eta[0][0] > 0 and medium.g[0] > -1
     assert np.isfinite(value(bsdf, 0.5)).all()
 
 
