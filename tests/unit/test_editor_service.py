@@ -20,6 +20,7 @@ from velatura.errors import InvalidInput, MissingTool
 from velatura.model import MODELS
 from velatura.scenes import OBJECTS
 from velatura.stack import Interface, Stack, loads, preset, presets
+from velatura.stack.layers import LAYERS, entry_name
 from velatura.stack.schema import parameters
 
 COAT: dict[str, Any] = {
@@ -59,6 +60,16 @@ def test_a_session_is_json_and_names_all_there_is() -> None:
     assert session["opened"] is None
     assert {"bk7", "water"} <= set(session["names"]["dielectrics"])
     assert all(len(index["eta"]) == len(index["k"]) == 3 for index in session["names"]["conductors"].values())
+
+
+def test_a_new_layer_of_every_kind_is_as_declared() -> None:
+    layers = VERBS["session"]({})["layers"]
+    assert list(layers) == list(LAYERS)
+    for name, layer in layers.items():
+        assert layer["title"] == LAYERS[name].title
+        made = LAYERS[name].from_dict(layer["fresh"])
+        assert entry_name(made) == name and made.kind == next(iter(LAYERS[name].lacks))
+    assert layers["interface"]["fresh"] == {"eta": 1.5, "alpha": 0.1}
 
 
 def test_parameters_are_those_that_are_declared() -> None:

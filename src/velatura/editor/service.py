@@ -25,7 +25,7 @@ from velatura.scenes.environments import studio
 from velatura.scenes.objects import OBJECTS, ground, plinth
 from velatura.scenes.surfaces import Surface
 from velatura.stack import Named, Stack, Texture, dumps, loads, names, preset, presets, rgb
-from velatura.stack.layers import LAYERS
+from velatura.stack.layers import LAYERS, LayerRecord, has
 from velatura.stack.schema import Parameter, Record, parameters, unknown
 from velatura.stack.spectra import MIRROR
 from velatura.stack.values import Angle, Brushing, Choice, Colour, Conductor, Flag, Index, Pair, Scalar, Text
@@ -65,6 +65,7 @@ def _constants() -> Answer:
     return {
         "version": __version__,
         "schema": {where: _keys(model) for where, model in _RECORDS.items()},
+        "layers": {name: _layer(layer) for name, layer in LAYERS.items()},
         "presets": [_preset(name) for name in presets()],
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
@@ -97,6 +98,13 @@ def _parameter(declared: Parameter, place: FieldInfo) -> Answer:
     if isinstance(declared, Conductor):
         known["options"] = (MIRROR, *names()[0])
     return known
+
+
+def _layer(layer: type[LayerRecord]) -> Answer:
+    """A kind of layer: its title, and the keys of a new one."""
+    declared = has(next(iter(layer.lacks))).items()
+    typical = {key: each.typical for key, each in declared if isinstance(each, Scalar) and each.typical is not None}
+    return {"title": layer.title, "fresh": {**typical, **layer.fresh}}
 
 
 def _titled(name: str) -> str:

@@ -97,11 +97,15 @@ class LayerRecord(Record):
         record: of its values.
         lacks: kinds that it may be of, each with the parameters that it then has not.
         surface: whether light meets it at one depth and may turn back; media lie above surfaces.
+        title: what it is called, in words.
+        fresh: what a new one is written with in the editor, beside what is typical of its parameters.
     """
 
     record: ClassVar[type[LayerValues]]
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]]
     surface: ClassVar[bool]
+    title: ClassVar[str]
+    fresh: ClassVar[Mapping[str, Any]] = {}
 
     @property
     def kind(self) -> Kind:
@@ -144,6 +148,7 @@ class Interface(LayerRecord):
         "mirror": ("eta", "k"),
     }
     surface = True
+    title = "interface"
 
     eta: Annotated[
         float | RGB | str | Spectrum | Texture | None,
@@ -214,6 +219,8 @@ class Medium(LayerRecord):
     record = MediumValues
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"medium": ()}
     surface = False
+    title = "medium"
+    fresh: ClassVar[Mapping[str, Any]] = {"sigma_a": (0.1, 0.2, 0.4)}
 
     depth: Annotated[float | Texture, Scalar("thickness, in the unit of length of sigma", unit="length", low=0)] = 1.0
     sigma_a: Annotated[float | RGB | Spectrum | Texture, Colour("absorption coefficient", unit="1/length", low=0)] = 0.0
@@ -235,6 +242,8 @@ class Diffuse(LayerRecord):
     record = DiffuseValues
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"diffuse": ()}
     surface = True
+    title = "diffuse base"
+    fresh: ClassVar[Mapping[str, Any]] = {"albedo": (0.5, 0.5, 0.5)}
 
     albedo: Annotated[float | RGB | Spectrum | Texture, Colour("fraction of light reflected", low=0, high=1)] = 0.5
 

@@ -78,7 +78,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     },
     onBaked: lobes.send,
   });
-  const ahead = lookAhead({ store, viewport, call, drawn: () => picture.drawn('a') });
+  const ahead = lookAhead({ store, viewport, call, session, drawn: () => picture.drawn('a') });
   const truth = followTruth({
     ...{ store, viewport, call },
     onProblem: (error) =>
@@ -111,7 +111,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   });
   update();
   const inspector = mountInspector(element.querySelector('.inspector-slot'), {
-    ...{ store, viewport, call, picture },
+    ...{ store, session, viewport, call, picture },
     onLobes: lobes.listen,
   });
   const appearance = mountAppearance(element.querySelector('.appearance-slot'), {

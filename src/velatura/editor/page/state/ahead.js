@@ -1,13 +1,13 @@
-// Makes ready what may come next, while there is no input: all for one more layer of either kind.
+// Makes ready what may come next, while there is no input: all for one more layer of each kind.
 
 import { addLayer } from './commands.js';
 import { documentOf, pattern } from './material.js';
 
 const PAUSE = 500; // milliseconds between two looks at whether there is time
-const KINDS = ['interface', 'medium', 'diffuse'];
 
 /** Follows a store: `{quiet, stop()}`; `drawn` returns the shape that the picture has. */
-export function lookAhead({ store, viewport, call, drawn }) {
+export function lookAhead({ store, viewport, call, session, drawn }) {
+  const added = Object.entries(session.layers).map(([kind, { fresh }]) => [kind, fresh]);
   let ready = ''; // the shape that all is ready for
   let busy = false;
   let timer = setTimeout(look, PAUSE);
@@ -18,16 +18,16 @@ export function lookAhead({ store, viewport, call, drawn }) {
     if (shape !== ready && shape === drawn() && viewport.idle) {
       ready = shape;
       busy = true;
-      for (const kind of KINDS) if (store.get() === state) await prepare(state, kind);
+      for (const layer of added) if (store.get() === state) await prepare(state, layer);
       busy = false;
     }
     if (timer !== null) timer = setTimeout(look, PAUSE);
   }
 
-  async function prepare(state, kind) {
+  async function prepare(state, layer) {
     const { model, switches } = state;
     try {
-      const shader = await call('shader', { material: documentOf(addLayer(state, kind)), model, switches });
+      const shader = await call('shader', { material: documentOf(addLayer(state, ...layer)), model, switches });
       if (store.get() === state) await viewport.prepare(shader);
     } catch {
       // The reason is shown when the layer is added

@@ -1,6 +1,6 @@
 // What can be done: pure functions from a state to the next, each with the title that undo shows.
 
-import { documentOf, enabled, indices, isOpaque, layersOf, variantOf } from './material.js';
+import { documentOf, enabled, indices, isBase, isOpaque, layersOf, variantOf } from './material.js';
 
 const titled = (title, command) => Object.assign(command, { title });
 
@@ -76,12 +76,6 @@ export const setThin = titled('change the thickness of the pane', (state, thin) 
 
 // Layers ---------------------------------------------------------------------------------------------
 
-const FRESH = {
-  interface: { eta: 1.5, alpha: 0.1 },
-  medium: { depth: 1, sigma_a: [0.1, 0.2, 0.4] },
-  diffuse: { albedo: [0.5, 0.5, 0.5] },
-};
-
 const changed = (state, id, change) => ({
   ...state,
   layers: state.layers.map((layer) => (layer.id === id ? { ...layer, ...change(layer) } : layer)),
@@ -94,10 +88,10 @@ function inserted(state, layer, index) {
 }
 
 /** Adds a layer where it makes sense: a coat on top, a medium between interfaces, a base below everything. */
-export const addLayer = titled('add a layer', (state, kind) => {
-  const layer = { id: freshId(state), kind, enabled: true, keys: FRESH[kind] };
+export const addLayer = titled('add a layer', (state, kind, keys = {}) => {
+  const layer = { id: freshId(state), kind, enabled: true, keys };
   if (kind === 'interface') return inserted(state, layer, 0);
-  if (kind === 'diffuse') {
+  if (isBase(layer)) {
     const covered = state.layers.map((other) => (isOpaque(other) ? { ...other, enabled: false } : other));
     return inserted({ ...state, layers: covered }, layer, state.layers.length);
   }

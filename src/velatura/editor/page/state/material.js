@@ -29,12 +29,15 @@ export function variantOf(keys) {
   return keys.k === undefined ? 'dielectric' : 'custom';
 }
 
-export const isOpaque = ({ kind, keys }) =>
-  kind === 'diffuse' || (kind === 'interface' && variantOf(keys) !== 'dielectric');
+/** Whether a layer lies below all others, whatever its values. */
+export const isBase = ({ kind }) => kind === 'diffuse';
 
-/** How a message or a button calls a layer. */
-export function layerName({ kind, keys }) {
-  if (kind !== 'interface') return kind === 'medium' ? 'medium' : 'diffuse base';
+export const isOpaque = (layer) =>
+  isBase(layer) || (layer.kind === 'interface' && variantOf(layer.keys) !== 'dielectric');
+
+/** How a message or a button calls a layer; `declared` are the layers of the session. */
+export function layerName({ kind, keys }, declared) {
+  if (kind !== 'interface') return declared[kind].title;
   if (keys.conductor !== undefined) return keys.conductor;
   return typeof keys.eta === 'string' ? keys.eta : variantOf(keys) === 'custom' ? 'metal' : 'dielectric';
 }

@@ -9,7 +9,7 @@ import { createClass } from './appearance/class.js';
 import { handles } from './appearance/handles.js';
 import { about, changed, hue, withMean } from './appearance/looks.js';
 import { asker, oneAtATime } from './appearance/questions.js';
-import { colourRow, hex, menu, number } from './controls.js';
+import { capital, colourRow, hex, menu, number } from './controls.js';
 import { mean, shown } from './plots/scale.js';
 import { line } from './settings.js';
 
@@ -360,7 +360,6 @@ const share = (label, value) => ({
   value: Number(Number(value.toPrecision(3)).toFixed(5)),
   spec: SHARE,
 });
-const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
 /** What was asked of a lobe that it has not got. */
 function difference(wish, got) {

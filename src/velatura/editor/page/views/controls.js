@@ -18,6 +18,9 @@ export function shown(value) {
   return texts.find(({ length }) => length <= ROOM) ?? texts.at(-1);
 }
 
+/** Words that begin with a capital. */
+export const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
+
 // Numbers --------------------------------------------------------------------------------------------
 
 /** How the ticks of a slider stand for values: `span` [low, high] evenly, or decades where there is none. */

@@ -25,10 +25,10 @@ const CHANNELS = ['red', 'green', 'blue'];
  * Shows the inspector in an element; it follows the store and what the viewport draws.
  *
  * @param {HTMLElement} element
- * @param {{store, viewport, call, picture, onLobes}} services `onLobes(f)` calls f(slot) after its lobes have changed
+ * @param {{store, session, viewport, call, picture, onLobes}} services `onLobes(f)` calls f(slot) after its lobes have changed
  * @returns {{destroy: function}}
  */
-export function mountInspector(element, { store, viewport, call, picture, onLobes }) {
+export function mountInspector(element, { store, session, viewport, call, picture, onLobes }) {
   let local = { tab: 'polar', angle: 45, azimuth: 0, below: false, logarithmic: true, cursors: {} };
   const slices = {}; // by slot
   const making = {}; // whether slices are on their way, by slot
@@ -345,7 +345,7 @@ export function mountInspector(element, { store, viewport, call, picture, onLobe
     if (kind === 'base') return 'diffuse base';
     if (kind === 'transmitted') return 'T transmitted';
     const all = enabled(slices.a.state);
-    return seenLayers(layers).map((layer) => `${layer} ${described(all[layer])}`).join(', ');
+    return seenLayers(layers).map((layer) => `${layer} ${described(all[layer], session.layers)}`).join(', ');
   }
 
   function legend({ title, parts, all, other, swatches = true }) {
@@ -392,8 +392,8 @@ const colourOf = (angles, colours, place) =>
   [0, 1, 2].map((channel) => valueAt({ x: angles, y: colours.map((colour) => colour[channel]) }, place));
 
 /** What an interface is, in few words. */
-function described(layer) {
-  const name = layerName(layer);
+function described(layer, declared) {
+  const name = layerName(layer, declared);
   const { eta } = layer.keys;
   return typeof eta === 'number' ? `${name}, eta ${shown(eta)}` : name;
 }

@@ -15,8 +15,8 @@ import {
   setThin,
   setVariant,
 } from '../state/commands.js';
-import { layerName, variantOf } from '../state/material.js';
-import { flag, iconButton, menu, numberField } from './controls.js';
+import { isBase, layerName, variantOf } from '../state/material.js';
+import { capital, flag, iconButton, menu, numberField } from './controls.js';
 import { icons } from './icons.js';
 import { parameter, parametersOf } from './parameter.js';
 import { text } from './typing.js';
@@ -47,14 +47,10 @@ function layers(panel) {
     </ol>
     <div class="add" role="group" aria-label="Add a layer">
       <span>Add</span>
-      ${[
-        ['interface', 'Interface'],
-        ['medium', 'Medium'],
-        ['diffuse', 'Diffuse base'],
-      ].map(
-        ([kind, title]) =>
-          html`<button type="button" data-add=${kind} @click=${() => panel.store.run(addLayer, kind)}>
-            ${title}
+      ${Object.entries(panel.session.layers).map(
+        ([kind, { title, fresh }]) =>
+          html`<button type="button" data-add=${kind} @click=${() => panel.store.run(addLayer, kind, fresh)}>
+            ${capital(title)}
           </button>`,
       )}
     </div>
@@ -85,7 +81,7 @@ function top({ store, session, edits }, { name, exterior, thin }) {
 
 function card(panel, layer, index) {
   const { store, session } = panel;
-  const name = layerName(layer);
+  const name = layerName(layer, session.layers);
   const problem = panel.messages.problemOf(layer.id);
   const number = numberOf(store.get(), layer.id);
   return html`<li
@@ -115,7 +111,7 @@ function card(panel, layer, index) {
           @change=${({ target }) => store.run(enableLayer, layer.id, target.checked)}
         />
         ${
-          layer.kind === 'diffuse'
+          isBase(layer)
             ? nothing
             : iconButton({
                 label: `Duplicate ${name}`,
@@ -139,7 +135,7 @@ function card(panel, layer, index) {
 
 function kindOf({ store, session }, layer) {
   if (layer.kind !== 'interface')
-    return html`<span class="kind">${layer.kind === 'medium' ? 'Medium' : 'Diffuse base'}</span>`;
+    return html`<span class="kind">${capital(session.layers[layer.kind].title)}</span>`;
   const choose = (variant) => store.run(setVariant, layer.id, variant, session.names);
   return menu({ label: 'Kind of interface', value: variantOf(layer.keys), options: VARIANTS, choose });
 }

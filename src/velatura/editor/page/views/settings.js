@@ -4,7 +4,7 @@ import { html, nothing } from 'lit-html';
 import { partsOf } from '../render/slices.js';
 import { setCamera, setModel, setSwitch, setView } from '../state/commands.js';
 import { enabled, layerName } from '../state/material.js';
-import { dial, menu, number } from './controls.js';
+import { capital, dial, menu, number } from './controls.js';
 
 const MODES = [
   ['single', 'One model'],
@@ -13,7 +13,6 @@ const MODES = [
 ];
 /** What is beside the models to compare with: slow, so that it comes a few samples at a time. */
 const TRUTH = { name: 'truth', title: 'Truth (random walk)' };
-const capital = (name) => name[0].toUpperCase() + name.slice(1);
 
 export function line(label, control) {
   return html`<div class="parameter">
@@ -51,7 +50,7 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
     ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
     ${line('Turned by', dial({ label: 'Rotation of the light', value: view.rotation, edit: change('rotation') }))}
     ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
-    ${line('Lobes', lobes({ store, picture }))}
+    ${line('Lobes', lobes({ store, session, picture }))}
     <div class="actions">
       <button type="button" @click=${() => store.aside(setCamera, null)}>Reset the camera</button>
       <button type="button" @click=${chooseEnvironment}>Light from a file</button>
@@ -60,14 +59,14 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
 }
 
 /** One button for all lobes, and one for each alone. */
-function lobes({ store, picture }) {
+function lobes({ store, session, picture }) {
   const { lobe } = store.get().view;
   const shader = picture.shader('a');
   if (!shader) return nothing;
   const all = enabled(picture.given('a'));
   const title = ({ kind, layers }) => {
     if (kind !== 'reflected') return capital(kind);
-    return layers.map((number) => `${number} ${layerName(all[number])}`).join(', ');
+    return layers.map((number) => `${number} ${layerName(all[number], session.layers)}`).join(', ');
   };
   const button = (value, text) =>
     html`<button
