@@ -1,4 +1,4 @@
-"""What `import velatura` offers: load a material, look at its lobes, render it, hold it to the laws."""
+"""The public functions of `velatura`: load a material, compute its lobes, render it, check it against the laws."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLUGINS = {"reference": "layered_reference", "weidlich_wilkie": "weidlich_wilkie
 
 
 def register() -> None:
-    """Make the plugins known to Mitsuba, in the variant that is set and in all that are set later."""
+    """Register the plugins with Mitsuba, in the current variant and in all that are set later."""
     import velatura.plugins
     import velatura.reference  # noqa: F401  (both declare theirs)
     from velatura import kernel
@@ -124,7 +124,7 @@ def check(
     progress: Callable[[int, int], None] | None = None,
     **switches: str,
 ) -> Report:
-    """Hold a BSDF to the laws: energy, reciprocity, sampling that follows its density, and the rest of `checks.LAWS`.
+    """Check a BSDF against the laws: energy, reciprocity, sampling by its density, and the others of `checks.LAWS`.
 
     Args:
         material: any `mi.BSDF`, ours or not; or a material (a stack, a file, or a preset's name) of which `model` makes

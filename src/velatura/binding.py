@@ -57,7 +57,7 @@ _STAND_IN = 0.5
 
 @dataclass(frozen=True)
 class Image:
-    """A Mitsuba texture that stands for a value: scale * texture + offset, kept within the value's range."""
+    """A Mitsuba texture in place of a value: scale * texture + offset, kept within the range of the value."""
 
     texture: Any
     colour: bool
@@ -106,7 +106,7 @@ class Field:
 
 
 def plugin_class(mi: Any) -> type:
-    """The base class of all layered plugins in the variant that is set: what they answer about their values.
+    """The base class of all layered plugins in the current variant, with the queries of their values.
 
     Theirs is a `binding`, `facts` by name, which `to_string` begins with, and `eval_pdf`.
     """
@@ -215,7 +215,7 @@ class Binding:
         return any(image.varies for image in self.images.values())
 
     def update(self) -> None:
-        """Work out what steers, after any value has changed."""
+        """Update the steering values, after any value has changed."""
         import drjit as dr
 
         self.constants = {name: self._within_range(name, value) for name, value in self.parameters.items()}
@@ -276,7 +276,7 @@ class Binding:
         return self.material({**self._colours(), **self.steering})
 
     def looked_at(self) -> Material:
-        """The material with constants as plain numbers where they are numbers, and images as they are."""
+        """The material with its numeric constants as plain numbers, and its images unchanged."""
         import drjit as dr
 
         def plain(value: Any) -> Any:
@@ -285,7 +285,7 @@ class Binding:
         return self.material({**{name: plain(value) for name, value in self.constants.items()}, **self.images})
 
     def symbolic(self, looked_at: Material) -> Material:
-        """The same with what is being differentiated as it is, so that it never equals another value."""
+        """The same, with differentiated values unchanged, so that they never equal another value."""
         import drjit as dr
 
         apart = {name: value for name, value in self.constants.items() if dr.grad_enabled(value)}
@@ -356,14 +356,14 @@ class Binding:
         return self.images[name].at(si, active) if name in self.images else self.constants[name]
 
     def described(self) -> dict[str, str]:
-        """All values by flat name as text: numbers, and what textures and spectra call themselves."""
+        """All values by flat name as text: numbers, and the text of textures and spectra."""
         texts = {name: _text(value) for name, value in self.constants.items()}
         return texts | {name: str(image) for name, image in self.images.items()}
 
     # How a property becomes a value of the stack, and that one of Mitsuba's
 
     def _given(self, properties: Any, name: str) -> Any:
-        """A property as a material file would hold it; a texture, or a spectrum in spectral variants, as it is."""
+        """A property as in a material file; textures, and spectra in spectral variants, unchanged."""
         mi, value = self.mi, properties[name]
         if isinstance(value, bool | int | float | str):
             return value
@@ -383,7 +383,7 @@ class Binding:
         return channels[0] if len(set(channels)) == 1 else tuple(channels)
 
     def _tried(self, name: str, texture: Any, colour: bool) -> Any:
-        """The value of a texture that asks nothing of a shape.
+        """The value of a texture that does not query a shape.
 
         Raises:
             InvalidInput: it has none in this variant.
@@ -476,7 +476,7 @@ def _text(value: Any) -> str:
 
 
 def _described(mi: Any, material: str) -> Stack:
-    """The stack that a scene names; files are found as Mitsuba finds those of its own plugins, beside the scene."""
+    """The stack named in a scene; files are resolved like those of Mitsuba's own plugins, beside the scene."""
 
     def find(path: str) -> str:
         return str(mi.file_resolver().resolve(path))

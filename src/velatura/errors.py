@@ -1,4 +1,4 @@
-"""What can go wrong, each with the exit status that the command line gives it.
+"""The errors of Velatura, each with its exit status on the command line.
 
 Every message is one line that a user can act on: it names the file, the layer, the key and what is allowed.
 """

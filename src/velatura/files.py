@@ -17,7 +17,7 @@ _TRIAL = bytes(4096)  # written and thrown away, so that a full disk shows itsel
 
 
 def check_writable(path: str | os.PathLike[str], what: str, endings: Sequence[str]) -> Path:
-    """The path of a file, once it is sure that it can be written there.
+    """The path of a file, after a check that it can be written there.
 
     Args:
         what: the file as a message names it, "a picture".
@@ -55,7 +55,7 @@ def check_folder(folder: Path, subject: str) -> None:
 
 @contextlib.contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A path to write to: what is there at the end of the block takes the place of `path`, unless the block fails.
+    """A temporary path to write to; its content replaces `path` at the end of the block, unless the block fails.
 
     A link stays a link, to a file that keeps its mode. A file without permission to write is not replaced, and neither
     is a device or a pipe, into which the finished file is copied.
@@ -84,7 +84,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def reason(error: Exception) -> str:
-    """What an error of the system says, as the end of a message."""
+    """The message of a system error, as the end of a line."""
     return (getattr(error, "strerror", None) or str(error)).lower()
 
 

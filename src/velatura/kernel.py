@@ -1,4 +1,4 @@
-"""The one door to Mitsuba and Dr.Jit: is there an LLVM that works, which variant is set, which of our plugins it knows.
+"""The only module that imports Mitsuba and Dr.Jit: finds LLVM, sets the variant, and registers the plugins.
 
 Importing this module imports neither. A Python BSDF class belongs to one Mitsuba variant, so a plugin module does not
 hold a class but a factory, which is called once for every variant that is used::
@@ -43,7 +43,7 @@ _registered: set[tuple[str, str]] = set()
 
 
 class Exclusive(contextlib.ContextDecorator):
-    """Lets one thread at a time work with Mitsuba; a block or a function that has it may ask for it again.
+    """Lock that lets one thread at a time work with Mitsuba; a block or a function that holds it may take it again.
 
     A rendering asks all objects of a kind what they do, those of other threads included. So none may be made while it
     runs, or be destroyed, which happens wherever the last reference goes: in the thread that does something else, or in
@@ -74,14 +74,14 @@ class Exclusive(contextlib.ContextDecorator):
             self._lock.release()
 
     def drop(self, thing: Any) -> None:
-        """Keep a thing whose last reference has gone, unless this thread may destroy it now. It never waits."""
+        """Keep an object without references, unless this thread may destroy it now. Never waits."""
         alone = self._owner is None and threading.active_count() == 1
         if not alone and self._owner != threading.get_ident():
             self._dropped.append(thing)
 
 
 def _let_go(error: BaseException | None) -> None:
-    """Clear the variables of the calls that an error, or what led to it, has ended."""
+    """Clear the variables of the calls that an error, or one of its causes, has ended."""
     waiting, seen = [error], set()
     while waiting:
         each = waiting.pop()
@@ -100,13 +100,13 @@ exclusive = Exclusive()
 
 
 def default_variant() -> str:
-    """The variant that is set where the user has set none."""
+    """The variant that is set if the user has set none."""
     return "llvm_ad_rgb"
 
 
 @exclusive
 def mitsuba(variant: str | None = None) -> ModuleType:
-    """Mitsuba with a variant set: the one asked for, or else the current one, or else `default_variant()`.
+    """Mitsuba with a variant set: the given one, else the current one, else `default_variant()`.
 
     Raises MissingTool where Mitsuba is not installed, or where an LLVM variant would run on an LLVM that is missing or
     too old (which would end the whole process at the first `minimum`, past anything Python can catch).
@@ -123,7 +123,7 @@ def mitsuba(variant: str | None = None) -> ModuleType:
 
 
 def is_picture(path: Path) -> bool:
-    """Whether Mitsuba can read a file as a picture. Sets no variant. Raises MissingTool where it is not installed."""
+    """Whether Mitsuba can read a file as a picture. Sets no variant. Raises MissingTool if Mitsuba is not installed."""
     _drjit()
     import mitsuba as mi
 
@@ -139,13 +139,13 @@ def is_picture(path: Path) -> bool:
 
 @functools.cache
 def llvm_version() -> tuple[int, int, int] | None:
-    """Version of the LLVM library that Dr.Jit has picked, None where it found none that it can use."""
+    """Version of the LLVM library that Dr.Jit uses, None if it found no usable one."""
     dr = _drjit()
     return dr.detail.llvm_version() if dr.has_backend(dr.JitBackend.LLVM) else None
 
 
 def require_llvm() -> None:
-    """Raise MissingTool, naming the command that mends it, unless Dr.Jit's LLVM can compile what we need."""
+    """Raise MissingTool, with the command that installs it, unless the LLVM of Dr.Jit is recent enough."""
     if not _llvm_works():
         found = "found none that it can use" if llvm_version() is None else f"{_dotted(llvm_version())} is too old"
         raise MissingTool(f"Dr.Jit needs LLVM {TRUSTED_LLVM} and {found}: run `{llvm_command()}`")
@@ -199,7 +199,7 @@ def _quiet_stderr() -> Iterator[None]:
 
 
 def plugin(name: str) -> Callable[[Factory], Factory]:
-    """Declare the factory below as the BSDF plugin `name`; `register()` makes it known to Mitsuba."""
+    """Declare the factory below as the BSDF plugin `name`; `register()` registers it with Mitsuba."""
 
     def declare(factory: Factory) -> Factory:
         _factories[name] = factory
@@ -210,7 +210,7 @@ def plugin(name: str) -> Callable[[Factory], Factory]:
 
 @exclusive
 def register() -> None:
-    """Make every declared plugin known to the current variant (if one is set) and to all that are set later."""
+    """Register every declared plugin in the current variant (if one is set) and in all that are set later."""
     _drjit()
     import mitsuba as mi
 
@@ -237,7 +237,7 @@ def _register_missing(mi: Any) -> None:
 
 
 def _built(made: type, properties: Any) -> Any:
-    """A plugin; without the calls that led to what it refuses, since Mitsuba would list them before the reason."""
+    """A plugin; its errors come without their stack of calls, which Mitsuba would list before the reason."""
     try:
         return made(properties)
     except VelaturaError as error:
@@ -255,10 +255,10 @@ def reason(error: BaseException) -> str:
 
 @exclusive
 def load_dict(description: dict[str, Any]) -> Any:
-    """`mi.load_dict`, which hides what a plugin of ours refuses under a stack of calls.
+    """`mi.load_dict`, with errors of our plugins without the stack of calls.
 
     Raises:
-        InvalidInput: what the plugin said, in its one line.
+        InvalidInput: the error of the plugin, in one line.
     """
     try:
         return mitsuba().load_dict(description)
@@ -276,7 +276,7 @@ EXTRAS = {"plots": "--plot, --sheet and figures", "editor": "velatura edit", "no
 
 
 class Finding(NamedTuple):
-    """One row of `doctor`: what was looked for, what was found, whether that will do, and the command that mends it."""
+    """One row of `doctor`: the component, what was found, whether that suffices, and the command that installs it."""
 
     what: str
     found: str
@@ -285,7 +285,7 @@ class Finding(NamedTuple):
 
 
 def doctor() -> tuple[Finding, ...]:
-    """What is installed, whether it will do, and else the command that mends it."""
+    """The installed components, whether they are sufficient, and otherwise the command that installs them."""
     packages = [_find_package(name) for name in ("mitsuba", "drjit")]
     backends = [_find_llvm(), _find_cuda()] if all(row.ok for row in packages) else []
     return (_find_python(), *packages, *backends)
@@ -303,7 +303,7 @@ def _find_package(name: str) -> Finding:
 
 
 def extras() -> tuple[Finding, ...]:
-    """The optional parts of Velatura, and which packages of theirs are installed; a missing one is fine."""
+    """The optional parts of Velatura, and their installed packages; a missing one is not an error."""
     return tuple(map(_find_extra, EXTRAS))
 
 
@@ -325,7 +325,7 @@ def _find_llvm() -> Finding:
 
 
 def _find_cuda() -> Finding:
-    """A GPU is welcome and never needed, so this row is always fine."""
+    """A GPU is optional, so this row never fails."""
     dr = _drjit()
     if not dr.has_backend(dr.JitBackend.CUDA):
         return Finding("CUDA", "none (optional)", True)

@@ -84,7 +84,7 @@ class _Numpy(Unrolled):
 
 
 class _Float(Unrolled):
-    """Python floats: NumPy's functions, without letting NumPy's own scalars out.
+    """Python floats: NumPy's functions, with results as Python floats.
 
     (A NumPy scalar times a Dr.Jit array would be a NumPy array.)
     """
@@ -154,7 +154,7 @@ _title: ContextVar[str] = ContextVar("title", default="")
 
 @contextmanager
 def readable() -> Iterator[None]:
-    """Records values for people to read meanwhile: with names, and loops as loops."""
+    """Record readable values in this block: with names, and loops as loops."""
     outside = _readable.set(True)
     try:
         yield
@@ -163,7 +163,7 @@ def readable() -> Iterator[None]:
 
 
 def is_readable() -> bool:
-    """Whether what is recorded now is for people to read."""
+    """Whether the current recording is readable."""
     return _readable.get()
 
 
@@ -268,7 +268,7 @@ def interpolate(table: Gridded, *coordinates: Value) -> list[Value]:
 
 
 def each(function: Callable[..., Value], nodes: Sequence[float], *values: Value) -> list[Value]:
-    """`function` of every node, a constant, and of the values; a loop where it is recorded.
+    """`function` of every node, a constant, and of the values; a loop if it is recorded.
 
     It may answer a list of values. `values` choose the dialect, though the function may read others, too.
     """
@@ -276,5 +276,5 @@ def each(function: Callable[..., Value], nodes: Sequence[float], *values: Value)
 
 
 def repeat(function: Callable[..., Sequence[Value]], times: int, *state: Value) -> Sequence[Value]:
-    """A state, one value or several, after `function` was applied to it so many times; a loop where it is recorded."""
+    """A state, one value or several, after `function` is applied to it a number of times; a loop if it is recorded."""
     return _dialect(*state).repeat(function, times, state)

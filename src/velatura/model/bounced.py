@@ -79,7 +79,7 @@ def rest(passage: Passage, wi: Direction) -> Rest:
 
 
 def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
-    """Roughness of the mirror that would turn light as all scattering does, in slabs with their cosines."""
+    """Roughness of the mirror that deflects light as much as all scattering in slabs with their cosines."""
     depths = [ops.mean(slab.scattering) / ops.maximum(cosine, COS_MIN) for slab, cosine in slabs]
     total = reduce(operator.add, depths)
     g = ops.divide(reduce(operator.add, (depth * slab.g for depth, (slab, _) in zip(depths, slabs))), total)

@@ -72,7 +72,7 @@ class Scattered:
     eta: Value
 
     def only(self, asked: Asked) -> Scattered:
-        """The parts that are asked for."""
+        """The queried parts."""
         if asked.reflection is True and asked.transmission:
             return self
         base = self.base if self.base and asked.reflects(len(self.reflected)) else None
@@ -86,7 +86,7 @@ class Scattered:
         return sum(part.energy for part in parts if part)
 
     def share(self, least: float = 0.0) -> Value:
-        """Of samples that are transmitted; where something is reflected too, there are at least so many of each."""
+        """Share of samples that are transmitted; if the stack reflects as well, each gets `least` at least."""
         if self.transmitted is None:
             return 0.0
         if not self.reflected:
@@ -98,7 +98,7 @@ class Scattered:
 
 @dataclass(frozen=True)
 class Asked:
-    """The query to a BSDF: reflection, transmission or both; of radiance, which the index scales, or not.
+    """The query to a BSDF: reflection, transmission or both; of radiance, which scales with the squared index, or not.
 
     `reflection` may also say for every reflected lobe, and then for the diffuse base, whether it is asked for.
     """
@@ -108,11 +108,11 @@ class Asked:
     radiance: bool = True
 
     def lobes(self, lobes: Sequence[Lobe]) -> Sequence[Lobe]:
-        """Those reflected lobes that are asked for."""
+        """The queried reflected lobes."""
         return [lobe for k, lobe in enumerate(lobes) if self.reflects(k)]
 
     def reflects(self, k: int) -> bool:
-        """Whether the k-th reflected part is asked for: a lobe, from the top, or after all lobes the base."""
+        """Whether the k-th reflected part is queried: a lobe, from the top, or after all lobes the base."""
         return self.reflection if isinstance(self.reflection, bool) else self.reflection[k]
 
 
@@ -141,7 +141,7 @@ def body(
 
 
 def scattered(stack: Body, wi: Direction) -> Scattered:
-    """The lobes for light from wi, which comes from below only where the stack transmits."""
+    """The lobes for light from wi, which may come from below only if the stack transmits."""
     turned = _upright(wi, wi)
     reflected, passed = stack.lobes_above(turned)
     if stack.below is None:
@@ -231,7 +231,7 @@ def sample_smooth(
 
 
 def component(stack: Body, wi: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
-    """Number of the part that `sample` draws from, or `sample_smooth`: of all reflected lobes, from the top, and then
+    """Number of the part that `sample` or `sample_smooth` draws from: all reflected lobes, from the top, then
     the diffuse base or the transmitted lobe."""
     every = scattered(stack, wi)
     seen, count = every.only(asked), len(every.reflected)
@@ -292,7 +292,7 @@ def _scaled(stack: Body, wi: Direction, wo: Direction, lobes: Sequence[Lobe]) ->
 
 
 def balanced(stack: Body, context: Context) -> Body:
-    """A uniform stack whose symmetric form keeps energy, where its model asks for that.
+    """A uniform stack with a symmetric form that conserves energy, if its model has one.
 
     Published models stay as they are, and so does a stack of which nothing may be sampled.
     """
@@ -336,7 +336,7 @@ def _difference(wi: Direction, wo: Direction) -> Direction:
 
 
 def _pair_below(stack: Body, wi: Direction, wo: Direction) -> tuple[Direction, Direction]:
-    """Light that is transmitted, as it is in the medium below: wi and wo turned up, the one from above refracted."""
+    """Transmitted light in the medium below: wi and wo turned up, the one from above refracted."""
     i, o = _upright(wi, wi), _down(_upright(wo, wi))
     from_above = wi[2] > 0
     i_below = _chosen_direction(from_above, _refracted(i, stack.eta), i)
@@ -356,7 +356,7 @@ def _down(w: Direction) -> Direction:
 
 
 def _refracted(w: Direction, eta: Value) -> Direction:
-    """The refracted direction turned up; its height is 0 where light is totally reflected."""
+    """The refracted direction turned up; its height is 0 under total internal reflection."""
     return w[0] / eta, w[1] / eta, fresnel.cos_transmitted(w[2], eta)
 
 

@@ -1,4 +1,4 @@
-"""What a renderer says to the model, once: its types, what may be sampled, and the tables."""
+"""The context of a computation: the number types of a renderer, permission to sample over direction, and the tables."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def as_it_is(value: Value) -> Value:
 
 
 def channels(*values: Value) -> np.ndarray:
-    """A colour of NumPy, from its channels or, the same in all or not, from one value."""
+    """A colour in NumPy, from its channels, or from one value for all."""
     return np.stack(values) if len(values) > 1 else np.broadcast_to(values[0], (3, np.shape(values[0])[-1]))
 
 
 @dataclass(frozen=True)
 class Context:
-    """Where the numbers of a material come from; by default they are NumPy's, of one material.
+    """The source of the numbers of a material; by default NumPy's, of one material.
 
     Args:
         constant: whether the values hold for all points, and may be looked at now.

@@ -1,4 +1,4 @@
-"""Fewer lobes than interfaces, for renderers that pay for each."""
+"""Merging of lobes, so that there are fewer than interfaces, for renderers in which each lobe has a cost."""
 
 from __future__ import annotations
 

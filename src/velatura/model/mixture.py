@@ -95,7 +95,7 @@ def sample(
 
 
 def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence[float], even: float = 0.0) -> Value:
-    """Of numbers, one for each lobe and for the base, that of the part that `sample` draws from; 0 without parts."""
+    """The number for the part that `sample` draws from, of one for each lobe and for the base; 0 without parts."""
     chosen: Value = numbers[0] if numbers else 0.0
     begin: Value = 0.0
     for number, before in zip(numbers[1:], probabilities(lobes, base, even)):
@@ -105,7 +105,7 @@ def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence
 
 
 def drawn(lobe: Lobe, wi: Direction, u1: Value, u2: Value) -> Value:
-    """Weight of a sample of a lobe by itself, for a gain of 1: of all light, or without facets of its energy."""
+    """Weight of a sample of a lobe by itself, for a gain of 1: of all light, or of its energy without facets."""
     alpha_u, alpha_v, i = _in_frame(lobe.roughness, wi)
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     fresnel = lobe.facets.reflect(ops.clip(ggx.dot(i, h), 0.0, 1.0)) if lobe.facets else 1.0

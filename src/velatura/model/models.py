@@ -1,4 +1,4 @@
-"""Named models: what each one chooses where the papers, and their published code, differ."""
+"""Named models: their choices where the papers, and their published code, differ."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Model:
         return dataclasses.replace(self, **changes)
 
     def allowed(self, key: str) -> tuple[str, ...]:
-        """Values that a switch may have: all, where the model is of the papers; else those that it is calibrated for,
+        """Allowed values of a switch: all for models of the papers; otherwise those for which the model is calibrated,
         and every form.
         """
         reflectances = self.recursion.reflectances()

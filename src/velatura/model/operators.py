@@ -70,7 +70,7 @@ def interface(
 
 
 def reflectance(prepared: Prepared, layer: PreparedInterface, cos_theta: Value, lit: Roughness, wi: Direction) -> Value:
-    """Energy that an interface reflects of light at cos_theta; `lit` is its roughness with that of the light."""
+    """Reflectance of an interface for light at cos_theta; `lit` is its roughness combined with that of the light."""
     if layer.reflectance is not None:
         # The split sum looks at the interface alone (Weier & Belcour 2020, Listing 3)
         roughness = layer.roughness if prepared.model.reflectance == "split-sum" else lit
@@ -116,7 +116,7 @@ def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) ->
 def fetched(
     prepared: Prepared, roughness: Roughness, cos_theta: Value, wi: Direction, opaque: bool = False
 ) -> tuple[Value, Value]:
-    """Cosine and isotropic roughness at which an average over an anisotropic interface is looked up."""
+    """Cosine and isotropic roughness for the look-up of an average over an anisotropic interface."""
     if prepared.variance is Isotropic:
         return cos_theta, roughness.alpha_u
     u, v, rotation = roughness

@@ -99,7 +99,7 @@ def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Directio
 
 
 def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Value:
-    """Albedo of a lobe, for directions wi of NumPy, (N,) each, as its roughness may be: (N,), or (3, N) of a colour.
+    """Albedo of a lobe in NumPy, for directions wi, (N,) each, and its roughness likewise: (N,), or (3, N) of a colour.
 
     A mean over visible normals on a lattice of a Fibonacci number of them; within .3 % on average.
     """
@@ -141,7 +141,7 @@ def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Value, Di
 
 
 def _out(x: Value, y: Value, n: Value) -> tuple[Direction, Value]:
-    """The direction inside of a momentum, and whether there is one."""
+    """The direction inside with a momentum, and whether it exists."""
     x, y = x / n, y / n
     cos2 = 1 - x * x - y * y
     return (x, y, ops.sqrt(ops.maximum(cos2, COS_MIN * COS_MIN))), cos2 > 0

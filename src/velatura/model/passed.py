@@ -1,4 +1,4 @@
-"""Light that passes a stack, whole: straight through, bounced inside, and scattered; each with its own energy.
+"""All light that passes a stack: straight through, bounced inside, and scattered; each part with its own energy.
 
 Once for a direction, `parts` has the energies over the integrals of the lobes, and the probabilities of sampling them.
 A share `OF_BOUNCED` of what facets met often add goes with light that bounces, the rest with what is scattered. So does
@@ -45,7 +45,7 @@ class Parts(ops.Named):
 
     @property
     def share(self) -> Value:
-        """Of all samples."""
+        """Share of all samples."""
         return self.of_straight + self.of_bounced + self.of_rest
 
 

@@ -1,4 +1,4 @@
-"""The lobes of a uniform stack, added up once over direction, so that all of them are one fetch.
+"""The lobes of a uniform stack, computed once over direction, so that a look-up of all of them is one fetch.
 
 Where all interfaces are isotropic they depend on the cosine alone; else on the azimuth as well, and are the same after
 half a turn.
@@ -99,7 +99,7 @@ def _kind(prepared: Prepared) -> type[Variance]:
 
 
 def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Value]]) -> list[Value]:
-    """The numbers of a lobe that a `PrecomputedLobes` is made of, in order; `apart` gives the channels of a colour."""
+    """The numbers of a lobe in a `PrecomputedLobes`, in order; `apart` gives the channels of a colour."""
     if lobe.facets is not None:
         return [*apart(lobe.energy), *apart(lobe.gain)]
     roughness = vars(_kind(prepared).of(lobe.roughness, _AS_IT_IS)).values()
@@ -107,7 +107,7 @@ def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Va
 
 
 def _gains(precomputed: PrecomputedLobes, seen: Sequence[Lobe], number: type) -> list[Value]:
-    """Those that give lobes their energy when they are drawn, however they are turned."""
+    """Gains with which lobes have their energy when they are evaluated, at any rotation."""
     x, y, z = directional_grid.directions(precomputed.curves.shape, number)
     _, u_1, u_2 = low_discrepancy.at_nodes(len(z), NORMALS, number)
     w = low_discrepancy.repeated(x, NORMALS), low_discrepancy.repeated(y, NORMALS), low_discrepancy.repeated(z, NORMALS)

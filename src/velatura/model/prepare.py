@@ -1,4 +1,4 @@
-"""A stack made ready for a model: all that does not depend on the direction of light.
+"""A stack prepared for a model: all values that do not depend on the direction of light.
 
 Values arrive as a `Material`, in any dialect; a renderer hands in constants once and textured values at every point.
 """
@@ -68,13 +68,13 @@ class PreparedMedium(ops.Named):
     g: Value
 
     def along(self, depth: Value, cosine: Value) -> Value:
-        """A depth along the normal, as light at this cosine goes through it."""
+        """A depth along the normal, as a depth along light at this cosine."""
         return depth / ops.maximum(cosine, COS_MIN)
 
 
 @dataclass(frozen=True)
 class PreparedBase:
-    """A diffuse base: albedo (a colour), index n of the medium at it over that outside, what the stack does to light.
+    """A diffuse base: albedo (a colour), relative index n of the medium above it, and means of the stack for its light.
 
     The means (colours) are those for diffuse light from below. `worth` is the share of light below the first interface
     that reaches the base, at each node of `tables.diffuse_nodes`. All are known once the layers are.
@@ -88,13 +88,13 @@ class PreparedBase:
 
     @property
     def means(self) -> tuple[Value, ...]:
-        """All that the stack does to its light."""
+        """All means of the stack for the light of the base."""
         return self.mean_reflectance, self.mean_transmittance, *self.worth
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """The layers from the top, a diffuse base apart; the model's parts that they were prepared for.
+    """The layers from the top, with a diffuse base apart, and the parts of the model for which they are prepared.
 
     For the recursion in momentum, `once` is the albedo of the first interface where light meets its facets once; None
     where a medium lies above the first interface, or below the last one.
@@ -182,7 +182,7 @@ def _interface(
 
 @dataclass(frozen=True)
 class _Averages:
-    """How a model looks up averages over rough interfaces."""
+    """Look-ups of averages over rough interfaces, as a model chooses them."""
 
     model: Model
     context: Context
@@ -205,7 +205,7 @@ class _Averages:
         return self._of(row)
 
     def once(self, eta: Value | None, kappa: Value | None) -> Average:
-        """Albedo of an interface whose facets light meets once."""
+        """Albedo of an interface with facets that light meets once."""
         average = replace(self, model=replace(self.model, reflectance="fgd")).reflectance(eta, kappa)
         assert average is not None
         return average

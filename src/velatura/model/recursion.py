@@ -1,4 +1,4 @@
-"""How the layers of a stack are summed up, and all that follows from that. A named model names its recursion."""
+"""Recursions over the layers of a stack, and the properties that follow. A named model names its recursion."""
 
 from __future__ import annotations
 
@@ -39,16 +39,16 @@ class Recursion(ABC):
 
     @abstractmethod
     def lobe_kind(self, variance: type[Variance]) -> type[Variance]:
-        """The kind of variance that lobes need, where interfaces have this one."""
+        """The kind of variance of lobes, given that of the interfaces."""
 
     def reflectances(self) -> tuple[str, ...] | None:
-        """Reflectances that it is calibrated for; None for any choice of all switches."""
+        """Reflectances for which it is calibrated; None if all switches may have any value."""
         return None
 
 
 @dataclass(frozen=True)
 class Adding(Recursion):
-    """That of the papers (Belcour 2018, section 5; Weier & Belcour 2020; Yamaguchi et al. 2019)."""
+    """The recursion of the papers (Belcour 2018, section 5; Weier & Belcour 2020; Yamaguchi et al. 2019)."""
 
     has_gain = False
     from_lowest = False

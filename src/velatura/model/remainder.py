@@ -1,4 +1,4 @@
-"""What a stack reflects in no lobe: scattered light, facets met often, a diffuse base, as one reciprocal polynomial.
+"""Light that a stack reflects outside its lobes (media, repeated facets, a diffuse base), as a reciprocal polynomial.
 
 For z the cosines outside and s = -(x_i x_o + y_i y_o), positive on the side of the mirror direction,
 
@@ -57,7 +57,7 @@ class Remainder(ops.Named):
         return ops.select(above, ops.maximum(polynomial, 0.0) * z * (1 / pi), 0.0)
 
     def albedo(self, cos_theta: Value) -> Value:
-        """Energy for light from a cosine, a colour; as if nothing were clipped."""
+        """Energy for light from a cosine, a colour, without clipping."""
         return sum(k * moment for k, moment in zip(self._at(cos_theta), MOMENTS))
 
     def _at(self, z: Value) -> tuple[Value, Value, Value]:
@@ -71,12 +71,12 @@ class Remainder(ops.Named):
 
 
 def density(wo: Direction) -> Value:
-    """Of `sample`: the cosine over pi."""
+    """Density of `sample`: the cosine over pi."""
     return ops.maximum(wo[2], 0.0) * (1 / pi)
 
 
 def sample(u1: Value, u2: Value) -> Direction:
-    """A direction from uniform numbers, as likely as its cosine is large."""
+    """A direction from uniform numbers, with a density proportional to its cosine."""
     radius, phi = ops.sqrt(u1), 2 * pi * u2
     return radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1)
 

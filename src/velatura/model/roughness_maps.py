@@ -41,7 +41,7 @@ class RoughnessMap:
 
 
 def _each(forward: Callable[[Value], Value], backward: Callable[[Value], Value]) -> RoughnessMap:
-    """The map that treats each axis by itself."""
+    """The map that treats each axis separately."""
     return RoughnessMap(lambda along, across: forward(along), lambda along, across: backward(along))
 
 
@@ -74,7 +74,7 @@ WEIER_2D = (
 
 
 def weier_2d(there: Sequence[float], back: Sequence[float]) -> RoughnessMap:
-    """A fit for either way, which are no exact inverses: .3 goes to .316 as published (Weier & Belcour 2020, B)."""
+    """A fit in each direction; they are not exact inverses: .3 goes to .316 as published (Weier & Belcour 2020, B)."""
 
     def forward(along: Value, across: Value) -> Value:
         a, b, c, d = there

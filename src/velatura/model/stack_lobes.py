@@ -52,7 +52,7 @@ def stack_lobes(
     model: str | Model = DEFAULT,
     **switches: str,
 ) -> StackLobes:
-    """The lobes of a stack, as `velatura.lobes` says."""
+    """The lobes of a stack; see `velatura.lobes`."""
     chosen = named(model, **switches)
     x, y, z = directions(cos_theta, phi).T
     material = Material.of(stack)

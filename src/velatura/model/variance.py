@@ -1,4 +1,4 @@
-"""Variances of a lobe: what the recursion adds and scales, and what becomes a GGX lobe in the end.
+"""Variances of a lobe, which the recursion adds and scales, and which finally become a GGX lobe.
 
 Three kinds, from the cheapest to the most general. A stack uses one kind throughout, the cheapest that holds all of its
 interfaces; the recursion does not care which.
@@ -40,7 +40,7 @@ class Variance(ops.Named):
     __rmul__ = __mul__
 
     def bounded(self: V) -> V:
-        """With every component below what a roughness map takes for infinite, so that no sum overflows."""
+        """With every component below the value that a roughness map treats as infinite, so that no sum overflows."""
         return type(self)(*(ops.clip(a, -VARIANCE_MAX, VARIANCE_MAX) for a in vars(self).values()))
 
     @classmethod

@@ -1,4 +1,4 @@
-"""How rough the lobe of an interface is in its own medium, and the veil about it that a medium scatters.
+"""Roughness of the lobe of an interface in its own medium, and of the veil about it that a medium scatters.
 
 Facets of slope m move tangential momentum by 2 n cos(theta) m in a reflection, and by (n_2 cos(theta_2) - n_1
 cos(theta_1)) m in a refraction, to first order. So a lobe has the tensor of its interface and, twice each, for the way
@@ -143,7 +143,7 @@ class _Coat:
         return abs(float(np.log(self.n_below / self.n)))
 
     def moved(self) -> Tensor:
-        """By how much it moves momentum in a refraction."""
+        """Displacement of momentum in a refraction."""
         x, y = (
             np.sqrt(np.maximum(self.n_below**2 - (1 - cos2) * self.n**2, COS_MIN**2)) - self.n * np.sqrt(cos2)
             for cos2 in _steeper(self.cosine, np.sqrt(self.tensor.xx), STEEPNESS)
@@ -203,7 +203,7 @@ def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -
 def features(
     part: Facets, first: Tensor, own: Tensor, coats: Sequence[_Coat], cos_theta: Array, share: Array, energy: Array
 ) -> dict[str, Array]:
-    """What the correction is made of, (M,) each, or (2, M) for the axes."""
+    """Features of the correction, (M,) each, or (2, M) for the axes."""
     n, n_top = coats[-1].n_below, coats[0].n_below
     cosine = _cosine(cos_theta, n)
     sin2 = 1 - cos_theta * cos_theta
@@ -275,7 +275,7 @@ def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Ten
 
 
 def nearly_straight(g: float) -> float:
-    """Share of what a medium of asymmetry g scatters that is turned by little, and stays in a veil."""
+    """Share of the scattered light of a medium of asymmetry g that is deflected by little, and stays in a veil."""
     if g <= ASYMMETRY_MIN:
         return 0.0
     chord = np.sqrt(1 + g * g - 2 * g * np.cos(NEARLY_STRAIGHT))
