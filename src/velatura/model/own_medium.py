@@ -123,7 +123,7 @@ def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Valu
 def _flat(reflectance: Reflectance, cosine: Value) -> Value:
     """A reflectance at an array of cosines (N, M)."""
     found = reflectance(cosine.ravel())
-    return found.reshape(*found.shape[:-1], *cosine.shape)
+    return found.reshape(*found.shape[:-1], *cosine.shape) if np.ndim(found) else found
 
 
 def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Value, Direction]:
