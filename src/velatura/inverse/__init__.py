@@ -1,4 +1,4 @@
-"""Inverse design: the stacks that give the lobes that are asked for at normal incidence.
+"""Inverse design: stacks with given lobes at normal incidence.
 
 After Bati et al. 2021, "An Inverse Method for the Exploration of Layered Material Appearance". Stacks are
 read by the model's own recursion, so that what is found holds for the model that renders it.

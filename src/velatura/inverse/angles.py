@@ -1,4 +1,4 @@
-"""Reflectance over angles: pairs of directions, tables of them in files, and what a model says there."""
+"""Reflectance over angles: pairs of directions, tables of reflectance in files, and the reflectance of a model."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Directions:
 
     @cached_property
     def lit(self) -> Array:
-        """All different wi."""
+        """The distinct directions wi."""
         return self._different[0]
 
     @cached_property
     def which(self) -> NDArray[np.intp]:
-        """Which of them the wi of each pair is."""
+        """The index in `lit` of the wi of each pair."""
         return self._different[1]
 
     @cached_property
@@ -55,7 +55,7 @@ class Directions:
 
     @classmethod
     def about_lobes(cls, turned: bool) -> Directions:
-        """Of light from several angles, what is near the mirror direction and far from it; `turned`: also azimuths."""
+        """Pairs at several angles of incidence, near the mirror direction and far from it; `turned`: also azimuths."""
         wi, wo, theta = [], [], []
         turns = np.linspace(0, 180, TURNS) if not turned else np.linspace(0, 360, 2 * TURNS, endpoint=False)
         tilt, turn = (x.ravel() for x in np.meshgrid(np.degrees(np.arctan(TILTS)), turns))
@@ -129,7 +129,7 @@ def radiance(seen: bsdf.Body, directions: Directions) -> Value:
 
 
 def report(wanted: ReflectanceTable, found: ReflectanceTable) -> list[dict[str, float]]:
-    """For every angle of incidence `theta_i`: root mean squares of f cos theta_o (`wanted`), and of what is missed.
+    """For every angle of incidence `theta_i`: root mean squares of f cos theta_o (`wanted`), and of its error.
 
     `error` is that of all of it, `relative` its share of `wanted`.
     """

@@ -1,4 +1,4 @@
-"""A coat on a material, with or without changing what is seen of the material (Bati et al. 2021, figure 14)."""
+"""A coat on a material, with or without a change of the lobes of the material (Bati et al. 2021, figure 14)."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def coat(
 
 
 def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
-    """The layers that give below a coat the lobes that those of the stack give bare."""
+    """Layers whose lobes below a coat equal those of the bare stack."""
     # Read the lobes of the bare stack
     material = Material.of(stack)
     kind = variance_kind(material)
@@ -157,7 +157,7 @@ def _scattered(stack: Stack, model: Model, *albedos: float) -> Array:
 
 
 def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
-    """The stack with the albedo of its base that gives this energy, or the nearest to it.
+    """The stack with the albedo of its base that has this energy, or the nearest to it.
 
     Of an albedo a the energy is p a / (1 - q a), with what passes, p, and what comes back to the base, q.
     """

@@ -39,7 +39,7 @@ DEPTH_MAX = 10.0  # of a medium
 
 @dataclass(frozen=True)
 class Fit:
-    """A stack that comes close to a table, and how close.
+    """A stack that approximates a table, and its error.
 
     error: root mean square of the difference of log(1 + f cos theta_o). by_angle: as `angles.report` has it. errors:
     what the descents from all starts came to, the best first.
@@ -68,7 +68,7 @@ class Free:
         return np.exp(x) if self.logarithmic else x
 
     def written(self, x: float) -> float:
-        """As `shown`; what can be no smoother is smooth."""
+        """As `shown`; a roughness at its lower bound is written as smooth."""
         value = float(self.shown(x))
         return 0.0 if self.low == ALPHA_MIN and value < 1.001 * ALPHA_MIN else value
 
@@ -78,7 +78,7 @@ class Free:
 
 
 def fit(table: ReflectanceTable, starts: Sequence[MaterialLike], model: str | Model, eta_max: float = 4.0) -> Fit:
-    """The closest of the stacks that descents from all starts (stacks, files, or presets' names) come to.
+    """The closest of the stacks found by descents from all starts (stacks, files, or presets' names).
 
     Raises:
         InvalidInput: not a valid material, an unknown model, or a texture in a start, which has no one value.
@@ -92,7 +92,7 @@ def fit(table: ReflectanceTable, starts: Sequence[MaterialLike], model: str | Mo
 
 @dataclass(frozen=True)
 class Descent:
-    """From one stack: its indices, roughnesses, absorption and albedo change; all else stays."""
+    """A descent from one stack: its indices, roughnesses, absorption and albedo change; all else stays."""
 
     table: ReflectanceTable
     start: Stack
@@ -118,7 +118,7 @@ class Descent:
         return np.log1p(self.table.value * self.table.directions.wo[2])
 
     def run(self) -> tuple[float, Stack]:
-        """The error at the end, and the stack."""
+        """The final error, and the stack."""
         from scipy.optimize import least_squares
 
         bounds = np.array([[free.coordinate(free.low), free.coordinate(free.high)] for free in self.free]).T
@@ -141,7 +141,7 @@ class Descent:
         return float(np.sqrt(np.mean(residuals**2))), self.stack(best)
 
     def residuals(self, x: Array) -> Array:
-        """By how much log(1 + f cos) is missed, (P, 3 N), at P points x (P, free) (Low et al. 2012)."""
+        """Errors of log(1 + f cos), (P, 3 N), at P points x (P, free) (Low et al. 2012)."""
         material = self.material
         for n, free in enumerate(self.free):
             layer, shown = material.layers[free.layer], free.shown(x[:, n, None])
@@ -161,7 +161,7 @@ class Descent:
         return ((ahead - behind) / (2 * STEP)).T
 
     def stack(self, x: Array) -> Stack:
-        """The material at a point; a medium that is clear is left out."""
+        """The material at a point, without clear media."""
         material = self.material.each(lambda address, value: np.ravel(value))
         for free, coordinate in zip(self.free, x):
             for key in free.keys:
@@ -232,7 +232,7 @@ def _changed(value: Value, free: Free, x: Array) -> Value:
 
 
 def written(value: Array) -> float | RGB:
-    """A colour as a material has it: one number where its channels are alike."""
+    """A colour as in a material: one number if its channels are equal."""
     if np.ptp(value) == 0:
         return float(value[0])
     r, g, b = (float(x) for x in value)
@@ -240,7 +240,7 @@ def written(value: Array) -> float | RGB:
 
 
 def _clear(layer: LayerValues) -> bool:
-    """Whether it is a medium that does nothing."""
+    """Whether a layer is a medium without effect."""
     if not isinstance(layer, MediumValues):
         return False
     return bool(np.maximum(layer.sigma_a, layer.sigma_s).max() * layer.depth < CLEAR)

@@ -44,7 +44,7 @@ class EquivalenceClass:
 
     @property
     def free(self) -> int:
-        """How many indices are free."""
+        """The number of free indices."""
         return self.interfaces - (self.choice.kind != "dielectric")
 
     def member(self, *indices: ArrayLike) -> tuple[Layers, ...]:
@@ -147,7 +147,7 @@ class EquivalenceClass:
         return np.stack([columns, _draw_between(rarer, denser, self.choice.eta_max, rng.random(count))], axis=1)
 
     def boundary(self, count: int = 256, channel: int | None = None) -> list[Array]:
-        """Of a pair of dielectrics the curves without absorption, (n, 2) each: in one channel, or of all."""
+        """The curves of pairs of dielectrics without absorption, (n, 2) each: in one channel, or of all."""
         curves = []
         for low, high in self.indices_1(channel):
             columns = low + (high - low) * (1 - np.cos(np.linspace(0, np.pi, count))) / 2  # close where curves turn
@@ -157,7 +157,7 @@ class EquivalenceClass:
         return [curve for curve in curves if len(curve)]
 
     def nearest(self, *indices: float) -> Array:
-        """The member with the nearest indices, by ratio, (free,). Empty where the class is."""
+        """The member with the nearest indices, by ratio, (free,). Empty if the class is."""
         spans = self.indices_1()
         if not spans:
             return np.empty(0)
@@ -180,7 +180,7 @@ class EquivalenceClass:
 
     @cached_property
     def chosen(self) -> tuple[Layers, ...] | None:
-        """The member that is preferred: clear, and of moderate indices; None where the class is empty."""
+        """The preferred member: clear, and of moderate indices; None if the class is empty."""
         found: list[tuple[float, tuple[Layers, ...]]] = []
         if self.empty:
             return None
@@ -224,7 +224,7 @@ class EquivalenceClass:
 
     @cached_property
     def _axis(self) -> Array:
-        """Where to look for an index: everywhere, and at the medium above, where an interface vanishes."""
+        """Points to search for an index: everywhere, and that of the medium above, where an interface vanishes."""
         eta_max = self.choice.eta_max
         return np.unique(np.r_[np.geomspace(1, eta_max, NODES), np.clip(self._eta_0, 1, eta_max)])
 
@@ -260,7 +260,7 @@ class EquivalenceClass:
         return above, _Rest(left, r, interface.floor(s_r).roughness(above.f), blur), (left >= 0) & (blur >= 0)
 
     def _reachable(self, eta_1: Array, channel: int | None) -> Mask:
-        """Whether a pair's second interface can give what the first one leaves."""
+        """Whether the second interface of a pair can reflect the energy that the first one leaves."""
         below, rest, possible = self._last(eta_1)
         some = self._channels(channel)
         ok: Mask = np.all(possible[some], axis=0)
@@ -272,7 +272,7 @@ class EquivalenceClass:
         return np.asarray(ok & (np.max(np.min(ends, axis=1), axis=0) >= -interface.NEGLIGIBLE))
 
     def _roots(self, channel: int | None, *eta_1: Array) -> tuple[Array, Array]:
-        """Last indices that need least absorption, (N,) on either side, NaN where there is none."""
+        """Last indices that need least absorption, (N,) on either side, NaN if there is none."""
         below, rest, possible = self._last(*eta_1)
         some, found = self._channels(channel), []
         for side in (RARER, DENSER):
@@ -285,7 +285,7 @@ class EquivalenceClass:
         return found[0], found[1]
 
     def _beyond(self, channel: int | None, *eta_1: Array) -> list[Interval]:
-        """All last indices: those that need least absorption, and what lies beyond them if that may absorb more."""
+        """All last indices: those that need least absorption, and those beyond them if more absorption is allowed."""
         ends = (float(eta[0]) for eta in self._roots(channel, *eta_1))
         bounds = (1.0, self.choice.eta_max)
         alone = self._clear or self.choice.eta is not None
@@ -320,7 +320,7 @@ def _depth(below: Above, rest: _Rest, eta: Array) -> Array:
 
 
 def _draw(spans: list[Interval], u: Array) -> Array:
-    """Points evenly over the logarithm of intervals, from uniform numbers; none where there are none."""
+    """Points evenly over the logarithm of intervals, from uniform numbers; none if there are no intervals."""
     if not spans:
         return np.empty(0)
     low, high = np.log(spans).T

@@ -31,7 +31,7 @@ REASONS = {
 
 @dataclass(frozen=True)
 class Direction:
-    """One way to change a target: what is changed, how it is told, and the nearest target that has a stack."""
+    """One way to change a target: the quantity, its description, and the nearest target that has a stack."""
 
     what: str
     words: str
@@ -53,12 +53,12 @@ class Infeasible(NoSolution):
 
     @property
     def nearest(self) -> Target | None:
-        """The target of all directions that changes least."""
+        """The target with the smallest change, of all directions."""
         return min(self.directions, key=lambda d: d.change).target if self.directions else None
 
 
 def infeasible(target: Target, model: Model) -> Infeasible:
-    """Why there is no stack, and what there is nearby."""
+    """The error for a target without a stack, with the nearest targets that have one."""
     total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
     if total > 1:
         directions = [d for d in [_scaled(target, model)] if d]
@@ -69,7 +69,7 @@ def infeasible(target: Target, model: Model) -> Infeasible:
 
 
 def _binding(target: Target, model: Model) -> tuple[int, str]:
-    """The first lobe that cannot be given, and the constraint that the best attempt at it breaks most."""
+    """The first lobe without a solution, and the constraint that the best attempt violates most."""
     spread, keep = EFFORT[-1]
     paths = stacks.beginning(target, model)
     for n, lobe in enumerate(target.lobes):
@@ -135,7 +135,7 @@ def _scaled(target: Target, model: Model) -> Direction | None:
 
 
 def _first(target: Target, model: Model, along: Callable[[float], Target], far: float) -> Target | None:
-    """The first target along a way that has a stack; None where none has up to a distance."""
+    """The first target along a way that has a stack; None if there is none up to a distance."""
 
     def possible(x: float) -> bool:
         t = along(x)

@@ -1,4 +1,4 @@
-"""The lobes that Bati et al. 2021 ask for in figures 10 (c) and 14 to 24, by figure, as a target file holds them."""
+"""The target lobes of Bati et al. 2021, figures 10 (c) and 14 to 24, by figure, as in a target file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Beyond the lobes head-on: stacks that come close to a table over angles, and simpler stacks that come close to one.
+"""Fits beyond normal incidence: stacks that approximate a table over angles, and simpler stacks that replace a stack.
 
 The future work that Bati et al. 2021 name in their section 8.
 """
@@ -83,13 +83,13 @@ def simplify(
 
 
 def _error(table: ReflectanceTable, start: Stack, model: Model) -> float:
-    """Of a stack as it is."""
+    """The error of a stack, unchanged."""
     value, cosine = angles.table_of(start, table.directions, model).value, table.directions.wo[2]
     return float(np.mean((np.log1p(value * cosine) - np.log1p(table.value * cosine)) ** 2))
 
 
 def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
-    """The stack with some of its interfaces, and one medium for all that lies between two of them."""
+    """The stack with some of its interfaces, and one medium for all layers between two of them."""
     layers: list[Layer] = []
     media: list[Medium] = []
     n = -1
@@ -122,5 +122,5 @@ def _merged(media: Sequence[Medium]) -> Medium:
 
 
 def _with_media(stack: Stack) -> Stack:
-    """The stack with a medium, though it be clear, between all of its layers."""
+    """The stack with a medium, clear if there was none, between all of its interfaces."""
     return _of_some(stack, range(len(stack.interfaces)))

@@ -1,4 +1,4 @@
-"""One interface below any stack: its index, roughness and the absorption above it, from the lobe that it must give.
+"""One interface below any stack: its index, roughness and the absorption above it, from its lobe.
 
 Everything is at normal incidence. Nothing is iterated but for what a model's averages make implicit: an index from its
 directional albedo, and what total internal reflection does to the light from below.
@@ -58,7 +58,7 @@ DIELECTRIC = Choice()
 
 @dataclass(frozen=True)
 class Found(Batch):
-    """N interfaces, the stacks that they complete, and the lobes that these read of them."""
+    """N interfaces, the stacks that they complete, and their lobes as read by these."""
 
     layers: Layers
     below: Above
@@ -98,7 +98,7 @@ def invert_interface(
 
 
 def own_variance(above: Above, variance: ArrayLike) -> Value:
-    """A variance of Belcour's map in the space of the model's."""
+    """A variance of Belcour's map, in the space of the model's map."""
     if above.f is BLUR:
         return np.asarray(variance, float)
     return above.f.variance(BLUR.roughness(np.asarray(variance, float)))
@@ -165,7 +165,7 @@ def with_index(above: Above, eta: Value, tau: Value, variance: Variance, paired:
 def _secant(
     x: Variance, read: Variance, apart: Variance, before: tuple[Variance, Variance] | None, slope: Value = 1.0
 ) -> Variance:
-    """What to ask for instead of x, of which `read` was read, so that nothing is missing; `before`: the last such pair.
+    """The next request after x, which gave the reading `read`, by the secant method; `before`: the previous such pair.
 
     `slope` is what is known of it at first.
     """
@@ -253,7 +253,7 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     denser = np.broadcast_to(np.asarray(choice.side) > 0, np.broadcast_shapes(np.shape(choice.side), r.shape[1:]))
 
     def index(u: Array) -> Array:
-        """Of reflectance u at normal incidence when smooth (Bati et al. 2021, Eq. 7)."""
+        """Index of a smooth dielectric of reflectance u at normal incidence (Bati et al. 2021, Eq. 7)."""
         root = np.sqrt(np.maximum(u, 0.0))  # of what rounding makes less than nothing
         ratio = (1 + root) / (1 - root)
         return above.eta * np.where(denser, ratio, 1 / ratio)[None]
@@ -277,7 +277,7 @@ def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     given = None if choice.kappa is None else _colour(choice.kappa) / eta_1
 
     def indices(u: Array) -> tuple[Array, Array]:
-        """Relative eta and kappa of reflectance u when smooth."""
+        """Relative eta and kappa of a smooth conductor of reflectance u."""
         if given is not None:
             # eta below kappa, the lower root of Bati et al. 2021, Eq. 1
             b = (1 + u) / (1 - u)
@@ -327,7 +327,7 @@ def conductor_extinction(reflectance: Value, eta: Value) -> Value:
 
 
 def conductor_tint(eta: Array, kappa: Array) -> Array:
-    """Where relative eta stands between the bounds that its reflectance allows, 0..1, as `conductor_index` takes it."""
+    """Position of relative eta between the bounds that its reflectance allows, 0..1, as in `conductor_index`."""
     reflectance = np.maximum(fresnel.normal_incidence(eta, kappa), CONDUCTOR_MIN)
     low, high = (conductor_index(reflectance, t) for t in (0.0, 1.0))
     return np.asarray(np.clip((eta - low) / np.maximum(high - low, 1e-12), 0, 1))
@@ -365,7 +365,7 @@ def _colour(value: Any) -> Value:
 
 
 def floor(s: Variance) -> Variance:
-    """The variance, nowhere below 0."""
+    """The variance, clamped to 0 from below."""
     return type(s)(*(np.maximum(x, 0.0) for x in vars(s).values())) if isinstance(s, Isotropic) else s
 
 
@@ -376,6 +376,6 @@ def least(s: Variance) -> Array:
 
 
 def margin(x: ArrayLike, slack: float = SLACK) -> Array:
-    """A margin that rounding does not break."""
+    """A margin that tolerates rounding."""
     x = np.atleast_1d(np.asarray(x, float))
     return np.where(x >= -slack, np.maximum(x, 0.0), np.where(x < 0, x, -np.inf))

@@ -76,7 +76,7 @@ def invert_pair(
 def solve(
     above: Above, energy: Array, variance: Variance, eta_1: Value, tau: Value, choice: Choice, printed: bool = False
 ) -> tuple[Found, Found]:
-    """Both interfaces of pairs below any stacks, and what these then read: Bati et al. 2021, Algorithm 5."""
+    """Both interfaces of pairs below any stacks, and their lobes as read by these: Bati et al. 2021, Algorithm 5."""
     upper = top(above, energy, variance, eta_1, tau, choice.eta_max, printed)
     left = energy - upper.energy  # Bati et al. 2021, Eq. 20
     return upper, interface.solve(upper.below, left, variance, choice)

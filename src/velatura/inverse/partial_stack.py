@@ -1,4 +1,4 @@
-"""Partial stacks above an interface that is sought: N of them, at normal incidence, by the model's own adding.
+"""Partial stacks above an unknown interface: N of them, at normal incidence, added up by the model itself.
 
 Colours are arrays of shape (C, N) or (1, N), other quantities (N,); a number is the same for all stacks.
 """
@@ -34,7 +34,7 @@ SAME = 1e-9  # share of a colour by which channels of a grey differ
 
 
 class Batch:
-    """A record of N stacks, or of a part of each: its arrays have a last axis of N, or of 1 where all are alike."""
+    """A record of N stacks, or of a part of each: its arrays have a last axis of N, or of 1 if all are equal."""
 
 
 @dataclass(frozen=True)
@@ -107,11 +107,11 @@ class Above(Batch):
 
     @property
     def adder(self) -> Model:
-        """The model, or where it has no closed form, the nearest that has one, for solutions to start from."""
+        """The model, or if it has no closed form, the nearest that has one, as a start of solutions."""
         return self.model if self.model.recursion.closed_form else self.model.in_closed_form
 
     def prepared(self, layers: Layers, reflectance: Value | None = None) -> Prepared:
-        """The interfaces as the next layer of each stack; `reflectance` where that is known already."""
+        """The interfaces as the next layer of each stack; `reflectance` if it is known already."""
         model = self.adder if reflectance is None else dataclasses.replace(self.adder, reflectance="fresnel")
         material = Material((_interface(layers),), self.eta)
         if self.over is not None and self.adder.tir != "off":
@@ -127,7 +127,7 @@ class Above(Batch):
         return dataclasses.replace(prepared, layers=(*prepared.layers[:-1], last))
 
     def reflectance(self, layers: Layers) -> Value:
-        """Energy that the interfaces reflect of light from the stack, of shape of eta or (C, N)."""
+        """Reflectance of the interfaces for light from the stack, of the shape of eta or (C, N)."""
         # Denser and rarer dielectrics need different tables; many are looked up apart
         if np.size(layers.eta) > MANY and np.shape(layers.eta) == (1, *np.shape(layers.alpha)):
             rarer = np.broadcast_to(layers.eta < self.eta, layers.eta.shape)[0]
@@ -147,7 +147,7 @@ class Above(Batch):
         return operators.interface(prepared, last, 1.0, self.state.s_t0i, NORMAL).r_12
 
     def through(self, tau: Value) -> Above:
-        """The stacks with an absorbing medium below them, which blurs nothing."""
+        """The stacks with an absorbing medium below them, which does not blur."""
         if np.ndim(tau) == 0 and tau == 0:
             return self
         t, state = np.exp(-np.asarray(tau)), self.state
@@ -156,7 +156,7 @@ class Above(Batch):
         return dataclasses.replace(self, state=dataclasses.replace(state, **passed))
 
     def below(self, layers: Layers, reflectance: Value | None = None) -> tuple[Above, adding.Lobe]:
-        """The stacks with the media and interfaces below them, and the lobes that these reflect.
+        """The stacks with media and interfaces added below, and the lobes of these interfaces.
 
         `reflectance` is what `reflectance` has found of the interfaces, where that was asked.
         """
@@ -204,7 +204,7 @@ def _interface(layers: Layers) -> InterfaceValues:
 
 
 def take(value: Any, index: Any, count: int) -> Any:
-    """Some of the `count` stacks of a record; what is the same for all stays.
+    """Some of the `count` stacks of a record; arrays shared by all stay.
 
     Raises:
         ValueError: an array that is neither for all stacks nor the same for all.
@@ -221,7 +221,7 @@ def take(value: Any, index: Any, count: int) -> Any:
 
 
 def mapped(value: Any, change: Callable[[np.ndarray], np.ndarray]) -> Any:
-    """A record with all its arrays changed; what is no array, tuple, dictionary or record of values stays."""
+    """A record with all arrays in it changed, also in tuples, dictionaries and records; other values stay."""
     if isinstance(value, np.ndarray):
         return change(value)
     if isinstance(value, Roughness):

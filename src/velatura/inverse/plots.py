@@ -21,7 +21,7 @@ STAR: dict[str, Any] = {"color": "white", "marker": "*", "markersize": 12, "mark
 
 
 def png(members: EquivalenceClass) -> bytes:
-    """A class as a picture, with the member that is preferred. Raises MissingTool without the extra `plots`."""
+    """A class as a picture, with its preferred member. Raises MissingTool without the extra `plots`."""
     with needs("plots"):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -92,7 +92,7 @@ def _name_fills(axes: Any, colours: Sequence[str]) -> None:
 
 
 def _place(members: EquivalenceClass, chosen: tuple[Layers, ...]) -> tuple[Any, Any]:
-    """Where on the axes of `draw` the chosen member lies; a conductor, with a point for each channel."""
+    """Position of the chosen member on the axes of `draw`; for a conductor, a point for each channel."""
     if members.free == 0:
         return np.ravel(chosen[-1].eta), np.ravel(chosen[-1].kappa)
     point = [float(np.ravel(part.eta)[0]) for part in chosen[: members.free]]

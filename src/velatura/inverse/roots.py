@@ -15,7 +15,7 @@ ROUNDS = 60
 def false_position(
     function: Callable[[Array], Array], low: Array, high: Array, f_low: Array, f_high: Array, tolerance: float = 1e-9
 ) -> Array:
-    """Where the functions are 0 to `tolerance`, given their values at both ends of the brackets, all of one shape.
+    """Zeros of the functions, to `tolerance`, given their values at both ends of the brackets, all of one shape.
 
     False position, with the value at an end that stays halved (the Illinois rule), is quick where functions are almost
     straight. Without a change of sign the answer is the end whose value is nearer to 0.
@@ -44,7 +44,7 @@ def false_position(
 
 
 def bisect(holds: Callable[[Array], NDArray[np.bool_]], inside: Array, outside: Array, rounds: int = 50) -> Array:
-    """The ends of what holds: the last points towards `outside` for which it does."""
+    """The ends of a condition: the last points towards `outside` for which it holds."""
     for _ in range(rounds):
         middle = (inside + outside) / 2
         ok = holds(middle)
@@ -53,7 +53,7 @@ def bisect(holds: Callable[[Array], NDArray[np.bool_]], inside: Array, outside: 
 
 
 def intervals(holds: Callable[[Array], NDArray[np.bool_]], grid: Array) -> list[tuple[float, float]]:
-    """The intervals on which a condition holds, as a grid sees them, with ends found by bisection."""
+    """The intervals on which a condition holds, as resolved by a grid, with ends found by bisection."""
     ok = holds(grid)
     starts, ends = np.flatnonzero(ok & ~np.r_[False, ok[:-1]]), np.flatnonzero(ok & ~np.r_[ok[1:], False])
     if not len(starts):

@@ -35,7 +35,7 @@ def highest(eta_0: float, eta_max: float) -> float:
 
 
 def points(eta_0: float, energy: float) -> dict[str, list[tuple[float, float]]]:
-    """Smooth pairs without absorption that have a name (figure 7), in and out of bounds, as (eta_1, eta_2).
+    """The named smooth pairs without absorption (figure 7), in and out of bounds, as (eta_1, eta_2).
 
     `matched above` and `matched below`: one of the two interfaces vanishes, so that there is one; `slab`: the medium
     below is the one above.
@@ -62,7 +62,7 @@ def curve(eta_0: float, energy: float, count: int = 400) -> list[tuple[float, fl
 
 
 def _arccosh(x: float) -> float:
-    """0 where there is no restriction."""
+    """Inverse hyperbolic cosine; 0 if there is no restriction."""
     return acosh(x) if x > 1 else 0.0
 
 

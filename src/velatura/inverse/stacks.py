@@ -33,7 +33,7 @@ ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that i
 
 @dataclass(frozen=True)
 class Partial(Batch):
-    """N partial stacks: their layers, what is below them, how far they are from what is preferred."""
+    """N partial stacks: their layers, the state below them, and their costs."""
 
     above: Above
     layers: tuple[Layers, ...]
@@ -49,7 +49,7 @@ class Partial(Batch):
 
 @dataclass(frozen=True)
 class Solution:
-    """A stack that gives the lobes of a target, and the classes that its parts were chosen from."""
+    """A stack with the lobes of a target, and the classes that its parts are chosen from."""
 
     target: Target
     model: Model
@@ -63,7 +63,7 @@ class Solution:
 
     @cached_property
     def classes(self) -> tuple[EquivalenceClass, ...]:
-        """For every lobe all that could stand in its place, below the layers chosen above it."""
+        """The equivalence class of every lobe, below the layers chosen above it."""
         above, layers, found = start(self.target, self.model), iter(self.layers), []
         for n, lobe in enumerate(self.target.lobes):
             found.append(class_of(above, lobe, self.target, first=n == 0))
@@ -98,12 +98,12 @@ def invert_stack(
 
 
 def model_of(target: Target, model: str | Model, **switches: str) -> Model:
-    """The model that reads a target's stacks; a switch that is asked for comes before what the target says."""
+    """The model that reads the stacks of a target; a given switch overrides that of the target."""
     return named(model, **({"channels": target.channels} if target.channels else {}) | switches)
 
 
 def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Solution | None:
-    """The preferred one of the stacks that are found with the least effort that finds any."""
+    """The preferred stack, of those found at the lowest effort that finds any."""
     if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
         return None
     for spread, keep in efforts:
@@ -194,7 +194,7 @@ def beginning(target: Target, model: Model) -> Partial:
 
 
 def pruned(tried: Partial, interfaces: int, keep: int) -> Partial:
-    """The feasible ones of those that some interfaces were just added to, not more than can be followed."""
+    """The feasible ones of the stacks that were just extended, at most as many as are followed."""
     feasible = reduce(np.logical_and, (layers.feasible for layers in tried.layers[-interfaces:]))
     return _thinned(tried.take(np.flatnonzero(np.broadcast_to(feasible, tried.cost.shape))), keep)
 
@@ -218,7 +218,7 @@ def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> Equ
 
 
 def extended(paths: Partial, lobe: TargetLobe, target: Target, spread: int, first: bool) -> Partial:
-    """All partial stacks with all that a lobe leaves open, feasible or not."""
+    """All partial stacks with all free choices of a lobe, feasible or not."""
     variance = Isotropic(np.atleast_1d(paths.above.f.variance(lobe.roughness)))
     energy = np.array(lobe.colour)[:, None]
     choice = _choice(lobe, lobe.interfaces - 1, target, absorbs=lobe.interfaces == 2 or not first)
@@ -301,7 +301,7 @@ def _pinned(lobe: TargetLobe, key: str, n: int) -> Any:
 
 
 def _held(layers: Layers, lobe: TargetLobe, n: int) -> Layers:
-    """With the constraint that a roughness which is fixed is the one that the target needs."""
+    """With the constraint that a fixed roughness equals the one that the target needs."""
     alpha = lobe.fixed.of("alpha", n)
     if alpha is None:
         return layers
@@ -309,7 +309,7 @@ def _held(layers: Layers, lobe: TargetLobe, n: int) -> Layers:
 
 
 def _thinned(paths: Partial, keep: int) -> Partial:
-    """Of many partial stacks the half that is preferred most, and others evenly over the rest."""
+    """The preferred half of many partial stacks, and others evenly over the rest."""
     count = len(paths.cost)
     if count <= keep:
         return paths

@@ -80,7 +80,7 @@ class Fixed(Record):
 
 
 class TargetLobe(Record):
-    """A lobe: its energy, its blur (`alpha`, or `variance` in the space of Belcour's map), and what makes it."""
+    """A lobe: its energy, its blur (`alpha`, or `variance` in the space of Belcour's map), and its interfaces."""
 
     energy: Annotated[float | RGB, _colour("energy at normal incidence")]
     alpha: Annotated[float | None, _number("GGX roughness of the lobe", high=1.0)] = None
@@ -194,7 +194,7 @@ def load_target(path: str | Path) -> Target:
 
 
 def read(target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path) -> Target:
-    """A target as it is, from a mapping, from its lobes alone, or from a file."""
+    """A target, unchanged, or from a mapping, from its lobes alone, or from a file."""
     if isinstance(target, Target):
         return target
     if isinstance(target, str | Path):
@@ -203,7 +203,7 @@ def read(target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str 
 
 
 def _asked(fields: Any) -> Target:
-    """The target that a user describes, refused where a key of it would be ignored."""
+    """The target that a user describes, refused if one of its keys would be ignored."""
     target = Target.from_dict(fields)
     for n, lobe in enumerate(target.lobes, 1):
         if lobe.base != "conductor" and "tint" in lobe.model_fields_set:

@@ -1,4 +1,4 @@
-"""The stack nearest to a given one that has given lobes, quick enough for dragging.
+"""The stack with given lobes that is nearest to a given stack, fast enough for dragging.
 
 The interfaces of a stack are described by coordinates (`coordinates`). Newton's method moves those until the model
 reads the lobes that are wished for (`newton`). Where a bound is in the way, a coordinate that is kept otherwise gives

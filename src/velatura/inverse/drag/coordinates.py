@@ -1,4 +1,4 @@
-"""A stack as coordinates: numbers that move while its lobes are dragged, their bounds, and how a model reads them.
+"""A stack as coordinates: numbers that change while its lobes are dragged, their bounds, and their reading by a model.
 
 Of the last interface of a lobe, the reflectance at normal incidence that it has when smooth, per channel; of every
 interface, a variance; these are free. The index between two interfaces and absorption that no reflectance needs are
@@ -78,7 +78,7 @@ class Bound:
     interface: int | None = None
 
     def why(self, target: Target) -> str:
-        """In words, why a target is not met."""
+        """The reason, in words, why a target is not met."""
         return f"lobe {self.lobe + 1}: {REASONS[self.reason].format(eta_max=target.eta_max)}"
 
 
@@ -127,7 +127,7 @@ class Space:
         return found
 
     def read(self, x: Array) -> Array:
-        """Of N points energies of all lobes, then variances of all interfaces, (3 K + I, N)."""
+        """Energies of all lobes, then variances of all interfaces, (3 K + I, N), of N points."""
         material = whole(self.layers(x), self.exterior)
         reflected, _ = lobes(prepare(material, self.model, Isotropic), NORMAL)
         energy = np.zeros((3 * self.lobes, x.shape[1]))
@@ -146,7 +146,7 @@ class Space:
         return Reading(read[:, 0], (read[:, 1:] - read[:, :1]) / steps), points
 
     def _brightest(self, own: InterfaceCoordinates, x: Array, s: Array) -> Array:
-        """Where every channel has a variance of its own, that of the one in which the lobe must reflect most."""
+        """The variance of the channel in which the lobe must reflect most, if every channel has its own."""
         if np.ndim(s) < 2 or len(s) == 1:
             return np.ravel(s) if np.ndim(s) > 1 else s
         of_lobe = next(o.reflectances for o in self.interfaces if o.lobe == own.lobe and o.reflectances is not None)
@@ -157,7 +157,7 @@ class Space:
 
     @property
     def lobes(self) -> int:
-        """How many lobes there are."""
+        """The number of lobes."""
         return self.interfaces[-1].lobe + 1
 
     @cached_property
@@ -192,21 +192,21 @@ class Space:
         return low, high
 
     def margin(self, bound: Bound, x: Array) -> Array:
-        """How far within a bound N points are, negative outside, (N,)."""
+        """Distance of N points from a bound, negative outside, (N,)."""
         if bound.coordinate is not None:
             return bound.sign * (x[bound.coordinate] - bound.at)
         assert bound.interface is not None
         return bound.sign * (np.log(self.layers(x)[bound.interface].eta[0]) - bound.at)
 
     def broken(self, x: Array, met: Bound | None) -> Bound | None:
-        """The bound that a point breaks most, but for the one that it lies on; None where all hold."""
+        """The bound that a point violates most, except the one that it lies on; None if all hold."""
         others = [bound for bound in self.bounds if bound != met]
         margins = [float(self.margin(bound, x[:, None])[0]) for bound in others]
         worst = int(np.argmin(margins))
         return others[worst] if margins[worst] < -SLACK else None
 
     def bound_at(self, coordinate: int, x: Array) -> Bound:
-        """The bound on a coordinate that a point breaks."""
+        """The bound on a coordinate that a point violates."""
         return next(b for b in self.bounds if b.coordinate == coordinate and b.sign * (x[coordinate] - b.at) < 0)
 
 
@@ -220,7 +220,7 @@ class Point:
 
     @cached_property
     def reading(self) -> Reading:
-        """How the model reads it."""
+        """The model's reading of it."""
         return self.known or self.space.reading(self.x, self.space.free)[0]
 
     @cached_property
@@ -297,7 +297,7 @@ class Reader:
             self.eta_1 = self.eta_1 * float(np.mean(ratio))
 
     def _upper(self, k: int, ratio: float, values: dict[str, Any]) -> InterfaceCoordinates:
-        """Of a pair the upper interface."""
+        """The upper interface of a pair."""
         pinned, top = self.target.lobes[k].fixed.of("eta", 0), float(np.log(self.target.eta_max))
         index = self._coordinate(k, float(np.log(pinned or self.eta_1 * ratio)), "index", 0.0, top)
         return InterfaceCoordinates(**values, log_index=index)

@@ -1,4 +1,4 @@
-"""A stack that is dragged: towards other lobes, or to another member of the class of a lobe."""
+"""A dragged stack: towards other lobes, or to another member of the class of a lobe."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class DraggedStack:
 
     @classmethod
     def of(cls, stack: Stack, target: Target, model: Model) -> DraggedStack | None:
-        """The stack, its interfaces shared out among the lobes of a target; None where these do not fit together.
+        """The stack with its interfaces assigned to the lobes of a target; None if these do not match.
 
         Raises:
             InvalidInput: a layer that no target can have.
@@ -79,11 +79,11 @@ class DraggedStack:
         return dataclasses.replace(part, eta=within) if near else part
 
     def renamed(self, target: Target) -> DraggedStack:
-        """With all of a target that it has, and no more than that."""
+        """With the parts of a target that it has, and no others."""
         return dataclasses.replace(self, target=target)
 
     def in_closed_form(self) -> DraggedStack:
-        """The same stack, and its lobes, as the model reads them that has a closed form."""
+        """The same stack and its lobes, read by the model with a closed form."""
         model = self.model.in_closed_form
         if model == self.model:
             return self
@@ -114,11 +114,11 @@ class DraggedStack:
         return self.point.reading.value[3 * self.space.lobes :]
 
     def now(self, wish: Target) -> Target:
-        """The lobes that are, in the form of a target."""
+        """The present lobes, in the form of a target."""
         return self._target_of(self.point.reading.value, wish)
 
     def between(self, wish: Target, t: float) -> Target:
-        """A target on the way from the lobes that are to those that are wished for, in energies and variances."""
+        """A target between the present lobes and the wished ones, in energies and variances."""
         now = self.point.reading.value
         return self._target_of(now + t * (self._wanted(wish) - now), wish)
 
@@ -148,14 +148,14 @@ class DraggedStack:
         return form
 
     def _wanted(self, wish: Target) -> Array:
-        """What the model must read, for a target to be met."""
+        """The reading of the model with which a target is met."""
         s = [MAPS[self.model.map].variance(wish.lobes[own.lobe].roughness) for own in self.interfaces]
         return np.array([*(max(e, ENERGY_MIN) for lobe in wish.lobes for e in lobe.colour), *s])
 
     # Towards other lobes ---------------------------------------------------------------------------------------------
 
     def towards(self, wish: Target) -> tuple[DraggedStack, Bound | None]:
-        """The stack with the lobes of a target of the same form, or of one on the way there, and the bound that is met.
+        """The stack with the lobes of a target of the same form, or of one on the way, and the bound that it reaches.
 
         None for the bound where the target is met.
         """
@@ -166,7 +166,7 @@ class DraggedStack:
         return self._part_of_the_way(wish, problem, found)
 
     def far(self, wish: Target) -> bool:
-        """Whether it is a long way to the lobes of a target."""
+        """Whether the lobes of a target are far away."""
         return float(np.max(np.abs(self._problem(self._wanted(wish)).way))) > FAR
 
     def achromatic(self, wish: Target) -> Target:
@@ -186,7 +186,7 @@ class DraggedStack:
         return dataclasses.replace(self, point=solution.point)
 
     def _met(self, problem: Problem, held: Sequence[int] = ()) -> Solution | Bound:
-        """The stack that meets the goal; where a bound is in the way, what is kept gives way, if it can."""
+        """The stack that meets the goal; at a bound, kept coordinates change if they can."""
         found = problem.solve()
         if isinstance(found, Solution):
             return found
@@ -208,7 +208,7 @@ class DraggedStack:
         return self.renamed(self.now(wish)), bound
 
     def _giving(self, bound: Bound, held: Sequence[int]) -> list[int]:
-        """Coordinates that are kept, and may yet give way to a bound: those of the nearest lobe first."""
+        """Kept coordinates that may change at a bound: those of the nearest lobe first."""
         found = []
         for own in reversed([own for own in self.interfaces if own.lobe <= bound.lobe]):
             if own.depth is not None and self.point.x[own.depth] > 0 and np.any(own.kept):
@@ -220,7 +220,7 @@ class DraggedStack:
     # To other members of a class -------------------------------------------------------------------------------------
 
     def member(self, k: int, point: Sequence[float]) -> tuple[DraggedStack, Bound | None]:
-        """The stack with another member of a lobe's class, or the nearest to it, and then the bound that is met.
+        """The stack with another member of a lobe's class, or the nearest to it, and then the bound that it reaches.
 
         point: as `point_of` gives it: free indices of dielectrics from the top, then a conductor's tint.
         """
@@ -240,7 +240,7 @@ class DraggedStack:
         return found, why
 
     def point_of(self, k: int) -> list[float]:
-        """Where in the class of a lobe its member is."""
+        """The point of the member in the class of a lobe."""
         point = []
         for own, part in zip(self.interfaces, self.point.layers):
             if own.lobe == k:
@@ -253,7 +253,7 @@ class DraggedStack:
         return float(np.mean(retinted(own, float(own[channel, 0]), tint)))
 
     def _moved(self, k: int, point: Array) -> DraggedStack | Bound:
-        """With the member of a class at a point; where there is none, the bound that is in the way."""
+        """With the member of a class at a point; the violated bound if there is none."""
         moved, held, level = self._placed(k, point)
         problem = moved._problem(self._wanted(self.target))
         if level is not None:

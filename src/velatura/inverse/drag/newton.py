@@ -16,20 +16,20 @@ ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; als
 
 @dataclass(frozen=True)
 class Compromise:
-    """A bound that the solution lies on, and what gives way: a coordinate that is kept, or (None) the goal."""
+    """A bound that the solution lies on, and what changes in return: a kept coordinate, or (None) the goal."""
 
     bound: Bound
     coordinate: int | None = None
 
     @property
     def of_goal(self) -> bool:
-        """Whether only a part of the way to the goal is asked for, as far as the bound allows."""
+        """Whether only a part of the way to the goal is sought, as far as the bound allows."""
         return self.coordinate is None
 
 
 @dataclass(frozen=True)
 class Solution:
-    """A point, and which part of the way to the goal it is."""
+    """A point, and the part of the way to the goal at which it lies."""
 
     point: Point
     part: float
@@ -37,13 +37,13 @@ class Solution:
 
 @dataclass(frozen=True)
 class Problem:
-    """From a point to one where the model reads the energies and variances `goal`."""
+    """The problem of moving from a point to one where the model reads the energies and variances `goal`."""
 
     start: Point
     goal: Array
 
     def solve(self, compromise: Compromise | None = None) -> Solution | Bound:
-        """The stack that meets the goal; where there is none, the bound that is in the way."""
+        """The stack that meets the goal; the violated bound if there is none."""
         space, bound = self.start.space, compromise.bound if compromise else None
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, set[int]()
