@@ -8,8 +8,7 @@ import tmm
 
 import velatura as vt
 from velatura import tables
-from velatura.model.transport.adding import indices, leaving, parts
-from velatura.model.transport.adding import layer as layer_of
+from velatura.model.transport.adding import indices, layers, leaving, parts
 from velatura.model.transport.energies import Energies, energies
 from velatura.model.transport.interfaces import Setting
 from velatura.model.transport.modes import Even, Relative
@@ -73,6 +72,15 @@ def test_smooth_stacks_are_the_incoherent_sum() -> None:
     expected = tmm.inc_tmm("s", layers, [np.inf, thickness, 1e6, np.inf], ["i"] * 4, 0, wavelength)
     assert reflected(found)[0, 0] == pytest.approx(expected["R"], abs=1e-6)
     assert found.passed[0, 0] == pytest.approx(expected["T"], abs=1e-6)
+
+
+def test_colours_of_a_metal_are_solved_each_like_a_metal_of_its_own() -> None:
+    """Where they differ in the extinction alone."""
+    k = (2.0, 3.0, 4.0)
+    together = solved(Stack([COAT, Interface(eta=0.2, k=k, alpha=0.4)]))
+    for colour, own in enumerate(k):
+        alone = solved(Stack([COAT, Interface(eta=0.2, k=own, alpha=0.4)]))
+        assert reflected(together)[colour] == pytest.approx(reflected(alone)[0], abs=1e-9)
 
 
 # Conservation
@@ -170,7 +178,7 @@ def test_modes_of_the_azimuth_agree_on_isotropic_stacks(often: bool) -> None:
     total = []
     for basis in (Relative(nodes), Even(nodes)):
         setting = Setting(basis, p, 0 * p, 377, tables.load() if often else None)
-        light = leaving([layer_of(part, setting) for part in found], setting)
+        light = leaving([layers(part, setting)[1] for part in found], setting)
         total.append(sum(light.energy(each) for each in light.reflected))
     assert total[1] == pytest.approx(total[0], abs=4e-3)
 

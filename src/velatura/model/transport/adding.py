@@ -52,9 +52,9 @@ class Leaving:
         return np.asarray(basis.energy(light.columns) + light.beams[..., 0, 0, :])
 
 
-def leaving(layers: Sequence[Layer], setting: Setting) -> Leaving:
+def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
     """Sum up layers from the top."""
-    first, *others = layers
+    first, *others = stack
     reflected, d, straight, out, below = [first.r], first.t, first.t, first.t_below, first.r_below
     for each in others:
         bounces = (below @ each.r).repeated()
@@ -65,12 +65,15 @@ def leaving(layers: Sequence[Layer], setting: Setting) -> Leaving:
     return Leaving(tuple(reflected), d, straight, setting)
 
 
-def layer(part: Part, setting: Setting) -> Layer:
-    """What one layer does to light."""
+def layers(part: Part, setting: Setting) -> tuple[Layer, Layer]:
+    """What one layer does to light, where facets are met once, and as the setting says."""
     if isinstance(part, Facets):
         return interface(part, setting)
-    if isinstance(part, Slab):
-        return medium(part, setting)
+    alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
+    return alike, alike
+
+
+def _lambert(part: Lambert, setting: Setting) -> Layer:
     basis = setting.basis
     nothing = Operator.nothing(basis.size, len(setting.p))
     even = basis.rows(basis.nodes.weights(part.n)[None].repeat(len(basis.azimuths), 0).reshape(1, -1), 0.0)

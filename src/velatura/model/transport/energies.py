@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.transport.adding import Leaving, Part, indices, layer, leaving, parts
+from velatura.model.transport.adding import Leaving, Part, indices, layers, leaving, parts
 from velatura.model.transport.interfaces import Facets, Setting
-from velatura.model.transport.media import Slab
+from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.modes import TINY, Basis, Even, Relative
 from velatura.model.transport.nodes import Nodes
-from velatura.model.transport.operators import Layer, Operator
+from velatura.model.transport.operators import Operator
 from velatura.stack import InterfaceValues, LayerValues, Material
 from velatura.tables import Tables
 
@@ -74,19 +74,19 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(INCIDENCES))])
     nodes = Nodes.of(indices(everything), NODES)
     basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES)
-    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, SAMPLES, None)
+    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, SAMPLES, often)
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
-    once = {i: layer(part, setting) for i, part in enumerate(everything) if not isinstance(part, Slab)}
-    sharp = _system(parts(material, lambda g: 0.0) if scatters else everything, setting, once)
-    kept = _system(parts(material, forward), setting, once) if scatters else sharp
-    full = sharp
-    if often:
-        many = replace(setting, often=often)
-        full = leaving([layer(part, many) for part in everything], many)
-    elif scatters:
-        full = _system(everything, setting, once)
+    each = [layers(part, setting) for part in everything]
+    full = leaving([last for _, last in each], setting)
+
+    def system(found: Sequence[Part]) -> Leaving:
+        kept = [medium(part, setting) if isinstance(part, Slab) else once for part, (once, _) in zip(found, each)]
+        return leaving(kept, setting)
+
+    sharp = system(parts(material, lambda g: 0.0)) if scatters or often else full
+    kept = system(parts(material, forward)) if scatters else sharp
 
     # Sort what leaves
     own = [i for i, part in enumerate(everything) if isinstance(part, Facets)]
@@ -118,10 +118,6 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
         remainder=remainder,
         nodes=nodes,
     )
-
-
-def _system(found: Sequence[Part], setting: Setting, known: Mapping[int, Layer]) -> Leaving:
-    return leaving([known.get(i) or layer(part, setting) for i, part in enumerate(found)], setting)
 
 
 def _sum(lights: Sequence[Operator]) -> Operator:

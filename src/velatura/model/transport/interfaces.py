@@ -7,7 +7,7 @@ tables of multiple scattering say.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -90,8 +90,8 @@ def lattice(count: int) -> tuple[Array, Array]:
 class _Events:
     """What first events make of light: reflected and refracted samples, by colour, and what they block of either.
 
-    Weights are (C, sources, samples), blocked shares (C, sources); `whole` is what would be blocked if all light were
-    reflected.
+    Weights are (C, sources, samples), for all ways to mask light, one after the other; blocked shares (C, sources) are
+    those of the last way; `whole` is what would be blocked if all light were reflected.
     """
 
     reflected: Light
@@ -101,11 +101,11 @@ class _Events:
     whole: Array
 
 
-def _events(facets: Facets, p: Array, psi: Array, samples: int, often: bool) -> _Events:
+def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[bool]) -> _Events:
     """First events for light of momenta of length p at azimuths psi (sources,), in the frame of the interface's axes.
 
-    Momenta are of the direction of travel, which a mirror leaves alone. `often` correlates masking with the height of
-    facets, as what follows needs (Heitz et al. 2016); otherwise masking is separable.
+    Momenta are of the direction of travel, which a mirror leaves alone. `ways` says whether masking is correlated with
+    the height of facets, as what follows needs (Heitz et al. 2016); otherwise it is separable.
     """
     n = float(np.mean(facets.above))
     alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
@@ -117,39 +117,34 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, often: bool) -> 
     cosine = np.minimum(ggx.dot(wi, h), 1.0)
     share = 1 / u_1.size
 
-    def escape(w: tuple[Array, Array, Array], out: Array, through: bool) -> Array:
+    def escape(w: tuple[Array, Array, Array], out: Array, through: bool, often: bool) -> Array:
         towards = (w[0], w[1], np.abs(w[2]))
         if not often:
             return np.where(out, ggx.masking(towards, *alpha), 0)
         there, here = _smith(towards, alpha), _smith(wi, alpha)
         both = np.exp(np.log1p(here) + betaln(1 + here, 1 + there)) if through else (1 + here) / (1 + here + there)
+        if through:
+            # Facets of a small step let light pass again and again, and hardly turn it
+            both = both + np.exp(-abs(np.log(eta)) / STRAIGHT) * (1 - both)
         return np.where(out, both, 0)
 
-    o = ggx.reflect(wi, h)
+    def divided(w: tuple[Array, Array, Array], n: float, shares: Array, kept: Sequence[Array]) -> tuple[Light, Array]:
+        light = Light(n * w[0], n * w[1], np.concatenate([shares * each for each in kept]))
+        return light, (shares * (1 - kept[-1])).sum(axis=-1)
+
+    o, reflectance = ggx.reflect(wi, h), facets.reflectance(cosine)
+    kept = [escape(o, o[2] > 0, False, often) for often in ways]
+    whole = (1 - kept[-1]).sum(axis=-1)[None] * share
+    reflected, blocked = divided(o, n, reflectance * share, kept)
     if facets.below is None or facets.k is not None:
-        reflectance = facets.reflectance(cosine)
-        kept = escape(o, o[2] > 0, False)
-        blocked = (reflectance * (1 - kept)).sum(axis=-1) * share
-        light = Light(n * o[0], n * o[1], reflectance * kept * share)
-        return _Events(light, None, blocked, np.zeros_like(blocked), (1 - kept).sum(axis=-1)[None] * share)
+        return _Events(reflected, None, blocked, np.zeros_like(blocked), whole)
     below = float(np.mean(facets.below))
     eta = below / n
-    cos_t = fresnel.cos_transmitted(cosine, eta)
-    reflectance = facets.reflectance(cosine)
-    along = cosine / eta - cos_t
-    t = tuple(along * a - b / eta for a, b in zip(h, wi))
-    reflected, refracted = escape(o, o[2] > 0, False), escape(t, t[2] < 0, True)
-    if often:
-        # Facets of a small step let light pass again and again, and hardly turn it
-        passes = np.exp(-abs(np.log(eta)) / STRAIGHT)
-        refracted = np.where(t[2] < 0, refracted + passes * (1 - refracted), 0)
-    return _Events(
-        Light(n * o[0], n * o[1], reflectance * reflected * share),
-        Light(below * t[0], below * t[1], (1 - reflectance) * refracted * share),
-        (reflectance * (1 - reflected)).sum(axis=-1) * share,
-        ((1 - reflectance) * (1 - refracted)).sum(axis=-1) * share,
-        (1 - reflected).sum(axis=-1)[None] * share,
-    )
+    along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
+    t = along * h[0] - wi[0] / eta, along * h[1] - wi[1] / eta, along * h[2] - wi[2] / eta
+    kept = [escape(t, t[2] < 0, True, often) for often in ways]
+    refracted, not_refracted = divided(t, below, (1 - reflectance) * share, kept)
+    return _Events(reflected, refracted, blocked, not_refracted, whole)
 
 
 def _smith(w: tuple[Array, Array, Array], alpha: tuple[float, float]) -> Array:
@@ -172,24 +167,35 @@ class Setting:
     often: Tables | None = None
 
 
-def interface(facets: Facets, setting: Setting) -> Layer:
-    """An interface as a layer; what is opaque lets nothing through, and has no other side."""
+def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
+    """An interface as a layer, with facets met once, and as the setting says; what is opaque lets nothing through, and
+    has no other side."""
     nothing = Operator.nothing(setting.basis.size, len(setting.p))
     if facets.is_smooth:
         r, t = (scaled(partial(facets.smooth, transmitted=side), setting) for side in (False, True))
         if facets.opaque:
-            return Layer(r, nothing, nothing, nothing)
-        back = facets.reversed()
-        return Layer(r, t, *(scaled(partial(back.smooth, transmitted=side), setting) for side in (False, True)))
+            t = r_below = t_below = nothing
+        else:
+            back = facets.reversed()
+            r_below, t_below = (scaled(partial(back.smooth, transmitted=side), setting) for side in (False, True))
+        smooth = Layer(r, t, r_below, t_below)
+        return smooth, smooth
     above = _Side.of(facets, setting)
     if facets.opaque:
-        return Layer(above.r + _again(above.to_r, above.to_r, setting), nothing, nothing, nothing)
+        once, first = (Layer(r, nothing, nothing, nothing) for r in above.r)
+        if not above.blocked:
+            return once, once
+        return once, replace(first, r=first.r + _again(above.blocked[0], above.blocked[0], setting))
     below = _Side.of(facets.reversed(), setting)
-    return Layer(
-        above.r + _again(above.to_r, above.to_r, setting),
-        above.t + _again(above.to_t, below.to_t, setting),
-        below.r + _again(below.to_r, below.to_r, setting),
-        below.t + _again(below.to_t, above.to_t, setting),
+    once, first = (Layer(*each) for each in zip(above.r, above.t, below.r, below.t))
+    if not (above.blocked and below.blocked):
+        return once, once
+    (to_r, to_t), (back_to_r, back_to_t) = above.blocked, below.blocked
+    return once, Layer(
+        first.r + _again(to_r, to_r, setting),
+        first.t + _again(to_t, back_to_t, setting),
+        first.r_below + _again(back_to_r, back_to_r, setting),
+        first.t_below + _again(back_to_t, to_t, setting),
     )
 
 
@@ -214,43 +220,45 @@ class _Blocked:
 
 @dataclass(frozen=True)
 class _Side:
-    """What becomes of light from one side of an interface at first events, and what they block."""
+    """What becomes of light from one side of an interface at first events, with facets met once, and as the setting
+    says; and what the latter block, that in the end is reflected, and that passes.
+    """
 
-    r: Operator
-    t: Operator
-    to_r: _Blocked | None
-    to_t: _Blocked | None
+    r: tuple[Operator, Operator]
+    t: tuple[Operator, Operator]
+    blocked: tuple[_Blocked, _Blocked] | None
 
     @classmethod
     def of(cls, facets: Facets, setting: Setting) -> _Side:
         basis, turn = setting.basis, facets.rotation
         p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
-        often = setting.often is not None
-        at_nodes = _events(facets, p, psi, setting.samples, often)
-        of_beams = _events(facets, setting.p, basis.relative(setting.phi, turn), setting.samples, often)
+        ways = [False] if setting.often is None else [False, True]
+        at_nodes = _events(facets, p, psi, setting.samples, ways)
+        of_beams = _events(facets, setting.p, basis.relative(setting.phi, turn), setting.samples, ways)
 
-        def operator(nodes: Light | None, beams: Light | None) -> Operator:
+        def operators(nodes: Light | None, beams: Light | None) -> tuple[Operator, Operator]:
             if nodes is None or beams is None:
-                return Operator.nothing(basis.size, len(setting.p))
-            return Operator.of(basis.operators(nodes, turn), basis.columns(beams, turn))
+                nothing = Operator.nothing(basis.size, len(setting.p))
+                return nothing, nothing
+            both = basis.operators(nodes, turn), basis.columns(beams, turn)
+            found = [Operator.of(*each) for each in zip(*(np.split(x, len(ways)) for x in both))]
+            return found[0], found[-1]
 
-        r, t = operator(at_nodes.reflected, of_beams.reflected), operator(at_nodes.refracted, of_beams.refracted)
+        r, t = operators(at_nodes.reflected, of_beams.reflected), operators(at_nodes.refracted, of_beams.refracted)
         if setting.often is None:
-            return cls(r, t, None, None)
-        blocked = [_again_shares(facets, setting.often, q, e) for q, e in ((p, at_nodes), (setting.p, of_beams))]
+            return cls(r, t, None)
+        shares = [_again_shares(facets, setting.often, q, e) for q, e in ((p, at_nodes), (setting.p, of_beams))]
         weights = basis.nodes.weights(float(np.mean(facets.above)))
-        found = []
-        for nodes, beams in zip(*blocked):
+        blocked = []
+        for nodes, beams in zip(*shares):
             rows = basis.rows(nodes, turn)
             emitted = rows * weights
-            found.append(_Blocked(rows, beams, emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)))
-        return cls(r, t, found[0], found[1])
+            blocked.append(_Blocked(rows, beams, emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)))
+        return cls(r, t, (blocked[0], blocked[1]))
 
 
-def _again(taken: _Blocked | None, there: _Blocked | None, setting: Setting) -> Operator:
+def _again(taken: _Blocked, there: _Blocked, setting: Setting) -> Operator:
     """Light that is blocked at first, and leaves in the directions in which light is blocked `there`."""
-    if taken is None or there is None:
-        return Operator.nothing(setting.basis.size, len(setting.p))
     outer = setting.basis.outer
     return Operator.of(outer(there.emitted, taken.nodes), outer(there.emitted, taken.beams))
 
@@ -270,11 +278,11 @@ def _again_shares(facets: Facets, known: Tables, p: Array, events: _Events) -> t
         row = tables.dielectric_row(known, ratio, True, True)
     else:
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
-    often = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean))).reshape(len(ratio), -1)
+    often = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean))).reshape(-1, p.size)
     stand_in = events
     if facets.alpha_u != facets.alpha_v:
-        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, STAND_IN, True)
-    once = stand_in.reflected.weight.sum(axis=-1)
+        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, STAND_IN, [True])
+    once = stand_in.reflected.weight[-len(stand_in.blocked_reflected) :].sum(axis=-1)
     blocked: Array
     little: Array
     if facets.k is None:

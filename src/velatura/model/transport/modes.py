@@ -8,10 +8,12 @@ distinguish a direction from its opposite.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array
 
 from velatura.model.transport.nodes import Nodes
 
@@ -95,10 +97,9 @@ class Relative(Basis):
         return np.zeros_like(phi)
 
     def columns(self, light: Light, rotation: float) -> Array:
-        p = np.hypot(light.x, light.y)
-        cosine = light.x / np.maximum(p, TINY)
-        angular = [np.ones_like(p), cosine, 2 * cosine * cosine - 1][: self.count]
-        return _deposited(self.nodes, p, light.weight, angular, [m % 2 == 1 for m in range(self.count)])
+        cosine = light.x / np.maximum(np.hypot(light.x, light.y), TINY)
+        angular = [np.ones_like(cosine), cosine, 2 * cosine * cosine - 1][: self.count]
+        return _deposited(self.nodes, light, angular, [m % 2 == 1 for m in range(self.count)])
 
     operators = columns
 
@@ -181,9 +182,9 @@ class Even(Basis):
         return np.stack([np.ones_like(azimuth), *waves])
 
     def _deposited(self, light: Light) -> Array:
-        p = np.hypot(light.x, light.y)
-        basis = self._basis(np.arctan2(light.y, light.x))
-        return _deposited(self.nodes, p, light.weight, list(basis), [False] * len(basis))
+        turn = (light.x + 1j * light.y) / np.maximum(np.hypot(light.x, light.y), TINY)
+        waves = [ROOT * part(turn**m) for m in self.orders for part in (np.real, np.imag)]
+        return _deposited(self.nodes, light, [np.ones_like(light.x), *waves], [False] * self.modes)
 
     def _turned(self, rotation: float) -> Array:
         """Coefficients in a frame that is turned."""
@@ -194,15 +195,17 @@ class Even(Basis):
         return found
 
 
-def _deposited(nodes: Nodes, p: Array, weight: Array, angular: list[Array], odd: list[bool]) -> Array:
+def _deposited(nodes: Nodes, light: Light, angular: Sequence[Array], odd: Sequence[bool]) -> Array:
     """Sums over the samples of each source, (C, modes, N, sources)."""
-    sources, count = p.shape[0], nodes.count
-    index, shares, beyond = nodes.shares(p)
-    place = (index * sources + np.arange(sources)[:, None]).ravel()
-    mirrored = np.where(beyond, -shares, shares) if any(odd) else shares
-    found = np.empty((len(weight), len(angular), count, sources))
-    for c, each in enumerate(weight):
-        for m, values in enumerate(angular):
-            spread = (mirrored if odd[m] else shares) * (each * values)
-            found[c, m] = np.bincount(place, spread.ravel(), count * sources).reshape(count, sources)
-    return found
+    sources, samples = light.x.shape
+    index, shares, beyond = nodes.shares(np.hypot(light.x, light.y))
+    # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
+    rows = np.where(beyond, nodes.count, index) * sources + np.arange(sources)[:, None]
+    shape = (nodes.count + 1) * sources, sources * samples
+    last = (1, 2, 0)
+    entries = shares.transpose(last).ravel(), rows.transpose(last).ravel(), np.arange(0, shares.size + 1, len(shares))
+    weights = np.stack([(each * values).ravel() for each in light.weight for values in angular], axis=-1)
+    found = (csc_array(entries, shape) @ weights).T.reshape(len(light.weight), len(angular), nodes.count + 1, sources)
+    sign = np.where(odd, -1, 1)[:, None]
+    found[:, :, 1] += sign * found[:, :, -1]
+    return found[:, :, :-1]
