@@ -68,7 +68,7 @@ def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> 
 
     Raises:
         InvalidInput: not a valid material, an unknown model or switch.
-        MissingTool: LLVM is missing or too old; the message says what to install.
+        MissingTool: LLVM is missing or too old; the message names the package to install.
     """
     from velatura import kernel
 

@@ -51,7 +51,7 @@ _SPECTRA = (
     "BlackBodySpectrum",
 )
 
-#: What stands in the stack for a value that a plugin got as a texture object, where its parameter declares nothing.
+#: The value in the stack in place of a texture object of a plugin, if its parameter declares no typical one.
 _STAND_IN = 0.5
 
 
@@ -318,7 +318,7 @@ class Binding:
         flags = self.mi.ParamFlags
         return flags.Differentiable if self.addresses[name].declared.differentiable else flags.NonDifferentiable
 
-    # What a plugin is asked about its values
+    # Queries of the values of a plugin
 
     def has(self, name: str) -> bool:
         """Whether the material has a value of that flat name."""

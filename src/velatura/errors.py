@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 
 def one_line(text: str) -> str:
-    """A text with what would end or garble its line (line breaks, control characters) written as Python escapes it.
+    """A text with line breaks and control characters, which would end or garble its line, as Python escapes.
 
-    What stands for a byte of a file's name that is no UTF-8 stays as it is.
+    Surrogates for bytes of a file's name that are not UTF-8 stay unchanged.
     """
     kept = (c if c.isprintable() or "\udc80" <= c <= "\udcff" else c.encode("unicode_escape").decode() for c in text)
     return "".join(kept)
@@ -47,7 +47,7 @@ class LawBroken(VelaturaError):
 
 
 class MissingTool(VelaturaError):
-    """Something that must be installed is missing or too old; the message holds the command that mends it."""
+    """Something that must be installed is missing or too old; the message holds the command that installs it."""
 
     exit_status = 1
 

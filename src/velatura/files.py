@@ -89,7 +89,7 @@ def reason(error: Exception) -> str:
 
 
 def _place(path: Path) -> tuple[Path, int | None]:
-    """Where a file is written to, links followed, and the type and mode of what is there already.
+    """The path to write to, with links followed, and the type and mode of an existing file.
 
     Raises:
         OSError: it cannot be looked at, or is a file without permission to write.

@@ -45,10 +45,10 @@ _registered: set[tuple[str, str]] = set()
 class Exclusive(contextlib.ContextDecorator):
     """Lock that lets one thread at a time work with Mitsuba; a block or a function that holds it may take it again.
 
-    A rendering asks all objects of a kind what they do, those of other threads included. So none may be made while it
-    runs, or be destroyed, which happens wherever the last reference goes: in the thread that does something else, or in
-    the traceback of an error that is kept. Hence what a failure holds is let go before the lock is, and a BSDF of ours
-    that another thread drops is kept until the lock is free.
+    A rendering queries all objects of a kind, those of other threads included. So none may be created while it runs,
+    nor destroyed, which happens where the last reference ends: in any thread, or in the traceback of a kept error.
+    Hence the references of a failure are cleared before the lock is released, and a BSDF of ours that another thread
+    releases is kept until the lock is free.
     """
 
     def __init__(self) -> None:
@@ -173,7 +173,7 @@ def _compiles_minimum() -> bool:
 @functools.cache
 def _drjit() -> ModuleType:
     try:
-        # Dr.Jit looks for LLVM while it is imported, and prints what our own message says better
+        # Dr.Jit looks for LLVM while it is imported, and prints a less helpful message than ours
         with exclusive, _quiet_stderr():
             import drjit
             import mitsuba  # noqa: F401
@@ -269,7 +269,7 @@ def load_dict(description: dict[str, Any]) -> Any:
         raise InvalidInput(reason.strip()) from None
 
 
-# What is installed
+# Installed components
 
 #: Optional parts of the package, and what needs them.
 EXTRAS = {"plots": "--plot, --sheet and figures", "editor": "velatura edit", "notebook": "vt.Editor"}

@@ -1,4 +1,4 @@
-"""Evidence for the laws: a BSDF's answers at a few directions of incidence, gathered once for all of them."""
+"""Evidence for the laws: values of a BSDF at a few directions of incidence, gathered once for all laws."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Drawn:
         asked, both: `eval` and `pdf`, and `eval_pdf`, at the directions sampled.
         arrived: samples that carry light, or would if the surface were not black (D, N).
         delta: those of them that a smooth component reflected or refracted (D, N).
-        energy: weights as energy: radiance over squared index is what is conserved (D, N, channels).
+        energy: weights as energy, since radiance over squared index is conserved (D, N, channels).
     """
 
     wi: Array
@@ -90,7 +90,7 @@ class Extremes:
 
 @dataclass(frozen=True)
 class Evidence:
-    """All that the laws look at; `asked` counts the answers, and `wrong` holds those that are no number or negative."""
+    """All evidence of the laws; `asked` counts the values, and `wrong` holds those that are not finite or negative."""
 
     asked: int
     wrong: tuple[Wrong, ...]
@@ -107,7 +107,7 @@ class Evidence:
 def gather(
     probe: Probe, expected: Probe | None, lossless: bool, seed: int, progress: Progress | None = None
 ) -> Evidence:
-    """Ask a BSDF, and the one that it should equal if there is one, all that the laws need to know."""
+    """Query a BSDF, and the one that it should equal if there is one, for all evidence of the laws."""
     rng = np.random.default_rng(seed)
     report = progress or (lambda done, total: None)
 
@@ -118,7 +118,7 @@ def gather(
     drawn = _draw(probe, wi, u)
     report(1, STEPS)
 
-    # Integrate what it says
+    # Integrate its values
     integrals = _integrate(probe, drawn, rng)
     report(2, STEPS)
 

@@ -3,8 +3,8 @@
 Coordinates are the azimuth from the mirror direction and the height 1 - |cos theta|, in which equal areas are equal
 solid angles. Along each axis some lines follow the samples, some their tail, and some are spread evenly: so lobes of
 any width are resolved, and nothing is missed where no sample falls. A column of azimuth has lines of height of its own,
-half of which follow the samples within it, for lobes that lie aslant. (Where these are sharper yet, .001 by .3, the
-integrals are noisy, and say so.)
+half of which follow the samples within it, for oblique lobes. (For even sharper ones, .001 by .3, the integrals are
+noisy, and report it.)
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The laws: what every BSDF must keep, and how it is found out.
+"""The laws that every BSDF must keep, and their tests.
 
 A law looks at the evidence and may be wrong by chance with the probability `alarm` at most, shared out among its tests
 (Sidak). What only rounding decides has a bound of its own, below.
@@ -28,7 +28,7 @@ CROWD = 10.0  # samples expected in a cell of a chi-square test, else it is pool
 
 @dataclass(frozen=True)
 class Law:
-    """A law: its name, what it says in one sentence, and how evidence is judged (None: there is nothing to judge)."""
+    """A law: its name, its statement in one sentence, and the judgement of evidence (None: nothing to judge)."""
 
     name: str
     says: str
@@ -39,7 +39,7 @@ class Law:
 
 
 def finite(evidence: Evidence, alarm: float) -> Finding:
-    """Count what is no number, infinite or negative."""
+    """Count values that are NaN, infinite or negative."""
     wrong = sorted(evidence.wrong, key=lambda answers: len(answers.answer), reverse=True)
     count = sum(len(answers.answer) for answers in wrong)
     detail = f"{evidence.asked} answers, grazing and below the surface too"
@@ -52,7 +52,7 @@ def finite(evidence: Evidence, alarm: float) -> Finding:
 
 
 def sides(evidence: Evidence, alarm: float) -> Finding:
-    """Find the most that is seen where nothing may be."""
+    """Find the largest value where there may be no light."""
     extremes = evidence.extremes
 
     def dark(wi: Array, wo: Array) -> Array:
@@ -182,7 +182,7 @@ def _chi_square(counts: Array, expected: Array, variance: Array) -> tuple[float,
     """Pearson's statistic and its degrees of freedom; `variance` is that of the integrals behind `expected`."""
     order = np.argsort(-expected)
     counts, expected, variance = counts[order], expected[order], variance[order]
-    # Pool what is rare: cells of the tail, in order, until they are a crowd
+    # Pool rare cells: those of the tail, in order, until they hold enough samples
     crowds = np.searchsorted(-expected, -CROWD)
     pool = np.minimum(np.arange(len(expected)), crowds) + (np.cumsum(expected * (expected < CROWD)) // CROWD).astype(
         int
@@ -308,12 +308,12 @@ LAWS: tuple[Law, ...] = (
 
 
 def _share(alarm: float, tests: int) -> float:
-    """Of one of several tests that together may be wrong with the probability `alarm` (Sidak)."""
+    """False alarm probability of one of several tests that together have `alarm` (Sidak)."""
     return float(-np.expm1(np.log1p(-alarm) / tests))
 
 
 def _sigmas(alarm: float, tests: int) -> float:
-    """By how many standard errors the largest of several normal numbers may be off."""
+    """Bound on the largest of several normal numbers, in standard errors."""
     return float(-ndtri(_share(alarm, tests)))
 
 
@@ -327,7 +327,7 @@ def _within(values: Array, bounds: Array) -> bool:
 
 
 def _worst(excess: Array) -> tuple[int, ...]:
-    """Where a law comes closest to being broken, or is broken most."""
+    """Index at which a law is closest to being broken, or broken most."""
     return tuple(int(i) for i in np.unravel_index(np.argmax(excess), excess.shape))
 
 

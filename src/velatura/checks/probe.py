@@ -1,4 +1,4 @@
-"""A BSDF on a flat patch, asked in bulk: NumPy arrays in, NumPy arrays out.
+"""A BSDF on a flat patch, queried in bulk: NumPy arrays in, NumPy arrays out.
 
 An answer that is no number, infinite or negative is noted for one law to judge; the others see 0 if it is not finite.
 Every question is traced for whole arrays, so that a BSDF is compiled once for each of its functions and not once for
@@ -33,7 +33,7 @@ class Samples(NamedTuple):
 
 
 class Wrong(NamedTuple):
-    """Answers that are no number, infinite or negative: of which function, for which directions (n, 3), which (n,)."""
+    """Values that are NaN, infinite or negative: their function, directions (n, 3), and the values (n,)."""
 
     function: str
     wi: Array
@@ -49,7 +49,7 @@ class Values(NamedTuple):
 
 
 class Probe:
-    """Asks one BSDF in the variant that is set.
+    """Queries one BSDF in the current variant.
 
     Args:
         bsdf: a `mi.BSDF`.
@@ -102,7 +102,7 @@ class Probe:
         return Values(self._noted("eval", wi, wo, value), self._noted("pdf", wi, wo, pdf))
 
     def _noted(self, function: str, wi: Array, wo: Array, answers: Array, count: Array | None = None) -> Array:
-        """The answers, 0 where they are not finite; what is wrong with those that count is written down."""
+        """The values, 0 where they are not finite; invalid values that count are recorded."""
         rows = answers.reshape(len(wi), -1)
         bad = ~np.isfinite(rows) | (rows < 0)
         if count is not None:
@@ -160,7 +160,7 @@ class Probe:
 
 
 def _in_batches(ask: Callable[[Array, Array], tuple[Array, ...]], a: Array, b: Array) -> tuple[Array, ...]:
-    """Ask about rows of a and b, always as many at a time: a kernel is compiled for one size."""
+    """Query rows of a and b, always the same number at a time: a kernel is compiled for one size."""
     n = len(a)
     filled = [np.concatenate([x, np.repeat(x[-1:], -n % _BATCH, axis=0)]) for x in (a, b)]
     answers = [ask(*(x[i : i + _BATCH] for x in filled)) for i in range(0, n, _BATCH)]

@@ -32,7 +32,7 @@ class Finding:
 
     @property
     def status(self) -> str:
-        """`kept`, `broken`, or `declared`: not kept, as was said before."""
+        """`kept`, `broken`, or `declared`: not kept, as declared beforehand."""
         return "kept" if self.passed else "declared" if self.declared else "broken"
 
 
@@ -50,7 +50,7 @@ class Report:
 
     @property
     def broken(self) -> tuple[str, ...]:
-        """Names of the laws that are broken, and were not declared to be."""
+        """Names of the laws that are broken but not declared."""
         return tuple(finding.law for finding in self.findings if finding.status == "broken")
 
     @property
@@ -64,7 +64,7 @@ class Report:
         return found[law]
 
     def to_dict(self) -> dict[str, Any]:
-        """All but what is plotted, as JSON can hold it (numbers that are not finite as None)."""
+        """All data except plots, for JSON (numbers that are not finite as None)."""
         rows = [
             {
                 "law": finding.law,

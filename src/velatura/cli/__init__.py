@@ -44,7 +44,7 @@ INTERRUPTED = 130  # as a shell reports a process that ended by Ctrl-C
 
 app = typer.Typer(
     name="velatura",
-    help="Layered materials: what a stack of interfaces and media looks like, and why.",
+    help="Layered materials: the appearance of a stack of interfaces and media, and its causes.",
     epilog="Exit status: 0 done; 1 a check failed or a tool is missing; 2 invalid input; 3 valid input, but no "
     "solution exists; 130 interrupted.",
     add_completion=False,
@@ -90,8 +90,8 @@ def _options(
 def main() -> None:
     """Run the command line on `sys.argv` and exit with its status.
 
-    Invalid input, a missing tool, a full disk and the like end in one line on standard error; a mistake of Velatura's
-    own says that it is one, before its traceback.
+    Invalid input, a missing tool, a full disk and the like end in one line on standard error; an error of Velatura
+    itself is reported as such, before its traceback.
     """
     with _interrupts() as interrupts:
         try:
@@ -133,7 +133,7 @@ def _drop_output() -> None:
 
 @contextlib.contextmanager
 def _interrupts() -> Iterator[list[int]]:
-    """Notes each Ctrl-C while the block runs: libraries turn the exception that it raises into all sorts of others."""
+    """Records each Ctrl-C while the block runs: libraries turn the exception that it raises into various others."""
     noted: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -150,14 +150,14 @@ def _interrupts() -> Iterator[list[int]]:
 
 
 def _explain(error: BaseException) -> int:
-    """The status for an error, once it is reported; an exit is passed on."""
+    """Report an error, and return its exit status; an exit is passed on."""
     if isinstance(error, VelaturaError):
         _complain(str(error))
         return error.exit_status
     if isinstance(error, typer.TyperException):  # a wrong option
         _complain(" ".join(error.format_message().split()))
         return error.exit_code
-    if isinstance(error, BrokenPipeError):  # the reader has gone (`velatura lobes ... | head`): nothing is left to say
+    if isinstance(error, BrokenPipeError):  # the reader has gone (`velatura lobes ... | head`): print nothing more
         return 1
     if isinstance(error, OSError):
         _complain(": ".join(filter(None, (str(error.filename or ""), reason(error)))))

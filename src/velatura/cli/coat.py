@@ -1,4 +1,4 @@
-"""`velatura coat`: a material under a coat, with or without changing what is seen of it."""
+"""`velatura coat`: a material under a coat, with or without a change of its lobes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def coat(
     settings: options.Settings = None,
     as_json: options.Json = False,
 ) -> None:
-    """Put a coat on a material, and say how that changes its lobes."""
+    """Put a coat on a material, and report the change of its lobes."""
     # Refuse what cannot work before anything slow begins
     stack, switches = options.read(material, settings)
     from velatura import files, inverse

@@ -1,4 +1,4 @@
-"""`velatura explore`: stacks that look alike head-on, by how they differ at grazing angles."""
+"""`velatura explore`: stacks with equal lobes at normal incidence, by their difference at grazing angles."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def explore(
     """List stacks that look alike head-on; how they differ at grazing.
 
     Every line is a stack that gives the target's lobes, from the top: absorption above, index and roughness of each
-    interface. The number before it says how much more or less it reflects than the stack that `velatura invert` finds,
+    interface. The number before it is its reflectance minus that of the stack that `velatura invert` finds,
     as a share of the incident light: the mean over colours and cosines of incidence .5, .4, .3, .2, .1.
     """
     # Refuse what cannot work before anything slow begins

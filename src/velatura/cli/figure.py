@@ -1,4 +1,4 @@
-"""`velatura figure`: a figure of the papers, computed anew."""
+"""`velatura figure`: a figure of the papers, recomputed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`velatura invert`: the stacks that give the lobes that are asked for."""
+"""`velatura invert`: stacks with given lobes."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ def _write(found: list[Solution], output: Path | None, folder: Path | None, stem
 
 
 def _table(solution: Solution) -> Table:
-    """A row per interface: what lies above it, and what it is."""
+    """A row per interface: the medium above it, and its parameters."""
     from rich.table import Table
     from rich.text import Text
 

@@ -59,7 +59,7 @@ def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, An
 
 
 def folder(text: str) -> Path:
-    """The path of a folder; an empty one would stand for the working directory."""
+    """The path of a folder; an empty one is refused, as it would mean the working directory."""
     if not text:
         raise typer.BadParameter("needs a name, got nothing")
     return Path(text)
@@ -73,7 +73,7 @@ def model_name(name: str | None) -> str:
 
 
 def cosines(text: str) -> list[float]:
-    """The cosines of a list such as `1,0.5`; whether they are cosines is for the model to say."""
+    """The numbers of a list such as `1,0.5`; the model checks that they are cosines."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -92,7 +92,7 @@ def _of_layer(key: str) -> bool:
 
 
 def _value(text: str) -> Any:
-    """What a file would hold: a number, several (`.1,.2,.3`, in brackets or not), true, false, or a name."""
+    """A value as in a file: a number, several (`.1,.2,.3`, in brackets or not), true, false, or a name."""
     bare = text[1:-1] if text.startswith("[") and text.endswith("]") else text
     try:
         numbers = tuple(float(part) for part in bare.split(","))

@@ -1,4 +1,4 @@
-"""`velatura schema`: the JSON Schema of material files, for editors that check while one types."""
+"""`velatura schema`: the JSON Schema of material files, for text editors that check material files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far each model is from the truth: lobes, albedo, distribution and pictures, as numbers and as one figure."""
+"""Errors of models against the truth: lobes, albedo, distribution and pictures, as numbers and as one figure."""
 
 from velatura.comparison.figure import check_figure, save_figure
 from velatura.comparison.result import Account, Comparison, Pictures

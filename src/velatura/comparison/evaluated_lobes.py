@@ -21,7 +21,7 @@ from velatura.stack import Material, Stack
 
 Array = NDArray[np.floating]
 
-SAMPLES = 2**19  # of each lobe: so many that they are less noisy than the truth
+SAMPLES = 2**19  # of each lobe: enough to be less noisy than the truth
 LIT_SAMPLES = 2**17  # of a lobe in the symmetric form, which adds up the layers for each of them
 BASE_SAMPLES = 2**17  # of a diffuse base, which is smooth
 
@@ -35,7 +35,7 @@ class Light:
 
 
 def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
-    """The lobes of a model, and what becomes of them when they are evaluated.
+    """The lobes of a model, and their values when they are evaluated.
 
     Raises:
         InvalidInput: a texture where a number is needed, or a model with a lobe for each channel.
@@ -54,7 +54,7 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
 
 
 def _column(body: bsdf.Body, incident: Array) -> tuple[list[WalkedLobe], Array]:
-    """The lobes of one direction, and the distribution (3, bins, bins) of what is reflected."""
+    """The lobes of one direction, and the distribution (3, bins, bins) of reflected light."""
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
     each, _ = body.above.model.recursion.lobes(body.above, wi)

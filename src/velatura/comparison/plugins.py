@@ -1,4 +1,4 @@
-"""BSDF plugins beside the named models: what they sample is compared, and of lobes they say nothing."""
+"""BSDF plugins beside the named models, compared by their samples; they have no lobes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SAMPLES = 2**21  # for each direction, as noisy as the truth
 
 
 def name_of(plugin: Plugin) -> str:
-    """What a plugin is called among the models: its `id`, if it has one; a file's name without the ending."""
+    """The name of a plugin among the models: its `id`, if it has one; the name of its file without the ending."""
     if isinstance(plugin, Mapping):
         return str(plugin.get("id", plugin.get("type")))
     return Path(plugin).stem if _is_file(plugin) else str(plugin)
@@ -64,7 +64,7 @@ def made(plugin: Plugin, stack: Stack, microsurface: bool) -> Any:
 
 
 def _from_file(mi: Any, path: Any) -> Any:
-    """What an XML file holds, refused before Mitsuba reads it unless that is a BSDF."""
+    """The content of an XML file, refused before Mitsuba reads it unless it is a BSDF."""
     try:
         root = ElementTree.parse(path).getroot()
     except (OSError, ElementTree.ParseError) as error:
@@ -89,7 +89,7 @@ def _from_type(mi: Any, plugin: Any) -> Any:
 
 
 def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
-    """Where a BSDF sends the light, by its own sampling; its lobes are not known, and NaN."""
+    """The distribution of the light of a BSDF, by its own sampling; its lobes are unknown, and NaN."""
     probe, rng = Probe(bsdf), np.random.default_rng(0)
     grids = []
     for wi in directions(cos_theta):

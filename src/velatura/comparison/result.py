@@ -15,7 +15,7 @@ from velatura.reference import WalkedLobe
 
 Array = NDArray[np.floating]
 
-#: Lobes of less energy (mean of the colours) have no say in `Comparison.roughness_error`.
+#: Lobes of less energy (mean of the colours) do not count in `Comparison.roughness_error`.
 ENERGY_MIN = 1e-3
 
 # A lobe's quantities, and whether their components (rgb, uv, ...) stand before the directions.
@@ -24,14 +24,13 @@ _FIELDS = {"energy": True, "alpha": True, "rotation": False, "mean": True, "cova
 
 @dataclass(frozen=True)
 class Account:
-    """Where the light goes, for N directions of incidence, as a model or the truth has it.
+    """The distribution of light for N directions of incidence, by a model or by the truth.
 
-    reflected: lobes by the deepest interface from the top, a diffuse base last (NaN of a plugin, which says nothing of
-    lobes); transmitted: what leaves below, or
-    None. Their mean and covariance are those of the outgoing directions on the projected disc, and a model's alpha is
-    that along the axes of the true lobe, wherever its own `rotation` has turned them. evaluated (3, N): the
-    integral of `eval`, which is the albedo of what is rendered. distribution (3, N, bins, bins): energies of reflected
-    light over x and y of the projected disc.
+    reflected: lobes by the deepest interface from the top, a diffuse base last (NaN of a plugin, which has no
+    lobes); transmitted: the light that leaves below, or None. Their mean and covariance are those of the outgoing
+    directions on the projected disc, and a model's alpha is that along the axes of the true lobe, wherever its own
+    `rotation` has turned them. evaluated (3, N): the integral of `eval`, which is the rendered albedo. distribution
+    (3, N, bins, bins): energies of reflected light over x and y of the projected disc.
     """
 
     reflected: tuple[WalkedLobe, ...]
@@ -68,7 +67,7 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A material as the truth has it and as each model has it.
+    """A material by the truth and by each model.
 
     name: of the material; lobe_names: "R1", "R2", ... from the top, "D" for a diffuse base, "T" for what is
     transmitted; cos_theta: the N cosines of incidence; paths: of the truth, for each; microsurface: whether light
@@ -109,7 +108,7 @@ class Comparison:
     def roughness_error(self) -> Mapping[str, float]:
         """By model: mean |log(alpha / true alpha)| over directions, axes, and lobes of an energy above `ENERGY_MIN`.
 
-        What is smoother than a model is ever evaluated counts as that smooth. NaN where there is no such lobe.
+        Roughness is clamped to the least one that a model evaluates. NaN if there is no such lobe.
         """
         return {name: float(np.mean(self._log_ratios(model))) for name, model in self.models.items()}
 
@@ -122,7 +121,7 @@ class Comparison:
         return np.array(ratios or [np.nan])
 
     def to_dict(self) -> dict[str, Any]:
-        """All numbers but the distributions and pictures, as JSON can hold them: what is not known as None.
+        """All numbers but the distributions and pictures, for JSON; unknown values are None.
 
         Inner lists run over `cos`, as in the JSON of `velatura lobes`.
         """

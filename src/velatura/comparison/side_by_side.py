@@ -1,4 +1,4 @@
-"""Hold models to the truth on one material."""
+"""Comparison of models with the truth on one material."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The formats, and what they have in common; each is a module with `write(Request) -> Export`."""
+"""The formats, and their common part; each is a module with `write(Request) -> Export`."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Export:
         """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.
 
         Raises:
-            InvalidInput: a file cannot be written; what was there before stays.
+            InvalidInput: a file cannot be written; an existing file stays.
         """
         path = Path(path)
         for ending, data in self.beside.items():

@@ -159,7 +159,7 @@ def _scattered(stack: Stack, model: Model, *albedos: float) -> Array:
 def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
     """The stack with the albedo of its base that has this energy, or the nearest to it.
 
-    Of an albedo a the energy is p a / (1 - q a), with what passes, p, and what comes back to the base, q.
+    The energy of an albedo a is p a / (1 - q a), with the transmitted share p and the share q that returns to the base.
     """
     half, white = _scattered(stack, model, 0.5, 1.0).T
     q = (white - 2 * half) / (white - half)

@@ -32,7 +32,7 @@ from velatura.stack import (
 )
 
 STEP = 1e-5  # of a value, to see how the model changes
-ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: what a round changes, as a share of what there is
+ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: the relative change in a round
 CONDUCTOR, RATIO = (0.02, 30.0), (1e-3, 30.0)  # bounds of a metal's eta, and of its k over that
 DEPTH_MAX = 10.0  # of a medium
 
@@ -42,7 +42,7 @@ class Fit:
     """A stack that approximates a table, and its error.
 
     error: root mean square of the difference of log(1 + f cos theta_o). by_angle: as `angles.report` has it. errors:
-    what the descents from all starts came to, the best first.
+    the results of the descents from all starts, the best first.
     """
 
     stack: Stack
@@ -204,7 +204,7 @@ def _of_interface(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
     return found
 
 
-#: What may change, by the layer; all else stays.
+#: The values that may change, by layer; all others stay.
 FREE: dict[type, Callable[..., list[Free]]] = {
     DiffuseValues: _of_base,
     MediumValues: _of_medium,

@@ -24,8 +24,8 @@ from velatura.optics import fresnel
 
 MODEL = "bati2021"
 DENSER, RARER = 1, -1
-SLACK = 1e-9  # by which a constraint may be broken: the rounding of what was solved
-NEGLIGIBLE = 1e-7  # the same for what is solved numerically
+SLACK = 1e-9  # by which a constraint may be broken: rounding of solutions
+NEGLIGIBLE = 1e-7  # the same for numerical solutions
 ENERGY_MIN = 1e-9  # of a lobe in a channel; less is taken for nothing
 CONDUCTOR_MIN = 3 - 2 * np.sqrt(2)  # a conductor (k >= eta) reflects more
 CONDUCTOR_MAX = 1 - 1e-6  # beyond which indices of a metal have no bound
@@ -167,7 +167,7 @@ def _secant(
 ) -> Variance:
     """The next request after x, which gave the reading `read`, by the secant method; `before`: the previous such pair.
 
-    `slope` is what is known of it at first.
+    `slope` is its first estimate.
     """
     entries = []
     for n, (now, y, miss) in enumerate(zip(*(vars(s).values() for s in (x, read, apart)))):
@@ -191,7 +191,7 @@ def _closed_form(
 
     Returns the interfaces, and what they reflect.
     """
-    # Ask for what the lobe has below the stack, absorption that is pinned included (Bati et al. 2021, Algorithm 3)
+    # Request the energy of the lobe below the stack, pinned absorption included (Bati et al. 2021, Algorithm 3)
     if choice.tau is not None:
         above = above.through(choice.tau)
     r = attenuated(above, energy)

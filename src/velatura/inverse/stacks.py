@@ -1,7 +1,7 @@
 """Lobes to stacks: any number of lobes, of one or two interfaces each, from the top (Bati et al. 2021, Algorithm 2).
 
-Every lobe leaves choices open: which of two indices, and of a pair the index between its interfaces. What is chosen
-above decides what is possible below, so that many partial stacks are followed at once.
+Every lobe has free choices: one of two indices, and in a pair the index between its interfaces. Choices above limit the
+possible layers below, so that many partial stacks are followed at once.
 """
 
 from __future__ import annotations
@@ -81,11 +81,11 @@ def invert_stack(
 
     Args:
         target: a target, the mapping of a target file, its lobes alone, or a file.
-        model: that is to read the stack; its `channels` are the target's, where that says so and no switch does.
+        model: that reads the stack; its `channels` are those of the target, if given there and by no switch.
 
     Raises:
         InvalidInput: not a target, or an unknown model or switch.
-        Infeasible: there is no such stack; the error says why, and which targets near it can be reached.
+        Infeasible: there is no such stack; the error gives the reason, and the nearest targets that have one.
     """
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)

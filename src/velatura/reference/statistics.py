@@ -35,7 +35,7 @@ class WalkedLobe:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Lobes by the deepest interface, in lists from the top, and what is transmitted (None below an opaque base).
+    """Lobes by the deepest interface, in lists from the top, and transmitted light (None below an opaque base).
 
     A diffuse base comes last, as an interface would. Light that a medium scatters back counts for the interface below
     it. `truncated` (N,) is the energy of paths that were cut off, in no lobe. `standard_error` has the same names.
@@ -77,7 +77,7 @@ def statistics(
     Raises:
         InvalidInput: no valid material, a cosine outside its range, lists of different lengths, or a texture where a
             number is needed.
-        MissingTool: LLVM is missing or too old; the message says what to install.
+        MissingTool: LLVM is missing or too old; the message names the package to install.
     """
     stack = load(stack)
     columns = [_column(stack, wi, paths, seed, microsurface) for wi in directions(cos_theta, phi)]
