@@ -146,7 +146,7 @@ def _dialect(*args: Value) -> Any:
     return found
 
 
-# What is printed of the model besides its values; numbers take no notice
+# Titles and names that are printed with the values; numbers ignore them
 
 _readable: ContextVar[bool] = ContextVar("readable", default=False)
 _title: ContextVar[str] = ContextVar("title", default="")

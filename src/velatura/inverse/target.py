@@ -184,7 +184,7 @@ def load_target(path: str | Path) -> Target:
     """The target in a file (.yaml, .yml or .json).
 
     Raises:
-        InvalidInput: no such file, or what is in it is not a target; one line that names the file.
+        InvalidInput: no such file, or its content is not a target; one line that names the file.
     """
     fields = io.read(path, "a target file")
     try:

@@ -100,7 +100,7 @@ class Scattered:
 class Asked:
     """The query to a BSDF: reflection, transmission or both; of radiance, which scales with the squared index, or not.
 
-    `reflection` may also say for every reflected lobe, and then for the diffuse base, whether it is asked for.
+    `reflection` may also be given for every reflected lobe, and then for the diffuse base.
     """
 
     reflection: bool | Sequence[bool] = True

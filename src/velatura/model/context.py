@@ -29,7 +29,7 @@ class Context:
         constant: whether the values hold for all points, and may be looked at now.
         number: Dr.Jit's type of numbers, to have what depends on direction alone sampled once; None to work it out for
             every direction.
-        colour: makes a colour of its channels, in what is sampled; None where nothing is.
+        colour: makes a colour of its channels, in sampled values; None if none are sampled.
         settle: applied to intermediate values; a renderer evaluates them, so that one kernel serves all.
         tables: the averages over rough interfaces.
     """

@@ -16,7 +16,7 @@ from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 
-ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
+ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 
 
 def probabilities(lobes: Sequence[Lobe], base: Base | None, even: float = 0.0) -> list[Value]:

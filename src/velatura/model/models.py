@@ -11,7 +11,7 @@ from velatura.model.calibration import CALIBRATIONS
 from velatura.model.recursion import ADDING, Momentum, Recursion
 from velatura.stack.schema import unknown
 
-#: Every switch with its values; `Model` says what each one means.
+#: Every switch with its values; `Model` describes each one.
 SWITCHES: dict[str, tuple[str, ...]] = {
     "reflectance": ("fresnel", "fg", "fgd", "fgd-multi", "split-sum"),
     "tir": ("off", "published", "clean"),

@@ -1,8 +1,8 @@
 """All light that passes a stack: straight through, bounced inside, and scattered; each part with its own energy.
 
 Once for a direction, `parts` has the energies over the integrals of the lobes, and the probabilities of sampling them.
-A share `OF_BOUNCED` of what facets met often add goes with light that bounces, the rest with what is scattered. So does
-what a lobe lacks that would have to be drawn more than `MOST` times as bright for its energy.
+A share `OF_BOUNCED` of the light of repeated facets is added to light that bounces, the rest to scattered light. So is
+the energy that a lobe lacks if it would have to be drawn more than `MOST` times as bright.
 
 A sample of light that goes straight through is that of a rough dielectric: it may be reflected. So nothing else has to
 be sampled of a single interface whose facets are met once; elsewhere reflected lobes are sampled by their energies.
@@ -111,7 +111,7 @@ def sample(passage: Passage, of: Parts, wi: Direction, u: Value, u1: Value, u2: 
 
 
 def _down(w: Direction) -> Direction:
-    """A direction turned down; what lies below the surface already is lost in it."""
+    """A direction turned down; one that lies below the surface already is lost."""
     return w[0], w[1], -ops.maximum(w[2], 0.0)
 
 

@@ -25,7 +25,7 @@ Lobes = Callable[[Direction], tuple[list[Lobe], Lobe | None]]
 
 NORMALS = 256  # over which the albedo of a lobe is averaged
 
-# What is interpolated is roughness itself: matrices of it, so that axes may turn
+# Interpolate roughness itself: matrices of it, so that axes may turn
 _AS_IT_IS = RoughnessMap(lambda along, across: along, lambda along, across: along)
 
 

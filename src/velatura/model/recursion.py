@@ -11,7 +11,7 @@ from velatura.model.calibration import Calibration
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics.ggx import Direction
 
-if TYPE_CHECKING:  # recursions are made of what is prepared for them
+if TYPE_CHECKING:  # recursions use records that are prepared for them
     from velatura.model.adding import Lobe
     from velatura.model.prepare import Prepared
 

@@ -220,7 +220,7 @@ def _drawn(passage: Passage, i: Crossed) -> tuple[list[_Component], list[Value]]
     components = [_component(passage, j, i.steps) for j in range(count)]
     if count == 1:
         return components, [1.0]
-    # Leave out what light does not reach; the first interface, it always does
+    # Leave out parts that light does not reach; it always reaches the first interface
     shares = [c.weight * ops.mean(_smooth(i, slice(j), slice(0))) for j, c in enumerate(components)]
     shares[0] = shares[0] + WEIGHT_MIN
     total = sum(shares[1:], shares[0])

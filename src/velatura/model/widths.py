@@ -239,7 +239,7 @@ def features(
 
 
 def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
-    """With its axes scaled, and then what lies in the plane and across it."""
+    """With its axes scaled, and then the components in the plane and across it."""
     axes, apart = np.zeros((2, *first.xx.shape)), np.zeros_like(first.xx)
     for (a, b), along, to_difference in CORRECTION:
         product = np.broadcast_to(seen[a] * seen[b], axes.shape)

@@ -21,7 +21,7 @@ from velatura.stack import Material
 
 @kernel.plugin("layered")
 def make(mi: Any) -> type:
-    """The class for the variant that is set."""
+    """The class for the current variant."""
     import drjit as dr
 
     flags = mi.BSDFFlags
@@ -44,7 +44,7 @@ def make(mi: Any) -> type:
         refract as a pane.
 
         Each lobe is a component, from the top, and so is the diffuse base or, last, the transmitted lobe. The lobes of
-        the forward form are flagged `NonSymmetric`, as what is transmitted always is. `eval_diffuse_reflectance` is the
+        the forward form are flagged `NonSymmetric`, the transmitted lobe always. `eval_diffuse_reflectance` is the
         albedo of all components for light from `si.wi`.
         """
 
@@ -64,7 +64,7 @@ def make(mi: Any) -> type:
 
         @property
         def exceptions(self) -> frozenset[str]:
-            """Laws of `velatura.checks` that it does not keep, and is known not to."""
+            """Laws of `velatura.checks` that it is known not to keep."""
             shape, form = "pane" if self.transmits else "opaque", self.model.form
             if form == "forward" and self.model.recursion.has_gain:
                 form = "scaled"
@@ -85,7 +85,7 @@ def make(mi: Any) -> type:
             self._update()
 
         def _update(self) -> None:
-            """Work out what does not depend on direction, and how the surface reflects."""
+            """Compute the values that do not depend on direction, and the flags of the surface."""
             self.binding.update()
             binding, based = self.binding, self.binding.stack.base is not None
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
@@ -124,7 +124,7 @@ def make(mi: Any) -> type:
             return bsdf.body(material, self.model, self.variance, context)
 
         def _sampled(self) -> Context:
-            """For a uniform material; scalar variants work everything out for every direction."""
+            """Samples over direction for a uniform material; scalar variants compute every direction anew."""
             if not dr.is_jit_v(mi.Float):
                 return Context(colour=None, settle=self._settled)
             return Context(number=mi.Float, colour=mi.UnpolarizedSpectrum, settle=self._settled)
@@ -144,7 +144,7 @@ def make(mi: Any) -> type:
             body = self._prepared(self.binding.steered(si, active), at_a_point())
             return self.spectra.at(body, si.wavelengths) if self.spectra else body
 
-        # What a BSDF is asked
+        # The interface of a BSDF
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             asked, body, wi = self._asked(ctx), self._body(si, active), tuple(si.wi)

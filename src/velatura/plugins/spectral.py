@@ -1,4 +1,4 @@
-"""Lobes of a stack that is the same everywhere, in spectral variants: sampled once over direction and wavelength.
+"""Lobes of a uniform stack in spectral variants, sampled once over direction and wavelength.
 
 Their shapes are those of fixed wavelengths, and so is the share of samples that each gets.
 """
@@ -60,7 +60,7 @@ class Spectra:
     means: directional_grid.Curves | None
 
     def at(self, body: bsdf.Body, wavelengths_nm: Any) -> bsdf.Body:
-        """The body for a ray, with what was sampled."""
+        """The body for a ray, with the sampled values."""
         place = (wavelengths_nm - BEGIN_NM) / (END_NM - BEGIN_NM)
         above = self.above.at(body.above, self.mi, place)
         if self.below is None or body.below is None:
@@ -127,7 +127,7 @@ def _over_wavelengths(mi: Any, colour: Value, times: int) -> Any:
 
 
 def carried(mi: Any, colour: Value) -> Any:
-    """The part of a colour that a ray carries: of a spectrum, the second half."""
+    """The part of a colour that a ray carries: the second half of a spectrum."""
     if isinstance(colour, mi.ArrayXf):
         colour = list(colour)[len(colour) // 2 :]
     return mi.UnpolarizedSpectrum(colour)

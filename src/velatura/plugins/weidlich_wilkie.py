@@ -18,13 +18,13 @@ from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 
-ALPHA_MIN = 1e-3  # what is smoother is evaluated as this
+ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 EXCEPTIONS = frozenset({"lossless"})  # laws of `velatura.checks`: light that is reflected twice, or passes, is lost
 
 
 @kernel.plugin("weidlich_wilkie")
 def make(mi: Any) -> type:
-    """The class for the variant that is set."""
+    """The class for the current variant."""
     import drjit as dr
 
     flags = mi.BSDFFlags
@@ -81,7 +81,7 @@ def make(mi: Any) -> type:
             return dr.clip(albedo, 0, 1) & active & (si.wi.z > 0)
 
         def _asked(self, ctx: Any) -> list[int]:
-            """The surfaces that are wanted."""
+            """The queried surfaces."""
             return [k for number, k in enumerate(self.surfaces) if ctx.is_enabled(self.types[number], number)]
 
     return WeidlichWilkie
@@ -163,7 +163,7 @@ def sample(
 
 
 def _shares(material: Material, asked: Sequence[int]) -> Iterator[tuple[int, Value]]:
-    """Every surface that is asked for with the share of samples that it gets: about its energy at normal incidence."""
+    """Every queried surface with its share of samples: about its energy at normal incidence."""
     all_energies = _energies(material, 1.0)
     energies = {k: ops.mean(all_energies[k]) + 0.02 for k in asked}  # at a slant it may be more
     total = sum(energies.values())
@@ -172,7 +172,7 @@ def _shares(material: Material, asked: Sequence[int]) -> Iterator[tuple[int, Val
 
 
 def _energies(material: Material, cosine: Value) -> dict[int, Value]:
-    """What every surface reflects, a colour, by its place: that of a stack of smooth ones."""
+    """Energy reflected by every surface, a colour, by its place: that of a stack of smooth ones."""
     energies: dict[int, Value] = {}
     n, left = material.exterior, 1.0
     for k, layer in enumerate(material.layers):
@@ -192,7 +192,7 @@ def _energies(material: Material, cosine: Value) -> dict[int, Value]:
 
 
 def _absorbed(layer: MediumValues, ways: Value) -> Value:
-    """What a medium leaves of light that goes through it and back; `ways` is the sum of both ways, in depths."""
+    """Transmittance of a medium there and back; `ways` is the sum of both ways, in depths."""
     return ops.exp(-layer.sigma_a * layer.depth * ways)
 
 
@@ -205,7 +205,7 @@ def _reflectance(layer: InterfaceValues, n: Value, cosine: Value) -> Value:
 
 
 def _refracted(w: Direction, h: Direction, eta: Value) -> Direction:
-    """Where the light along w comes from or goes to below, away from the next surface."""
+    """The direction below of light along w, pointing away from the next surface."""
     t = refraction.refract(w, h, eta)
     return -t[0], -t[1], -t[2]
 

@@ -1,4 +1,4 @@
-"""Ground truth: random walks through the layers, which share nothing with the statistical model."""
+"""The reference: random walks through the layers, which share nothing with the statistical model."""
 
 from velatura.reference import plugin  # noqa: F401  (declares it)
 from velatura.reference.distribution import Distribution, distribution

@@ -1,4 +1,4 @@
-"""Where the light goes: energies on a grid over the projected disc."""
+"""Distribution of light: energies on a grid over the projected disc."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, 
         reflected = f.rng.next_float32() < chance
         share = ops.select(reflected, reflectance / chance, ops.divide(1 - reflectance, 1 - chance))
         f.weight = ops.select(f.alive, f.weight * share, f.weight)
-        # Turn; what is refracted sees the surface upside down
+        # Turn; for refracted light the surface is upside down
         o = select(reflected, ggx.reflect(i, h), _reverse(refraction.refract(i, h, _eta(meeting, f.outside))))
         f.w = select(f.alive, o, f.w)
         f.rank = ops.select(reflected | (f.alive ^ True), f.rank, 1 - f.rank)

@@ -1,4 +1,4 @@
-"""A stack as the walk meets it: surfaces, and the slabs of one index between them.
+"""A stack for the walk: surfaces, and the slabs of one index between them.
 
 Slab k lies above surface k, so slab 0 is the exterior, and slab n lies below all n surfaces. Lengths are measured in
 the depth of a slab, so that only optical depths remain. Which surface a path meets differs from lane to lane: `pick`
@@ -59,7 +59,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Slab:
-    """A medium by its optical depths along the normal, and its asymmetry; `scatters` decides what is compiled."""
+    """A medium by its optical depths along the normal, and its asymmetry; `scatters` decides which code is compiled."""
 
     absorption: Value = 0.0
     scattering: Value = 0.0
@@ -70,11 +70,11 @@ class Slab:
         return not _is_zero(self.scattering)
 
     def absorbed(self, length: Value) -> Value:
-        """What absorption leaves of light, along a way through it of that length."""
+        """Share that absorption leaves along a way of that length."""
         return ops.exp(-self.absorption * length)
 
     def straight(self, length: Value) -> Value:
-        """What goes straight on along a way of that length, neither absorbed nor scattered."""
+        """Share that passes a way of that length, neither absorbed nor scattered."""
         return ops.exp(-(self.absorption + self.scattering) * length)
 
 
@@ -122,7 +122,7 @@ class Layers:
         surfaces, slabs = swapped(self.surfaces), swapped(self.slabs)
         return replace(self, surfaces=surfaces, slabs=slabs, index=swap(self.index))
 
-    # What a path meets -----------------------------------------------------------------------------------------------
+    # Surfaces and slabs -----------------------------------------------------------------------------------------------
 
     def surface(self, j: Value) -> Surface:
         return _picked(self.surfaces, j)

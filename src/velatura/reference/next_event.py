@@ -47,7 +47,7 @@ class WayOut:
 
 @dataclass(frozen=True)
 class _Crossing:
-    """One surface on the way: what passes, what is reflected on both sides, and the slabs above and below.
+    """One surface on the way: its transmittance, its reflectance on both sides, and the slabs above and below.
 
     `smooth` is 1 where this surface and all before it are smooth, else 0.
     """

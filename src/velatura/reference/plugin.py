@@ -26,7 +26,7 @@ LOSS = frozenset({"lossless"})
 
 @kernel.plugin("layered_reference")
 def make(mi: Any) -> type:
-    """The class for the variant that is set."""
+    """The class for the current variant."""
     import drjit as dr
 
     flags = mi.BSDFFlags
@@ -71,7 +71,7 @@ def make(mi: Any) -> type:
             self._update()
 
         def _update(self) -> None:
-            """Find out what the walk may leave out, and which kinds of scattering there are."""
+            """Determine the parts that the walk may leave out, and the kinds of scattering."""
             binding = self.binding
             peaks = {name: float(np.max(np.abs(np.array(value)))) for name, value in binding.constants.items()}
             seen = binding.material({**peaks, **binding.images})
@@ -109,14 +109,14 @@ def make(mi: Any) -> type:
             return layers.reversed(flipped) if self.transmits else layers
 
         def _stream(self, *numbers: Any) -> Any:
-            """Random numbers that follow from the seed and from what was asked."""
+            """Random numbers that follow from the seed and from the query."""
             a, b = mi.UInt32(self.seed), mi.UInt32(0)
             bits = [_bits(mi, x) for x in numbers]
             for x, y in zip(bits[::2], bits[1::2]):
                 a, b = mi.sample_tea_32(a ^ x, b ^ y, 4)
             return mi.PCG32(initstate=mi.UInt64(a), initseq=mi.UInt64(b))
 
-        # What a BSDF is asked
+        # The interface of a BSDF
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             # Walk, from above
@@ -178,7 +178,7 @@ def make(mi: Any) -> type:
             return kind in self.kinds and ctx.is_enabled(kind, self.kinds.index(kind))
 
         def _asked(self, ctx: Any, reflected: Any) -> Any:
-            """Whether any scattered light of that side was asked for."""
+            """Whether any scattered light of that side is queried."""
             reflection = self._wanted(ctx, flags.GlossyReflection) or self._wanted(ctx, flags.DiffuseReflection)
             transmission = self._wanted(ctx, flags.GlossyTransmission)
             return (reflected & reflection) | ((reflected ^ True) & transmission)
@@ -208,7 +208,7 @@ def make(mi: Any) -> type:
 
 
 def _widest(layer: LayerValues) -> float | None:
-    """The larger roughness of a surface: None where that is a texture's business, 1 for a diffuse base."""
+    """The larger roughness of a surface: None if a texture gives it, 1 for a diffuse base."""
     if not isinstance(layer, InterfaceValues):
         return 1.0
     alphas = (layer.alpha_u, layer.alpha_v)

@@ -1,7 +1,7 @@
 """A density over directions that resembles the layered BSDF, for multiple importance sampling.
 
-The density of what the walk samples is not known. Any function of the two directions will do in its place as long as
-all strategies use the same one: the weights still sum to 1. Widths are guessed from small tilts of the facets, to first
+The density of the samples of the walk is not known. Any function of the two directions can replace it, as long as all
+strategies use the same one: the weights still sum to 1. Widths are guessed from small tilts of the facets, to first
 order, and all roughness matrices (alpha^2, in slopes of half-vectors outside) simply add up.
 """
 
@@ -74,7 +74,7 @@ def density(layers: Layers, wi: Direction, wo: Direction) -> Value:
         passing = passing.plus(surface, bend / index[0] * 0.7)
         passing_back = passing_back.plus(surface, bend / index[-1] * 0.5)
         cosine = fresnel.cos_transmitted(cosine, index[k + 1] / index[k])
-    # Add what is transmitted, and what goes anywhere
+    # Add transmitted light, and light in all directions
     value = ops.select(above, value, 0.0)
     anywhere = spread * upright[2] / pi
     if not layers.transmits:

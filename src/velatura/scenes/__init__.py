@@ -1,4 +1,4 @@
-"""The pictures' stage: objects, environments, a camera, and image files.
+"""The stage of pictures: objects, environments, a camera, and image files.
 
 `render` makes a picture of a material. `scene_dict` gives the scene behind it to those who want another camera, or
 several materials side by side: `mesh(mi, OBJECTS["ball"].surface().moved((2.4, 0, 0)), bsdf)` is one more ball in it.

@@ -1,4 +1,4 @@
-"""The lights of the stage: a studio of softboxes, a clear sky, a furnace, or a picture of the user's own."""
+"""The lights of the stage: a studio of softboxes, a clear sky, a furnace, or an image file."""
 
 from __future__ import annotations
 

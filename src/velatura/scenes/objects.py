@@ -14,7 +14,7 @@ from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, flattene
 
 
 class View(NamedTuple):
-    """A camera: where it stands, what it looks at, and the field of view in degrees over the picture's shorter side."""
+    """A camera: its position, its target, and the field of view in degrees over the picture's shorter side."""
 
     origin: tuple[float, float, float]
     target: tuple[float, float, float]
@@ -22,7 +22,7 @@ class View(NamedTuple):
 
 
 class Object(NamedTuple):
-    """A surface, made when it is asked for, and a view of it."""
+    """A surface, made on demand, and a view of it."""
 
     surface: Callable[[], Surface]
     view: View
@@ -89,7 +89,7 @@ def plinth() -> Surface:
 
 @functools.cache
 def ground() -> Surface:
-    """A floor without an end in sight, which the plinth stands on."""
+    """An unbounded floor below the plinth."""
     return extrude(np.array([[1e3, -0.12], [0.0, -0.12], [-1e3, -0.12]]), width=2e3)
 
 

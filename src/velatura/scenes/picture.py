@@ -92,7 +92,7 @@ def tone_map(linear: ArrayLike, knee: float = 0.7) -> NDArray[np.float64]:
 
 
 def check_writable(path: Name) -> Path:
-    """The path of a picture, once it is sure that it can be written there. Raises InvalidInput."""
+    """The path of a picture, after a check that it can be written there. Raises InvalidInput."""
     return files.check_writable(path, "a picture", (".png (tone-mapped)", ".exr (linear)"))
 
 

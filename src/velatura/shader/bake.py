@@ -1,7 +1,7 @@
-"""The lobes of a uniform material, worked out once over direction for a texture, and read back from it.
+"""The lobes of a uniform material, computed once over direction for a texture, and read back from it.
 
-A tape works them out, so that another stack of layers asks for no compiler. What they are, and how lobes are made of
-them again, are those of `velatura.model.precomputed_lobes`: energies, gains, and roughness as a matrix, over the
+A tape computes them, so that another stack of layers needs no compilation. The values, and the lobes made of them, are
+those of `velatura.model.precomputed_lobes`: energies, gains, and roughness as a matrix, over the
 cosine, and over the azimuth where an interface is anisotropic.
 """
 
@@ -72,7 +72,7 @@ def bake(material: Material, body: bsdf.Body) -> Bake:
     nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
     w = directional_grid.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
 
-    # Work out what is seen of a direction
+    # Compute the lobes seen in a direction
     columns, facets = _seen(material, body, w)
     base, groups = body.base(w), []
     if base:

@@ -15,7 +15,7 @@ COMMUTE = {"add", "multiply", "minimum", "maximum", "both"}
 class Graph:
     """Symbols without duplicates.
 
-    `given` are symbols of another graph that need not be worked out, with what is read in their place.
+    `given` are symbols of another graph that need not be computed, with the values read in their place.
     """
 
     given: Mapping[Symbol, Symbol] = field(default_factory=dict)

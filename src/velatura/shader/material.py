@@ -1,4 +1,4 @@
-"""The struct of a material in a shader, and what fills it: numbers, and textures."""
+"""The struct of a material in a shader, and its contents: numbers and textures."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Brushed(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A value of a material, by its place in the struct: a constant, or what it is at texture coordinates."""
+    """A value of a material, by its place in the struct: a constant, or a value at texture coordinates."""
 
     place: str
     value: Operand | Mapped | Brushed
@@ -43,7 +43,7 @@ class Entry(NamedTuple):
 
 
 class Filled(NamedTuple):
-    """What fills a material: entries, over the uniform where it has `parameters`; and textures by sampler."""
+    """The contents of a material: entries, over the uniform where it has `parameters`; and textures by sampler."""
 
     entries: Sequence[Entry]
     samplers: Mapping[str, Texture]
@@ -74,7 +74,7 @@ def structs(stack: Stack, read: Sequence[str]) -> list[Struct]:
 
 
 def filled(stack: Stack, read: Sequence[str], parameters: bool) -> Filled:
-    """What fills the struct; with `parameters`, plain values are those of a uniform."""
+    """The contents of the struct; with `parameters`, plain values are those of a uniform."""
     images = _images(stack, read)
     entries = [
         Entry(place(address), _value(address, value, images), address.colour)

@@ -1,4 +1,4 @@
-"""A shader language: how values, statements and the parts of a program are written in it.
+"""A shader language: the spelling of values, statements and the parts of a program.
 
 `shader.statements` puts the values of a function in order and names them, `shader.program` puts the parts of a program
 in order; both take a printer, which gives each its text. A language is a class of its own with these methods.
@@ -57,7 +57,7 @@ class Printer(ABC):
     # Values
 
     def input(self, place: str) -> str:
-        """What a function is given: `m.layer0.eta`, `l.reflected[0].energy` or its `.r`, `wi.x`, `vt_shown[0]`."""
+        """An argument of a function: `m.layer0.eta`, `l.reflected[0].energy` or its `.r`, `wi.x`, `vt_shown[0]`."""
         return place
 
     @abstractmethod
@@ -108,7 +108,7 @@ class Printer(ABC):
 
     @abstractmethod
     def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        """The channels of a table at a place get a name, as so many texels."""
+        """The channels of a table at a place get a name, as a number of texels."""
 
     @abstractmethod
     def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
@@ -142,7 +142,7 @@ class Printer(ABC):
 
     @abstractmethod
     def header(self, name: str, model: str) -> str:
-        """Comments that describe the material and how the code is called; what has to stand first."""
+        """Comments that describe the material and how the code is called, and the required first lines."""
 
     @abstractmethod
     def structs(self, structs: Sequence[Struct]) -> str:
@@ -150,7 +150,7 @@ class Printer(ABC):
 
     @abstractmethod
     def parameters(self, shown: int) -> str:
-        """The uniforms that change: a material, and the weights of so many lobes."""
+        """The uniforms that change: a material, and the weights of a number of lobes."""
 
     @abstractmethod
     def material(self, filled: Filled) -> str:

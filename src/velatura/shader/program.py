@@ -1,4 +1,4 @@
-"""A material as a shader: what is recorded, printed with all that it needs."""
+"""A material as a shader: its recording, printed with all declarations."""
 
 from __future__ import annotations
 

@@ -32,8 +32,8 @@ SHOWN = "vt_shown"  # in the code: the weights of lobes
 class Recording:
     """The model's computation for a stack: `lobes` from material and wi, the rest from these, wo, and random numbers u.
 
-    Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ... `baked` is what the lobes
-    are read from, where they are not added up; `shown` names the weights of lobes, where they have any.
+    Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ... `baked` is the texture that
+    lobes are read from, if they are not added up; `shown` names the weights of lobes, where they have any.
     """
 
     stack: Stack
@@ -48,7 +48,7 @@ class Recording:
 
     @cached_property
     def symbols(self) -> list[Symbol]:
-        """All that is worked out, and all inputs."""
+        """All computed values, and all inputs."""
         return in_order([*self.lobes.values(), self.value, self.density, *self.drawn])
 
     @cached_property
@@ -104,12 +104,12 @@ def record(
         body = baked.body if baked else prepared()
         if parameters:
             body, shown = _weighed(body)
-        base = body.above.base if baked is None else None  # what is read of a base holds all of it
+        base = body.above.base if baked is None else None  # the values read of a base hold all of it
         fields, kinds = _fields(bsdf.scattered(body, wi), base.worth if base else ())
         value, density = bsdf.eval_pdf(body, wi, wo)
         drawn, _ = bsdf.sample(body, wi, *u)
 
-    # Read from the lobes what they hold
+    # Read the values that the lobes hold
     graph = Graph()
     lobes = dict(zip(fields, graph.unique(list(fields.values()))))
     held = {x: _held(name, kinds[name], x) for name, x in reversed(lobes.items()) if _worth(x)}

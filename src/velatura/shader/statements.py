@@ -30,7 +30,7 @@ class _Statements:
         self.uses = Counter(x for symbol in order for x in symbol.args if isinstance(x, Symbol))
         self.uses.update(x for x in outputs if isinstance(x, Symbol))
         self.inside = inside(order)
-        self.open: frozenset[str] = frozenset()  # what is bound where we are
+        self.open: frozenset[str] = frozenset()  # bound in the loops around this point
         self.text: dict[Symbol, tuple[str, int]] = {}
         self.taken = {*printer.words, *ARGUMENTS}
         self.lines: list[str] = []
@@ -57,7 +57,7 @@ class _Statements:
             self.text[symbol] = name, ATOM
 
     def _texels(self, symbol: Symbol, name: str) -> list[str]:
-        """What is looked up under a name, in a table or in the lobes over direction."""
+        """A look-up under a name, in a table or in the lobes over direction."""
         args = [self.of(x) for x in symbol.args]
         if symbol.op == "baked":
             return self.printer.baked(name, symbol.detail, args)
@@ -77,7 +77,7 @@ class _Statements:
         else:
             self.lines += printer.state(name, filled, kind, [self.of(x, wide=wide) for x in symbol.args[:count]])
 
-        # Write what depends on what is bound
+        # Write the values that depend on bound ones
         before, self.lines = self.lines, []
         outside, self.open = self.open, self.open | set(bound)
         body = [x for x in in_order(results) if set(bound) & self.inside[x] and self.inside[x] <= self.open]

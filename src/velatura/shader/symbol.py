@@ -1,8 +1,8 @@
-"""The third dialect of `velatura.ops`: values that remember how they were made.
+"""The third dialect of `velatura.ops`: values that record their operations.
 
 A `Symbol` is a node of an expression: an input, or an operation on other symbols and constants. The functions of the
-model run on symbols as they run on arrays. What does not depend on an input is worked out in Python, so constants fold
-by themselves: constants are floats, or NumPy arrays of three channels.
+model run on symbols as they run on arrays. Values independent of inputs are computed in Python, so constants fold by
+themselves: constants are floats, or NumPy arrays of three channels.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ class Symbol:
     """A recorded value.
 
     Args:
-        op: what was done: an elementary function by its name in `ops`, an operator (`add`, `less`, ...), or `input`,
+        op: the operation: an elementary function by its name in `ops`, an operator (`add`, `less`, ...), or `input`,
             `texels`, `value`, `component`, `colour`; of loops `bound`, which stands for a node or for a value of the
             state, `each`, `repeat`, and `item`.
-        args: what it was done to; constants as floats, or as three of them; of a loop its results, which are made of
-            what is bound, and before them the state that it begins with.
+        args: its arguments; constants as floats, or as three of them; of a loop its results, which are made of the
+            bound symbols, and before them the initial state.
         kind: number, colour, the truth of either, the channels of a table, or a loop.
-        detail: name of an input, a table or what is bound, number of a component or item, the `Loop`.
+        detail: name of an input, a table or a bound symbol, number of a component or item, the `Loop`.
 
     Attributes:
         serial: numbers symbols in the order in which they were made.
@@ -143,7 +143,7 @@ def component(x: Operand, channel: int) -> Operand:
 
 
 def record(op: str, *values: Value) -> Value:
-    """The symbol of an operation, or what it comes to where that is known."""
+    """The symbol of an operation, or its result if that is known."""
     args = tuple(operand(x) for x in values)
     known = _known(op, args)
     if known is not None:
@@ -177,7 +177,7 @@ class Loop(NamedTuple):
 
 
 class Recorder(Unrolled):
-    """The elementary functions on symbols; loops are kept where people are to read them, and unrolled elsewhere."""
+    """The elementary functions on symbols; loops are kept in readable code, and unrolled elsewhere."""
 
     @staticmethod
     def name(x: Symbol, name: str) -> None:
@@ -256,7 +256,7 @@ Symbol.dialect = Recorder()
 
 
 def in_order(outputs: Sequence[Value]) -> list[Symbol]:
-    """All symbols that the outputs are made of, inputs first, arguments before what is made of them."""
+    """All symbols that the outputs are made of, inputs first, arguments before their results."""
     found: set[Symbol] = set()
     waiting = [x for x in outputs if isinstance(x, Symbol)]
     while waiting:
@@ -268,7 +268,7 @@ def in_order(outputs: Sequence[Value]) -> list[Symbol]:
 
 
 def inside(order: Sequence[Symbol]) -> dict[Symbol, frozenset[str]]:
-    """By symbol: what it depends on of what is bound in the loops around it."""
+    """By symbol: the bound symbols of the loops around it that it depends on."""
     found: dict[Symbol, frozenset[str]] = {}
     for symbol in order:
         own = {symbol.detail} if symbol.op == "bound" else set()

@@ -34,7 +34,7 @@ class Tape:
 
 
 def tape(outputs: Sequence[Operand]) -> Tape:
-    """The tape that works out the outputs; what is the same is worked out once."""
+    """The tape that computes the outputs; equal values are computed once."""
     order = in_order(outputs)
     inputs = list(dict.fromkeys(symbol.detail for symbol in order if symbol.op == "input"))
     arguments = chain(outputs, *(symbol.args for symbol in order))

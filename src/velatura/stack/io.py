@@ -37,7 +37,7 @@ def load(material: MaterialLike) -> Stack:
     A bare word without an extension is a preset. Paths in it are relative to the file.
 
     Raises:
-        InvalidInput: no such file or preset, or what is in it is not a material; one line that names the file.
+        InvalidInput: no such file or preset, or its content is not a material; one line that names the file.
     """
     if isinstance(material, Stack):
         return material
@@ -80,7 +80,7 @@ def loads(
 
 
 def read(path: str | Path, what: str) -> Any:
-    """What a YAML or JSON file holds, unchecked; `what` it should be, "a target file", is for messages.
+    """The content of a YAML or JSON file, unchecked; `what` is its kind in messages, as "a target file".
 
     Raises:
         InvalidInput: no such file, or its text is neither; one line that names the file.

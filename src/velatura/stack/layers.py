@@ -38,7 +38,7 @@ Value: TypeAlias = float | RGB | Named | Spectrum | Texture | Brushing
 @dataclass(frozen=True)
 class InterfaceValues:
     """A dielectric, a conductor or a mirror: GGX roughness along two axes, turned by `rotation` (degrees), and absolute
-    indices of what lies below; a mirror has none, and a dielectric no extinction `k`.
+    indices of the medium below; a mirror has none, and a dielectric no extinction `k`.
     """
 
     kind: Kind
@@ -91,14 +91,14 @@ def is_zero(value: object) -> bool:
 
 
 class LayerRecord(Record):
-    """What all kinds of layers have in common.
+    """The common part of all kinds of layers.
 
     Attributes:
         record: of its values.
         lacks: kinds that it may be of, each with the parameters that it then has not.
         surface: whether light meets it at one depth and may turn back; media lie above surfaces.
-        title: what it is called, in words.
-        fresh: what a new one is written with in the editor, beside what is typical of its parameters.
+        title: its name, in words.
+        fresh: values of a new one in the editor, besides the typical values of its parameters.
     """
 
     record: ClassVar[type[LayerValues]]
@@ -109,7 +109,7 @@ class LayerRecord(Record):
 
     @property
     def kind(self) -> Kind:
-        """What it is."""
+        """The kind of the layer."""
         return next(iter(self.lacks))
 
     @property
@@ -123,7 +123,7 @@ class LayerRecord(Record):
         return True
 
     def written(self, key: str) -> Any:
-        """What stands for a parameter."""
+        """The value of a parameter as written."""
         return getattr(self, key)
 
     def flat(self) -> dict[str, Value]:
@@ -208,7 +208,7 @@ class Interface(LayerRecord):
         return self.kind != "conductor"
 
     def written(self, key: str) -> Any:
-        """What stands for a parameter: of the indices, the name of a conductor."""
+        """The value of a parameter as written: for the indices, the name of a conductor."""
         value = getattr(self, key)
         return self.conductor if value is None else value
 
@@ -267,7 +267,7 @@ EXTERIOR = Scalar(
     "absolute index of refraction above", low=INDEX_LOW, high=INDEX_HIGH, texturable=False, differentiable=False
 )
 
-#: The layers by what they may be.
+#: The layers by their possible kinds.
 KINDS: dict[str, type[Layer]] = {kind: layer for layer in LAYERS.values() for kind in layer.lacks}
 
 

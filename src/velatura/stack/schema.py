@@ -1,8 +1,8 @@
-"""How a parameter of a material is declared, and the models that hold parameters.
+"""Declarations of the parameters of a material, and the models that hold parameters.
 
-A parameter is declared once, as the annotation of a model's field: what it holds (a class of `values`: `Scalar`,
+A parameter is declared once, as the annotation of a model's field: its type (a class of `values`: `Scalar`,
 `Colour`, ...), its range, unit and meaning, and whether it may be textured and differentiated. Validation, the JSON
-Schema and the manual's table are all read off that declaration.
+Schema and the manual's table are derived from that declaration.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def unknown(what: str, name: object, known: Iterable[str], listed: str = "") -> 
 
 
 def show(value: object) -> str:
-    """`value` as an error message quotes it: on one line and not too long."""
+    """`value` as quoted in an error message: one line, of limited length."""
     if value is None:
         return "nothing"
     text = repr(value)
@@ -54,12 +54,12 @@ class Parameter:
 
     @property
     def values(self) -> str:
-        """What a value may be, as the manual says it."""
+        """The allowed values, as in the manual."""
         return self.what
 
     @property
     def expects(self) -> str:
-        """What a value may be, as an error message says it."""
+        """The allowed values, as in an error message."""
         return self.values
 
     @property

@@ -174,7 +174,7 @@ def read(path: Path) -> Table:
     """The table in a file: lines of a wavelength in nanometres and a value; what follows # is a comment.
 
     Raises:
-        ValueError: it is none; one line that names the file, but holds nothing of what is in it.
+        ValueError: it is none; one line that names the file, without its content.
     """
     rows: list[tuple[float, float]] = []
     try:

@@ -52,7 +52,7 @@ class Stack(Record):
             raise ValueError("thin: only for a stack that ends in a dielectric interface")
         return self
 
-    # What it holds ---------------------------------------------------------------------------------------------------
+    # Contents -----------------------------------------------------------------------------------------------------
 
     @property
     def kinds(self) -> tuple[Kind, ...]:

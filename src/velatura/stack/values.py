@@ -1,4 +1,4 @@
-"""What a parameter may hold: words, files, names of materials, numbers, colours, and textures in their place."""
+"""The types of parameters: words, files, names of materials, numbers, colours, and textures in their place."""
 
 from __future__ import annotations
 
@@ -137,10 +137,10 @@ class Scalar(Parameter):
     strict: bool = False  # the ends of the range are excluded
     differentiable: bool = True
     texturable: bool = True
-    typical: float | None = None  # stands for a value that is not known; None: the default does
+    typical: float | None = None  # in place of an unknown value; None: the default
 
     what = "a number"
-    channel: ClassVar[str] = "r"  # what a texture gives where it does not say
+    channel: ClassVar[str] = "r"  # of a texture that names none
 
     @property
     def within(self) -> tuple[float, float]:

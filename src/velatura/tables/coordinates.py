@@ -1,4 +1,4 @@
-"""Where the nodes of the tables lie: maps between [0, 1] and cosines, roughnesses and relative indices.
+"""Positions of the nodes of the tables: maps between [0, 1] and cosines, roughnesses and relative indices.
 
 Nodes crowd where the averages bend: at grazing angles, at low roughness, at critical angles near grazing and, for light
 inside a denser medium, at the critical angle, which the angular axis of the three-dimensional tables follows.

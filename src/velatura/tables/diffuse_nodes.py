@@ -1,4 +1,4 @@
-"""Light by parts of the directions in a medium, and where rough interfaces send it; diffuse light is followed so.
+"""Light by parts of the directions in a medium, and its scattering by rough interfaces, for diffuse light.
 
 Light of direction theta in a medium of index n, relative to that outside, has the tangential momentum p = n sin(theta),
 which Snell's law leaves alone: up to p = 1 it may leave a smooth stack, beyond it is trapped. A function of direction

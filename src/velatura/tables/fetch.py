@@ -26,8 +26,8 @@ FEW = 256  # numbers of which NumPy takes longer to begin with than to work out
 class Row:
     """Fresnel of one relative index at the nodes of a low-rank table, raised to the powers that the table names.
 
-    `denser` and `rarer` say whether the relative index can be above and below 1 (for metals: whether it can be
-    anywhere but, and in, the corner kappa < eta < 1): what cannot be is not looked up. `multiple` is whether light may
+    `denser` and `rarer`: whether the relative index can be above and below 1 (for metals: outside and inside the corner
+    kappa < eta < 1); impossible parts are not looked up. `multiple` is whether light may
     bounce between the facets before it leaves.
     """
 
@@ -41,7 +41,7 @@ class Row:
 
 
 def dielectric_row(tables: Tables, eta: Value, constant: bool = False, multiple: bool = False) -> Row:
-    """Row of a dielectric of relative index eta > 0; `constant` says that eta may be looked at now."""
+    """Row of a dielectric of relative index eta > 0; `constant`: whether eta may be looked at now."""
     table = tables.dielectric_multi if multiple else tables.dielectric
     reflectance = _raised(table, _at_nodes(fresnel.dielectric, table.nodes, eta))
     denser, rarer = _sides(eta < 1) if constant else (True, True)

@@ -55,7 +55,7 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """All that is looked up; `build` says what each one holds."""
+    """All tables; `build` describes each one."""
 
     dielectric: Table
     conductor: Table

@@ -1,4 +1,4 @@
-"""Where rough interfaces send light, walked: the tables of `velatura.tables.diffuse_nodes`."""
+"""Scattering by rough interfaces, from random walks: the tables of `velatura.tables.diffuse_nodes`."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def parts(cos_theta: np.ndarray, n: float) -> np.ndarray:
 def scattered(
     cos_theta: np.ndarray, alpha: float, n: tuple[float, float], paths: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parts of what is reflected and transmitted out of the first index into the second, shape (cosines, nodes)."""
+    """Parts of light reflected, and transmitted from the first index into the second, shape (cosines, nodes)."""
     eta = n[1] / n[0]
     if alpha == 0 or eta == 1:
         r, refracted = fresnel.dielectric(cos_theta, eta), fresnel.cos_transmitted(cos_theta, eta)

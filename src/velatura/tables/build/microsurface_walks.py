@@ -1,8 +1,8 @@
 """Light that meets several facets of one rough interface: walks through the Smith microsurface (Heitz et al. 2016).
 
-What comes of a walk at each meeting is summed as an expectation: of the light that leaves, the share that it leaves
-with; of the light between a reflection and a refraction, both. Only the facets are drawn, those of the first meetings
-from a Sobol sequence. So a few thousand walks know a directional albedo to a thousandth.
+The outcome of each meeting is summed as an expectation: the share of the light that leaves, and both reflection and
+refraction of the rest. Only the facets are drawn, those of the first meetings from a Sobol sequence. So a few thousand
+walks give a directional albedo to a thousandth.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class Walks:
         x, y, z = map(np.concatenate, zip(ggx.reflect(i, h), refracted))
         self.w = x, y, z
         self.weight *= np.concatenate([reflectance, 1 - reflectance])
-        # What is refracted sees the surface upside down
+        # For refracted light the surface is upside down
         below = len(reflectance)
         self.rank[below:] = 1 - self.rank[below:]
         self.outside[below:] ^= True

@@ -1,4 +1,4 @@
-"""Averages over a GGX interface by quadrature that knows where the integrand bends.
+"""Averages over a GGX interface by quadrature that is split where the integrand bends.
 
 The average of a function of one microfacet reflection, weighted as in the directional albedo (Belcour 2018, Eq. 2):
 
@@ -57,7 +57,7 @@ def average(
 ) -> np.ndarray:
     """`of(reflections, *indices)` at every point, all of shape (points,), the results joined.
 
-    The first of the indices, if there are any, is a relative index, and what is averaged may bend where the cosine
+    The first of the indices, if there are any, is a relative index, and the integrand may bend where the cosine
     named by `bend` passes its critical angle. Masking is height-`correlated`, or separable.
     """
     cos_critical = np.sqrt(np.maximum(1 - indices[0] ** 2, 0)) if indices else np.zeros(len(alpha))
@@ -90,7 +90,7 @@ def reflections(
 ) -> Reflections:
     """Quadrature at points (cos_theta, alpha > 0) of shape (points,).
 
-    What is averaged may bend where the cosine named by `bend` passes cos_critical, shape (points,).
+    The integrand may bend where the cosine named by `bend` passes cos_critical, shape (points,).
     """
     theta, theta_c = np.arccos(cos_theta)[:, None], np.arccos(cos_critical)[:, None]
     alpha = alpha[:, None]

@@ -113,7 +113,7 @@ def conductors() -> tuple[np.ndarray, np.ndarray]:
     eta = np.concatenate([0.05 + 3.95 * u, 0.05 + 0.25 * u[:150]])  # the second part: silver, and metals under coats
     kappa = np.concatenate([4 * v, 0.5 * v[:150]])
     smooth = (kappa >= eta) | (eta >= 1)
-    high = 1 + 24 * u[:100]  # what the inverse asks for
+    high = 1 + 24 * u[:100]  # as the inverse requests
     return np.concatenate([eta[smooth], high]), np.concatenate([kappa[smooth], high * (1 + 1.5 * v[:100])])
 
 
@@ -174,7 +174,7 @@ def _absorbing_inside(progress: Progress) -> Table:
     return Table(closest_interpolant(data).astype(np.float32), ABSORBING_ANGLES)
 
 
-# --- what is averaged ---------------------------------------------------------------------------------------------
+# --- the averages -------------------------------------------------------------------------------------------------
 
 
 def mean_fresnel(r: Reflections, eta: np.ndarray) -> np.ndarray:
