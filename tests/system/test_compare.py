@@ -198,7 +198,7 @@ def test_the_error_of_a_picture_is_a_root_mean_square() -> None:
         (["--models", "belcour2018,nobody"], "nobody"),
         (["--models", ""], "model"),
         (["--models", "velatur"], "did you mean velatura?"),
-        (["--models", "velatura,velatura"], "velatura is there twice"),
+        (["--models", "velatura,velatura"], "velatura is given twice"),
         (["--models", "blendbsdf"], "blendbsdf holds other BSDFs"),
         (["--models", "measured"], 'models: measured: Property "filename" cannot be found!'),
         (["--models", "sphere"], "sphere is no BSDF"),

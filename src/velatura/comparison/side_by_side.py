@@ -66,7 +66,7 @@ def compare(
     if not names:
         raise InvalidInput("models: name at least one")
     if len(set(names)) < len(names):
-        raise InvalidInput(f"models: {max(names, key=names.count)} is there twice")
+        raise InvalidInput(f"models: {max(names, key=names.count)} is given twice")
     if switches and not any(isinstance(m, Model) for m in asked):
         raise InvalidInput(f"{', '.join(switches)}: for named models only, and there is none among these")
     made = [m if isinstance(m, Model) else plugins.made(m, described, microsurface) for m in asked]

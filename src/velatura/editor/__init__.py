@@ -1,4 +1,4 @@
-"""The editor in the browser: its page, what the page asks of the model, and the server that brings both together.
+"""The editor in the browser: its page, the calls of the page to the model, and the server of both.
 
-`service` has what any page needs, `folder` what a server adds, files; neither knows HTTP, which `server` alone speaks.
+`service` has the calls of every page, `folder` those for the files of a server; only `server` knows HTTP.
 """

@@ -1,7 +1,7 @@
-"""What the Appearance panel asks: a material as lobes, and the material that has other ones.
+"""The calls of the Appearance panel: the lobes of a material, and the material with other lobes.
 
 Every verb is a function of a mapping to a mapping, both of JSON's types; `service.VERBS` takes them over. An answer
-depends on its question alone, and its lobes are read from the stack that is answered.
+depends on its request alone, and its lobes are read from the returned stack.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SAVED_MODEL = "bati2021"
 
 
 def reader_of(body: Body, target: Target) -> Model:
-    """The model that reads the stacks; its channels are the target's, where that says so."""
+    """The model that reads the stacks; its channels are those of the target, if given there."""
     chosen = model_of(body)
     return chosen.with_switches(channels=target.channels) if target.channels else chosen
 
@@ -53,7 +53,7 @@ def lobe_of(body: Body, target: Target) -> int:
 
 
 def held(material: Answer, target: Target, model: Model) -> DraggedStack | None:
-    """A material as what can be moved, None where it does not have the form of the target."""
+    """A material that can be dragged, None if it does not have the form of the target."""
     try:
         return DraggedStack.of(Stack.from_dict(material), target, model)
     except InvalidInput:
@@ -73,7 +73,7 @@ def described(target: Target) -> Answer:
 
 
 def appearance(body: Body) -> Answer:
-    """A material as a target; where it can be none, `says` why, and the target is there to be looked at."""
+    """A material as a target; if it is not one, `says` is the reason, and the target is for display only."""
     stack, model = material_of(body), model_of(body)
     try:
         parts = plain(stack)
@@ -97,7 +97,7 @@ def appearance(body: Body) -> Answer:
 
 
 def haze(target: Target, model: Model) -> list[Answer]:
-    """Of every lobe and the next one below the ratio of their energies, by channel, and of their widths."""
+    """Ratios of energies, by channel, and of widths, of every lobe and the next one below."""
     found = []
     for lobe, below in zip(target.lobes, target.lobes[1:]):
         s, s_below = (float(MAPS[model.map].variance(one.roughness)) for one in (lobe, below))
@@ -200,7 +200,7 @@ def invert(body: Body) -> Answer:
 
 
 def answered(found: DraggedStack, snapped: str | None) -> Answer:
-    """A stack as an answer, what was asked for or, `snapped` for that reason, the nearest to it."""
+    """A stack as an answer: the requested one, or the nearest one, with the reason as `snapped`."""
     return _answer(_under(found), found.target, found.model, snapped)
 
 
@@ -225,7 +225,7 @@ def _under(found: DraggedStack) -> Stack:
 
 
 def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
-    """The stack that has the lobes, found without regard to what there is."""
+    """A stack with the lobes, found independently of the present one."""
     found = stacks.search(wish, near.model.in_closed_form, EFFORT)
     fresh = DraggedStack.of(found.stack, wish, near.model) if found else None
     if fresh is None:
@@ -236,7 +236,7 @@ def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
 
 
 def _approached(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound | None]:
-    """As near to a wish that is far and cannot be met as halves of the way lead, and then what is kept allows."""
+    """The stack nearest to a distant unreachable wish, by bisection of the way, and then by kept coordinates."""
     t, found = 0.0, near
     for n in range(1, HALVES + 1):
         other = _elsewhere(near.between(wish, t + 0.5**n), near)
@@ -246,7 +246,7 @@ def _approached(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound |
 
 
 def _further(wish: Target, found: DraggedStack) -> DraggedStack:
-    """As far towards the wished blurs as the energies that there are allow, and then the other way round."""
+    """As far towards the wished blurs as the present energies allow, and then the other way round."""
     for key in ("alpha", "energy"):
         part = found.now(wish)
         for k, lobe in enumerate(wish.lobes):
@@ -268,7 +268,7 @@ def _fresh(wish: Target, model: Model) -> Answer:
 
 
 def _starts(wish: Target) -> Iterator[Target]:
-    """Targets from which a wish is approached: itself, then such as have more blur below, then darker ones."""
+    """Targets from which a wish is approached: itself, then ones with more blur below, then darker ones."""
     yield wish
     for scale in STARTS:
         start, s = wish, 0.0

@@ -1,4 +1,4 @@
-"""The class of one lobe as a map: all indices with which it looks the same head-on, and the member that is taken."""
+"""The class of one lobe as a map: all indices with the same lobe at normal incidence, and the chosen member."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def member(body: Body) -> Answer:
 
 
 def _held(body: Body) -> tuple[Target, DraggedStack, int]:
-    """The target, the material that has it, and the lobe that is meant."""
+    """The target, the material that has it, and the requested lobe."""
     target = Target.from_dict(body.get("target"))
     near = held(body.get("material") or {}, target, reader_of(body, target))
     if near is None:

@@ -1,4 +1,4 @@
-"""The files of the folder that the editor was started in: materials and textures, by plain names, and nothing else."""
+"""The files of the folder of the editor: materials and textures, by plain names, and nothing else."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Folder:
     # Verbs -----------------------------------------------------------------------------------------------------------
 
     def listed(self, body: Body) -> Answer:
-        """What there is to open."""
+        """The files that can be opened."""
         names = sorted(os.listdir(self.path))
         kinds = {"files": MATERIALS, "textures": PICTURES}
         return {kind: [name for name in names if self._readable(name, endings)] for kind, endings in kinds.items()}
@@ -94,7 +94,7 @@ class Folder:
     # Names -----------------------------------------------------------------------------------------------------------
 
     def place(self, name: str, endings: Sequence[str]) -> Path:
-        """The path of a file of that name, which may not be there yet.
+        """The path of a file of that name, which may not exist yet.
 
         Raises:
             InvalidInput: anything but the plain name of a file of this folder with one of the endings.
@@ -113,7 +113,7 @@ class Folder:
         return path
 
     def existing(self, name: str, endings: Sequence[str]) -> Path:
-        """The path of a file that is there. Raises InvalidInput as `place`, and where it is missing or too large."""
+        """The path of an existing file. Raises InvalidInput as `place`, and where it is missing or too large."""
         path = self.place(name, endings)
         if not path.is_file():
             raise InvalidInput(f"{name}: there is no such file in {self.path}")
@@ -136,7 +136,7 @@ class Folder:
 
 
 def _version(path: Path) -> str | None:
-    """What the content of a file is known by; None where there is none."""
+    """The version of the content of a file; None if there is no file."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
     except FileNotFoundError:

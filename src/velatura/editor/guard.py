@@ -1,4 +1,4 @@
-"""Who may ask the editor's server, and for how long a connection may keep it waiting."""
+"""Access to the editor's server, and time limits of connections."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ VARIABLE = "VELATURA_TOKEN"
 
 HEAD_TIME = 15  # seconds for the head of a request
 
-#: What the page may load: from here alone, and what it makes itself; attributes of style are how it moves things about.
+#: Sources that the page may load: this server, and its own objects; it positions elements by style attributes.
 POLICY = {
     "default-src": "'self' blob: data:",
     "script-src": "'self'",
@@ -105,7 +105,7 @@ class Guard:
             await instead(scope, receive, send_guarded)
 
     def _instead(self, asked: HTTPConnection) -> Response | None:
-        """What a request gets in place of an answer; None where it may have that."""
+        """The refusal of a request; None if it is admitted."""
         if not _from_here(asked.headers):
             return refusal(403, "the editor answers its own page alone")
         name = cookie_name(asked.scope["server"][1])
@@ -129,7 +129,7 @@ class Guard:
 
 
 def _from_here(headers: Headers) -> bool:
-    """Whether a request is to this machine by its own name, and from a page of this very server, if from any."""
+    """Whether a request names this machine as its host, and comes from a page of this server, if from any."""
     hosts, origins = headers.getlist("host"), headers.getlist("origin")
     if len(hosts) != 1 or hosts[0].partition(":")[0] not in HOSTS:
         return False

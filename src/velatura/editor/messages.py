@@ -1,7 +1,7 @@
-"""Bodies and answers of the page's calls, mappings of JSON's types, and what stands in many of them.
+"""Bodies and answers of the page's calls, mappings of JSON's types, and their common parts.
 
-What a key of a body may hold, and how much, is declared once for all verbs, in `KEYS`; a verb that is `admitting` is
-called with what is declared alone, and says itself what it needs and what that must be there.
+The allowed values of the keys of bodies are declared once, in `KEYS`; a verb that is `admitting` is called
+with declared keys only, and checks itself which of them it requires.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class Several(Parameter):
 
 @dataclass(frozen=True)
 class Fields(Parameter):
-    """An object; what it holds is for its reader to check, but how many `entries` lie under one of its keys."""
+    """An object; its reader checks the content, except the number of `entries` under one of its keys."""
 
     entries: str = ""
     most: int = LAYERS
@@ -167,7 +167,7 @@ def _point(name: str, value: Any) -> list[float]:
     return [_within(name, x, Scalar("", low=-1e4, high=1e4, texturable=False)) for x in value]
 
 
-#: What the keys of all bodies may hold; null is as good as nothing.
+#: The allowed values of the keys of all bodies; null is the same as a missing key.
 KEYS: dict[str, Parameter] = {
     "material": Fields("of a material", entries="layers", most=LAYERS),
     "target": Fields("of a target", entries="lobes", most=LOBES),
@@ -198,7 +198,7 @@ KEYS: dict[str, Parameter] = {
 
 
 def admitted(body: Body) -> Body:
-    """What is declared of a body. Raises InvalidInput where a key holds what it may not."""
+    """The declared keys of a body. Raises InvalidInput for values that are not allowed."""
     checked = {}
     for key, declared in KEYS.items():
         value = body.get(key)
@@ -209,7 +209,7 @@ def admitted(body: Body) -> Body:
 
 
 def admitting(verb: Verb) -> Verb:
-    """The verb, called with what is admitted of a body."""
+    """The verb, called with the admitted part of a body."""
     return functools.wraps(verb)(lambda body: verb(admitted(body)))
 
 

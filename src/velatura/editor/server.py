@@ -34,7 +34,7 @@ from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, VelaturaError
 from velatura.stack.schema import unknown
 
-BUG = "the editor has failed, which is a mistake in it; the terminal says more"
+BUG = "the editor has failed, which is a mistake in it; the terminal shows details"
 BUSY = "the editor is busy with other calls like this one; ask again later"
 
 SMALL = 2**20  # bytes of a message, and of every request but that of a texture
@@ -141,7 +141,7 @@ def application(material: str | None, token: str) -> Guard:
 
 
 async def _received(request: Request, body: IO[bytes], most: int) -> bool:
-    """Receive a body; False where it is too large. One that says so is not received at all."""
+    """Receive a body; False if it is too large. One with a larger declared length is not received at all."""
     if int(request.headers.get("content-length", 0)) > most:
         return False
     async for chunk in request.stream():
@@ -157,7 +157,7 @@ def _whole(body: IO[bytes]) -> bytes:
 
 
 class Desk:
-    """Has calls answered in threads, a few for each kind of verb."""
+    """Answers calls in threads, a few for each kind of verb."""
 
     def __init__(self, verbs: Mapping[str, Verb]) -> None:
         self.verbs = verbs
@@ -193,7 +193,7 @@ def _text(answer: Answer) -> str:
     try:
         return json.dumps(answer, allow_nan=False)
     except ValueError:
-        raise InvalidInput("the values are so large that some of what follows from them is no number") from None
+        raise InvalidInput("the values are so large that some results are not finite") from None
 
 
 def _error(reason: str) -> str:

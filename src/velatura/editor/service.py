@@ -1,4 +1,4 @@
-"""What the page asks: which parameters and presets there are, a material's shader, an object, a text.
+"""The calls of the page: parameters and presets, the shader of a material, an object, a text.
 
 Every verb is a function of a mapping to a mapping, both of JSON's types. Textures in a material are relative to the
 working directory. All errors that a user can make are InvalidInput.
@@ -31,7 +31,7 @@ from velatura.stack.spectra import MIRROR
 from velatura.stack.values import Angle, Brushing, Choice, Colour, Conductor, Flag, Index, Pair, Scalar, Text
 from velatura.tables import load as load_tables
 
-#: What the page shows a parameter as.
+#: The control of the page for each type of parameter.
 KINDS: dict[type[Parameter], str] = {
     Scalar: "number",
     Colour: "colour",
@@ -55,7 +55,7 @@ ENVIRONMENTS: dict[str, Callable[[], ArrayLike]] = {
 
 
 def session(body: Body) -> Answer:
-    """All that the page knows from the start; nothing is `opened` yet."""
+    """The initial data of the page; nothing is `opened` yet."""
     return {**_constants(), "opened": None}
 
 
@@ -137,7 +137,7 @@ def _names() -> Answer:
 
 
 def shader(body: Body) -> Answer:
-    """How to draw a material, as `shading.shading` says it, with the model and its switches."""
+    """The data to draw a material, of `shading.shading`, with the model and its switches."""
     stack = material_of(body)
     written = (entry.get("interface") or {} for entry in body["material"]["layers"])
     return shading(stack, model_of(body), stretched=any(isinstance(keys.get("alpha"), list) for keys in written))
@@ -157,7 +157,7 @@ def table(body: Body) -> Answer:
 
 
 def read(body: Body) -> Answer:
-    """The material in a text, YAML or JSON; what is wrong with it is said of the file that it was in."""
+    """The material in a text, YAML or JSON; errors name the file that it was in."""
     name = field(body, "file", str, "the text")
     return {"material": document(loads(field(body, "text", str), name if name.isprintable() else repr(name)))}
 
@@ -168,7 +168,7 @@ def write(body: Body) -> Answer:
 
 
 def object_(body: Body) -> Answer:
-    """An object with what it stands on, as triangles, and the camera that sees it."""
+    """An object with its plinth and the ground, as triangles, and its camera."""
     name = field(body, "name", str)
     if name not in OBJECTS:
         raise InvalidInput(unknown("object", name, OBJECTS))

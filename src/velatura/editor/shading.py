@@ -1,4 +1,4 @@
-"""A material as what the page draws it with: shader code, which few changes touch, and values, which most do."""
+"""A material for drawing in the page: shader code, which few changes affect, and values, which most do."""
 
 from __future__ import annotations
 
@@ -85,6 +85,6 @@ def tables(key: str) -> np.ndarray:
 
 
 def _plain(address: Address, value: Any) -> float | list[float]:
-    """A value as a uniform holds it: a number, or three for what may be a colour."""
+    """A value for a uniform: a number, or three for a possible colour."""
     number = constant(address, value)
     return np.broadcast_to(number, 3).tolist() if address.colour else float(number)

@@ -1,4 +1,4 @@
-"""The truth beside a model: the same view by the random walk through the layers, a few samples at a time."""
+"""The reference beside a model: the same view by the random walk through the layers, a few samples at a time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST = 2**21  # samples of one call
 
 
 def truth(body: Body) -> Answer:
-    """The view as paths see it: `picture` (h, w, 3), linear RGB, from the upper left.
+    """The view by random walks: `picture` (h, w, 3), linear RGB, from the upper left.
 
     Of the body: `material`, `object`, `environment`, `rotation` (degrees about y), `camera` {origin, target, fov in
     degrees over the shorter side}, `size` [w, h], `spp`, `seed`.
@@ -30,10 +30,10 @@ def truth(body: Body) -> Answer:
     stack = material_of(body)
     name, environment = body.get("object"), body.get("environment", "studio")
     if name not in scenes.OBJECTS:
-        raise InvalidInput(f"object: the truth knows {', '.join(scenes.OBJECTS)}, got {name!r}")
+        raise InvalidInput(f"object: must be one of {', '.join(scenes.OBJECTS)}, got {name!r}")
     known = {*scenes.ENVIRONMENTS, *bundle.environments()}
     if environment not in known:
-        raise InvalidInput(f"environment: the truth knows {', '.join(sorted(known))}, got {environment!r}")
+        raise InvalidInput(f"environment: must be one of {', '.join(sorted(known))}, got {environment!r}")
     size = body.get("size")
     if not isinstance(size, list) or len(size) != 2:
         raise InvalidInput("size: must be a width and a height")

@@ -1,7 +1,7 @@
 """The model's assumptions beside the reference: the interactive validations of Belcour 2018's supplement, as numbers.
 
 Each answers sliders with curves: those of kind `truth` are counted from random walks or evenly spread samples, with
-standard errors, those of kind `model` are what the recursion takes in their place. Lobes are shown as densities across
+standard errors, those of kind `model` are the approximations of the recursion. Lobes are shown as densities across
 the projected disc: over the sine of the outgoing angle in the plane of incidence, summed over the directions beside
 that plane.
 """
@@ -25,12 +25,12 @@ Light = tuple[NDArray[Any], NDArray[Any]]  # directions (3, n), turned up, and t
 PATHS = 20_000  # random walks of an answer, so that it takes a fraction of a second
 SAMPLES = 2**15  # evenly spread ones
 BINS = 64  # across the disc
-SMOOTH = 1e-3  # what a roughness of 0 is sampled as
+SMOOTH = 1e-3  # samples a roughness of 0
 
 
 @dataclass(frozen=True)
 class Slider:
-    """A number that may be chosen, and what it is."""
+    """A number that may be chosen, and its meaning."""
 
     doc: str
     low: float
@@ -40,7 +40,7 @@ class Slider:
 
 @dataclass(frozen=True)
 class Validation:
-    """A page: what it is about, its sliders by name, and what answers them."""
+    """A page: its subject, its sliders by name, and the function that answers them."""
 
     title: str
     doc: str
@@ -62,7 +62,7 @@ def validation(body: Body) -> Answer:
     """The answer of the validation `name` to `parameters`, those left out at their defaults.
 
     `curves` of `label`, `kind` (truth or model), `x`, `y` and, where they are counted, standard `error`; `axes` x and y
-    with `label`, `low`, `high` (None: what fits); `says`, the numbers in words.
+    with `label`, `low`, `high` (None: fitted); `says`, the numbers in words.
 
     Raises:
         InvalidInput: an unknown validation or parameter, or a parameter outside its range.
@@ -307,7 +307,7 @@ VALIDATIONS: dict[str, Validation] = {
     ),
     "transmission": Validation(
         "Transmission scale",
-        "A rough interface spreads what it transmits less than what it reflects. The model takes it for the "
+        "A rough interface spreads transmitted light less than reflected light. The model treats it as the "
         "reflection of the refracted direction by a roughness that is scaled, by the cosines at normal incidence or by "
         "the real ones.",
         {"eta": Slider("relative index", 0.5, 3, 1.5), "alpha": _alpha("roughness", 0.3), "angle": _ANGLE},

@@ -1,4 +1,4 @@
-"""The editor in a cell of a notebook: the same page, with this process in the place of the server."""
+"""The editor in a cell of a notebook: the same page, with this process as its server."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ with needs("notebook"):
     import anywidget
     import traitlets
 
-BUG = "the editor has failed, which is a mistake in it; the kernel's log says more"
+BUG = "the editor has failed, which is a mistake in it; the kernel's log shows details"
 LOWEST = 200  # pixels
 THREADS = 4  # that answer one widget
 
@@ -71,7 +71,7 @@ def _written(stack: Stack, editor: Editor) -> Answer:
 
 
 def _described(fields: Answer, editor: Editor) -> Stack:
-    """The page's stack; while that is not valid, which the page says itself, the last one that was."""
+    """The page's stack; while that is invalid, which the page reports, the last valid one."""
     try:
         stack = material_of(admitted({"material": fields}))
     except InvalidInput:
@@ -165,7 +165,7 @@ class Editor(anywidget.AnyWidget):
             self.send({**about, "error": BUG, "status": 500})
 
     def _file(self, address: str) -> bytes:
-        """What the server has at an address: an environment, or a texture of the folder."""
+        """The content at an address of the server: an environment, or a texture of the folder."""
         if address in bundle.environments().values():
             return (bundle.STATIC / address.lstrip("/")).read_bytes()
         return self._folder.existing(unquote(address.removeprefix("/files/")), PICTURES).read_bytes()

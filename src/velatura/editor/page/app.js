@@ -130,7 +130,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     ];
   }
 
-  // What comes from outside
+  // Input from outside
 
   store.subscribe(() => {
     messages.done();
@@ -163,7 +163,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     get problems() {
       return messages.problems;
     },
-    /** Whether Python has answered all that it was asked about the picture, and about what may come. */
+    /** Whether Python has answered all requests for the picture, and those made in advance. */
     get quiet() {
       return isQuiet();
     },

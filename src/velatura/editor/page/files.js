@@ -61,12 +61,12 @@ export function createFiles({ store, session, call, storage, messages, address, 
         const { text } = await call('write', { material: documentOf(store.get()) });
         offer(new Blob([text], { type: 'application/yaml' }), files.nameOf('yaml'));
       }),
-    /** The name of a file for what is open. */
+    /** The file name of the open material. */
     nameOf(ending) {
       const name = store.get().name.toLowerCase();
       return `${name.replace(/[^\p{L}\p{N}]+/gu, '-').replace(/^-|-$/g, '') || 'material'}.${ending}`;
     },
-    /** An address that opens what is shown, on the clipboard. */
+    /** Copies an address of the present state to the clipboard. */
     share: () =>
       messages.attempt('share', async () => {
         const fragment = await fragmentOf(store.get(), documentOf(store.get()));
@@ -84,7 +84,7 @@ export function createFiles({ store, session, call, storage, messages, address, 
         messages.say(`Opened ${checked.material.name || 'a material'} from the address.`);
       }),
 
-    // What is around the material
+    // The surroundings of the material
 
     /** Puts a picture into the folder; the name that it has there. */
     upload: async (file) => (await call('texture', { file: file.name, data: await base64(file) })).file,
@@ -101,7 +101,7 @@ export function createFiles({ store, session, call, storage, messages, address, 
         store.run(commands.setView, { object: DROPPED + file.name });
         store.aside(commands.setCamera, null);
       }),
-    /** What was dropped on the page, by its ending. */
+    /** Opens a file dropped on the page, by its ending. */
     take(file) {
       if (/\.(ya?ml|json)$/i.test(file.name)) return files.readFile(file);
       if (/\.(hdr|exr)$/i.test(file.name)) return files.takeEnvironment(file);

@@ -1,4 +1,4 @@
-// The page's entry: connects to the server, mounts the editor, restores what was open.
+// The page's entry: connects to the server, mounts the editor, restores the last state.
 
 import { mount } from './app.js';
 import { call, liveConnection } from './connection.js';

@@ -1,4 +1,4 @@
-// A bounded memory of what was found last.
+// A bounded cache of the latest results.
 
 /** A map that holds so many entries at most: those that were set or found latest. */
 export class Recent {

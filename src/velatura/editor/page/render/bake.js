@@ -48,7 +48,7 @@ export class Bake {
     return texels;
   }
 
-  /** Fills what lies between every second node: first along lines, then between lines. */
+  /** Interpolates every second node: first along lines, then between lines. */
   #fill() {
     const texels = this.#texels, turns = this.#turns, line = 4 * this.width;
     const between = (first, end, by) => {

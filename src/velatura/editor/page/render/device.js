@@ -12,7 +12,7 @@ export class Device {
   empty; // array of vertices
   programs; // promises of them, by their text
 
-  /** Raises Error where the browser lacks what is needed. */
+  /** Throws Error if the browser lacks a required feature. */
   constructor(canvas) {
     const options = { antialias: false, alpha: false, powerPreference: 'high-performance' };
     const gl = canvas.getContext('webgl2', options);
@@ -75,7 +75,7 @@ export class Device {
     if (mipmaps) gl.generateMipmap(gl.TEXTURE_2D);
   }
 
-  /** What is drawn into: one or more textures, with `options` as for these, and maybe a buffer of depths. */
+  /** A render target: one or more textures, with `options` as for these, and a depth buffer if `depth`. */
   target(width, height, formats, { depth = false, ...options } = {}) {
     const { gl } = this;
     const textures = formats.map((format) => this.texture(format, width, height, null, options));
@@ -179,7 +179,7 @@ export class Device {
     return { handle, places: new Map() };
   }
 
-  /** Takes a program and its uniforms: numbers, arrays, textures; what it does not have is left out. */
+  /** Takes a program and its uniforms: numbers, arrays, textures; names that it does not have are ignored. */
   use(program, uniforms) {
     const { gl } = this;
     gl.useProgram(program.handle);

@@ -91,7 +91,7 @@ export class GBuffer {
     this.#outdated = true;
   }
 
-  /** Draws what is seen, where that has changed. */
+  /** Draws the visible surfaces, if they have changed. */
   update(projection) {
     if (!this.#outdated) return;
     this.#outdated = false;

@@ -1,4 +1,4 @@
-// What the server and the folder hold for pictures: objects, environments, tables, textures.
+// Data of the server and the folder for pictures: objects, environments, tables, textures.
 
 import { decode } from '../arrays.js';
 import { Recent } from '../recent.js';

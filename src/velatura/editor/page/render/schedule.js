@@ -1,4 +1,4 @@
-// What to draw when: a preview at once after a change, then paths in slices of time, until there are enough.
+// The order of drawing: a preview at once after a change, then paths in slices of time, until there are enough.
 // Times are in milliseconds, of the clock that gives `now`.
 
 const QUIET = 150; // without a change, after which paths are traced
@@ -25,7 +25,7 @@ export class Schedule {
     this.#touched = this.#changed = now;
   }
 
-  /** Asks for another preview of the same state. */
+  /** Requests another preview of the same state. */
   outdate() {
     this.previewed = 0;
     this.#coarse = false;
@@ -39,7 +39,7 @@ export class Schedule {
     this.#touched = now;
   }
 
-  /** What to do now that there are so many samples: {act: 'preview' | 'trace' | 'wait', milliseconds}. */
+  /** The next action at a number of samples: {act: 'preview' | 'trace' | 'wait', milliseconds}. */
   next(now, samples) {
     if (!this.previewed) return { act: 'preview' };
     if (this.held) return { act: 'wait', milliseconds: LOOK };

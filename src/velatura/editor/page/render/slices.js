@@ -55,7 +55,7 @@ export class Slices {
     this.#uniforms = { ...slot.uniforms(), ...incidence, vt_shown: this.only(null) };
   }
 
-  /** Waits for the programs, and for what most plots show; a disc is drawn when it is asked for. */
+  /** Waits for the programs, and for the data of most plots; a disc is drawn on demand. */
   async ready() {
     const texts = [lobesProgram(this.shader, this.parts), valuesProgram(this.shader)];
     [this.#lobesProgram, this.#valuesProgram] = await Promise.all(texts.map((text) => this.#device.program(text)));
@@ -86,7 +86,7 @@ export class Slices {
     });
   }
 
-  /** What was made once already under this key, or is now. */
+  /** The value made earlier under this key, or made now. */
   once(key, make) {
     if (!this.#kept.has(key)) this.#kept.set(key, make());
     return this.#kept.get(key);

@@ -31,13 +31,13 @@ export class Slot {
   #surrounded = false; // whether the preview has what is around the object
   #sums = null; // two targets: light added up, and a spare one
 
-  /** `loader` gives what a shader names, as that of loader.js does. */
+  /** `loader` provides the data that a shader names, like that of loader.js. */
   constructor(device, loader) {
     this.device = device;
     this.#loader = loader;
   }
 
-  /** What all materials have in common. */
+  /** Compiles the programs that all materials share. */
   async compile() {
     const texts = [adding, learning];
     [this.#adding, this.#learning] = await Promise.all(texts.map((text) => this.device.program(text)));
@@ -125,7 +125,7 @@ export class Slot {
     this.#surrounded = false;
   }
 
-  /** Draws the preview of what a G-buffer holds; all around the object stays as it is until the view changes. */
+  /** Draws the preview of the contents of a G-buffer; all around the object stays as it is until the view changes. */
   drawPreview(gbuffer, uniforms, coarse) {
     const shade = this.shades[0].textures[0];
     if (!this.#surrounded) gbuffer.drawSurroundings({ ...uniforms, shade }, this.preview);

@@ -56,7 +56,7 @@ export class Stage {
     this.#nodes = null;
   }
 
-  /** What the shaders read of both, for a picture from a camera, with the light turned by `rotation` degrees. */
+  /** The uniforms of both, for a picture from a camera, with the light turned by `rotation` degrees. */
   uniforms(camera, { width, height }, rotation) {
     const turn = (rotation * Math.PI) / 180;
     return {

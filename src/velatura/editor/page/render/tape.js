@@ -1,7 +1,7 @@
-// Tapes: what Python has recorded of a model, run one step after another on arrays of numbers.
+// Tapes: recordings of a model by Python, run one step after another on arrays of numbers.
 //
 // A value is {channels, count, wide}: an array for each channel, of `count` numbers or of one. Inputs of many numbers
-// are gone through in blocks, so that all stays close at hand; what does not depend on them is worked out once.
+// are gone through in blocks, so that all data stay in the cache; values that do not depend on them are computed once.
 
 const BLOCK = 512; // numbers
 
@@ -205,7 +205,7 @@ function lastUses(steps, outputs, first) {
   const last = new Map(outputs.map((k) => [k, Infinity]));
   for (let k = steps.length - 1; k >= 0; k--) {
     const [op, ...args] = steps[k];
-    // A component lies in what it is one of
+    // A component shares the array of its colour
     const until = op === 'component' ? (last.get(first + k) ?? k) : k;
     for (const x of args.slice(DETAILED.includes(op) ? 1 : 0)) last.set(x, Math.max(last.get(x) ?? 0, until));
   }

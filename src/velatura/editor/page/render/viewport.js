@@ -63,9 +63,9 @@ export class Viewport {
     this.#run();
   }
 
-  // What is shown
+  // Contents
 
-  /** A name that call("object") knows, or {parts, view}; the camera goes where its view says. */
+  /** A name for call("object"), or {parts, view}; the camera takes its view. */
   async setObject(object) {
     const { parts, view } = typeof object === 'string' ? await this.loader.object(object) : object;
     this.sources.parts = parts;
@@ -209,7 +209,7 @@ export class Viewport {
     return this.thumbnails.draw(shader, values, { size, samples, exposure: this.settings.exposure, uniforms });
   }
 
-  /** What the shaders read of object, light and camera, for a picture of a size. */
+  /** The uniforms of object, light and camera, for a picture of a size. */
   uniforms(size = this.canvas) {
     return this.stage.uniforms(this.camera, size, this.settings.rotation);
   }
@@ -235,7 +235,7 @@ export class Viewport {
     this.ready = Promise.all([this.screen, this.gbuffer, this.slots.a].map((part) => part.compile()));
   }
 
-  /** All that the lost context held, from what the page has kept. */
+  /** Restores all data of the lost context from the page's own copies. */
   async #restore() {
     const { slots, truth, sources } = this;
     this.device.restore();

@@ -1,4 +1,4 @@
-// Makes ready what may come next, while there is no input: all for one more layer of each kind.
+// Prepares possible next states while there is no input: one more layer of each kind.
 
 import { addLayer } from './commands.js';
 import { documentOf, pattern } from './material.js';

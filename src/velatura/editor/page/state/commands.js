@@ -1,4 +1,4 @@
-// What can be done: pure functions from a state to the next, each with the title that undo shows.
+// Commands: pure functions from a state to the next, each with the title that undo shows.
 
 import { documentOf, enabled, indices, isBase, isOpaque, layersOf, variantOf } from './material.js';
 

@@ -1,4 +1,4 @@
-// Values under the hand: what is dragged changes at once, and is one step when it is let go.
+// Values being edited: a drag changes them at once, and is one step when it is released.
 
 const SETTLED = 400; // milliseconds after which a value that is no longer moved counts as set
 

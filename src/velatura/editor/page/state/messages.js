@@ -1,4 +1,4 @@
-// What the page says: what is wrong, until its cause has gone, and what was done last.
+// Messages of the page: problems, until their cause is gone, and the last action.
 
 import { Offline } from '../connection.js';
 
@@ -8,7 +8,7 @@ export function createMessages(changed) {
   let note = '';
 
   const messages = {
-    /** Says what is wrong: until it is forgiven, what is `passing` until anything is done, and `away` until the server is back. */
+    /** Reports a problem until it is forgiven, or the next action (`passing`), or the server is back (`away`). */
     complain(about, text, { layer = null, actions = [], passing = false, away = false } = {}) {
       problems.delete(about); // the latest comes last
       problems.set(about, { text, layer, actions, passing, away });
@@ -22,11 +22,11 @@ export function createMessages(changed) {
     forgive(about) {
       if (problems.delete(about)) changed();
     },
-    /** What is no longer wrong: of all that is `passing`, or `away`. */
+    /** Withdraws all problems that are `passing`, or `away`. */
     forgiveAll(kind) {
       for (const [about, problem] of problems) if (problem[kind]) messages.forgive(about);
     },
-    /** Does what may fail, and says so in words. */
+    /** Performs an action, and reports its failure. */
     async attempt(about, act) {
       try {
         await act();
@@ -39,7 +39,7 @@ export function createMessages(changed) {
       note = text;
       changed();
     },
-    /** Something was done: what was said of acts before is over, and is not drawn again for that alone. */
+    /** An action was done: messages about earlier ones end, and are not redrawn for that alone. */
     done() {
       messages.forgiveAll('passing');
       note = '';

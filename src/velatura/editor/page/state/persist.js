@@ -1,4 +1,4 @@
-// What outlives a page: the history of this tab, the last material of any, and the files dropped on them.
+// State that outlives a page: the history of this tab, the last material of any, and the files dropped on them.
 
 const TAB = 'velatura.tab';
 const LAST = 'velatura.last';

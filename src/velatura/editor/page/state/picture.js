@@ -66,7 +66,7 @@ class Slot {
     onBaked(name);
   }
 
-  /** Asks for the shader of what is wanted, one question at a time and the latest only. */
+  /** Requests the shader of the wanted state, one request at a time and only the latest. */
   async #ask() {
     if (this.#busy) return;
     const { call, onProblem } = this.#services;

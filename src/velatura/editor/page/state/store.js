@@ -28,7 +28,7 @@ export function createStore(present, { past = [], future = [], outside = [] } = 
     become(state);
   }
 
-  /** Takes the last step of `from` back, and puts what reverts that on top of `to`. */
+  /** Takes the last step of `from` back, and puts its inverse on top of `to`. */
   function exchanged(from, to) {
     const { state, title } = from.at(-1);
     dragged = null;
@@ -43,11 +43,11 @@ export function createStore(present, { past = [], future = [], outside = [] } = 
     },
 
     run: (command, ...args) => step(null, command, args),
-    /** Like `run`, but one step together with what was dragged by the same key just before. */
+    /** Like `run`, but one step together with the preceding drag by the same key. */
     drag: (key, command, ...args) => step(key, command, args),
     /** The drag is over: the next one is a step of its own. */
     release: () => (dragged = null),
-    /** A change that is no step: of a camera, or of what the disk holds. */
+    /** A change that is no step: of a camera, or of the version on disk. */
     aside(command, ...args) {
       const state = command(present, ...args);
       if (state !== present) become(state);
@@ -71,7 +71,7 @@ export function createStore(present, { past = [], future = [], outside = [] } = 
     get canRedo() {
       return future.length > 0;
     },
-    /** What the next undo takes back, and the next redo does again. */
+    /** The titles of the next undo, and of the next redo. */
     get undoes() {
       return past.at(-1)?.title ?? '';
     },

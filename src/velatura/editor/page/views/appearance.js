@@ -1,4 +1,4 @@
-// The material by what is seen of it: lobes under the hand, and the stack that has them.
+// The material by its lobes: handles to drag, and the stack that has them.
 
 import { html, nothing, render } from 'lit-html';
 import { Recent } from '../recent.js';
@@ -45,7 +45,7 @@ export function mountAppearance(element, services) {
   let frame = 0;
   let reading = 0; // questions about a material that are not answered yet
 
-  // What is known of a material
+  // Known targets of materials
 
   const textOf = ({ layers, exterior = 1, thin = false }, { model, switches }) =>
     JSON.stringify([layers, exterior, thin, model, switches]);
@@ -126,7 +126,7 @@ export function mountAppearance(element, services) {
     paint();
   }
 
-  /** Wishes for a lobe that differs; what was asked before in the same drag stays asked. */
+  /** Requests changes of a lobe; earlier requests of the same drag remain. */
   function wish(index, changes) {
     chosen = index;
     asked = changed(underHand(), index, changes);
@@ -339,7 +339,7 @@ export function mountAppearance(element, services) {
     get quiet() {
       return !held && !wishes.busy && !reading;
     },
-    /** Says beforehand which target a material has, by a model. */
+    /** Stores the target of a material by a model in advance. */
     know: (material, model, answer) => known.set(textOf(material, { model, switches: {} }), { says: null, ...answer }),
     destroy() {
       stop();

@@ -1,4 +1,4 @@
-// Controls of single values. Each takes its value and `edit`: what to do with a new one.
+// Controls of single values. Each takes its value and `edit`, which is called with a new one.
 
 import { html, nothing } from 'lit-html';
 import { live } from 'lit-html/directives/live.js';

@@ -58,7 +58,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
   const isCompared = () => store.get().view.mode !== 'single' && !store.get().view.other?.truth;
   const showAlone = (k) => store.run(setView, { lobe: store.get().view.lobe === k ? null : k });
 
-  /** Every frame in which it can be seen: what has changed since the last one. */
+  /** Draws changes, in every frame in which it is visible. */
   function follow() {
     frame = requestAnimationFrame(follow);
     if (!element.getClientRects().length) return;
@@ -67,7 +67,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
     stale = false;
   }
 
-  /** New slices of what is drawn, where that, or where the light comes from, has changed. */
+  /** New slices, if the picture or the direction of the light has changed. */
   function slice() {
     for (const name of Object.keys(changed)) {
       const slot = viewport.slots[name];
@@ -182,7 +182,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
     <output>${local[key]}°</output>
   </label>`;
 
-  // The four plots: each a picture, and what is read where its cursor is
+  // The four plots: each a picture, and the numbers at its cursor
 
   const lobe = () => store.get().view.lobe;
   const seen = (k) => lobe() === null || lobe() === k;

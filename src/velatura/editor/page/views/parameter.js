@@ -1,4 +1,4 @@
-// A parameter of a layer: its name, the control that its kind asks for, and what else it may be.
+// A parameter of a layer: its name, the control for its kind, and its alternatives.
 
 import { html, nothing } from 'lit-html';
 import { axes, indices, variantOf } from '../state/material.js';

@@ -1,4 +1,4 @@
-// What the picture shows, and by which model.
+// The contents of the picture, and its model.
 
 import { html, nothing } from 'lit-html';
 import { partsOf } from '../render/slices.js';
@@ -32,7 +32,7 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
   const { view } = store.get();
   const change = (key) => edits.of(`view.${key}`, (value) => [setView, { [key]: value }], 'view');
   const known = session.environments.map(({ name, title }) => [name, title]);
-  /** What was dropped, among what is known. */
+  /** The known options, with a dropped file if it is chosen. */
   const withOwn = (options, name) =>
     options.some(([known]) => known === name) ? options : [...options, [name, name.replace('file:', '')]];
   const chooseObject = (object) => {

@@ -1,4 +1,4 @@
-// Fields that a hand is in: what is typed or picked there stays as it is until it is taken, or left.
+// Fields in use: typed or picked text stays unchanged until it is accepted, or the field is left.
 
 import { noChange } from 'lit-html';
 import { Directive, directive } from 'lit-html/directive.js';

@@ -1,4 +1,4 @@
-// What is where in the picture, for the preview: material, normal, tangent, texture coordinates.
+// Attributes of the pixels, for the preview: material, normal, tangent, texture coordinates.
 
 export const rasterVertex = /* glsl */ `#version 300 es
 layout(location = 0) in vec3 position;

@@ -1,4 +1,4 @@
-// Rays against the triangles of the scene, and what lies at a hit.
+// Rays against the triangles of the scene, and the attributes of a hit.
 
 import { NODES_WIDTH, TRIANGLES_WIDTH } from '../scene.js';
 

@@ -20,7 +20,7 @@ const PATH = /* glsl */ `
 uniform vec2 within; // the place within a pixel
 out vec4 radiance;
 
-// What a surface at hand makes of light; grey reflects 18 percent, diffusely
+// Value and density of a surface; the grey one reflects 18 percent, diffusely
 vec4 surface_eval_pdf(int material, VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
   if (material == 0) return vt_eval_pdf(m, l, wi, wo);
   float cos_o = wi.z > 0.0 ? max(wo.z, 0.0) : 0.0;
@@ -55,7 +55,7 @@ void main() {
     vec3 wo;
     vec4 light;
     if (to_light) {
-      // Add what arrives, and draw where to go on
+      // Add the light that arrives, and sample the next direction
       if (hit.triangle < 0) found += lit;
       vec3 u = vec3(random_number(dimension + 2), random_pair(dimension + 3));
       wo = surface_sample(point.material, m, l, wi, u);

@@ -36,7 +36,7 @@ export function createClass(services, panel) {
   let pictures = []; // of members along the path: {point, material, image, problem}
   let timer = null;
 
-  /** Asks for the map where it is of something else now; while a hand is on it, it stays. */
+  /** Requests the map if its subject has changed; while it is held, it stays. */
   function follow() {
     const target = panel.target();
     if (!target || panel.held()) return;
@@ -141,7 +141,7 @@ export function createClass(services, panel) {
     )}
   </div>`;
 
-  /** A point by the names of its axes; what is not on the map is a tint. */
+  /** A point by the names of its axes; outside the map it is a tint. */
   const titleOf = (point) => {
     const onMap = point.length === card.axes.length && card.kind !== 'conductor';
     return point.map((value, axis) => `${onMap ? card.axes[axis].label : 'tint'} ${shown(value)}`).join(', ');

@@ -1,4 +1,4 @@
-// What plots share: round numbers to mark, numbers as text, looks of lines.
+// The common part of plots: round numbers for ticks, numbers as text, styles of lines.
 
 const LOOKS = 6;
 

@@ -1,4 +1,4 @@
-// The papers' validations: what the model assumes, beside the truth, for sliders to explore.
+// The papers' validations: assumptions of the model compared with the truth, with sliders.
 
 import { html, nothing } from 'lit-html';
 import { chart, valueAt } from '../plots/chart.js';
