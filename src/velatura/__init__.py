@@ -1,6 +1,6 @@
-"""Layered materials: rendered by statistics of light, held to a ground truth, and inverted.
+"""Layered materials: rendered by statistics of light, compared with a reference, and designed by inversion.
 
-Importing this package imports no renderer and sets no variant of one; what needs more is imported at first use.
+Importing this package imports no renderer and sets no variant; other modules are imported at first use.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ def coat(
     eta: Annotated[float, typer.Option(min=0.1, max=10.0, metavar="N", help="Index of the coat.")] = 1.5,
     alpha: Annotated[float, typer.Option(min=0.0, max=1.0, metavar="A", help="Roughness of the coat.")] = 0.0,
     keep_appearance: Annotated[
-        bool, typer.Option("--keep-appearance", help="Change the material below so that its lobes stay as they are.")
+        bool, typer.Option("--keep-appearance", help="Change the material below so that its lobes stay the same.")
     ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="F", help="The coated material (YAML or JSON).")

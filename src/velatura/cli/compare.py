@@ -24,7 +24,7 @@ def compare(
         str | None,
         typer.Option(
             metavar="NAME,NAME,...",
-            help=f"{options.MODELS}; else all of these. Also weidlich_wilkie, reference, a BSDF plugin of "
+            help=f"{options.MODELS}; default: all of these. Also weidlich_wilkie, reference, a BSDF plugin of "
             "Mitsuba's with its defaults (principled), or an XML file of one (mine.xml).",
         ),
     ] = None,
@@ -33,21 +33,19 @@ def compare(
     ] = "1,0.7,0.35",
     settings: options.Settings = None,
     paths: Annotated[
-        int, typer.Option(min=2, max=2 * 10**7, metavar="N", help="Random walks of the truth, for each direction.")
+        int, typer.Option(min=2, max=2 * 10**7, metavar="N", help="Random walks of the truth for each direction.")
     ] = 3_000_000,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random numbers.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random numbers.")] = 0,
     microsurface: Annotated[
         bool | None,
         typer.Option(
             "--microsurface/--no-microsurface",
-            help="In the truth, let light scatter many times between microfacets; else if a model counts that.",
+            help="In the truth, let light scatter many times between microfacets; default: if a model does.",
         ),
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="F", help="A figure of all that was found (PNG, PDF or SVG).")
-    ] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="F", help="A figure of the results (PNG, PDF or SVG).")] = None,
     pictures: Annotated[
-        bool, typer.Option("--pictures", help="Render spheres too: their errors, and the figure shows them.")
+        bool, typer.Option("--pictures", help="Also render spheres, for their errors and the figure.")
     ] = False,
     as_json: options.Json = False,
 ) -> None:

@@ -11,7 +11,9 @@ def edit(
     material: Annotated[
         str | None, typer.Argument(metavar="M", help="A material file (YAML or JSON), or the name of a preset.")
     ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Of the server; 0 for any free one.")] = 0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, metavar="N", help="Port of the server; 0 for any free one.")
+    ] = 0,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> None:
     """Edit the materials of the working directory in the browser."""

@@ -18,17 +18,18 @@ def explore(
     target: Annotated[
         str, typer.Argument(metavar="TARGET", help="A target file, as `velatura invert --help` describes it.")
     ],
-    sheet: Annotated[bool, typer.Option("--sheet", help="Render the stacks to one picture.")] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="Render the stacks into one picture.")] = False,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="F", help="The sheet; else TARGET with -sheet.png, here.")
+        Path | None,
+        typer.Option("--output", "-o", metavar="F", help="The sheet; default: TARGET, ending in -sheet.png, here."),
     ] = None,
-    count: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Stacks.")] = 8,
+    count: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Number of stacks.")] = 8,
     env: Annotated[
         str, typer.Option(metavar="NAME|F", help="studio, sky, furnace, or an .hdr or .exr file.")
     ] = "studio",
     spp: Annotated[int, typer.Option(min=1, max=2**16, metavar="N", help="Samples per pixel.")] = 32,
     size: Annotated[int, typer.Option(min=16, max=2048, metavar="N", help="Pixels of each picture.")] = 192,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random stacks.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random stacks.")] = 0,
     model: invert.ModelName = None,
     settings: invert.Switches = None,
 ) -> None:

@@ -19,9 +19,9 @@ _SHADERS = " and ".join(with_constants())
 
 def export(
     material: options.Material,
-    to: Annotated[To, typer.Option("--to", help="The kind of file.")],
+    to: Annotated[To, typer.Option("--to", help="The format of the file.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="F", help="The file; else standard output.")
+        Path | None, typer.Option("--output", "-o", metavar="F", help="The file; default: standard output.")
     ] = None,
     model: options.Model = None,
     constant: Annotated[

@@ -15,10 +15,10 @@ from velatura.cli import progress
 def figure(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The figure, such as belcour2018-12.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="F", help="PNG, PDF or SVG; else NAME.png, here.")
+        Path | None, typer.Option("--output", "-o", metavar="F", help="PNG, PDF or SVG; default: NAME.png, here.")
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print the figure's numbers as JSON; draw it only if -o is given.")
+        bool, typer.Option("--json", help="Print the figure's numbers as JSON; draw it only with -o.")
     ] = False,
 ) -> None:
     """Compute a figure of the papers: its numbers, and its picture."""

@@ -21,12 +21,13 @@ def fit(
     target: Annotated[
         str,
         typer.Argument(
-            metavar="TARGET", help="Its lobes head-on, roughly: a file as `velatura invert --help` describes."
+            metavar="TARGET",
+            help="Its approximate lobes at normal incidence: a file as `velatura invert --help` describes.",
         ),
     ],
     starts: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Stacks to descend from.")] = 4,
     output: Output = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the stacks to descend from.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of these stacks.")] = 0,
     model: invert.ModelName = None,
     settings: invert.Switches = None,
     as_json: options.Json = False,

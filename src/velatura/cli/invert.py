@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ENDINGS = (".yaml", ".yml", ".json")
 
 TargetFile = Annotated[str, typer.Argument(metavar="TARGET", help="A target file (YAML or JSON).")]
-ModelName = Annotated[str | None, typer.Option("--model", metavar="NAME", help=f"{options.MODELS}; else bati2021.")]
+ModelName = Annotated[str | None, typer.Option("--model", metavar="NAME", help=f"{options.MODELS}; default: bati2021.")]
 Switches = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A switch of the model (tir=off); may be repeated."),
@@ -36,12 +36,14 @@ def invert(
             "-o",
             parser=options.folder,
             metavar="F",
-            help="A material file, or a folder for --count of them.",
+            help="A material file, or a folder if --count is given.",
         ),
     ] = None,
-    count: Annotated[int, typer.Option(min=1, max=1000, metavar="N", help="Stacks, the later ones at random.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random stacks.")] = 0,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw the classes, to TARGET with .png, here.")] = False,
+    count: Annotated[
+        int, typer.Option(min=1, max=1000, metavar="N", help="Number of stacks; all but the first are random.")
+    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random stacks.")] = 0,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the classes to TARGET, ending in .png, here.")] = False,
     model: ModelName = None,
     settings: Switches = None,
     as_json: options.Json = False,

@@ -17,11 +17,13 @@ Material = Annotated[str, typer.Argument(metavar="M", help="A material file (YAM
 # By name, since the models themselves load NumPy (tests/unit/test_cli.py holds the two to each other).
 MODELS = "belcour2018, yamaguchi2019, weier2020, bati2021, realtime, velatura"
 
-Model = Annotated[str | None, typer.Option("--model", metavar="NAME", help=f"{MODELS}; else velatura.")]
+Model = Annotated[str | None, typer.Option("--model", metavar="NAME", help=f"{MODELS}; default: velatura.")]
 Bsdf = Annotated[
     str | None,
     typer.Option(
-        "--model", metavar="NAME", help=f"{MODELS}; reference, the walk; weidlich_wilkie, the baseline. Else velatura."
+        "--model",
+        metavar="NAME",
+        help=f"{MODELS}; reference, the walk; weidlich_wilkie, the baseline. Default: velatura.",
     ),
 ]
 Settings = Annotated[

@@ -19,19 +19,21 @@ def render(
     material: options.Material,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="F", help="PNG (tone-mapped) or EXR (linear); else M with .png, here."),
+        typer.Option(
+            "--output", "-o", metavar="F", help="PNG (tone-mapped) or EXR (linear); default: M, ending in .png, here."
+        ),
     ] = None,
     scene: Annotated[
         str, typer.Option(metavar="NAME|F", help="ball, sphere, teapot, plane, wedges, lid, or a Mitsuba scene (.xml).")
     ] = "ball",
     env: Annotated[
         str | None,
-        typer.Option(metavar="NAME|F", help="studio, sky, furnace, or an .hdr or .exr file; else the scene's own."),
+        typer.Option(metavar="NAME|F", help="studio, sky, furnace, or an .hdr or .exr file; default: the scene's own."),
     ] = None,
     model: options.Bsdf = None,
     spp: Annotated[int, typer.Option(min=1, max=2**20, metavar="N", help="Samples per pixel.")] = 64,
-    size: Annotated[str | None, typer.Option(metavar="N|WxH", help="Pixels; else 512, or the scene's own.")] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Of the random numbers.")] = 0,
+    size: Annotated[str | None, typer.Option(metavar="N|WxH", help="Pixels; default: 512, or the scene's own.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random numbers.")] = 0,
     settings: options.Settings = None,
 ) -> None:
     """Render a picture of a material."""

@@ -29,7 +29,7 @@ export function variantOf(keys) {
   return keys.k === undefined ? 'dielectric' : 'custom';
 }
 
-/** Whether a layer lies below all others, whatever its values. */
+/** Whether a layer lies below all others, at all values. */
 export const isBase = ({ kind }) => kind === 'diffuse';
 
 export const isOpaque = (layer) =>
