@@ -178,7 +178,7 @@ def test_modes_of_the_azimuth_agree_on_isotropic_stacks(often: bool) -> None:
     total = []
     for basis in (Relative(nodes), Even(nodes)):
         setting = Setting(basis, p, 0 * p, 377, tables.load() if often else None)
-        light = leaving([layers(part, setting)[1] for part in found], setting)
+        light = leaving([last for _, last in layers(found, setting)], setting)
         total.append(sum(light.energy(each) for each in light.reflected))
     assert total[1] == pytest.approx(total[0], abs=4e-3)
 

@@ -65,8 +65,18 @@ def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
     return Leaving(tuple(reflected), d, straight, setting)
 
 
-def layers(part: Part, setting: Setting) -> tuple[Layer, Layer]:
-    """What one layer does to light, where facets are met once, and as the setting says."""
+def layers(found: Sequence[Part], setting: Setting) -> list[tuple[Layer, Layer]]:
+    """What each layer does to light, where facets are met once, and as the setting says."""
+    return [_layer(part, of) for part, of in zip(found, settings(found, setting))]
+
+
+def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
+    """That of each layer: beams end at the first rough interface."""
+    ends = [isinstance(part, Lambert) or (isinstance(part, Facets) and not part.is_smooth) for part in found]
+    return [setting.dark if any(ends[:i]) else setting for i in range(len(found))]
+
+
+def _layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
     if isinstance(part, Facets):
         return interface(part, setting)
     alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.transport.adding import Leaving, Part, indices, layers, leaving, parts
+from velatura.model.transport.adding import Leaving, Part, indices, layers, leaving, parts, settings
 from velatura.model.transport.interfaces import Facets, Setting
 from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.modes import TINY, Basis, Even, Relative
@@ -78,11 +78,12 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
-    each = [layers(part, setting) for part in everything]
+    each = layers(everything, setting)
     full = leaving([last for _, last in each], setting)
 
     def system(found: Sequence[Part]) -> Leaving:
-        kept = [medium(part, setting) if isinstance(part, Slab) else once for part, (once, _) in zip(found, each)]
+        of = settings(found, setting)
+        kept = [medium(part, x) if isinstance(part, Slab) else once for part, x, (once, _) in zip(found, of, each)]
         return leaving(kept, setting)
 
     sharp = system(parts(material, lambda g: 0.0)) if scatters or often else full

@@ -166,6 +166,11 @@ class Setting:
     samples: int
     often: Tables | None = None
 
+    @property
+    def dark(self) -> Setting:
+        """Without beams."""
+        return replace(self, p=self.p[:0], phi=self.phi[:0])
+
 
 def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
     """An interface as a layer, with facets met once, and as the setting says; what is opaque lets nothing through, and
@@ -186,7 +191,7 @@ def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
         if not above.blocked:
             return once, once
         return once, replace(first, r=first.r + _again(above.blocked[0], above.blocked[0], setting))
-    below = _Side.of(facets.reversed(), setting)
+    below = _Side.of(facets.reversed(), setting.dark)
     once, first = (Layer(*each) for each in zip(above.r, above.t, below.r, below.t))
     if not (above.blocked and below.blocked):
         return once, once
@@ -278,7 +283,8 @@ def _again_shares(facets: Facets, known: Tables, p: Array, events: _Events) -> t
         row = tables.dielectric_row(known, ratio, True, True)
     else:
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
-    often = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean))).reshape(-1, p.size)
+    found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean)))
+    often = found.reshape(len(events.blocked_reflected), -1)
     stand_in = events
     if facets.alpha_u != facets.alpha_v:
         stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, STAND_IN, [True])

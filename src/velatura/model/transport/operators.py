@@ -2,7 +2,8 @@
 
 A beam is light of one direction that no rough interface has met, and no medium has scattered. Its length lies between
 nodes, and so it is kept apart: what an operator makes of it is a share that stays in the beam and a column of light at
-the nodes. That is an algebra of block triangular matrices, one for each beam, that share the block of the nodes.
+the nodes. That is an algebra of block triangular matrices, one for each beam, that share the block of the nodes. An
+operator that beams do not reach, below the first rough interface, is made for none (M = 0), and leaves none.
 """
 
 from __future__ import annotations
@@ -37,8 +38,10 @@ class Operator:
         return cls(nodes, columns, np.zeros((1, 1, 1, columns.shape[-1])))
 
     def __matmul__(self, first: Operator) -> Operator:
-        columns = self.nodes @ first.columns + self.columns * first.beams
-        return Operator(self.nodes @ first.nodes, columns, self.beams * first.beams)
+        nodes, columns = self.nodes @ first.nodes, self.nodes @ first.columns
+        if self.columns.shape[-1] and first.columns.shape[-1]:
+            return Operator(nodes, columns + self.columns * first.beams, self.beams * first.beams)
+        return Operator.of(nodes, columns)
 
     def __add__(self, other: Operator) -> Operator:
         return Operator(self.nodes + other.nodes, self.columns + other.columns, self.beams + other.beams)
