@@ -102,12 +102,12 @@ def main() -> int:
         for state in appearance.targets({})["targets"]:
             for verb, seconds in visit(state, model, options.drags, rng).items():
                 every.setdefault(verb, []).extend(seconds)
-        failed |= told(f"{model}, figures", every) > BOUND
-        failed |= told(f"{model}, visit", session(model, options.drags)) > BOUND
+        failed |= report(f"{model}, figures", every) > BOUND
+        failed |= report(f"{model}, visit", session(model, options.drags)) > BOUND
     return int(failed)
 
 
-def told(title: str, every: dict[str, list[float]]) -> float:
+def report(title: str, every: dict[str, list[float]]) -> float:
     """Print how long calls took, by verb; the median of all."""
     for verb, seconds in every.items():
         if seconds:

@@ -105,7 +105,7 @@ class Visit:
         self.page.evaluate("window.velatura.viewport.setBudget({ samples: 0 })")
 
     def told(self) -> str:
-        """What the page says of itself, for whoever asks why a test has failed."""
+        """The state of the page, for the report of a failed test."""
         if self.page.is_closed():
             return "closed"
         told = """({ quiet, problems, viewport, store, session }) => JSON.stringify({

@@ -6,5 +6,5 @@ import signal
 
 
 def hear() -> None:
-    """Before a process begins: hear interrupts, which those that are started in the background were told to ignore."""
+    """Before a process begins: restore interrupts, which background processes ignore."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)

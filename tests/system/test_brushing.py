@@ -41,7 +41,7 @@ def value(rotation: Any, si: Any, wi: list[float], wo: list[float]) -> Any:
 @pytest.mark.parametrize(("field", "across"), [("radial", 0), ("concentric", 90)])
 @pytest.mark.parametrize("shape", ["rectangle", "mirrored", "disk"])
 def test_a_field_is_the_rotation_that_it_names_at_every_point(shape: str, field: str, across: float) -> None:
-    """Expected: the tangent runs away from the centre or around it in space, whatever the texture coordinates do."""
+    """Expected: the tangent runs away from the centre or around it in space, regardless of texture coordinates."""
     angles = np.array([-170, -80, 20, 135])
     points = [[0.6 * np.cos(a), 0.6 * np.sin(a)] for a in np.deg2rad(angles)]
     flip = mi.ScalarTransform4f().scale([-1, 1, 1]) if shape == "mirrored" else mi.ScalarTransform4f()

@@ -139,7 +139,7 @@ def metal(alpha: float | tuple[float, float]) -> Any:
     ids=lambda d: " ".join(str(x) for x in d.values() if not isinstance(x, dict)),
 )
 def test_mitsubas_own_bsdfs_keep_every_law(described: dict[str, Any]) -> None:
-    """Expected: nothing is broken, whatever is smooth, narrow, black, or lets light through."""
+    """Expected: nothing is broken by smooth, narrow, black or transmitting materials."""
     report = check(mi.load_dict(described))
     assert report.passed, {law: report[law] for law in report.broken}
 

@@ -1,7 +1,7 @@
 """The command as a user runs it, with real models and real pictures.
 
 Rationale: what unit tests cannot show is that the parts fit, that the messages of all of them are fit to be read, and
-that a process ends as it should when it is interrupted, when nobody reads what it says, and when LLVM is missing.
+that a process ends as it should when it is interrupted, when its output is not read, and when LLVM is missing.
 """
 
 from __future__ import annotations

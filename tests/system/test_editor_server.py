@@ -1,7 +1,7 @@
-"""The editor's server as a browser meets it, and as somebody who should not meet it does.
+"""The editor's server with its own page, and with clients that it must refuse.
 
-Rationale: it reads and writes files of its user, so that nobody but the page that it serves itself may call it; and it
-is a process of its own, which must start fast and stop when it is told to. Requests are made by hand, so that they can
+Rationale: it reads and writes files of its user, so that only the page that it serves may call it; and it
+is a process of its own, which must start fast and stop on request. Requests are made by hand, so that they can
 be wrong.
 """
 
@@ -159,7 +159,7 @@ def test_textures_are_sent_and_nothing_else(here: Path, port: int) -> None:
 
 
 def test_mistakes_are_answered_in_words(port: int) -> None:
-    """Expected: one line for what a user can do wrong, and for what nobody should send."""
+    """Expected: one line for what a user can do wrong, and for invalid requests."""
     assert call(port, "read", {"text": "layers: [\n  oops"})[0] == 422
     for body in (b"", b"{", b"[]", b"\xff", b'{"a":' * 100_000, b"null"):
         status, answer = call(port, "read", body)
@@ -527,7 +527,7 @@ def test_it_stops_when_it_is_told_to(here: Path) -> None:
 
 
 def test_the_page_is_opened_in_the_browser(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Expected: the user's browser is told an address that lets it in once, since others may read a command line."""
+    """Expected: the user's browser gets an address that admits it once, since others may read a command line."""
     browser = here / "browser.py"
     browser.write_text("import pathlib, sys; pathlib.Path('address').write_text(sys.argv[1])")
     monkeypatch.setenv("BROWSER", f"{sys.executable} {browser} %s")

@@ -67,7 +67,7 @@ def test_a_sphere_of_smooth_glass_keeps_all_energy(fidelity) -> None:
 
 
 def test_walks_are_kept(fidelity, tmp_path, monkeypatch) -> None:
-    """Expected: a second call reads the file, whatever becomes of the walk; the halves share no stack; the energies by
+    """Expected: a second call reads the file, independent of the walk; the halves share no stack; the energies by
     interface add up to the grid's, within 5 standard errors of either."""
     walks, of = importlib.import_module("walks"), kind(fidelity, "absorbing, often")
     first = walks.kept(of, "fit", 0, 5000, 0, tmp_path)

@@ -1,4 +1,4 @@
-"""The papers' figures: their numbers against what the papers say of them, and the verb that makes them."""
+"""The papers' figures: their numbers against those of the papers, and the verb that makes them."""
 
 from __future__ import annotations
 

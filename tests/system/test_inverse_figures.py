@@ -1,4 +1,4 @@
-"""The figures of Bati et al. 2021: their numbers against what the paper says of them."""
+"""The figures of Bati et al. 2021: their numbers against those of the paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tutorial notebook: it runs, tells the numbers that it was stored with, and is fit to be shipped."""
+"""The tutorial notebook: it runs, prints the numbers that it was stored with, and is fit to be shipped."""
 
 from __future__ import annotations
 

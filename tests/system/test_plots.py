@@ -1,4 +1,4 @@
-"""What a picture says of itself: whose it is, and what is on its axes.
+"""Labels of pictures: the material, and the axes.
 
 Rationale: a plot is looked at away from the command that made it.
 """

@@ -1,4 +1,4 @@
-"""The editor of a notebook without one: what it takes, what it tells the page, and how it answers."""
+"""The editor of a notebook without one: its arguments, its messages to the page, and its answers."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ def test_two_interfaces_by_the_closed_form_with_covariances(top, base, n, k, cos
     np.testing.assert_allclose(lobe.energy[0], (1 - r12) ** 2 * r23 / (1 - r), rtol=1e-7)
     np.testing.assert_allclose([[xx, xy], [xy, yy]], as_shipped, rtol=1e-7, atol=1e-7 * np.abs(as_shipped).max())
 
-    # Back to a lobe, whatever the eigenvalues
+    # Back to a lobe, for any eigenvalues
     found, axes = np.linalg.eigh(as_shipped)
     alpha_u, alpha_v, rotation = (x.item() for x in lobe.roughness)
     expected = [(s / (1 + s)) ** (1 / 1.1) for s in np.maximum(found, 0)]

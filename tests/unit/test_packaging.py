@@ -1,4 +1,4 @@
-"""What the package says of itself: licences, extras, types."""
+"""The metadata of the package: licences, extras, types."""
 
 from __future__ import annotations
 

@@ -411,7 +411,7 @@ def test_the_yardstick_is_larger_and_worse() -> None:
 
 
 def test_threads_share_the_tables() -> None:
-    """Whoever asks first, and at the same time as others, gets the same tables as they."""
+    """Concurrent first calls get the same tables."""
     script = (
         "from concurrent.futures import ThreadPoolExecutor; from velatura import tables\n"
         "print(len({id(found) for found in ThreadPoolExecutor(8).map(lambda _: tables.load(), range(8))}))"

@@ -16,7 +16,7 @@ from velatura.checks.grid import Grid, integrate
 from velatura.checks.probe import Array, Probe
 from velatura.model.models import Model
 
-TEXTURED = 0.05  # share of stacks: whatever may vary is compiled anew, which takes long
+TEXTURED = 0.05  # share of stacks: varying values are compiled anew, which takes long
 COSINES = (1.0, 0.8, 0.5, 0.2, 0.02, 1e-4, 1e-6)
 SAMPLES = 512  # at each of them, on either side
 OFF = 1e-2  # two numbers that should be equal are not where they differ by this share
