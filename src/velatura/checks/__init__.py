@@ -41,7 +41,7 @@ def check(
         lossless: it absorbs nothing, so that loss breaks a law as well as gain does.
         expected: the BSDF that this one should equal, if it is the limit of something.
         uv: where on its textures it is looked at.
-        seed: of the random numbers; the same seed gives the same report, but for rounding.
+        seed: of the random numbers; the same seed gives the same report, except for rounding.
         plots: a folder; every law that is broken leaves `LAW.png` there.
         subject: what these call the BSDF.
         progress: called with (steps done, all steps) now and then.

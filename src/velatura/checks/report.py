@@ -15,7 +15,7 @@ class Finding:
 
     Args:
         law: its name.
-        passed: whether the law was kept; `value <= bound`, but for noise and rounding that the law allows for.
+        passed: whether the law was kept; `value <= bound`, except for noise and rounding that the law allows.
         value, bound: the number that decides, and the largest that is allowed, where it came closest or went furthest.
         detail: the same in words, with the other numbers of interest.
         data: what to plot: curves (their first one is the abscissa) or pictures.

@@ -118,7 +118,7 @@ def _open_streams() -> None:
         raise OSError(errno.EBADF, "standard output is closed")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            # Names of files that are no UTF-8 come out as they are
+            # Names of files that are not UTF-8 are printed unchanged
             stream.reconfigure(encoding="utf-8", errors="surrogateescape")
 
 

@@ -71,7 +71,7 @@ def _table(title: str, cosines: list[float], lobes: dict[str, dict[str, Any]]) -
 
 
 def _cell(values: Any, form: str = ".4f") -> str:
-    """Numbers in a line; where there is one set of them per channel, a line each."""
+    """Numbers in a line; with one set of them per channel, a line each."""
     if values.ndim > 1:
         return "\n".join(_cell(row, form) for row in values)
     return " ".join(format(value, form) for value in values.ravel())

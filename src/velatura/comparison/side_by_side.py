@@ -94,7 +94,7 @@ def compare(
 
 
 def _model(model: Model | Plugin, switches: dict[str, str]) -> Model | Plugin:
-    """A named model with these switches; a plugin as it is."""
+    """A named model with these switches; a plugin unchanged."""
     if isinstance(model, Model) or (isinstance(model, str) and model in [m.name for m in MODELS]):
         return named(model, **switches)
     return model

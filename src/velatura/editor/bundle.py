@@ -1,4 +1,4 @@
-"""The page as it is served: built from `page/` when the package is built, so that a wheel needs no Node."""
+"""The page in its served form: built from `page/` when the package is built, so that a wheel needs no Node."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def class_(body: Body) -> Answer:
 
 
 def member(body: Body) -> Answer:
-    """The stack with the member of a lobe's class at a point of its map, or the nearest; all lobes stay as they are.
+    """The stack with the member of a lobe's class at a point of its map, or the nearest; all lobes stay unchanged.
 
     point: as `class` gives `member`; with `map: conductor` a point [eta, k], to which the nearest tint is taken.
     """

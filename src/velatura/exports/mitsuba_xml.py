@@ -20,5 +20,5 @@ def write(request: Request) -> Export:
 
 
 def _quoted(text: str) -> str:
-    """An attribute in single quotes, so that the double ones of JSON stay as they are."""
+    """An attribute in single quotes, so that the double ones of JSON stay unchanged."""
     return f"'{escape(text, {chr(39): '&apos;'})}'"

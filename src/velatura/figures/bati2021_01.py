@@ -1,4 +1,4 @@
-"""Bati et al. 2021, figure 1: a gallery of materials that were found from the lobes that they shall have.
+"""Bati et al. 2021, figure 1: a gallery of materials found from given lobes.
 
 (a) Colour and sharpness of a pair of dielectrics; (b) the edge of a coated conductor; (c) a coat on a pair that keeps
 its appearance; (d) extent and colour of haze. The object, its light, and the choice of materials are ours.

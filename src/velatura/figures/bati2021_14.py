@@ -1,4 +1,4 @@
-"""Bati et al. 2021, figure 14: a material without a coat, coated, and coated so that its lobes stay as they are.
+"""Bati et al. 2021, figure 14: a material without a coat, coated, and coated with its lobes unchanged.
 
 (a) A coloured conductor; (b) a coloured pair of dielectrics. The coat of (a) has the index 1.5 and an alpha of 0.05;
 that of (b), which the paper does not print, here as well.

@@ -1,4 +1,4 @@
-"""Bati et al. 2021, figure 25: lobes that were asked for, and those of the stacks that were found.
+"""Bati et al. 2021, figure 25: target lobes, and those of the stacks found.
 
 The targets are those of figures 15, 16 and 17. The paper's conductors (figure 16) miss their energy a little, as its
 table of directional albedos is coarse in kappa; here they are solved with the averages that read them. The random walk

@@ -1,4 +1,4 @@
-"""Presets under the first paper's model, under ours, and as random walks have them, with maps of the differences.
+"""Presets by the first paper's model, by ours, and by random walks, with maps of the differences.
 
 Not a figure of a paper. Facets are met once in all three, as renderers do it.
 """

@@ -1,4 +1,4 @@
-"""Belcour 2018, figure 8: how rough a medium looks, by absorption and by scattering.
+"""Belcour 2018, figure 8: the equivalent roughness of a medium, by absorption and by scattering.
 
 Light along the normal is scattered once by the phase function of Henyey and Greenstein, forwards, and then (a) absorbed
 along its way through a slab. Equivalent is the roughness of the GGX reflection that is as wide, by the variance on the

@@ -1,4 +1,4 @@
-"""Belcour 2018, table 2: what three scenes cost by the model and by the baseline of Weidlich and Wilkie 2007.
+"""Belcour 2018, table 2: the cost of three scenes by the model and by the baseline of Weidlich and Wilkie 2007.
 
 Frosted metal (figure 13) and the white furnace (figure 12) with direct light only, and the dragon (figure 14) with
 all of it. Objects and sizes are chosen here: spheres, and a hollow ball for the dragon. So are the roughness of the

@@ -1,4 +1,4 @@
-"""The linear space of roughness, derived anew: what Belcour 2018 (appendix A) and Weier & Belcour 2020 (3.3) fit.
+"""The linear space of roughness, derived anew: the fits of Belcour 2018 (appendix A) and Weier & Belcour 2020 (3.3).
 
 Light that comes along the normal is reflected by one rough surface, or by two that are parallel. The *equivalent
 roughness* of two bounces is that of the one bounce that is as wide. A roughness map f should make widths add,

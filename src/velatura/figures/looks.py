@@ -1,4 +1,4 @@
-"""Figures of pictures of what was inverted: stacks by name, their lobes over the angle, and a sphere of each."""
+"""Figures of pictures of inverted stacks: stacks by name, their lobes over the angle, and a sphere of each."""
 
 from __future__ import annotations
 

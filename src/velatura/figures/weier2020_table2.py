@@ -1,4 +1,4 @@
-"""Weier & Belcour 2020, table 2: what their anisotropic model costs, in units of the isotropic one of Belcour 2018.
+"""Weier & Belcour 2020, table 2: the cost of their anisotropic model, in units of the isotropic one of Belcour 2018.
 
 The scenes are chosen here: `area light`, a sphere of an isotropic material by both models, which differ in the
 formulas alone, and `teaser`, the ball, isotropic by the one model and brushed by the other. The material is that of

@@ -1,4 +1,4 @@
-"""Yamaguchi et al. 2019, figure 5: what a covariance costs more than a variance, over the samples of a pixel.
+"""Yamaguchi et al. 2019, figure 5: the extra cost of a covariance over a variance, over the samples of a pixel.
 
 The model of Belcour 2018 with the choices of Yamaguchi's, on two isotropic layers, and Yamaguchi's on two brushed ones,
 turned apart; a sphere in the studio. Indices and roughnesses are those chosen for figure 4 (a) and (d). Where nothing

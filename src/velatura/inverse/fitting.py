@@ -73,7 +73,7 @@ def simplify(
     turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
     table = angles.table_of(stack, Directions.about_lobes(turned), chosen)
 
-    # Descend from the sets of interfaces that come closest as they are
+    # Descend from the sets of interfaces that are closest before any change
     opaque = stack.interfaces[-1].opaque
     sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
     starts = [_of_some(stack, kept) for kept in sets]

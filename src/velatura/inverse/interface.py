@@ -1,6 +1,6 @@
 """One interface below any stack: its index, roughness and the absorption above it, from its lobe.
 
-Everything is at normal incidence. Nothing is iterated but for what a model's averages make implicit: an index from its
+Everything is at normal incidence. The only iteration is for an implicit average of a model: an index from its
 directional albedo, and what total internal reflection does to the light from below.
 """
 

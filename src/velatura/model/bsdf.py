@@ -294,7 +294,7 @@ def _scaled(stack: Body, wi: Direction, wo: Direction, lobes: Sequence[Lobe]) ->
 def balanced(stack: Body, context: Context) -> Body:
     """A uniform stack with a symmetric form that conserves energy, if its model has one.
 
-    Published models stay as they are, and so does a stack of which nothing may be sampled.
+    Published models are unchanged, and so is a stack that may not be sampled over direction.
     """
     colour, model = context.colour, stack.above.model
     if colour is None or not context.constant or model.form == "forward" or not model.recursion.has_gain:

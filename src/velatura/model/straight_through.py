@@ -152,7 +152,7 @@ def entered(passage: Passage, wi: Direction) -> Crossed:
 
 
 def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -> Crossed:
-    """With the cosines above and below all interfaces, as far as they are known better."""
+    """With the cosines above and below all interfaces, where more exact ones are known."""
     p2 = p[0] * p[0] + p[1] * p[1]
     cosines = [ops.sqrt(1 - p2 / (n * n)) for n in passage.indices]
     bounded = [ops.maximum(c, COS_MIN) for c in cosines]

@@ -94,7 +94,7 @@ def _to_azimuth(t: Value) -> Value:
 
 
 def as_constants(*values: Any) -> tuple[Any, ...]:
-    """Values, and tuples of them, as they are now, without their gradients."""
+    """Values, and tuples of them, detached from their gradients."""
     if all(isinstance(x, (float, np.ndarray, tuple)) for x in values):
         return values
     import drjit as dr

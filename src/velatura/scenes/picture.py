@@ -33,7 +33,7 @@ def render(
     Args:
         bsdf, scene, env, size, zoom: as for `scene_dict`.
         spp: samples per pixel.
-        seed: the same seed gives the same picture, but for rounding.
+        seed: the same seed gives the same picture, except for rounding.
         progress: called after every pass with (samples per pixel done, spp).
 
     Raises:
@@ -83,7 +83,7 @@ def _passes(spp: int, pixels: int) -> list[int]:
 def tone_map(linear: ArrayLike, knee: float = 0.7) -> NDArray[np.float64]:
     """Linear RGB to display values in [0, 1]: a soft shoulder from `knee` to 1, then the sRGB curve.
 
-    Up to the knee a picture is shown as it is; above, highlights approach white without ever reaching it.
+    Up to the knee a picture is unchanged; above, highlights approach white without ever reaching it.
     """
     x = np.maximum(np.nan_to_num(np.asarray(linear, dtype=np.float64)), 0.0)
     room = 1.0 - knee

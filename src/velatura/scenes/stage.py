@@ -36,7 +36,7 @@ def scene_dict(
     size: tuple[int, int] | None = None,
     zoom: float = 1.0,
 ) -> dict[str, Any]:
-    """A scene for `mi.load_dict`, to be rendered as it is or changed first.
+    """A scene for `mi.load_dict`, to be rendered unchanged or after changes.
 
     Args:
         scene: a name of `OBJECTS` ("ball", "sphere", ...), or a Mitsuba scene file (.xml), in which every shape whose

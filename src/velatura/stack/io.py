@@ -32,7 +32,7 @@ MaterialLike: TypeAlias = Stack | str | Path
 
 
 def load(material: MaterialLike) -> Stack:
-    """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack as it is.
+    """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack unchanged.
 
     A bare word without an extension is a preset. Paths in it are relative to the file.
 

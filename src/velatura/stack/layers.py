@@ -1,4 +1,4 @@
-"""The layers of a stack: interfaces, media, and a diffuse base, as they are written, and the values that they have.
+"""The layers of a stack: interfaces, media, and a diffuse base, as written in files, and the records of their values.
 
 A kind of layer is declared here and nowhere else in this package: its parameters, the record of its values, and what
 it is to its neighbours. Files, flat names, `--set`, plugins, textures, schema and manual follow from that.

@@ -152,7 +152,7 @@ def _layers(entries: Any) -> tuple[Layer, ...]:
 
 
 def _layer(index: int, entry: Any) -> Layer:
-    """A layer as it is, or from an entry of a file, `{interface: {eta: 1.5}}`."""
+    """A layer, unchanged or from an entry of a file, `{interface: {eta: 1.5}}`."""
     if isinstance(entry, Layer):
         return entry
     if not isinstance(entry, Mapping) or not entry:
