@@ -200,7 +200,8 @@ def shell(command: str, cwd: Path, **environment: str) -> tuple[int, str, str]:
 def test_an_output_that_takes_nothing(output: str, says: str, tmp_path: Path) -> None:
     """Expected: one line, where there is a place for it, and status 1."""
     line = f"velatura: {says}\n" if says else ""
-    assert shell(f"velatura schema {output}", tmp_path) == (1, "", line)
+    for unbuffered in ("", "1"):
+        assert shell(f"velatura schema {output}", tmp_path, PYTHONUNBUFFERED=unbuffered) == (1, "", line)
 
 
 def test_output_is_utf8_in_every_locale(tmp_path: Path) -> None:
