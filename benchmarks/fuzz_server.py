@@ -94,8 +94,8 @@ def slow(port: int, token: str) -> list[str]:
         client.call("list", {})
         times.append(time.perf_counter() - begun)
         time.sleep(0.05)
-    told = f"{answers.count(200)} x 200, {answers.count(503)} x 503"
-    row(f"list beside {INVERSIONS} inversions", f"median {median(times):.3f} s, worst {max(times):.3f} s; {told}")
+    statuses = f"{answers.count(200)} x 200, {answers.count(503)} x 503"
+    row(f"list beside {INVERSIONS} inversions", f"median {median(times):.3f} s, worst {max(times):.3f} s; {statuses}")
     lost = len(answers) < INVERSIONS or set(answers) - {200, 503}
     return ["inversions are lost"] * bool(lost) + [f"list takes {max(times):.1f} s"] * (max(times) > REACH_S)
 

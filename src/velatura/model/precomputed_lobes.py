@@ -14,7 +14,7 @@ from velatura import ops
 from velatura.model import mixture
 from velatura.model.adding import Lobe
 from velatura.model.prepare import Prepared, PreparedInterface
-from velatura.model.roughness_maps import RoughnessMap
+from velatura.model.roughness_maps import AS_IT_IS
 from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -24,9 +24,6 @@ from velatura.sampling import directional_grid, low_discrepancy
 Lobes = Callable[[Direction], tuple[list[Lobe], Lobe | None]]
 
 NORMALS = 256  # over which the albedo of a lobe is averaged
-
-# Interpolate roughness itself: matrices of it, so that axes may turn
-_AS_IT_IS = RoughnessMap(lambda along, across: along, lambda along, across: along)
 
 
 class Sampled(Protocol):
@@ -63,7 +60,7 @@ class PrecomputedLobes:
         if facets is not None:
             return Lobe(energy, facets.s_r, facets.roughness, self._colour(channels), facets)
         kind = _kind(self.prepared)
-        roughness = kind(*(next(channels) for _ in kind.__dataclass_fields__)).roughness(_AS_IT_IS)
+        roughness = kind(*(next(channels) for _ in kind.__dataclass_fields__)).roughness(AS_IT_IS)
         if kind is not Isotropic and self.prepared.variance is Isotropic:
             roughness = roughness._replace(rotation=ops.arctan2(w[1], w[0]))
         gain = next(channels) if self.prepared.model.recursion.has_gain else 1.0
@@ -102,7 +99,7 @@ def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Va
     """The numbers of a lobe in a `PrecomputedLobes`, in order; `apart` gives the channels of a colour."""
     if lobe.facets is not None:
         return [*apart(lobe.energy), *apart(lobe.gain)]
-    roughness = vars(_kind(prepared).of(lobe.roughness, _AS_IT_IS)).values()
+    roughness = vars(_kind(prepared).of(lobe.roughness, AS_IT_IS)).values()
     return [*apart(lobe.energy), *roughness, *([lobe.gain] if prepared.model.recursion.has_gain else [])]
 
 

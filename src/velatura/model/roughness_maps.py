@@ -95,6 +95,9 @@ def _log_sigmoid(s: Value, b: Value) -> Value:
     return x / (x + b)
 
 
+#: For what is interpolated: roughness itself, as matrices, so that axes may turn.
+AS_IT_IS = RoughnessMap(lambda along, across: along, lambda along, across: along)
+
 MAPS: dict[str, RoughnessMap] = {
     "belcour": _odds_of_power(1.1),  # Belcour 2018, Eq. 6
     "belcour-release": _each(lambda a: a / (1 - a), lambda s: s / (1 + s)),  # as in its released plugin

@@ -21,9 +21,9 @@ from velatura.model.context import Context
 from velatura.model.models import Model
 from velatura.model.own_medium import OwnMediumLobe
 from velatura.model.passed import Parts
-from velatura.model.precomputed_lobes import _AS_IT_IS
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium, prepare
 from velatura.model.remainder import Remainder
+from velatura.model.roughness_maps import AS_IT_IS
 from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import parts
 from velatura.model.transport.energies import INCIDENCES, energies
@@ -269,7 +269,7 @@ def _columns(material: Material, model: Model, variance: type[Variance], grid: _
     def shown(tensor: Tensor) -> list[Array]:
         if variance is Isotropic:  # axes lie in the plane of incidence, and across it
             return [np.minimum(tensor.width(np.array(axis)), widths.ALPHA_MAX) for axis in widths.AXES]
-        return list(vars(Covariance.of(tensor.roughness(0 * phi), _AS_IT_IS)).values())
+        return list(vars(Covariance.of(tensor.roughness(0 * phi), AS_IT_IS)).values())
 
     # Share samples by energies
     shares = [energy.mean(axis=0) for _, energy, _ in drawn]
@@ -359,7 +359,7 @@ def seen(solved: Solved, wi: Direction) -> _Seen:
     azimuth = ops.arctan2(turned[1], turned[0])
     lobes = []
     for shape, weight, numbers in zip(side.shapes, columns.weights, columns.roughness):
-        u, v, rotation = side.kind(*numbers).roughness(_AS_IT_IS)
+        u, v, rotation = side.kind(*numbers).roughness(AS_IT_IS)
         lobes.append(shape.lobe(weight, Roughness(u, v, rotation + azimuth)))
     return _Seen(
         lobes, columns.chances, columns.energies, side.polynomial, columns.scale, columns.rest, columns.chance,

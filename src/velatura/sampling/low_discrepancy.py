@@ -25,6 +25,18 @@ def square(count: int) -> tuple[np.ndarray, np.ndarray]:
     return pairs[0], pairs[1]
 
 
+@functools.cache
+def fibonacci(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """A Fibonacci lattice of at least `count` points in the unit square; not to be written to."""
+    a, b = 1, 1
+    while b < count:
+        a, b = b, a + b
+    i = np.arange(b)
+    u, v = (i * a / b + 0.5 / b) % 1, (i + 0.5) / b
+    u.flags.writeable = v.flags.writeable = False
+    return u, v
+
+
 def at_nodes(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:
     """Three uniform numbers for every sample, the same at all nodes, that fill the cube evenly, the last two the
     square."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from velatura import tables
 from velatura.model.transport.modes import TINY, Basis, Light
 from velatura.model.transport.operators import Layer, Operator
 from velatura.optics import fresnel, ggx
+from velatura.sampling.low_discrepancy import fibonacci
 from velatura.tables import Tables
 
 Array = NDArray[np.floating]
@@ -76,16 +77,6 @@ class Facets:
         return np.asarray(fresnel.conductor(cosine, eta, (self.k / self.above).reshape(shape)))
 
 
-@cache
-def lattice(count: int) -> tuple[Array, Array]:
-    """A Fibonacci lattice of at least `count` points in the unit square."""
-    a, b = 1, 1
-    while b < count:
-        a, b = b, a + b
-    i = np.arange(b)
-    return (i * a / b + 0.5 / b) % 1, (i + 0.5) / b
-
-
 @dataclass(frozen=True)
 class _Events:
     """What first events make of light: reflected and refracted samples, by colour, and what they block of either.
@@ -109,7 +100,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     """
     n = float(np.mean(facets.above))
     alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
-    u_1, u_2 = lattice(samples)
+    u_1, u_2 = fibonacci(samples)
     sin = np.minimum(p / n, np.sqrt(1 - GRAZING**2))[:, None]
     # Light comes from wi, and travels to -wi
     wi = (-sin * np.cos(psi)[:, None], -sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin))

@@ -8,10 +8,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.transport.interfaces import Setting, lattice, scaled
+from velatura.model.transport.interfaces import Setting, scaled
 from velatura.model.transport.modes import TINY, Light
 from velatura.model.transport.operators import Layer, Operator
 from velatura.optics import phase
+from velatura.sampling.low_discrepancy import fibonacci
 
 Array = NDArray[np.floating]
 
@@ -81,7 +82,7 @@ def _kept(slab: Slab, depth: Array, p: Array) -> Array:
 
 def _scattered(n: float, g: float, p: Array, psi: Array, share: Array) -> tuple[Light, Light]:
     """Light that is scattered up, and down, of light that travels down."""
-    u_1, u_2 = lattice(EVENTS)
+    u_1, u_2 = fibonacci(EVENTS)
     sin = np.minimum(p / n, np.sqrt(1 - COS_MIN**2))[:, None]
     w = sin * np.cos(psi)[:, None], sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin)
     x, y, z = phase.deflect(w, phase.sample_henyey_greenstein(g, u_1), 2 * np.pi * u_2)
