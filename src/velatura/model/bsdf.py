@@ -122,6 +122,10 @@ def body(
     """Constants of a stack for both of its sides; arguments as `prepare`."""
     context = context or Context()
     material, variance = material.solid(), variance or variance_kind(material)
+    if model.name == "velatura" and model.form == "forward" and context.number and material.interfaces:
+        from velatura.model import solved
+
+        return solved.solve(material, model, variance, context)
 
     def lobes(prepared: Prepared) -> precomputed_lobes.Lobes:
         added = partial(_lobes, prepared)
@@ -142,6 +146,10 @@ def body(
 
 def scattered(stack: Body, wi: Direction) -> Scattered:
     """The lobes for light from wi, which comes from below only where the stack transmits."""
+    from velatura.model import solved
+
+    if isinstance(stack, solved.Solved):
+        return solved.seen(stack, wi)
     turned = _upright(wi, wi)
     reflected, passed = stack.lobes_above(turned)
     if stack.below is None:
@@ -158,6 +166,10 @@ def scattered(stack: Body, wi: Direction) -> Scattered:
 
 def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; 0 from below an opaque stack."""
+    from velatura.model import solved
+
+    if isinstance(stack, solved.Solved):
+        return solved.eval_pdf(stack, wi, wo, asked.radiance)
     seen, i, o = scattered(stack, wi).only(asked), _upright(wi, wi), _upright(wo, wi)
     symmetric = stack.above.model.form == "symmetric"
     reflected, passed = exchangeable(stack, wi, wo) if symmetric else (seen.reflected, seen.transmitted)
@@ -197,6 +209,10 @@ def sample(
 
     Where light cannot go the way that is drawn, `eval_pdf` is 0.
     """
+    from velatura.model import solved
+
+    if isinstance(stack, solved.Solved):
+        return solved.sample(stack, wi, u, u1, u2)
     seen, i = scattered(stack, wi).only(asked), _upright(wi, wi)
     if stack.below is None:
         return mixture.sample(seen.reflected, seen.base, i, u, u1, u2, stack.even), 1.0
@@ -233,6 +249,10 @@ def sample_smooth(
 def component(stack: Body, wi: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
     """Number of the part that `sample` draws from, or `sample_smooth`: of all reflected lobes, from the top, and then
     the diffuse base or the transmitted lobe."""
+    from velatura.model import solved
+
+    if isinstance(stack, solved.Solved):
+        return 0.0
     every = scattered(stack, wi)
     seen, count = every.only(asked), len(every.reflected)
     least, even = (0.0, 0.0) if smooth else (_least(stack), stack.even)

@@ -270,7 +270,7 @@ def _again_shares(facets: Facets, known: Tables, p: Array, events: _Events) -> t
         row = tables.dielectric_row(known, ratio, True, True)
     else:
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
-    often = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean))).reshape(len(ratio), -1)
+    often = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean))).reshape(-1, p.size)
     stand_in = events
     if facets.alpha_u != facets.alpha_v:
         stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, STAND_IN, True)
