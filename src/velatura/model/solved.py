@@ -1,53 +1,42 @@
-"""A uniform material, solved once for all directions: its lobes in their own media, the remainder, and what passes.
+"""A uniform material as a BSDF: lobes in their own media, the remainder, and what passes, each with its own energy.
 
-Energies over integrals, widths and probabilities are columns of numbers over direction. A side is a material as light
-from above sees it; stacks that transmit have two.
+All that depends on direction is columns of numbers (`velatura.model.solution`): energies over integrals, widths, and
+chances of being sampled. A side is a material as light from above sees it; stacks that transmit have two.
+
+The forward form takes all of a part from the direction of the light. The symmetric form takes the geometric mean of
+the values there and back, with weights by which it keeps the energies (`velatura.model.exchange`); samples are those of
+the forward form.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-
 from velatura import ops
-from velatura.model import own_medium, passed, remainder, straight_through, widths
-from velatura.model.context import Context
-from velatura.model.models import Model
+from velatura.model import own_medium, passed, remainder
+from velatura.model.bsdf import Asked, chosen_direction, refracted, upright
 from velatura.model.own_medium import OwnMediumLobe
 from velatura.model.passed import Parts
 from velatura.model.precomputed_lobes import _AS_IT_IS
-from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium, prepare
+from velatura.model.prepare import PreparedInterface
 from velatura.model.remainder import Remainder
 from velatura.model.straight_through import Passage
-from velatura.model.transport.adding import parts
-from velatura.model.transport.energies import INCIDENCES, Energies, energies
-from velatura.model.transport.interfaces import Facets
-from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid
-from velatura.stack import Material
-from velatura.tables import Tables
 
-Array = NDArray[np.floating]
-
-COSINES = 48  # nodes, even in the root of the cosine
-AZIMUTHS = 12  # in half a turn, where interfaces are brushed
-COS_MIN = 1e-3
-VEIL_MIN = 1e-3  # energy of veils that are drawn
-FAINT = 1e-9
+FAINT = 1e-9  # energy of a part that is drawn even where it has none
+GRAZING = 1e-6  # cosine
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A lobe but for its columns: index of its medium, the facets that it is of and what lets it out."""
+    """A lobe but for its columns: number of its interface, index of its medium, the facets that it is of and what lets
+    it out."""
 
+    interface: int
     n: Value
     facets: PreparedInterface | None
     first: PreparedInterface | None
@@ -65,7 +54,7 @@ class Shape:
 class Columns:
     """What depends on direction: one direction's, or arrays (C, M) and (M,) over directions.
 
-    `weights`, `roughness` and `chances` are those of lobes; of the remainder `scale` and `chance`.
+    `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
     """
 
     weights: list[Value]
@@ -111,270 +100,203 @@ class Side:
             through = colour()
         return Columns(weights, roughness, chances, found, scale, chance, rest, passes, through)
 
+    def seen(self, w: Direction) -> Seen:
+        """What light from a direction above sees."""
+        return self._seen(w, self.at(w))
+
+    def _seen(self, w: Direction, columns: Columns) -> Seen:
+        azimuth = ops.arctan2(w[1], w[0])
+        lobes = []
+        for shape, weight, numbers in zip(self.shapes, columns.weights, columns.roughness):
+            u, v, rotation = self.kind(*numbers).roughness(_AS_IT_IS)
+            lobes.append(shape.lobe(weight, Roughness(u, v, rotation + azimuth)))
+        return Seen(self.shapes, lobes, self.polynomial, self.passage, columns)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A side as light from one direction sees it: lobes, the remainder, and what passes are its parts, in that order."""
+
+    shapes: tuple[Shape, ...]
+    lobes: list[OwnMediumLobe]
+    polynomial: Remainder
+    passage: Passage | None
+    columns: Columns
+
+    @property
+    def interfaces(self) -> int:
+        return 1 + max(shape.interface for shape in self.shapes)
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of the components that reflected parts belong to."""
+        return [*(shape.interface for shape in self.shapes), self.interfaces]
+
+    @property
+    def energies(self) -> list[Value]:
+        """Of the reflected parts."""
+        return [*self.columns.energies, self.columns.rest]
+
+    @property
+    def passed(self) -> Value:
+        return 0.0 if self.columns.passed is None else self.columns.passed
+
+    def only(self, asked: Asked, by_energy: bool = False) -> Drawn:
+        """Chances of what is asked for: as samples are shared among all parts, or else by energy."""
+        columns, passes = self.columns, self.columns.passes
+        wanted = [asked.reflects(number) for number in self.numbers]
+        if all(wanted) and (asked.transmission or passes is None) and not by_energy:
+            return Drawn(wanted, True, [*columns.chances, columns.chance], passes)
+        shares = [ops.mean(e) + FAINT if w else 0.0 for w, e in zip(wanted, self.energies)]
+        through = ops.mean(self.passed) + FAINT if passes and asked.transmission else 0.0
+        total = sum(shares) + through
+        if isinstance(total, float) and total == 0:
+            return Drawn(wanted, False, shares, None)
+        if passes is not None:
+            scale = ops.divide(through / total, passes.share)
+            chances = (scale * x for x in (passes.of_straight, passes.of_bounced, passes.of_rest))
+            passes = Parts(passes.straight, passes.bounced, passes.rest, *chances)
+        return Drawn(wanted, asked.transmission, [share / total for share in shares], passes)
+
+    def reflected(self, i: Direction, o: Direction) -> Iterator[tuple[Value, Value]]:
+        """f |cos theta_o| and density of the reflected parts."""
+        for lobe in self.lobes:
+            yield own_medium.eval_pdf(lobe, i, o)
+        yield self.columns.scale * self.polynomial.value(i, o), remainder.density(o)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Parts that are asked for: whether each one that is reflected is, and what passes; their chances."""
+
+    wanted: list[bool]
+    passing: bool
+    chances: list[Value]
+    passes: Parts | None
+
+    @property
+    def share(self) -> Value:
+        """Of samples that are drawn from what passes."""
+        return self.passes.share if self.passes else 0.0
+
 
 @dataclass(frozen=True)
 class Solved:
-    """A uniform material as a BSDF."""
+    """A uniform material as a BSDF; `smooth` ones have no remainder among their components."""
 
     above: Side
     below: Side | None
     eta: Value
-    even: float = 0.0
-    scaling: None = None
-
-
-def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
-    """The BSDF of a material with constants of a renderer."""
-    material = material.solid()
-    grid, side = _Grid(variance is Isotropic), partial(_side, model=model, variance=variance, context=context)
-
-    def found(seen: Material) -> _Columns:
-        plain = seen.each(lambda address, value: _plain(value, address.colour))
-        return _columns(plain, model, variance, grid, context.tables)
-
-    if not material.transmits:
-        return Solved(side(material, found(material)), None, 1.0)
-    below = material.reversed()
-    from_above, from_below = found(material), found(below)
-    most = max(len(from_above.lobes), len(from_below.lobes))
-    eta = ops.mean(material.below) / ops.mean(material.exterior)
-    return Solved(side(material, from_above.padded(most)), side(below, from_below.padded(most)), eta)
-
-
-def _side(material: Material, found: _Columns, model: Model, variance: type[Variance], context: Context) -> Side:
-    shape = directional_grid.LINE if variance is Isotropic else directional_grid.PLANE
-    grid = _Grid(variance is Isotropic)
-    columns = [column for lobe in found.lobes for column in lobe.columns] + found.others
-    polynomial = found.polynomial
-    own = prepare(material, replace(model, reflectance="fresnel", tir="off"), variance, context)
-    each, kind = _shapes(own), PerAxis if variance is Isotropic else Covariance
-    shapes = tuple(each[lobe.interface] for lobe in found.lobes)
-    dense = [grid.spread(column, shape) for column in columns]
-    number = context.number
-    curves = directional_grid.curves([number(np.float32(c)) if number else c for c in dense], shape, number)
-    assert context.colour is not None
-    numbers = Remainder(*(context.colour(*np.broadcast_to(x, len(context.colour())).tolist()) for x in vars(polynomial).values()))
-    passage = straight_through.passage(material, variance) if material.transmits else None
-    return Side(curves, shapes, numbers, passage, context.colour, kind)
-
-
-def _plain(value: Value, colour: bool) -> Any:
-    found = np.asarray(value, float).reshape(-1)
-    return found[:, None] if colour else float(found[0])
-
-
-def _shapes(prepared: Prepared) -> list[Shape]:
-    """One for each interface from the top."""
-    found: list[Shape] = []
-    n: Value = 1.0
-    first: PreparedInterface | None = None
-    for layer in prepared.layers:
-        if isinstance(layer, PreparedMedium):
-            continue
-        found.append(Shape(n, layer if first is None or not layer.opaque else None, first))
-        first = first or layer
-        n = n * layer.n12
-    return found
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """Directions at which a material is solved, and how columns are spread over a finer grid."""
-
-    isotropic: bool
+    symmetric: bool
+    smooth: bool
 
     @property
-    def nodes(self) -> Array:
-        return np.linspace(0, 1, COSINES)
+    def diffuse(self) -> bool:
+        return not self.smooth
 
-    @property
-    def turns(self) -> int:
-        return 1 if self.isotropic else AZIMUTHS
-
-    @property
-    def cosine(self) -> Array:
-        return np.repeat(np.maximum(self.nodes**2, COS_MIN), self.turns)
-
-    @property
-    def phi(self) -> Array:
-        return np.tile(np.pi * np.arange(self.turns) / self.turns, COSINES)
-
-    def spread(self, column: Array, shape: tuple[int, ...]) -> Array:
-        """Values at the nodes, (M,), interpolated: by splines over the cosine, by waves over the azimuth."""
-        values = column.reshape(COSINES, self.turns)
-        if not self.isotropic:
-            x, y, _ = directional_grid.directions(shape, None)
-            phi = np.arctan2(y, x).reshape(shape)[0]
-            waves = np.fft.rfft(values, axis=1) / self.turns
-            order = np.arange(waves.shape[1])
-            both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
-            values = (waves[:, None, :] * both * np.exp(2j * order * phi[:, None])).real.sum(axis=-1)
-        return np.asarray(CubicSpline(self.nodes, values)(np.linspace(0, 1, shape[0])).ravel())
-
-
-@dataclass(frozen=True)
-class _Drawn:
-    """A lobe: the number of its interface, and its columns in the order in which `Side.at` reads them."""
-
-    interface: int
-    columns: list[Array]
-
-
-@dataclass(frozen=True)
-class _Columns:
-    lobes: list[_Drawn]
-    others: list[Array]
-    polynomial: Remainder
-
-    def padded(self, count: int) -> _Columns:
-        """With lobes of no energy, as many as the other side has."""
-        last = self.lobes[-1]
-        dark = _Drawn(last.interface, [0 * column for column in last.columns])
-        return replace(self, lobes=[*self.lobes, *[dark] * (count - len(self.lobes))])
-
-
-def _columns(material: Material, model: Model, variance: type[Variance], grid: _Grid, known: Tables) -> _Columns:
-    """What a material is at the directions of a grid."""
-    cosine, phi = grid.cosine, grid.phi
-    often = known if model.reflectance == "fgd-multi" else None
-    sine = np.sqrt(1 - cosine * cosine)
-    wi = sine * np.cos(phi), sine * np.sin(phi), cosine
-    all_cosines, all_phi = np.concatenate([cosine, INCIDENCES]), np.concatenate([phi, 0 * INCIDENCES])
-    solved = energies(material, all_cosines, all_phi, often, widths.nearly_straight)
-    count = len(cosine)
-    found = parts(material)
-    own = _shapes(prepare(material, replace(model, reflectance="fresnel", tir="off"), variance))
-    lit = solved.lobes[..., :count]
-    tensors = widths.tensors(found, cosine, phi, lit.mean(axis=1)) if len(own) else []
-
-    colours = max(3, solved.rest.shape[0])
-
-    def full(x: Array) -> Array:
-        return np.broadcast_to(x, (colours, count))
-
-    # Lobes, and the veils that are seen
-    drawn: list[tuple[int, Array, Any]] = []
-    for k, tensor in enumerate(tensors):
-        drawn.append((k, solved.lobes[k][:, :count], tensor))
-        if solved.veils[k].max() > VEIL_MIN:
-            drawn.append((k, solved.veils[k][:, :count], widths.veil(found, k, cosine, tensor)))
-    weights, shown = [], []
-    for k, energy, tensor in drawn:
-        roughness = tensor.roughness(phi)
-        integral = own_medium.integral(own[k].lobe(1.0, roughness), wi)
-        weights.append(full(np.where(integral > FAINT, energy / np.maximum(integral, FAINT), 1.0)))
-        in_plane = tensor.roughness(0 * phi)
-        shown.append(vars((PerAxis if variance is Isotropic else Covariance).of(in_plane, _AS_IT_IS)).values())
-    albedo = solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest
-    polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, np.broadcast_to(albedo[:, count:], (len(solved.rest), len(INCIDENCES))))
-    rest = full(solved.rest[:, :count])
-    numbers = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(polynomial).values()))
-    scale = np.clip(rest / np.maximum(full(numbers.albedo(cosine)), 1e-6), 0, 4)
-
-    # Chances of being sampled
-    shares = [energy.mean(axis=0) * np.ones(count) for _, energy, _ in drawn]
-    if material.transmits and len(drawn) == 1:
-        once = own_medium.integral(own[0].lobe(1.0, tensors[0].roughness(phi)), wi).mean(axis=0)
-        shares[0] = np.maximum(shares[0] - once, 0)
-    shares.append(rest.mean(axis=0) + FAINT)
-    passing: list[Array] = []
-    left = 1.0
-    if material.transmits:
-        of = passed.parts(
-            straight_through.passage(material, variance), wi, *(x[:, :count] for x in (solved.straight, solved.bounced, solved.passed)),
-            np.array([sum(shares)]),
-        )
-        left = 1 - of.share
-        passing = [*full(of.straight), *full(of.bounced), *full(of.rest), of.of_straight, of.of_bounced, of.of_rest]
-        passing = [*passing, *full(solved.passed[:, :count])]
-    total = sum(shares)
-    lobes = [
-        _Drawn(k, [*weight, *full(energy), *(x * np.ones(count) for x in shape), left * share / total])
-        for weight, (k, energy, _), shape, share in zip(weights, drawn, shown, shares)
-    ]
-    return _Columns(lobes, [*scale, *rest, left * shares[-1] / total, *passing], polynomial)
-
-
-# The BSDF
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """A side as light from one direction sees it."""
-
-    lobes: list[OwnMediumLobe]
-    chances: list[Value]
-    energies: list[Value]
-    polynomial: Remainder
-    scale: Value
-    rest: Value
-    chance: Value
-    passage: Passage | None
-    passes: Parts | None
-    passed: Value
-    eta: Value
-
-    @property
-    def albedo(self) -> Value:
-        return sum(self.energies) + self.rest + self.passed
-
-
-def seen(solved: Solved, wi: Direction) -> _Seen:
-    """What light from wi sees, turned up."""
-    turned = _upright(wi, wi)
-    side, columns, eta = solved.above, solved.above.at(turned), solved.eta
-    if solved.below:
+    def seen(self, wi: Direction) -> tuple[Seen, Value]:
+        """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
+        turned = upright(wi, wi)
+        if self.below is None:
+            return self.above.seen(turned), 1.0
         where = wi[2] > 0
-        columns = _select(where, columns, solved.below.at(turned))
+        columns = select(where, self.above.at(turned), self.below.at(turned))
         side = replace(
-            solved.above,
-            shapes=tuple(_either(where, a, b) for a, b in zip(solved.above.shapes, solved.below.shapes)),
-            polynomial=_select(where, solved.above.polynomial, solved.below.polynomial),
-            passage=_select(where, solved.above.passage, solved.below.passage),
+            self.above,
+            shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),
+            polynomial=select(where, self.above.polynomial, self.below.polynomial),
+            passage=select(where, self.above.passage, self.below.passage),
         )
-        eta = ops.select(where, eta, 1 / eta)
-    azimuth = ops.arctan2(turned[1], turned[0])
-    lobes = []
-    for shape, weight, numbers in zip(side.shapes, columns.weights, columns.roughness):
-        u, v, rotation = side.kind(*numbers).roughness(_AS_IT_IS)
-        lobes.append(shape.lobe(weight, Roughness(u, v, rotation + azimuth)))
-    return _Seen(
-        lobes, columns.chances, columns.energies, side.polynomial, columns.scale, columns.rest, columns.chance,
-        side.passage, columns.passes, columns.passed if columns.passed is not None else 0.0, eta,
-    )  # fmt: skip
+        return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
+
+    def albedo(self, wi: Direction) -> Value:
+        """Energy of all parts, a colour."""
+        of, _ = self.seen(wi)
+        return sum(of.energies) + of.passed
+
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
+        """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
+        of, eta = self.seen(wi)
+        back = self.seen(wo)[0] if self.symmetric else None
+        return eval_pdf(of, back, eta, wi, wo, asked)
+
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = Asked()) -> tuple[Direction, Value]:
+        """A direction wo, and the index on its side over that on the side of wi."""
+        of, eta = self.seen(wi)
+        i, drawn = upright(wi, wi), of.only(asked)
+        wo = remainder.sample(u1, u2)
+        begin = 1 - drawn.chances[-1]
+        for lobe, chance in zip(reversed(of.lobes), reversed(drawn.chances[:-1])):
+            wo = chosen_direction(u < begin, own_medium.sample(lobe, i, u1, u2), wo)
+            begin = begin - chance
+        if of.passage is None or drawn.passes is None:
+            return wo, 1.0
+        again = ops.clip(ops.divide(u, drawn.share), 0.0, passed.BELOW_ONE)
+        through = passed.sample(of.passage, drawn.passes, i, again, u1, u2)
+        wo = chosen_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
+        return upright(wo, wi), ops.select(wo[2] < 0, eta, 1.0)
+
+    def sample_smooth(self, wi: Direction, u: Value, asked: Asked = Asked()) -> tuple[Direction, Value, Value, Value]:
+        """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
+        of, eta = self.seen(wi)
+        i, drawn = upright(wi, wi), of.only(asked, by_energy=True)
+        reflected = sum(energy for energy, wanted in zip(of.energies, drawn.wanted) if wanted)
+        if drawn.passes is None:
+            lit = (wi[2] > 0) | (self.below is not None)
+            return (-wi[0], -wi[1], wi[2]), 1.0, ops.select(lit, 1.0 if any(drawn.wanted) else 0.0, 0.0), reflected
+        passes = u < drawn.share
+        x, y, z = refracted(i, eta)
+        o = chosen_direction(passes, (-x, -y, -z), (-i[0], -i[1], i[2]))
+        through = of.passed / (eta * eta) if asked.radiance else of.passed
+        probability = ops.select(passes, drawn.share, 1 - drawn.share)
+        weight = ops.divide(ops.select(passes, through, reflected), probability)
+        return upright(o, wi), ops.select(passes, eta, 1.0), probability, weight
+
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
+        """Number of the part that `sample` drew wo from, or `sample_smooth`: an interface from the top, the remainder,
+        or last what passes. Light that does not pass the facets of a rough dielectric is reflected by the first one."""
+        of, _ = self.seen(wi)
+        drawn = of.only(asked, by_energy=smooth)
+        kept = [(number, chance) for number, chance, w in zip(of.numbers, drawn.chances, drawn.wanted) if w]
+        last = float(of.interfaces + self.diffuse)
+        if not kept:
+            return last
+        found: Value = float(kept[0][0])
+        begin = drawn.share
+        for (number, chance), (following, _) in zip(kept, kept[1:]):
+            begin = begin + chance
+            found = ops.select(u > begin, float(following), found)
+        if self.below is None:
+            return found
+        return ops.select(wi[2] * wo[2] < 0, last, found) if drawn.passing else found
 
 
-def eval_pdf(solved: Solved, wi: Direction, wo: Direction, radiance: bool) -> tuple[Value, Value]:
-    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
-    of, i, o = seen(solved, wi), _upright(wi, wi), _upright(wo, wi)
-    value = of.scale * of.polynomial.value(i, o)
-    density = of.chance * remainder.density(o)
-    for lobe, chance in zip(of.lobes, of.chances):
-        more, pdf = own_medium.eval_pdf(lobe, i, o)
-        value, density = value + more, density + chance * pdf
-    if of.passage is None or of.passes is None:
+def eval_pdf(
+    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Asked = Asked()
+) -> tuple[Value, Value]:
+    """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
+    i, o, drawn = upright(wi, wi), upright(wo, wi), of.only(asked)
+    i_back, o_back = upright(wi, wo), upright(wo, wo)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    there, returned = of.reflected(i, o), back.reflected(o_back, i_back) if back else None
+    value: Value = 0.0
+    density: Value = 0.0
+    for wanted, chance, (part, pdf) in zip(drawn.wanted, drawn.chances, there):
+        if returned:
+            part = ops.sqrt(part * next(returned)[0] * cosines)
+        value = value + part if wanted else value
+        density = density + chance * pdf
+    if of.passage is None or of.columns.passes is None:
         lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
-    through, pdf = passed.eval_pdf(of.passage, of.passes, i, o)
-    if radiance:
-        through = through / (of.eta * of.eta)
-    return value + through, density + pdf
-
-
-def sample(solved: Solved, wi: Direction, u: Value, u1: Value, u2: Value) -> tuple[Direction, Value]:
-    """A direction wo, and the index on its side over that on the side of wi."""
-    of, i = seen(solved, wi), _upright(wi, wi)
-    wo = remainder.sample(u1, u2)
-    begin = 1 - of.chance
-    for lobe, chance in zip(reversed(of.lobes), reversed(of.chances)):
-        wo = _chosen(u < begin, own_medium.sample(lobe, i, u1, u2), wo)
-        begin = begin - chance
-    if of.passage is None or of.passes is None:
-        return wo, 1.0
-    share = of.passes.share
-    through = passed.sample(of.passage, of.passes, i, ops.clip(ops.divide(u, share), 0.0, 1 - 2**-24), u1, u2)
-    wo = _chosen(u < share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
-    return _upright(wo, wi), ops.select(wo[2] < 0, of.eta, 1.0)
+    through, pdf = passed.eval_pdf(of.passage, drawn.passes or of.columns.passes, i, o)
+    if back and back.passage and back.columns.passes:
+        other, _ = passed.eval_pdf(back.passage, back.columns.passes, o_back, i_back)
+        through = ops.sqrt(through * other * cosines) * eta
+    if asked.radiance:
+        through = through / (eta * eta)
+    value = value + through if drawn.passing else value + 0 * through
+    return value, density + pdf if drawn.passes else density
 
 
 def _either(where: Value, a: Shape, b: Shape) -> Shape:
@@ -382,30 +304,21 @@ def _either(where: Value, a: Shape, b: Shape) -> Shape:
     assert a.facets and b.facets
     facets = replace(a.facets, eta=ops.select(where, a.facets.eta, b.facets.eta))
     if a.first is None and b.first is None:
-        return Shape(1.0, facets, None)
+        return Shape(a.interface, 1.0, facets, None)
     some = a.first or b.first
     assert some
     first = replace(some, eta=ops.select(where, a.first.eta if a.first else 1.0, b.first.eta if b.first else 1.0))
-    return Shape(ops.select(where, a.n, b.n), facets, first)
+    return Shape(a.interface, ops.select(where, a.n, b.n), facets, first)
 
 
-def _select(where: Value, a: Any, b: Any) -> Any:
+def select(where: Value, a: Any, b: Any) -> Any:
     """Records of values, value by value."""
     if is_dataclass(a) and not isinstance(a, type):
-        return type(a)(*(_select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
+        return type(a)(*(select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
     if isinstance(a, tuple) and hasattr(a, "_fields"):
-        return type(a)(*(_select(where, x, y) for x, y in zip(a, b)))
+        return type(a)(*(select(where, x, y) for x, y in zip(a, b)))
     if isinstance(a, (list, tuple)):
-        return type(a)(_select(where, x, y) for x, y in zip(a, b))
+        return type(a)(select(where, x, y) for x, y in zip(a, b))
     if a is None or (isinstance(a, float) and isinstance(b, float) and a == b):
         return a
     return ops.select(where, a, b)
-
-
-def _upright(w: Direction, wi: Direction) -> Direction:
-    return w[0], w[1], ops.select(wi[2] < 0, -w[2], w[2])
-
-
-def _chosen(where: Value, a: Direction, b: Direction) -> Direction:
-    x, y, z = (ops.select(where, p, q) for p, q in zip(a, b))
-    return x, y, z
