@@ -8,15 +8,13 @@ s(wi) and s(wo) belong to the two sides. Kernels are known at the nodes of a gri
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import own_medium, passed, remainder
-from velatura.model.bsdf import Asked, upright
-from velatura.model.solved import Seen, Side, Solved, eval_pdf
+from velatura.model.solved import Solved, exchanged
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import low_discrepancy
@@ -64,13 +62,10 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int) -> list[l
         if side.passage and of.columns.passes:
             wo = passed.sample(side.passage, of.columns.passes, i, np.minimum(u[0], passed.BELOW_ONE), *u[1:])
             down = wo[0], wo[1], np.maximum(-wo[2], 0.0)
-            share = of.columns.passes.share
-            there = passed.eval_pdf(side.passage, of.columns.passes, i, wo)
-            back = other.seen(down)
-            assert back.passage and back.columns.passes
-            returned, _ = passed.eval_pdf(back.passage, back.columns.passes, down, (i[0], i[1], -i[2]))
             eta = solved.eta if side is solved.above else 1 / solved.eta
-            value = _weight((there[0], there[1] / share), returned * eta * eta, i, wo)
+            value, density = exchanged(of, other.seen(down), eta, i, wo)
+            value = np.where(density > 0, ops.divide(value * of.columns.passes.share, density), 0.0)
+            value = np.where(wo[2] < 0, value, 0.0)
             crossing.append((kernel(value, down), at_nodes.passed))
     if crossing:
         for found, passing in zip(result, _balanced_between(*crossing)):

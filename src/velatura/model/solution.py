@@ -218,7 +218,9 @@ class _Columns:
     def weighed(self, factors: Sequence[Array]) -> _Columns:
         """With the weights of reflected parts, and of what passes, scaled by factors (C, M)."""
         lobes = [replace(lobe, weight=factor * lobe.weight) for lobe, factor in zip(self.lobes, factors)]
-        passes = np.tile(factors[-1], (3, 1)) * self.passes if len(self.passes) else self.passes
+        passes = self.passes
+        if len(passes):
+            passes = np.concatenate([factors[-1], passes[len(factors[-1]) :]])
         return replace(self, lobes=lobes, scale=factors[len(lobes)] * self.scale, passes=passes)
 
 

@@ -289,14 +289,26 @@ def eval_pdf(
     if of.passage is None or of.columns.passes is None:
         lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
-    through, pdf = passed.eval_pdf(of.passage, drawn.passes or of.columns.passes, i, o)
-    if back and back.passage and back.columns.passes:
-        other, _ = passed.eval_pdf(back.passage, back.columns.passes, o_back, i_back)
-        through = ops.sqrt(through * other * cosines) * eta
+    passes = drawn.passes or of.columns.passes
+    if back and back.columns.passes:
+        through, pdf = exchanged(replace(of, columns=replace(of.columns, passes=passes)), back, eta, wi, wo)
+        through = through * ops.sqrt(passes.straight * back.columns.passes.straight)
+    else:
+        through, pdf = passed.eval_pdf(of.passage, passes, i, o)
     if asked.radiance:
         through = through / (eta * eta)
     value = value + through if drawn.passing else value + 0 * through
     return value, density + pdf if drawn.passes else density
+
+
+def exchanged(of: Seen, back: Seen, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """Mean of what passes there and back, with all that goes straight through, and the density of samples."""
+    i, o, i_back, o_back = upright(wi, wi), upright(wo, wi), upright(wi, wo), upright(wo, wo)
+    assert of.passage and of.columns.passes and back.passage and back.columns.passes
+    there, density = passed.eval_pdf(of.passage, replace(of.columns.passes, straight=1.0), i, o)
+    other, _ = passed.eval_pdf(back.passage, replace(back.columns.passes, straight=1.0), o_back, i_back)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    return 0.5 * (there + other * (cosines * eta * eta)), density
 
 
 def _either(where: Value, a: Shape, b: Shape) -> Shape:
