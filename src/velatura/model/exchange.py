@@ -22,10 +22,10 @@ from velatura.sampling import low_discrepancy
 Array = NDArray[np.floating]
 Shares = Callable[[Direction], Sequence[tuple[Array, Array]]]
 
-SAMPLES = {False: 2048, True: 256}  # at each node; fewer where there are many
+SAMPLES = {False: 1024, True: 233}  # at each node; fewer where there are many
 MANY = 100
 STEPS = 24
-MOST = 3.0  # times as bright, there and back
+MOST = 50.0  # times as bright, there and back
 DARK = 1e-6
 
 
@@ -57,7 +57,7 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int) -> list[l
         for k, energy in enumerate(at_nodes.energies):
             wo = own_medium.sample(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else remainder.sample(*u[1:])
             up = wo[0], wo[1], np.maximum(wo[2], 0.0)
-            value = _weight(list(of.reflected(i, wo))[k], list(side.seen(up).reflected(up, i))[k][0], i, wo)
+            value = _weight(of.part(k, i, wo), side.seen(up).part(k, up, i)[0], i, wo)
             result[-1].append(_balanced(kernel(value, up), energy))
         if side.passage and of.columns.passes:
             wo = passed.sample(side.passage, of.columns.passes, i, np.minimum(u[0], passed.BELOW_ONE), *u[1:])

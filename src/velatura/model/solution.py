@@ -252,8 +252,10 @@ def _columns(material: Material, model: Model, variance: type[Variance], grid: _
         roughness = tensor.roughness(phi)
         integral = own_medium.integral(own[k].lobe(1.0, roughness), wi)
         weights.append(full(np.where(integral > FAINT, energy / np.maximum(integral, FAINT), 1.0)))
-        in_plane = tensor.roughness(0 * phi)
-        shown.append(vars((PerAxis if variance is Isotropic else Covariance).of(in_plane, _AS_IT_IS)).values())
+        if variance is Isotropic:
+            shown.append(vars(PerAxis.of(tensor.straight(), _AS_IT_IS)).values())
+        else:
+            shown.append(vars(Covariance.of(tensor.roughness(0 * phi), _AS_IT_IS)).values())
     albedo = solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest
     polynomial = remainder.fit(
         solved.nodes,

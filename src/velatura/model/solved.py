@@ -10,7 +10,7 @@ the forward form.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
@@ -158,11 +158,11 @@ class Seen:
             passes = Parts(passes.straight, passes.bounced, passes.rest, *chances)
         return Drawn(wanted, asked.transmission, [share / total for share in shares], passes)
 
-    def reflected(self, i: Direction, o: Direction) -> Iterator[tuple[Value, Value]]:
-        """f |cos theta_o| and density of the reflected parts."""
-        for lobe in self.lobes:
-            yield own_medium.eval_pdf(lobe, i, o)
-        yield self.columns.scale * self.polynomial.value(i, o), remainder.density(o)
+    def part(self, k: int, i: Direction, o: Direction) -> tuple[Value, Value]:
+        """f |cos theta_o| and density of a reflected part."""
+        if k < len(self.lobes):
+            return own_medium.eval_pdf(self.lobes[k], i, o)
+        return self.columns.scale * self.polynomial.value(i, o), remainder.density(o)
 
 
 @dataclass(frozen=True)
@@ -278,12 +278,12 @@ def eval_pdf(
     i, o, drawn = upright(wi, wi), upright(wo, wi), of.only(asked)
     i_back, o_back = upright(wi, wo), upright(wo, wo)
     cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
-    there, returned = of.reflected(i, o), back.reflected(o_back, i_back) if back else None
     value: Value = 0.0
     density: Value = 0.0
-    for wanted, chance, (part, pdf) in zip(drawn.wanted, drawn.chances, there):
-        if returned:
-            part = ops.sqrt(part * next(returned)[0] * cosines)
+    for k, (wanted, chance) in enumerate(zip(drawn.wanted, drawn.chances)):
+        part, pdf = of.part(k, i, o)
+        if back:
+            part = ops.sqrt(part * back.part(k, o_back, i_back)[0] * cosines)
         value = value + part if wanted else value
         density = density + chance * pdf
     if of.passage is None or of.columns.passes is None:

@@ -120,6 +120,11 @@ class Tensor:
         u, v = (np.minimum(self.width(self.angle + turn), ALPHA_MAX) for turn in AXES)
         return Roughness(u, v, self.angle + phi)
 
+    def straight(self) -> Roughness:
+        """In the plane and across it, where these are its axes."""
+        u, v = (np.minimum(self.width(np.asarray(turn)), ALPHA_MAX) for turn in AXES)
+        return Roughness(u, v, 0.0)
+
 
 def _sum(parts: Sequence[Tensor]) -> Tensor:
     """Along the axes of the sum of all, powers q of widths add."""
