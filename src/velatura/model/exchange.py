@@ -25,7 +25,8 @@ Shares = Callable[[Direction], Sequence[tuple[Array, Array]]]
 SAMPLES = {False: 1024, True: 233}  # at each node; fewer where there are many
 MANY = 100
 STEPS = 24
-MOST = 50.0  # times as bright, there and back
+MOST = 10.0  # times as bright, there and back
+MOST_REST = 4.0  # for the remainder
 DARK = 1e-6
 
 
@@ -58,7 +59,8 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int) -> list[l
             wo = own_medium.sample(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else remainder.sample(*u[1:])
             up = wo[0], wo[1], np.maximum(wo[2], 0.0)
             value = _weight(of.part(k, i, wo), side.seen(up).part(k, up, i)[0], i, wo)
-            result[-1].append(_balanced(kernel(value, up), energy))
+            most = MOST if k < len(of.lobes) else MOST_REST
+            result[-1].append(_balanced(kernel(value, up), energy, most))
         if side.passage and of.columns.passes:
             wo = passed.sample(side.passage, of.columns.passes, i, np.minimum(u[0], passed.BELOW_ONE), *u[1:])
             down = wo[0], wo[1], np.maximum(-wo[2], 0.0)
@@ -80,10 +82,10 @@ def _weight(there: tuple[Value, Value], back: Value, wi: Direction, wo: Directio
     return np.where(density > 0, ops.divide(np.sqrt(both), density), 0.0)
 
 
-def _balanced(kernel: Array, energy: Array) -> Array:
+def _balanced(kernel: Array, energy: Array, most: float) -> Array:
     factor = np.ones_like(energy)
     for _ in range(STEPS):
-        factor = _bounded(factor * np.sqrt(_ratio(energy, factor * _leaving(kernel, factor))))
+        factor = _bounded(factor * np.sqrt(_ratio(energy, factor * _leaving(kernel, factor))), most)
     return factor**2
 
 
@@ -92,7 +94,7 @@ def _balanced_between(above: tuple[Array, Array], below: tuple[Array, Array]) ->
     for _ in range(2 * STEPS):
         leaving = [s * _leaving(kernel, t) for s, t, (kernel, _) in zip(found, reversed(found), (above, below))]
         ratios = [_ratio(energy, light) for (_, energy), light in zip((above, below), leaving)]
-        found = [_bounded(s * np.sqrt(ratio)) for s, ratio in zip(found, ratios)]
+        found = [_bounded(s * np.sqrt(ratio), MOST) for s, ratio in zip(found, ratios)]
     return [s**2 for s in found]
 
 
@@ -104,5 +106,5 @@ def _ratio(energy: Array, light: Array) -> Array:
     return np.where(light > DARK, energy / np.maximum(light, DARK), 1.0)
 
 
-def _bounded(factor: Array) -> Array:
-    return np.clip(factor, 0.0, np.sqrt(MOST))
+def _bounded(factor: Array, most: float) -> Array:
+    return np.clip(factor, 0.0, np.sqrt(most))

@@ -33,6 +33,7 @@ COSINES = 48  # nodes, even in the root of the cosine
 AZIMUTHS = 12  # in half a turn, where interfaces are brushed
 COS_MIN = 1e-3
 VEIL_MIN = 1e-3  # energy of veils that are drawn
+EVEN = 0.1  # share of samples of the symmetric form that the remainder has at least, and of those that pass
 
 
 def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
@@ -46,6 +47,7 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     found = [columns.with_lobes(_both([columns.drawn for columns in found])) for columns in found]
     symmetric = model.form == "symmetric" and not smooth
     if symmetric:
+        found = [replace(columns, scale=np.ones_like(columns.scale)) for columns in found]
         numbers = _bsdf(plain, found, model, variance, replace(context, number=None, colour=_colour), grid, True)
         factors = exchange.factors(numbers, grid.directions, grid.shares, grid.count)
         found = [columns.weighed(each) for columns, each in zip(found, factors)]
@@ -273,15 +275,22 @@ def _columns(material: Material, model: Model, variance: type[Variance], grid: _
         once = own_medium.integral(own[0].lobe(1.0, tensors[0].roughness(phi)), wi).mean(axis=0)
         shares[0] = np.maximum(shares[0] - once, 0)
     shares.append(rest.mean(axis=0) + FAINT)
+    least = EVEN if model.form == "symmetric" else 0.0
+    shares[-1] = np.maximum(shares[-1], least * sum(shares))
     weights_passing, passing = np.empty((0, count)), []
     left = 1.0
     if material.transmits:
         of = passed.parts(
             straight_through.passage(material, variance),
             wi,
-            *(x[:, :count] for x in (solved.straight, solved.bounced, solved.passed)),
+            solved.straight[:, :count],
+            solved.bounced[:, :count],
+            solved.passed[:, :count],
             np.array([sum(shares)]),
         )
+        even = np.maximum(least * of.share - of.of_rest, 0) / np.maximum(of.share - of.of_rest, FAINT)
+        others = (1 - even) * of.of_straight, (1 - even) * of.of_bounced
+        of = replace(of, of_straight=others[0], of_bounced=others[1], of_rest=of.share - sum(others))
         left = 1 - of.share
         weights_passing = np.concatenate([full(of.straight), full(of.bounced), full(of.rest)])
         passing = [of.of_straight, of.of_bounced, of.of_rest, *full(solved.passed[:, :count])]
