@@ -23,6 +23,7 @@ DARK = 1e-8  # light between two directions that rounding makes
 ONE_WAY = 1e-2  # relative error of reciprocity, weighted by the light
 CHANGE = 5e-3  # of energy, between a BSDF and the one that it should equal
 BLURRED = 2e-3  # relative standard error of the integral of a pdf that the cells do not resolve
+HEAVY = 3.0  # weight of a sample
 CROWD = 10.0  # samples expected in a cell of a chi-square test, else it is pooled with others
 
 
@@ -212,6 +213,18 @@ def weights(evidence: Evidence, alarm: float) -> Finding:
     return _count_off("weights", drawn, {"weight times density and eval": _any(_differ(value, drawn.asked.value))})
 
 
+def spread(evidence: Evidence, alarm: float) -> Finding:
+    """Find the largest weight of a sample, as energy."""
+    drawn = evidence.drawn
+    heaviest = drawn.energy.max(axis=2)
+    at = _worst(heaviest)
+    usual = np.quantile(heaviest, 0.999)
+    detail = f"of {heaviest.size} samples, 999 of 1000 below {usual:.3g}; heaviest {_at(drawn.wi[at[0]])}"
+    data = {"cosine of incidence": drawn.wi[:, 2], "largest weight": heaviest.max(axis=1)}
+    value = float(heaviest[at])
+    return Finding("spread", value <= HEAVY, value, HEAVY, detail, data)
+
+
 def _count_off(law: str, drawn: Drawn, off: dict[str, Array]) -> Finding:
     looked_at = drawn.arrived & ~drawn.delta
     count = looked_at.sum()
@@ -299,6 +312,7 @@ LAWS: tuple[Law, ...] = (
     Law("chi-square", "Samples fall where the pdf says.", chi_square),
     Law("agreement", "`sample`, `pdf`, `eval` and `eval_pdf` agree about every direction.", agreement),
     Law("weights", "The weight of a sample is its value over its density.", weights),
+    Law("spread", "No sample carries more than three times the light that arrives.", spread),
     Law("reciprocity", "f(wi, wo) is f(wo, wi), with the squared index on either side.", reciprocity),
     Law("limit", "In a limiting case the BSDF equals the one that is expected.", limit),
 )

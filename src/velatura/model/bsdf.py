@@ -51,7 +51,9 @@ class Asked:
 
     def reflects(self, k: int) -> bool:
         """Whether the k-th reflected part is asked for: a lobe, from the top, or after all lobes the base."""
-        return self.reflection if isinstance(self.reflection, bool) else self.reflection[k]
+        if isinstance(self.reflection, bool):
+            return self.reflection
+        return k < len(self.reflection) and self.reflection[k]
 
 
 class Body(Protocol):

@@ -33,7 +33,7 @@ COSINES = 48  # nodes, even in the root of the cosine
 AZIMUTHS = 12  # in half a turn, where interfaces are brushed
 COS_MIN = 1e-3
 VEIL_MIN = 1e-3  # energy of veils that are drawn
-EVEN = 0.1  # share of samples of the symmetric form that the remainder has at least, and of those that pass
+EVEN = 0.2  # share of samples of the symmetric form that the remainder has at least, and of those that pass
 
 
 def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:

@@ -116,7 +116,7 @@ def make(mi: Any) -> type:
             components = [kind | common | one_way for kind in self.kinds]
             if self.body.diffuse if self.body else based:
                 self.kinds += [flags.DiffuseReflection]
-                components += [self.kinds[-1] | common]
+                components += [self.kinds[-1] | common | (one_way if self.body else flags.Empty)]
             if self.transmits:
                 self.kinds += [flags.DeltaTransmission if self.delta else flags.GlossyTransmission]
                 components += [self.kinds[-1] | common | flags.NonSymmetric]
