@@ -24,6 +24,7 @@ ONE_WAY = 1e-2  # relative error of reciprocity, weighted by the light
 CHANGE = 5e-3  # of energy, between a BSDF and the one that it should equal
 BLURRED = 2e-3  # relative standard error of the integral of a pdf that the cells do not resolve
 HEAVY = 3.0  # weight of a sample
+SHIFT = 2e-2  # of the light, where layers are turned
 CROWD = 10.0  # samples expected in a cell of a chi-square test, else it is pooled with others
 
 
@@ -288,6 +289,22 @@ def limit(evidence: Evidence, alarm: float) -> Finding | None:
     return Finding("limit", smooth <= CHANGE and _within(shift, allowed), value, bound, detail, data)
 
 
+def turning(evidence: Evidence, alarm: float) -> Finding | None:
+    """Compare with the BSDF whose layers are turned, if there is one: light that goes elsewhere."""
+    if evidence.turned is None:
+        return None
+    found = evidence.turned
+    cosines, place = np.unique(found.wi[:, 2], return_inverse=True)
+    change = np.abs(found.light - found.turned).mean(axis=1)
+    elsewhere = np.bincount(place, change)
+    light = np.bincount(place, found.light.mean(axis=1))
+    share = elsewhere / np.maximum(light, DARK)
+    at = _worst(share)
+    data = {"cosine of incidence": cosines, "share that goes elsewhere": share}
+    detail = f"share of light that goes elsewhere, most at cosine {cosines[at]:.3g}"
+    return Finding("turning", bool(share[at] <= SHIFT), float(share[at]), SHIFT, detail, data)
+
+
 def _flow(drawn: Drawn) -> Array:
     """Energy of smooth components, and its flow along x, y, z: (D, N, 4 channels)."""
     energy = drawn.energy * drawn.delta[..., None]
@@ -314,6 +331,7 @@ LAWS: tuple[Law, ...] = (
     Law("weights", "The weight of a sample is its value over its density.", weights),
     Law("spread", "No sample carries more than three times the light that arrives.", spread),
     Law("reciprocity", "f(wi, wo) is f(wo, wi), with the squared index on either side.", reciprocity),
+    Law("turning", "Where all layers are turned, light turns with them, at the normal too.", turning),
     Law("limit", "In a limiting case the BSDF equals the one that is expected.", limit),
 )
 

@@ -84,6 +84,16 @@ class Stack(Record):
         """Other layers under the same index, by the same name unless given."""
         return Stack(layers, name=self.name if name is None else name, exterior=self.exterior, thin=self.thin)
 
+    def turned(self, degrees: float) -> Stack | None:
+        """All layers turned, anticlockwise; None if no interface has axes, or one is turned by a texture."""
+        brushed = [each for each in self.interfaces if isinstance(each.alpha, tuple) and each.alpha[0] != each.alpha[1]]
+        if not brushed or not all(isinstance(each.rotation, (int, float)) for each in brushed):
+            return None
+        return self.with_layers(
+            each.model_copy(update={"rotation": each.rotation + degrees}) if each in brushed else each
+            for each in self.layers
+        )
+
     # As a file holds it ----------------------------------------------------------------------------------------------
 
     @classmethod
