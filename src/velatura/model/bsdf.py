@@ -59,11 +59,15 @@ class Asked:
 class Body(Protocol):
     """A stack as light sees it, from either side.
 
-    `diffuse` says whether a diffuse part comes after the lobes, among what is reflected.
+    `diffuse` says whether a diffuse part comes after the lobes, among what is reflected; `balanced`, whether its
+    symmetric form keeps energy.
     """
 
     @property
     def diffuse(self) -> bool: ...
+
+    @property
+    def balanced(self) -> bool: ...
 
     def albedo(self, wi: Direction) -> Value: ...
 
@@ -105,6 +109,11 @@ class Lobed:
     def diffuse(self) -> bool:
         """Whether a diffuse base is the last reflected part."""
         return self.above.base is not None
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the symmetric form keeps energy."""
+        return self.scaling is not None
 
     def albedo(self, wi: Direction) -> Value:
         """Energy of all parts, a colour."""
@@ -178,8 +187,8 @@ class Lobed:
         return upright(o, wi), ops.select(passes, seen.eta, 1.0), probability, weight
 
     def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
-        """Number of the part that `sample` draws from, or `sample_smooth`: of all reflected lobes, from the top, and then
-        the diffuse base or the transmitted lobe."""
+        """Number of the part that `sample` draws from, or `sample_smooth`: of all reflected lobes, from the top, then
+        of the diffuse base or the transmitted lobe."""
         every = scattered(self, wi)
         seen, count = every.only(asked), len(every.reflected)
         least, even = (0.0, 0.0) if smooth else (_least(self), self.even)

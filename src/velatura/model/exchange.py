@@ -65,7 +65,7 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int) -> list[l
             wo = passed.sample(side.passage, of.columns.passes, i, np.minimum(u[0], passed.BELOW_ONE), *u[1:])
             down = wo[0], wo[1], np.maximum(-wo[2], 0.0)
             eta = solved.eta if side is solved.above else 1 / solved.eta
-            value, density = exchanged(of, other.seen(down), eta, i, wo)
+            value, density, _ = exchanged(of, other.seen(down), eta, i, wo)
             value = np.where(density > 0, ops.divide(value * of.columns.passes.share, density), 0.0)
             value = np.where(wo[2] < 0, value, 0.0)
             crossing.append((kernel(value, down), at_nodes.passed))
@@ -78,7 +78,7 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int) -> list[l
 def _weight(there: tuple[Value, Value], back: Value, wi: Direction, wo: Direction) -> Array:
     """Of samples of the geometric mean."""
     value, density = there
-    both = value * back * (np.abs(wo[2]) / wi[2])
+    both = np.maximum(value, 0) * np.maximum(back, 0) * (np.abs(wo[2]) / wi[2])
     return np.where(density > 0, ops.divide(np.sqrt(both), density), 0.0)
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 from velatura import ops
@@ -27,8 +28,10 @@ from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
+ALL = Asked()
 FAINT = 1e-9  # energy of a part that is drawn even where it has none
 GRAZING = 1e-6  # cosine
+HEAVY = 2.9  # weight of a sample, in the symmetric form
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Seen:
-    """A side as light from one direction sees it: lobes, the remainder, and what passes are its parts, in that order."""
+    """A side as light from one direction sees it: its parts are lobes, the remainder, and what passes."""
 
     shapes: tuple[Shape, ...]
     lobes: list[OwnMediumLobe]
@@ -133,6 +136,11 @@ class Seen:
         return [*(shape.interface for shape in self.shapes), self.interfaces]
 
     @property
+    def chances(self) -> list[Value]:
+        """Of the reflected parts."""
+        return [*self.columns.chances, self.columns.chance]
+
+    @property
     def energies(self) -> list[Value]:
         """Of the reflected parts."""
         return [*self.columns.energies, self.columns.rest]
@@ -143,10 +151,10 @@ class Seen:
 
     def only(self, asked: Asked, by_energy: bool = False) -> Drawn:
         """Chances of what is asked for: as samples are shared among all parts, or else by energy."""
-        columns, passes = self.columns, self.columns.passes
+        passes = self.columns.passes
         wanted = [asked.reflects(number) for number in self.numbers]
         if all(wanted) and (asked.transmission or passes is None) and not by_energy:
-            return Drawn(wanted, True, [*columns.chances, columns.chance], passes)
+            return Drawn(wanted, True, self.chances, passes)
         shares = [ops.mean(e) + FAINT if w else 0.0 for w, e in zip(wanted, self.energies)]
         through = ops.mean(self.passed) + FAINT if passes and asked.transmission else 0.0
         total = sum(shares) + through
@@ -194,6 +202,10 @@ class Solved:
     def diffuse(self) -> bool:
         return not self.smooth
 
+    @property
+    def balanced(self) -> bool:
+        return self.symmetric
+
     def seen(self, wi: Direction) -> tuple[Seen, Value]:
         """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
         turned = upright(wi, wi)
@@ -214,13 +226,13 @@ class Solved:
         of, _ = self.seen(wi)
         return sum(of.energies) + of.passed
 
-    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
         """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
         of, eta = self.seen(wi)
         back = self.seen(wo)[0] if self.symmetric else None
         return eval_pdf(of, back, eta, wi, wo, asked)
 
-    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = Asked()) -> tuple[Direction, Value]:
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ALL) -> tuple[Direction, Value]:
         """A direction wo, and the index on its side over that on the side of wi."""
         of, eta = self.seen(wi)
         i, drawn = upright(wi, wi), of.only(asked)
@@ -236,7 +248,7 @@ class Solved:
         wo = chosen_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
         return upright(wo, wi), ops.select(wo[2] < 0, eta, 1.0)
 
-    def sample_smooth(self, wi: Direction, u: Value, asked: Asked = Asked()) -> tuple[Direction, Value, Value, Value]:
+    def sample_smooth(self, wi: Direction, u: Value, asked: Asked = ALL) -> tuple[Direction, Value, Value, Value]:
         """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
         of, eta = self.seen(wi)
         i, drawn = upright(wi, wi), of.only(asked, by_energy=True)
@@ -252,7 +264,7 @@ class Solved:
         weight = ops.divide(ops.select(passes, through, reflected), probability)
         return upright(o, wi), ops.select(passes, eta, 1.0), probability, weight
 
-    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = ALL, smooth: bool = False) -> Value:
         """Number of the part that `sample` drew wo from, or `sample_smooth`: an interface from the top, the remainder,
         or last what passes. Light that does not pass the facets of a rough dielectric is reflected by the first one."""
         of, _ = self.seen(wi)
@@ -263,7 +275,7 @@ class Solved:
             return last
         found: Value = float(kept[0][0])
         begin = drawn.share
-        for (number, chance), (following, _) in zip(kept, kept[1:]):
+        for (_, chance), (following, _) in pairwise(kept):
             begin = begin + chance
             found = ops.select(u > begin, float(following), found)
         if self.below is None:
@@ -272,43 +284,56 @@ class Solved:
 
 
 def eval_pdf(
-    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Asked = Asked()
+    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Asked
 ) -> tuple[Value, Value]:
     """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
     i, o, drawn = upright(wi, wi), upright(wo, wi), of.only(asked)
     i_back, o_back = upright(wi, wo), upright(wo, wo)
     cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
     value: Value = 0.0
-    density: Value = 0.0
+    whole: Value = 0.0
+    densities: list[Value] = [0.0, 0.0, 0.0]  # of what is asked for; of all, there and back
     for k, (wanted, chance) in enumerate(zip(drawn.wanted, drawn.chances)):
         part, pdf = of.part(k, i, o)
+        chances = [chance, of.chances[k], 0.0]
+        pdfs = [pdf, pdf, 0.0]
         if back:
-            part = ops.sqrt(part * back.part(k, o_back, i_back)[0] * cosines)
-        value = value + part if wanted else value
-        density = density + chance * pdf
-    if of.passage is None or of.columns.passes is None:
+            other, pdfs[2] = back.part(k, o_back, i_back)
+            chances[2] = back.chances[k]
+            part = ops.sqrt(part * other * cosines)
+        densities = [total + c * each for total, c, each in zip(densities, chances, pdfs)]
+        whole = whole + part
+        value = value + (part if wanted else 0 * part)
+    columns = of.columns
+    if of.passage and columns.passes:
+        through, pdf = passed.eval_pdf(of.passage, columns.passes, i, o)
+        returned: Value = 0.0
+        if back and back.passage and back.columns.passes:
+            through, pdf, returned = exchanged(of, back, eta, wi, wo)
+            through = through * ops.sqrt(columns.passes.straight * back.columns.passes.straight)
+        share = ops.divide(drawn.share, columns.passes.share)
+        densities = [a + b for a, b in zip(densities, (share * pdf, pdf, returned))]
+        whole = whole + through
+        value = value + (through if drawn.passing else 0 * through)
+    scale = ops.select(wi[2] * wo[2] < 0, eta * eta, 1.0)
+    if back:
+        # No sample is too heavy, there and back
+        most = HEAVY * ops.minimum(densities[1], densities[2] * cosines * scale)
+        value = value * ops.minimum(ops.divide(most, whole), 1.0)
+    if of.passage is None:
         lit = wi[2] > 0
-        return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
-    passes = drawn.passes or of.columns.passes
-    if back and back.columns.passes:
-        through, pdf = exchanged(replace(of, columns=replace(of.columns, passes=passes)), back, eta, wi, wo)
-        through = through * ops.sqrt(passes.straight * back.columns.passes.straight)
-    else:
-        through, pdf = passed.eval_pdf(of.passage, passes, i, o)
-    if asked.radiance:
-        through = through / (eta * eta)
-    value = value + through if drawn.passing else value + 0 * through
-    return value, density + pdf if drawn.passes else density
+        return ops.select(lit, value, 0.0), ops.select(lit, densities[0], 0.0)
+    return value / scale if asked.radiance else value, densities[0]
 
 
-def exchanged(of: Seen, back: Seen, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value]:
-    """Mean of what passes there and back, with all that goes straight through, and the density of samples."""
+def exchanged(of: Seen, back: Seen, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value, Value]:
+    """Mean of what passes there and back, with all that goes straight through, and the densities there and back."""
     i, o, i_back, o_back = upright(wi, wi), upright(wo, wi), upright(wi, wo), upright(wo, wo)
     assert of.passage and of.columns.passes and back.passage and back.columns.passes
     there, density = passed.eval_pdf(of.passage, replace(of.columns.passes, straight=1.0), i, o)
-    other, _ = passed.eval_pdf(back.passage, replace(back.columns.passes, straight=1.0), o_back, i_back)
+    other, returned = passed.eval_pdf(back.passage, replace(back.columns.passes, straight=1.0), o_back, i_back)
     cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
-    return 0.5 * (there + other * (cosines * eta * eta)), density
+    return 0.5 * (there + other * (cosines * eta * eta)), density, returned
 
 
 def _either(where: Value, a: Shape, b: Shape) -> Shape:

@@ -68,8 +68,8 @@ def make(mi: Any) -> type:
             shape, form = "pane" if self.transmits else "opaque", self.model.form
             if form == "forward" and self.model.recursion.has_gain:
                 form = "scaled"
-            elif self.body and getattr(self.body, "scaling", None) and shape == "opaque" and self.variance is Isotropic:
-                form = "balanced"
+            elif self.body and self.body.balanced:
+                form = "balanced" if shape == "opaque" and self.variance is Isotropic else "exchanged"
             declared = EXCEPTIONS[form, shape]
             # The albedo of a base is a sum over cosines, which hardly resolves a critical angle outside, and errs by up
             # to 2.5 % below several interfaces

@@ -86,13 +86,14 @@ class Stack(Record):
 
     def turned(self, degrees: float) -> Stack | None:
         """All layers turned, anticlockwise; None if no interface has axes, or one is turned by a texture."""
-        brushed = [each for each in self.interfaces if isinstance(each.alpha, tuple) and each.alpha[0] != each.alpha[1]]
-        if not brushed or not all(isinstance(each.rotation, (int, float)) for each in brushed):
-            return None
-        return self.with_layers(
-            each.model_copy(update={"rotation": each.rotation + degrees}) if each in brushed else each
-            for each in self.layers
-        )
+        layers: list[Layer] = []
+        for each in self.layers:
+            if isinstance(each, Interface) and isinstance(each.alpha, tuple) and each.alpha[0] != each.alpha[1]:
+                if not isinstance(each.rotation, int | float):
+                    return None
+                each = each.model_copy(update={"rotation": each.rotation + degrees})
+            layers.append(each)
+        return None if layers == list(self.layers) else self.with_layers(layers)
 
     # As a file holds it ----------------------------------------------------------------------------------------------
 
