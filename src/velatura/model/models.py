@@ -28,8 +28,8 @@ GAIN = frozenset({"energy", "white furnace"})  # laws that a gain breaks
 
 #: By form and shape of the stack, the laws that BSDFs do not keep. Light that a lobe sends below the surface is lost.
 #: The forward form is not reciprocal; `scaled` is that whose lobes are drawn with their full energy, which gains where
-#: light meets rough glass from inside. The symmetric form gains at grazing angles, and the weights of its samples have no
-#: bound; `balanced` is that of isotropic opaque stacks of uniform values by `velatura`, `exchanged` that of others.
+#: light meets rough glass from inside. The symmetric form gains at grazing angles, and its samples have any
+#: weight; `balanced` is that of isotropic opaque stacks of uniform values by `velatura`, `exchanged` that of others.
 EXCEPTIONS: dict[tuple[str, str], frozenset[str]] = {
     ("forward", "opaque"): frozenset({"lossless", "reciprocity"}),
     ("forward", "pane"): frozenset({"lossless", "reciprocity"}),

@@ -23,7 +23,7 @@ from velatura.model.transport.adding import parts
 from velatura.model.transport.energies import INCIDENCES, energies
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
-from velatura.sampling import directional_grid
+from velatura.sampling import directional_grid, low_discrepancy
 from velatura.stack import Material
 from velatura.tables import Tables
 
@@ -32,6 +32,7 @@ Array = NDArray[np.floating]
 COSINES = 48  # nodes, even in the root of the cosine
 AZIMUTHS = 12  # in half a turn, where interfaces are brushed
 COS_MIN = 1e-3
+EVENLY = 377  # directions over which the remainder is integrated
 VEIL_MIN = 1e-3  # energy of veils that are drawn
 EVEN = 0.2  # share of samples of the symmetric form that the remainder has at least, and of those that pass
 
@@ -266,8 +267,10 @@ def _columns(material: Material, model: Model, variance: type[Variance], grid: _
         np.broadcast_to(albedo[:, count:], (len(solved.rest), len(INCIDENCES))),
     )
     rest = full(solved.rest[:, :count])
-    numbers = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(polynomial).values()))
-    scale = np.clip(rest / np.maximum(full(numbers.albedo(cosine)), 1e-6), 0, 4)
+    numbers = Remainder(*(np.reshape(x, (-1, 1, 1)) for x in vars(polynomial).values()))
+    wo = remainder.sample(*low_discrepancy.square(EVENLY))
+    clipped = numbers.value((wi[0][:, None], wi[1][:, None], wi[2][:, None]), wo) / remainder.density(wo)
+    scale = np.clip(rest / np.maximum(full(clipped.mean(axis=-1)), 1e-6), 0, 4)
 
     # Chances of being sampled
     shares = [energy.mean(axis=0) * np.ones(count) for _, _, energy, _ in drawn]

@@ -221,7 +221,7 @@ def features(
         assert part.below is not None
         below = float(np.mean(part.below)) / n
         both = own_medium.integral(replace(lobe, facets=lambda c: fresnel.dielectric(c, below)), wi, COARSE)
-        reflected = both / let_out
+        reflected = both / np.maximum(let_out, 1e-9)
     brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(reflected * let_out * share, 1e-9))
     moved = max((coat.tensor.size * coat.contrast for coat in coats), key=np.max)
     axes = np.array([first.width(first.angle + turn) for turn in AXES])
