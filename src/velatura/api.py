@@ -20,6 +20,8 @@ __all__ = ["bsdf", "check", "lobes", "register", "render"]
 #: What `bsdf` makes that is no statistical model: plugins by the name that it goes by among the models.
 PLUGINS = {"reference": "layered_reference", "weidlich_wilkie": "weidlich_wilkie"}
 
+TURN = 37.0  # degrees, by which `check` turns brushed materials
+
 
 def register() -> None:
     """Register the plugins with Mitsuba, in the current variant and in all that are set later."""
@@ -144,16 +146,19 @@ def check(
     def made(thing: Any) -> Any:
         return bsdf(thing, model, **switches) if isinstance(thing, MaterialLike) else thing
 
-    subject = "BSDF"
+    subject, turned = "BSDF", None
     if isinstance(material, MaterialLike):
         material = load(material)
         subject = f"{material.name or 'material'} ({model if isinstance(model, str) else model.name})"
         lossless = lossless or all(layer.lossless for layer in material.layers)
+        if other := material.turned(TURN):
+            turned = made(other), TURN
     return checks.check(
         made(material),
         exceptions=exceptions,
         lossless=lossless,
         expected=made(expected),
+        turned=turned,
         plots=plots,
         subject=subject,
         progress=progress,

@@ -44,7 +44,7 @@ class Gridded(Protocol):
 
 
 class Unrolled:
-    """Loops of a dialect that has none of its own."""
+    """Loops of a dialect that has none of its own, and channels of one that interpolates numbers alone."""
 
     def each(self, function: Callable[..., Value], nodes: Sequence[float], values: Sequence[Value]) -> list[Value]:
         return [function(x, *values) for x in nodes]
@@ -53,6 +53,9 @@ class Unrolled:
         for _ in range(times):
             state = function(*state)
         return state
+
+    def channel(self, value: Value, k: int | None) -> Value:
+        return value
 
 
 class _Numpy(Unrolled):
@@ -111,6 +114,11 @@ class _DrJit(Unrolled):
 
     def _is_colour(self, x: Value) -> bool:
         return self._dr.is_array_v(x) and (self._dr.depth_v(x) > 1 or not self._dr.is_jit_v(x))
+
+    def channel(self, value: Value, k: int | None) -> Value:
+        if not self._is_colour(value):
+            return value
+        return self.mean(value) if k is None else value[k]
 
     def mean(self, x: Value) -> Value:
         if not self._is_colour(x):
@@ -260,6 +268,11 @@ def divide(a: Value, b: Value) -> Value:
 def mean(colour: Value) -> Value:
     """Mean over the channels."""
     return _dialect(colour).mean(colour)
+
+
+def channel(value: Value, k: int | None = None) -> Value:
+    """The k-th channel, or the mean, of what is interpolated, maybe at colours; a number is that of all channels."""
+    return _dialect(value).channel(value, k)
 
 
 def interpolate(table: Gridded, *coordinates: Value) -> list[Value]:

@@ -99,8 +99,8 @@ def in_numpy(case: Case, recording: Recording) -> Results:
     wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]
-    value, density = bsdf.eval_pdf(body, wi, wo)
-    drawn, _ = bsdf.sample(body, wi, *u)
+    value, density = body.eval_pdf(wi, wo)
+    drawn, _ = body.sample(wi, *u)
     count = len(density)
     return Results(
         np.array([np.broadcast_to(lobe.energy, (3, count)) for lobe in lobes]),

@@ -116,6 +116,23 @@ def metal(alpha: float | tuple[float, float]) -> Any:
     return mi.load_dict({"type": "roughconductor", "distribution": "ggx", "alpha_u": u, "alpha_v": v})
 
 
+class Turned(Through):
+    """Another BSDF, turned about the normal."""
+
+    def __init__(self, inner: Any, degrees: float) -> None:
+        super().__init__(inner)
+        self.angle = float(np.radians(-degrees))
+
+    def back(self, w: Any) -> Any:
+        c, s = dr.cos(self.angle), dr.sin(self.angle)
+        return mi.Vector3f(c * w.x - s * w.y, s * w.x + c * w.y, w.z)
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        turned = mi.SurfaceInteraction3f(si)
+        turned.wi = self.back(si.wi)
+        return self.inner.eval_pdf(ctx, turned, self.back(wo), active)
+
+
 # BSDFs that keep the laws
 
 
@@ -153,7 +170,9 @@ def test_mitsubas_principled_keeps_the_laws_of_energy() -> None:
 
 def test_a_white_surface_of_our_own_keeps_every_law() -> None:
     """Expected: what the broken ones below are made from is whole, and loses nothing."""
-    report = check(Made(), lossless=True, expected=mi.load_dict({"type": "diffuse", "reflectance": 1.0}))
+    report = check(
+        Made(), lossless=True, expected=mi.load_dict({"type": "diffuse", "reflectance": 1.0}), turned=(Made(), 30)
+    )
     assert report.passed and [finding.law for finding in report.findings] == [law.name for law in LAWS]
     assert report["white furnace"].value == pytest.approx(1, abs=1e-3)
     assert report["limit"].value < 1e-5
@@ -168,6 +187,14 @@ def test_the_furnace_is_a_number(rho: float) -> None:
 
 
 # BSDFs made to break them
+
+
+def upright(u: Any) -> Any:
+    """Directions near the normal, of density 5 cos^9 / pi."""
+    z, phi = u.x**0.1, dr.two_pi * u.y
+    sine = dr.safe_sqrt(1 - z * z)
+    return mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), z)
+
 
 BROKEN = {
     "no number at grazing angles": ("finite", lambda: Made(f=lambda wi, wo: dr.sqrt(wi.z - 1e-3) * dr.inv_pi)),
@@ -185,6 +212,10 @@ BROKEN = {
     "a narrow lobe, a little off": ("chi-square", lambda: Mismatched(metal(0.005), metal(0.0055))),
     "eval_pdf not eval": ("agreement", lambda: Made(eval_pdf=lambda ctx, si, wo, active: (0.98 * si.wi, wo.z))),
     "weight not eval over pdf": ("weights", lambda: Made(weight=lambda wi, wo: 1.5 * wo.z)),
+    "bright specks": (
+        "spread",
+        lambda: Made(drawn=lambda wi, u: upright(u), density=lambda wi, wo: 5 * dr.inv_pi * dr.maximum(wo.z, 0.0) ** 9),
+    ),
     "one-way": ("reciprocity", lambda: Made(f=lambda wi, wo: (1 - 0.1 * wi.z) * dr.inv_pi)),
 }
 
@@ -199,8 +230,16 @@ def test_what_is_broken_is_found(name: str) -> None:
 
 
 def test_every_law_is_broken_by_something() -> None:
-    """Expected: no law lacks its counter-example, here or in the two tests below."""
-    assert {law for law, _ in BROKEN.values()} | {"lossless", "limit"} == {law.name for law in LAWS}
+    """Expected: no law lacks its counter-example, here or in the three tests below."""
+    assert {law for law, _ in BROKEN.values()} | {"lossless", "turning", "limit"} == {law.name for law in LAWS}
+
+
+def test_layers_that_do_not_turn_as_they_should_are_found() -> None:
+    """Expected: a brushed metal that was turned by 30 degrees is that one, and none that was not turned."""
+    brushed = metal((0.1, 0.3))
+    assert check(brushed, turned=(Turned(brushed, 30), 30)).passed
+    assert check(brushed, turned=(brushed, 30)).broken == ("turning",)
+    assert check(brushed, turned=(Turned(brushed, 25), 30)).broken == ("turning",)
 
 
 def test_loss_is_found_where_nothing_absorbs() -> None:

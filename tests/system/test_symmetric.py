@@ -130,8 +130,8 @@ def test_the_plugin_is_the_model_that_numpy_runs(name: str) -> None:
     z, phi = rng.uniform(0.05, 1, n), rng.uniform(0, 2 * np.pi, n)
     z = z * np.where(rng.random(n) < 0.5 * stack.transmits, -1, 1)
     wi = (np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z)
-    wo, _ = bsdf.sample(body, wi, *rng.random((3, n)))
-    value, pdf = bsdf.eval_pdf(body, wi, wo)
+    wo, _ = body.sample(wi, *rng.random((3, n)))
+    value, pdf = body.eval_pdf(wi, wo)
     si = mi.SurfaceInteraction3f()
     si.wi = mi.Vector3f(*wi)
     found, found_pdf = vt.bsdf(stack, model="belcour2018", form="symmetric").eval_pdf(

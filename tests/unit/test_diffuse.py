@@ -23,7 +23,7 @@ SHIPPED = tables.load()
 COSINES = np.array([1.0, 0.7, 0.4, 0.2])
 
 
-def prepared(stack: vt.Stack, model: str = "velatura", **switches: str) -> bsdf.Body:
+def prepared(stack: vt.Stack, model: str = "velatura", **switches: str) -> bsdf.Lobed:
     return bsdf.body(Material.of(stack), named(model, **switches))
 
 

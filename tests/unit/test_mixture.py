@@ -33,7 +33,7 @@ STACKS = {
 }
 
 
-def body_of(stack: vt.Stack, model: str = "belcour2018", **switches: str) -> bsdf.Body:
+def body_of(stack: vt.Stack, model: str = "belcour2018", **switches: str) -> bsdf.Lobed:
     return bsdf.body(Material.of(stack), named(model, **switches))
 
 
@@ -44,13 +44,13 @@ def directions(n: int, both: bool, seed: int) -> tuple[Array, Array, Array]:
     return r * np.cos(phi), r * np.sin(phi), z
 
 
-def one_way(body: bsdf.Body) -> float:
+def one_way(body: bsdf.Lobed) -> float:
     """The largest relative difference of f(wi, wo) / n_o^2 and f(wo, wi) / n_i^2, where it is not negligible."""
     both = body.below is not None
     wi, wo = directions(2000, both, 1), directions(2000, both, 2)
     adjoint = bsdf.Asked(radiance=False)
-    there = bsdf.eval_pdf(body, wi, wo, adjoint)[0] / np.abs(wo[2])
-    back = bsdf.eval_pdf(body, wo, wi, adjoint)[0] / np.abs(wi[2])
+    there = body.eval_pdf(wi, wo, adjoint)[0] / np.abs(wo[2])
+    back = body.eval_pdf(wo, wi, adjoint)[0] / np.abs(wi[2])
     squared = [np.where(w[2] > 0, 1.0, body.eta * body.eta) for w in (wi, wo)]
     there, back = there / squared[1], back / squared[0]
     scale = np.maximum(np.maximum(there, back), 1e-9)
@@ -69,7 +69,7 @@ def test_both_forms_agree_where_the_normal_is_halfway() -> None:
     """In value; the density is not the same, since the symmetric form always samples either way (`LEAST`)."""
     body, other = (body_of(BRUSHED_PANE, form=form) for form in ("forward", "symmetric"))
     x, y, z = directions(200, True, 3)
-    mirror = bsdf.eval_pdf(body, (x, y, z), (-x, -y, z)), bsdf.eval_pdf(other, (x, y, z), (-x, -y, z))
+    mirror = body.eval_pdf((x, y, z), (-x, -y, z)), other.eval_pdf((x, y, z), (-x, -y, z))
     (forward, _), (symmetric, _) = mirror
     np.testing.assert_allclose(forward, symmetric, rtol=1e-7)
 
@@ -81,10 +81,10 @@ def test_the_symmetric_form_of_velatura_keeps_the_energy_of_a_furnace() -> None:
     n = 2**15
     for cos_theta in (1.0, 0.5, 0.1):
         wi = (np.full(n, np.sqrt(1 - cos_theta**2)), np.zeros(n), np.full(n, cos_theta))
-        wo, _ = bsdf.sample(body, wi, *qmc.Sobol(3, seed=8).random(n).T)
+        wo, _ = body.sample(wi, *qmc.Sobol(3, seed=8).random(n).T)
 
-        def albedo(some: bsdf.Body, wi: tuple[Array, Array, Array] = wi, wo: Any = wo) -> float:
-            value, pdf = bsdf.eval_pdf(some, wi, wo)
+        def albedo(some: bsdf.Lobed, wi: tuple[Array, Array, Array] = wi, wo: Any = wo) -> float:
+            value, pdf = some.eval_pdf(wi, wo)
             return float(np.mean(value / np.where(pdf > 0, pdf, 1)))
 
         assert albedo(body) == pytest.approx(1, abs=5e-3)
@@ -108,8 +108,8 @@ def test_a_nearly_smooth_interface_has_the_energies_of_fresnel(cos_theta: float,
     body = body_of(vt.Stack([vt.Interface(eta=1.5, alpha=0.002)]), form=form, reflectance="fresnel")
     rng, n = np.random.default_rng(4), 20_000
     wi = (np.full(n, np.sqrt(1 - cos_theta**2)), np.zeros(n), np.full(n, cos_theta))
-    wo, eta = bsdf.sample(body, wi, *rng.random((3, n)))
-    value, pdf = bsdf.eval_pdf(body, wi, wo)
+    wo, eta = body.sample(wi, *rng.random((3, n)))
+    value, pdf = body.eval_pdf(wi, wo)
     weight = np.where(pdf > 0, value / np.where(pdf > 0, pdf, 1), 0)[0] * eta**2
     through = wo[2] * cos_theta < 0
     n12 = 1.5 if cos_theta > 0 else 1 / 1.5
@@ -130,7 +130,7 @@ def test_a_pane_lets_light_out_as_it_came_in() -> None:
     assert thin.eta == pane.eta == 1
     wi, wo = directions(500, True, 5), directions(500, True, 6)
     upside_down = [(w[0], w[1], -w[2]) for w in (wi, wo)]
-    for a, b, c in zip(*(bsdf.eval_pdf(*x) for x in ((thin, wi, wo), (pane, wi, wo), (pane, *upside_down)))):
+    for a, b, c in zip(thin.eval_pdf(wi, wo), pane.eval_pdf(wi, wo), pane.eval_pdf(*upside_down)):
         np.testing.assert_allclose(a, b, rtol=1e-12)
         np.testing.assert_allclose(a, c, rtol=1e-9)
 
@@ -139,9 +139,9 @@ def test_what_is_not_asked_for_is_dark() -> None:
     body = body_of(BRUSHED_PANE)
     wi, wo = directions(500, True, 7), directions(500, True, 8)
     through = wi[2] * wo[2] < 0
-    value, pdf = bsdf.eval_pdf(body, wi, wo)
+    value, pdf = body.eval_pdf(wi, wo)
     for asked, lit in ((bsdf.Asked(transmission=False), ~through), (bsdf.Asked(reflection=False), through)):
-        part, density = bsdf.eval_pdf(body, wi, wo, asked)
+        part, density = body.eval_pdf(wi, wo, asked)
         np.testing.assert_allclose(part, value * lit)
         assert np.all(density[~lit] == 0) and np.all(density[lit] >= pdf[lit])
 

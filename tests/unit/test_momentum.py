@@ -111,7 +111,7 @@ def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
     body = bsdf.body(Material.of(stack), named("velatura", reflectance="fgd"))
     rng = np.random.default_rng(0)
     wi, wo = (w / np.linalg.norm(w, axis=0) for w in abs(rng.normal(size=(2, 3, 200))))
-    value, _ = bsdf.eval_pdf(body, tuple(wi), tuple(wo))
+    value, _ = body.eval_pdf(tuple(wi), tuple(wo))
     h = ggx.normalize(tuple(wi + wo))
     i, o, m = (ggx.rotate(tuple(w), np.radians(20)) for w in (wi, wo, h))
     f = fresnel.conductor(ggx.dot(tuple(wi), h), *(np.array(GOLD[part])[:, None] for part in ("eta", "k")))

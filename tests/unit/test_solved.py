@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from velatura import load, tables
-from velatura.model import named, solved
+from velatura.model import named, solution
+from velatura.model.bsdf import Asked
 from velatura.model.context import Context
 from velatura.model.prepare import variance_kind
 from velatura.model.solved import Solved
@@ -18,11 +19,12 @@ BRUSHED = ("coated-gold",)
 COSINES = (1.0, 0.7, 0.35)
 SAMPLES = 1 << 13
 HEAVIEST = 4.0  # sample
+POWER = Asked(radiance=False)
 
 
 def body(stack: MaterialLike) -> tuple[Material, Solved]:
     material = Material.of(load(stack)).solid()
-    return material, solved.solve(material, named("velatura"), variance_kind(material), Context())
+    return material, solution.solve(material, named("velatura"), variance_kind(material), Context())
 
 
 def uniform(seed: int) -> list[np.ndarray]:
@@ -40,8 +42,8 @@ def test_samples_carry_the_energies_of_the_stack(preset: str) -> None:
     material, found = body(preset)
     for i, cosine in enumerate(COSINES):
         wi = from_cosine(cosine)
-        wo, _ = solved.sample(found, wi, *uniform(i))
-        value, density = solved.eval_pdf(found, wi, wo, radiance=False)
+        wo, _ = found.sample(wi, *uniform(i))
+        value, density = found.eval_pdf(wi, wo, POWER)
         weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
         true = energies(material, np.array([cosine]), np.array([0.4]), tables.load(), nearly_straight)
         back = (true.lobes + true.veils).sum(axis=0) + true.rest
@@ -60,15 +62,15 @@ def test_densities_integrate_to_one_at_most(base: Interface) -> None:
     sine = np.sqrt(1 - z * z)
     wo = sine * np.cos(2 * np.pi * v), sine * np.sin(2 * np.pi * v), z
     for cosine in (0.7, 0.35):
-        _, density = solved.eval_pdf(found, from_cosine(cosine), wo, radiance=False)
+        _, density = found.eval_pdf(from_cosine(cosine), wo, POWER)
         total, error = 4 * np.pi * density.mean(), 4 * np.pi * density.std() / np.sqrt(SAMPLES)
         assert 0.7 - 4.5 * error < total < 1 + 4.5 * error
 
 
 def test_light_from_below_sees_the_material_turned_over() -> None:
     material, found = body("frosted-glass")
-    turned = solved.solve(material.reversed(), named("velatura"), variance_kind(material), Context())
+    turned = solution.solve(material.reversed(), named("velatura"), variance_kind(material), Context())
     i, o = from_cosine(0.6), from_cosine(0.5, 2.0)
-    below = solved.eval_pdf(found, (i[0], i[1], -i[2]), (o[0], o[1], -o[2]), radiance=False)
-    above = solved.eval_pdf(turned, i, o, radiance=False)
+    below = found.eval_pdf((i[0], i[1], -i[2]), (o[0], o[1], -o[2]), POWER)
+    above = turned.eval_pdf(i, o, POWER)
     assert below[0] == pytest.approx(above[0], rel=1e-9) and below[1] == pytest.approx(above[1], rel=1e-9)

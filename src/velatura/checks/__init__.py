@@ -26,6 +26,7 @@ def check(
     exceptions: Collection[str] = (),
     lossless: bool = False,
     expected: Any = None,
+    turned: tuple[Any, float] | None = None,
     uv: tuple[float, float] = (0.5, 0.5),
     seed: int = 0,
     plots: str | Path | None = None,
@@ -40,6 +41,7 @@ def check(
             has one: these give numbers, and no failure.
         lossless: it absorbs nothing, so that loss breaks a law as well as gain does.
         expected: the BSDF that this one should equal, if it is the limit of something.
+        turned: the BSDF whose layers are those of this one, turned by an angle (degrees, anticlockwise).
         uv: where on its textures it is looked at.
         seed: of the random numbers; the same seed gives the same report, except for rounding.
         plots: a folder; every law that is broken leaves `LAW.png` there.
@@ -57,7 +59,8 @@ def check(
 
     # Gather evidence once, and let every law judge it
     other = None if expected is None else Probe(expected, uv)
-    evidence = gather(Probe(bsdf, uv), other, lossless, seed, progress)
+    also = None if turned is None else (Probe(turned[0], uv), turned[1])
+    evidence = gather(Probe(bsdf, uv), other, also, lossless, seed, progress)
     alarm = 1 - (1 - FALSE_ALARMS) ** (1 / len(LAWS))
     judged = (law.judge(evidence, alarm) for law in LAWS)
     report = Report(tuple(replace(found, declared=found.law in declared) for found in judged if found), FALSE_ALARMS)

@@ -14,6 +14,7 @@ COSINES = (0.98, 0.8, 0.55, 0.3, 0.1)  # of incidence
 SAMPLES = 2**16  # at each of them
 PILOT = SAMPLES // 4  # samples that only shape the grid
 PAIRS = 2**14
+TURNED = (1.0, 1.0, 0.999, 0.8, 0.3)  # cosines of incidence, where layers are turned
 EXTREMES = (1.0, 0.999, 0.1, 1e-2, 1e-4, 1e-6)  # cosines where formulas break
 
 Progress = Callable[[int, int], None]
@@ -89,6 +90,16 @@ class Extremes:
 
 
 @dataclass(frozen=True)
+class Turned:
+    """Light (n, channels) from directions wi (n, 3), times solid angle, and that of the BSDF whose layers are turned,
+    for directions that are turned with them."""
+
+    wi: Array
+    light: Array
+    turned: Array
+
+
+@dataclass(frozen=True)
 class Evidence:
     """All evidence of the laws; `asked` counts the values, and `wrong` holds those that are not finite or negative."""
 
@@ -102,10 +113,16 @@ class Evidence:
     pairs: Pairs
     extremes: Extremes
     expected: Drawn | None
+    turned: Turned | None
 
 
 def gather(
-    probe: Probe, expected: Probe | None, lossless: bool, seed: int, progress: Progress | None = None
+    probe: Probe,
+    expected: Probe | None,
+    turned: tuple[Probe, float] | None,
+    lossless: bool,
+    seed: int,
+    progress: Progress | None = None,
 ) -> Evidence:
     """Query a BSDF, and the one that it should equal if there is one, for all evidence of the laws."""
     rng = np.random.default_rng(seed)
@@ -127,7 +144,8 @@ def gather(
     extremes = _extremes(probe, rng)
     report(3, STEPS)
 
-    # Ask the other one
+    # Ask the other ones
+    by_turning = _turn(probe, *turned, rng) if turned else None
     other = _draw(expected, wi, u) if expected else None
     report(4, STEPS)
     return Evidence(
@@ -141,6 +159,7 @@ def gather(
         pairs,
         extremes,
         other,
+        by_turning,
     )
 
 
@@ -243,6 +262,20 @@ def _extremes(probe: Probe, rng: np.random.Generator) -> Extremes:
     sampled = np.repeat(_directions(heights, np.zeros(len(heights))), 64, axis=0)
     samples = probe.sample(sampled, rng.random((len(sampled), 3), dtype=np.float32))
     return Extremes(wi, wo, probe.eval_pdf(wi, wo), sampled, samples)
+
+
+def _turn(probe: Probe, other: Probe, degrees: float, rng: np.random.Generator) -> Turned:
+    each = PAIRS // len(TURNED)
+    wi = np.repeat([_direction(cos, 2.4 * k) for k, cos in enumerate(TURNED)], each, axis=0)
+    samples = probe.sample(wi, rng.random((len(wi), 3), dtype=np.float32))
+    # Half go evenly, for what the samples miss
+    evenly = _directions(rng.random(len(wi)), rng.random(len(wi)))
+    wo = np.where((rng.random(len(wi)) < 0.5)[:, None], samples.wo, evenly)
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    matrix = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    here, there = probe.eval_pdf(wi, wo), other.eval_pdf(wi @ matrix.T, wo @ matrix.T)
+    density = (0.5 * here.pdf + 0.25 / np.pi)[:, None] * each
+    return Turned(wi, here.value / density, there.value / density)
 
 
 def _direction(cos_theta: float, phi: float) -> Array:

@@ -23,6 +23,8 @@ DARK = 1e-8  # light between two directions that rounding makes
 ONE_WAY = 1e-2  # relative error of reciprocity, weighted by the light
 CHANGE = 5e-3  # of energy, between a BSDF and the one that it should equal
 BLURRED = 2e-3  # relative standard error of the integral of a pdf that the cells do not resolve
+HEAVY = 3.0  # weight of a sample
+SHIFT = 2e-2  # of the light, where layers are turned
 CROWD = 10.0  # samples expected in a cell of a chi-square test, else it is pooled with others
 
 
@@ -212,6 +214,18 @@ def weights(evidence: Evidence, alarm: float) -> Finding:
     return _count_off("weights", drawn, {"weight times density and eval": _any(_differ(value, drawn.asked.value))})
 
 
+def spread(evidence: Evidence, alarm: float) -> Finding:
+    """Find the largest weight of a sample, as energy."""
+    drawn = evidence.drawn
+    heaviest = drawn.energy.max(axis=2)
+    at = _worst(heaviest)
+    usual = np.quantile(heaviest, 0.999)
+    detail = f"of {heaviest.size} samples, 999 of 1000 below {usual:.3g}; heaviest {_at(drawn.wi[at[0]])}"
+    data = {"cosine of incidence": drawn.wi[:, 2], "largest weight": heaviest.max(axis=1)}
+    value = float(heaviest[at])
+    return Finding("spread", value <= HEAVY, value, HEAVY, detail, data)
+
+
 def _count_off(law: str, drawn: Drawn, off: dict[str, Array]) -> Finding:
     looked_at = drawn.arrived & ~drawn.delta
     count = looked_at.sum()
@@ -275,6 +289,22 @@ def limit(evidence: Evidence, alarm: float) -> Finding | None:
     return Finding("limit", smooth <= CHANGE and _within(shift, allowed), value, bound, detail, data)
 
 
+def turning(evidence: Evidence, alarm: float) -> Finding | None:
+    """Compare with the BSDF whose layers are turned, if there is one: light that goes elsewhere."""
+    if evidence.turned is None:
+        return None
+    found = evidence.turned
+    cosines, place = np.unique(found.wi[:, 2], return_inverse=True)
+    change = np.abs(found.light - found.turned).mean(axis=1)
+    elsewhere = np.bincount(place, change)
+    light = np.bincount(place, found.light.mean(axis=1))
+    share = elsewhere / np.maximum(light, DARK)
+    at = _worst(share)
+    data = {"cosine of incidence": cosines, "share that goes elsewhere": share}
+    detail = f"share of light that goes elsewhere, most at cosine {cosines[at]:.3g}"
+    return Finding("turning", bool(share[at] <= SHIFT), float(share[at]), SHIFT, detail, data)
+
+
 def _flow(drawn: Drawn) -> Array:
     """Energy of smooth components, and its flow along x, y, z: (D, N, 4 channels)."""
     energy = drawn.energy * drawn.delta[..., None]
@@ -299,7 +329,9 @@ LAWS: tuple[Law, ...] = (
     Law("chi-square", "Samples fall where the pdf says.", chi_square),
     Law("agreement", "`sample`, `pdf`, `eval` and `eval_pdf` agree about every direction.", agreement),
     Law("weights", "The weight of a sample is its value over its density.", weights),
+    Law("spread", "No sample carries more than three times the light that arrives.", spread),
     Law("reciprocity", "f(wi, wo) is f(wo, wi), with the squared index on either side.", reciprocity),
+    Law("turning", "Where all layers are turned, light turns with them, at the normal too.", turning),
     Law("limit", "In a limiting case the BSDF equals the one that is expected.", limit),
 )
 

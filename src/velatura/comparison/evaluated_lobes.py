@@ -53,7 +53,7 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     return Account(reflected, transmitted, grids.sum(axis=(2, 3)), grids)
 
 
-def _column(body: bsdf.Body, incident: Array) -> tuple[list[WalkedLobe], Array]:
+def _column(body: bsdf.Lobed, incident: Array) -> tuple[list[WalkedLobe], Array]:
     """The lobes of one direction, and the distribution (3, bins, bins) of reflected light."""
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
@@ -71,7 +71,7 @@ def _column(body: bsdf.Body, incident: Array) -> tuple[list[WalkedLobe], Array]:
     return lobes, np.sum([distribution(light) for light in lights], axis=0)
 
 
-def _sampled(body: bsdf.Body, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> Light:
+def _sampled(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> Light:
     """A lobe as it is evaluated; one that is smooth, in its one direction.
 
     `place` is its place among the lobes that the symmetric form evaluates, None for a lobe that it does not.
@@ -86,13 +86,13 @@ def _sampled(body: bsdf.Body, lobe: adding.Lobe, wi: Direction, place: int | Non
     return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo, [lit]))
 
 
-def _sampled_below(body: bsdf.Body, lobe: adding.Lobe, wi: Direction) -> Light:
+def _sampled_below(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction) -> Light:
     """The transmitted lobe as it is evaluated, as energy."""
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
         return Light(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
     asked = bsdf.Asked(reflection=False, radiance=False)
-    wo, _ = bsdf.sample(body, wi, 0.0, *square(LIT_SAMPLES), asked)
-    return _light(wo, *bsdf.eval_pdf(body, wi, wo, asked))
+    wo, _ = body.sample(wi, 0.0, *square(LIT_SAMPLES), asked)
+    return _light(wo, *body.eval_pdf(wi, wo, asked))
 
 
 def _light(wo: Direction, value: Array, density: Array) -> Light:

@@ -117,11 +117,11 @@ def table_of(stack: MaterialLike, directions: Directions, model: str | Model) ->
     return ReflectanceTable(directions, np.broadcast_to(value, (3, len(directions.theta_i))))
 
 
-def radiance(seen: bsdf.Body, directions: Directions) -> Value:
+def radiance(seen: bsdf.Lobed, directions: Directions) -> Value:
     """f(wi, wo) cos theta_o of a stack that is prepared: colours, over directions on the last axis."""
     wi, wo = tuple(directions.wi), tuple(directions.wo)
     if seen.above.model.form == "symmetric":
-        return bsdf.eval_pdf(seen, wi, wo, bsdf.Asked(transmission=False))[0]
+        return seen.eval_pdf(wi, wo, bsdf.Asked(transmission=False))[0]
     # The lobes depend on wi alone, which many pairs have in common
     lit = bsdf.scattered(seen, tuple(directions.lit))
     reflected, base = take((tuple(lit.reflected), lit.base), directions.which, directions.lit.shape[-1])

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 from velatura import ops
 from velatura.model import energy_balance, mixture, precomputed_lobes
@@ -34,7 +35,51 @@ ROUNDING = 1e-6  # share of samples that reflection gets at least: less than tha
 
 
 @dataclass(frozen=True)
-class Body:
+class Asked:
+    """The query to a BSDF: reflection, transmission or both; of radiance, which scales with the squared index, or not.
+
+    `reflection` may also be given for every reflected lobe, and then for the diffuse base.
+    """
+
+    reflection: bool | Sequence[bool] = True
+    transmission: bool = True
+    radiance: bool = True
+
+    def lobes(self, lobes: Sequence[Lobe]) -> Sequence[Lobe]:
+        """The queried reflected lobes."""
+        return [lobe for k, lobe in enumerate(lobes) if self.reflects(k)]
+
+    def reflects(self, k: int) -> bool:
+        """Whether the k-th reflected part is queried: a lobe, from the top, or after all lobes the base."""
+        if isinstance(self.reflection, bool):
+            return self.reflection
+        return k < len(self.reflection) and self.reflection[k]
+
+
+class Body(Protocol):
+    """A material as light meets it, from either side.
+
+    `diffuse` says whether a diffuse part comes after the lobes, among what is reflected; `balanced`, whether its
+    symmetric form conserves energy.
+    """
+
+    @property
+    def diffuse(self) -> bool: ...
+
+    @property
+    def balanced(self) -> bool: ...
+
+    def albedo(self, wi: Direction) -> Value: ...
+
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ...) -> tuple[Value, Value]: ...
+
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ...) -> tuple[Direction, Value]: ...
+
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = ...) -> Value: ...
+
+
+@dataclass(frozen=True)
+class Lobed:
     """A stack prepared from above and, where it transmits, from below (else None).
 
     `eta` is the index below over the index above, one for all colours; 1 where nothing is transmitted. `lobes_above`
@@ -57,6 +102,97 @@ class Body:
     def base(self, w: Direction) -> Base | None:
         """The diffuse base for a direction above; None without one."""
         return self.base_above(w) if self.base_above else under(self.above, w)
+
+    @property
+    def diffuse(self) -> bool:
+        """Whether a diffuse base is the last reflected part."""
+        return self.above.base is not None
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the symmetric form conserves energy."""
+        return self.scaling is not None
+
+    def albedo(self, wi: Direction) -> Value:
+        """Energy of all parts, a colour."""
+        return scattered(self, wi).albedo
+
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
+        """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; 0 from below an opaque stack."""
+        seen, i, o = scattered(self, wi).only(asked), upright(wi, wi), upright(wo, wi)
+        symmetric = self.above.model.form == "symmetric"
+        reflected, passed = exchangeable(self, wi, wo) if symmetric else (seen.reflected, seen.transmitted)
+        if symmetric:
+            reflected = asked.lobes(reflected)
+
+        # Reflect
+        value, density = mixture.eval_pdf(seen.reflected, seen.base, i, o, reflected, self.even)
+        if self.below is None:
+            lit = wi[2] > 0
+            return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
+        if seen.transmitted is None or passed is None:
+            return value, density
+
+        # Transmit, as a reflection in the medium beyond; radiance is squeezed into the cone there
+        i_beyond, o_beyond = _beyond(self, i, seen.eta), _down(o)
+        through, density_through = mixture.eval_pdf([seen.transmitted], None, i_beyond, o_beyond, even=self.even)
+        if symmetric:
+            # In the medium below, for light in either direction
+            i_below, o_below = _pair_below(self, wi, wo)
+            through, _ = mixture.eval_pdf([passed], None, i_below, o_below)
+            through = through * ops.divide(o_beyond[2], o_below[2])
+            through = through * ops.select(wi[2] > 0, 1.0, seen.eta * seen.eta)
+        if asked.radiance:
+            through = through / (seen.eta * seen.eta)
+
+        # Choose the side
+        share, passes = seen.share(_least(self)), o[2] < 0
+        value = ops.select(passes, through, value)
+        return value, ops.select(passes, share * density_through, (1 - share) * density)
+
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = Asked()) -> tuple[Direction, Value]:
+        """A direction wo from uniform numbers, and the index on its side over that on the side of wi.
+
+        Where light cannot go the way that is drawn, `eval_pdf` is 0.
+        """
+        seen, i = scattered(self, wi).only(asked), upright(wi, wi)
+        if self.below is None:
+            return mixture.sample(seen.reflected, seen.base, i, u, u1, u2, self.even), 1.0
+        passes, u = _way(seen, u, _least(self))
+        o = mixture.sample(seen.reflected, seen.base, i, u, u1, u2, self.even)
+        if seen.transmitted is None:
+            return upright(o, wi), 1.0
+        beyond = _down(mixture.sample([seen.transmitted], None, _beyond(self, i, seen.eta), u, u1, u2, self.even))
+        x, y, z = chosen_direction(passes, beyond, o)
+        # Clamp samples that end up in the wrong hemisphere
+        z = ops.select(passes, ops.minimum(z, 0.0), ops.maximum(z, 0.0))
+        return upright((x, y, z), wi), ops.select(passes, seen.eta, 1.0)
+
+    def sample_smooth(self, wi: Direction, u: Value, asked: Asked = Asked()) -> tuple[Direction, Value, Value, Value]:
+        """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
+        seen, i = scattered(self, wi).only(asked), upright(wi, wi)
+        share = seen.share()
+        reflected = sum(lobe.energy for lobe in seen.reflected)
+        if seen.transmitted is None:
+            lit = (wi[2] > 0) | (self.below is not None)
+            return (-wi[0], -wi[1], wi[2]), 1.0, ops.select(lit, 1.0 if seen.reflected else 0.0, 0.0), reflected
+        passes = u < share
+        x, y, z = refracted(i, seen.eta)
+        o = chosen_direction(passes, (-x, -y, -z), (-i[0], -i[1], i[2]))
+        through = seen.transmitted.energy / (seen.eta * seen.eta) if asked.radiance else seen.transmitted.energy
+        probability = ops.select(passes, share, 1 - share)
+        weight = ops.divide(ops.select(passes, through, reflected), probability)
+        return upright(o, wi), ops.select(passes, seen.eta, 1.0), probability, weight
+
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
+        """Number of the part that `sample` draws from, or `sample_smooth`: of all reflected lobes, from the top, then
+        of the diffuse base or the transmitted lobe."""
+        every = scattered(self, wi)
+        seen, count = every.only(asked), len(every.reflected)
+        least, even = (0.0, 0.0) if smooth else (_least(self), self.even)
+        passes, u = _way(seen, u, least)
+        numbers = [float(k) for k in range(count + (every.base is not None)) if asked.reflects(k)]
+        return ops.select(passes, float(count), mixture.picked(seen.reflected, seen.base, u, numbers, even))
 
 
 @dataclass(frozen=True)
@@ -96,29 +232,9 @@ class Scattered:
         return ops.clip(share, least, 1 - max(least, ROUNDING))
 
 
-@dataclass(frozen=True)
-class Asked:
-    """The query to a BSDF: reflection, transmission or both; of radiance, which scales with the squared index, or not.
-
-    `reflection` may also be given for every reflected lobe, and then for the diffuse base.
-    """
-
-    reflection: bool | Sequence[bool] = True
-    transmission: bool = True
-    radiance: bool = True
-
-    def lobes(self, lobes: Sequence[Lobe]) -> Sequence[Lobe]:
-        """The queried reflected lobes."""
-        return [lobe for k, lobe in enumerate(lobes) if self.reflects(k)]
-
-    def reflects(self, k: int) -> bool:
-        """Whether the k-th reflected part is queried: a lobe, from the top, or after all lobes the base."""
-        return self.reflection if isinstance(self.reflection, bool) else self.reflection[k]
-
-
 def body(
     material: Material, model: Model, variance: type[Variance] | None = None, context: Context | None = None
-) -> Body:
+) -> Lobed:
     """Constants of a stack for both of its sides; arguments as `prepare`."""
     context = context or Context()
     material, variance = material.solid(), variance or variance_kind(material)
@@ -133,16 +249,16 @@ def body(
     above = with_means(prepare(material, model, variance, context), context.settle)
     if not material.transmits:
         from_above = lobes(above)
-        opaque = Body(above, None, 1.0, from_above, from_above)
+        opaque = Lobed(above, None, 1.0, from_above, from_above)
         return replace(balanced(opaque, context) if material.interfaces else opaque, even=even)
     below = prepare(material.reversed(), model, variance, context)
     eta = ops.mean(material.below) / ops.mean(material.exterior)
-    return replace(balanced(Body(above, below, eta, lobes(above), lobes(below)), context), even=even)
+    return replace(balanced(Lobed(above, below, eta, lobes(above), lobes(below)), context), even=even)
 
 
-def scattered(stack: Body, wi: Direction) -> Scattered:
+def scattered(stack: Lobed, wi: Direction) -> Scattered:
     """The lobes for light from wi, which may come from below only if the stack transmits."""
-    turned = _upright(wi, wi)
+    turned = upright(wi, wi)
     reflected, passed = stack.lobes_above(turned)
     if stack.below is None:
         return Scattered(reflected, stack.base(turned), None, 1.0)
@@ -151,94 +267,9 @@ def scattered(stack: Body, wi: Direction) -> Scattered:
     assert passed is not None and passed_below is not None
     eta = ops.select(from_above, stack.eta, 1 / stack.eta)
     through = _chosen(from_above, passed, passed_below)
-    through = replace(through, energy=ops.select(_refracted(turned, eta)[2] > 0, through.energy, 0.0))
+    through = replace(through, energy=ops.select(refracted(turned, eta)[2] > 0, through.energy, 0.0))
     reflected = [_chosen(from_above, a, b) for a, b in zip(reflected, reflected_below)]
     return Scattered(reflected, None, through, eta)
-
-
-def eval_pdf(stack: Body, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
-    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; 0 from below an opaque stack."""
-    seen, i, o = scattered(stack, wi).only(asked), _upright(wi, wi), _upright(wo, wi)
-    symmetric = stack.above.model.form == "symmetric"
-    reflected, passed = exchangeable(stack, wi, wo) if symmetric else (seen.reflected, seen.transmitted)
-    if symmetric:
-        reflected = asked.lobes(reflected)
-
-    # Reflect
-    value, density = mixture.eval_pdf(seen.reflected, seen.base, i, o, reflected, stack.even)
-    if stack.below is None:
-        lit = wi[2] > 0
-        return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
-    if seen.transmitted is None or passed is None:
-        return value, density
-
-    # Transmit, as a reflection in the medium beyond; radiance is squeezed into the cone there
-    i_beyond, o_beyond = _beyond(stack, i, seen.eta), _down(o)
-    through, density_through = mixture.eval_pdf([seen.transmitted], None, i_beyond, o_beyond, even=stack.even)
-    if symmetric:
-        # In the medium below, for light in either direction
-        i_below, o_below = _pair_below(stack, wi, wo)
-        through, _ = mixture.eval_pdf([passed], None, i_below, o_below)
-        through = through * ops.divide(o_beyond[2], o_below[2])
-        through = through * ops.select(wi[2] > 0, 1.0, seen.eta * seen.eta)
-    if asked.radiance:
-        through = through / (seen.eta * seen.eta)
-
-    # Choose the side
-    share, passes = seen.share(_least(stack)), o[2] < 0
-    value = ops.select(passes, through, value)
-    return value, ops.select(passes, share * density_through, (1 - share) * density)
-
-
-def sample(
-    stack: Body, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = Asked()
-) -> tuple[Direction, Value]:
-    """A direction wo from uniform numbers, and the index on its side over that on the side of wi.
-
-    Where light cannot go the way that is drawn, `eval_pdf` is 0.
-    """
-    seen, i = scattered(stack, wi).only(asked), _upright(wi, wi)
-    if stack.below is None:
-        return mixture.sample(seen.reflected, seen.base, i, u, u1, u2, stack.even), 1.0
-    passes, u = _way(seen, u, _least(stack))
-    o = mixture.sample(seen.reflected, seen.base, i, u, u1, u2, stack.even)
-    if seen.transmitted is None:
-        return _upright(o, wi), 1.0
-    beyond = _down(mixture.sample([seen.transmitted], None, _beyond(stack, i, seen.eta), u, u1, u2, stack.even))
-    x, y, z = _chosen_direction(passes, beyond, o)
-    # Clamp samples that end up in the wrong hemisphere
-    z = ops.select(passes, ops.minimum(z, 0.0), ops.maximum(z, 0.0))
-    return _upright((x, y, z), wi), ops.select(passes, seen.eta, 1.0)
-
-
-def sample_smooth(
-    stack: Body, wi: Direction, u: Value, asked: Asked = Asked()
-) -> tuple[Direction, Value, Value, Value]:
-    """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
-    seen, i = scattered(stack, wi).only(asked), _upright(wi, wi)
-    share = seen.share()
-    reflected = sum(lobe.energy for lobe in seen.reflected)
-    if seen.transmitted is None:
-        lit = (wi[2] > 0) | (stack.below is not None)
-        return (-wi[0], -wi[1], wi[2]), 1.0, ops.select(lit, 1.0 if seen.reflected else 0.0, 0.0), reflected
-    passes = u < share
-    x, y, z = _refracted(i, seen.eta)
-    o = _chosen_direction(passes, (-x, -y, -z), (-i[0], -i[1], i[2]))
-    through = seen.transmitted.energy / (seen.eta * seen.eta) if asked.radiance else seen.transmitted.energy
-    probability = ops.select(passes, share, 1 - share)
-    weight = ops.divide(ops.select(passes, through, reflected), probability)
-    return _upright(o, wi), ops.select(passes, seen.eta, 1.0), probability, weight
-
-
-def component(stack: Body, wi: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
-    """Number of the part that `sample` or `sample_smooth` draws from: all reflected lobes, from the top, then
-    the diffuse base or the transmitted lobe."""
-    every = scattered(stack, wi)
-    seen, count = every.only(asked), len(every.reflected)
-    least, even = (0.0, 0.0) if smooth else (_least(stack), stack.even)
-    passes, u = _way(seen, u, least)
-    numbers = [float(k) for k in range(count + (every.base is not None)) if asked.reflects(k)]
-    return ops.select(passes, float(count), mixture.picked(seen.reflected, seen.base, u, numbers, even))
 
 
 def _way(seen: Scattered, u: Value, least: float) -> tuple[Value, Value]:
@@ -251,30 +282,30 @@ def _way(seen: Scattered, u: Value, least: float) -> tuple[Value, Value]:
 # The symmetric form
 
 
-def _least(stack: Body) -> float:
+def _least(stack: Lobed) -> float:
     """Share of samples that reflection and transmission get at least: the forward form, by whose lobes the symmetric
     one is sampled, may have no light where this one has some."""
     return MIN_BRANCH_PROBABILITY if stack.above.model.form == "symmetric" else 0.0
 
 
-def _beyond(stack: Body, i: Direction, eta: Value) -> Direction:
+def _beyond(stack: Lobed, i: Direction, eta: Value) -> Direction:
     """The refracted direction about which light is sampled; the symmetric form passes light beyond the critical angle,
     too, where it is sampled at grazing."""
-    x, y, z = _refracted(i, eta)
+    x, y, z = refracted(i, eta)
     if stack.above.model.form == "forward":
         return x, y, z
     return ggx.normalize((x, y, ops.maximum(z, GRAZING)))
 
 
-def exchangeable(stack: Body, wi: Direction, wo: Direction) -> tuple[Sequence[Lobe], Lobe | None]:
+def exchangeable(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Sequence[Lobe], Lobe | None]:
     """The lobes, reflected and transmitted, that the symmetric form takes its value from: of half the angle between wi
     and wo."""
-    i, o = _upright(wi, wi), _upright(wo, wi)
+    i, o = upright(wi, wi), upright(wo, wi)
     half = _difference(i, o)
     if stack.below is None:
         return _scaled(stack, wi, wo, stack.lobes_above(half)[0]), None
     half_below = _difference(*_pair_below(stack, wi, wo))
-    seen = _chosen_direction(o[2] > 0, half, _refracted(half_below, 1 / stack.eta))
+    seen = chosen_direction(o[2] > 0, half, refracted(half_below, 1 / stack.eta))
     reflected, passed = stack.lobes_above(seen)
     reflected_below, _ = stack.lobes_below(half)
     assert passed is not None
@@ -284,14 +315,14 @@ def exchangeable(stack: Body, wi: Direction, wo: Direction) -> tuple[Sequence[Lo
     return reflected, passed
 
 
-def _scaled(stack: Body, wi: Direction, wo: Direction, lobes: Sequence[Lobe]) -> list[Lobe]:
+def _scaled(stack: Lobed, wi: Direction, wo: Direction, lobes: Sequence[Lobe]) -> list[Lobe]:
     if stack.scaling is None:
         return list(lobes)
     factor = stack.scaling(wi) * stack.scaling(wo)
     return [replace(lobe, gain=lobe.gain * factor) for lobe in lobes]
 
 
-def balanced(stack: Body, context: Context) -> Body:
+def balanced(stack: Lobed, context: Context) -> Lobed:
     """A uniform stack with a symmetric form that conserves energy, if its model has one.
 
     Published models are unchanged, and so is a stack that may not be sampled over direction.
@@ -302,8 +333,8 @@ def balanced(stack: Body, context: Context) -> Body:
     bare, asked = replace(stack, above=replace(stack.above, base=None)), Asked(radiance=False)
 
     def sampled(wi: Direction, u: Value, u1: Value, u2: Value) -> tuple[Direction, Value]:
-        wo, _ = sample(bare, wi, u, u1, u2, asked)
-        value, density = eval_pdf(bare, wi, wo, asked)
+        wo, _ = bare.sample(wi, u, u1, u2, asked)
+        value, density = bare.eval_pdf(wi, wo, asked)
         return wo, full(ops.select(density > 0, value / ops.maximum(density, ops.TINY), 0.0), wi)
 
     def energy(wi: Direction) -> Value:
@@ -335,18 +366,18 @@ def _difference(wi: Direction, wo: Direction) -> Direction:
     return scale * x, scale * y, cos_d
 
 
-def _pair_below(stack: Body, wi: Direction, wo: Direction) -> tuple[Direction, Direction]:
+def _pair_below(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Direction, Direction]:
     """Transmitted light in the medium below: wi and wo turned up, the one from above refracted."""
-    i, o = _upright(wi, wi), _down(_upright(wo, wi))
+    i, o = upright(wi, wi), _down(upright(wo, wi))
     from_above = wi[2] > 0
-    i_below = _chosen_direction(from_above, _refracted(i, stack.eta), i)
-    return i_below, _chosen_direction(from_above, o, _refracted(o, stack.eta))
+    i_below = chosen_direction(from_above, refracted(i, stack.eta), i)
+    return i_below, chosen_direction(from_above, o, refracted(o, stack.eta))
 
 
 # Directions on either side
 
 
-def _upright(w: Direction, wi: Direction) -> Direction:
+def upright(w: Direction, wi: Direction) -> Direction:
     """The direction flipped with wi, so that wi lies in the upper hemisphere."""
     return w[0], w[1], ops.select(wi[2] < 0, -w[2], w[2])
 
@@ -355,12 +386,12 @@ def _down(w: Direction) -> Direction:
     return w[0], w[1], -w[2]
 
 
-def _refracted(w: Direction, eta: Value) -> Direction:
+def refracted(w: Direction, eta: Value) -> Direction:
     """The refracted direction turned up; its height is 0 under total internal reflection."""
     return w[0] / eta, w[1] / eta, fresnel.cos_transmitted(w[2], eta)
 
 
-def _chosen_direction(where: Value, a: Direction, b: Direction) -> Direction:
+def chosen_direction(where: Value, a: Direction, b: Direction) -> Direction:
     x, y, z = (ops.select(where, p, q) for p, q in zip(a, b))
     return x, y, z
 

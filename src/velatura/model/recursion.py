@@ -13,7 +13,11 @@ from velatura.optics.ggx import Direction
 
 if TYPE_CHECKING:  # recursions use records that are prepared for them
     from velatura.model.adding import Lobe
+    from velatura.model.bsdf import Body
+    from velatura.model.context import Context
+    from velatura.model.models import Model
     from velatura.model.prepare import Prepared
+    from velatura.stack import Material
 
 
 class Recursion(ABC):
@@ -44,6 +48,12 @@ class Recursion(ABC):
     def reflectances(self) -> tuple[str, ...] | None:
         """Reflectances for which it is calibrated; None if all switches may have any value."""
         return None
+
+    def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
+        """A material as a BSDF, with constants of a renderer."""
+        from velatura.model import bsdf
+
+        return bsdf.body(material, model, variance, context)
 
 
 @dataclass(frozen=True)
@@ -87,3 +97,10 @@ class Momentum(Recursion):
 
     def reflectances(self) -> tuple[str, ...]:
         return tuple(self.calibrations)
+
+    def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
+        from velatura.model import solution
+
+        if not material.interfaces or not any(layer.spreads for layer in solution.plain(material).layers):
+            return super().body(material, solution.geometry(model), variance, context)
+        return solution.solve(material, model, variance, context)

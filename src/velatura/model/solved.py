@@ -1,56 +1,48 @@
-"""A uniform material, solved once for all directions: its lobes in their own media, the remainder, and what passes.
+"""A uniform material as a BSDF: lobes in their own media, the remainder, and what passes, each with its own energy.
 
-Energies over integrals, widths and probabilities are columns of numbers over direction. A side is a material as light
-from above sees it; stacks that transmit have two.
+All that depends on direction is columns of numbers (`velatura.model.solution`): energies over integrals, widths, and
+chances of being sampled. A side is a material as light from above sees it; stacks that transmit have two.
+
+The forward form takes all of a part from the direction of the light. The symmetric form takes the geometric mean of
+the values there and back, with weights by which it keeps the energies (`velatura.model.exchange`); samples are those of
+the forward form.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import partial
+from itertools import pairwise
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-
 from velatura import ops
-from velatura.model import own_medium, passed, remainder, straight_through, widths
-from velatura.model.context import Context
-from velatura.model.models import Model
+from velatura.model import own_medium, passed, remainder
+from velatura.model.bsdf import Asked, chosen_direction, upright
 from velatura.model.own_medium import OwnMediumLobe
 from velatura.model.passed import Parts
-from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium, prepare
+from velatura.model.prepare import PreparedInterface
 from velatura.model.remainder import Remainder
-from velatura.model.roughness_maps import AS_IT_IS
+from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.straight_through import Passage
-from velatura.model.transport.adding import parts
-from velatura.model.transport.energies import INCIDENCES, energies
-from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
-from velatura.model.widths import Tensor
+from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid
-from velatura.stack import Material
-from velatura.tables import Tables
 
-Array = NDArray[np.floating]
+ALL = Asked()
+FAINT = 1e-9  # energy of a part that is drawn even where it has none
+GRAZING = 1e-6  # cosine
+HEAVY = 2.9  # weight of a sample, in the symmetric form
 
-COSINES = 48  # nodes, even in the root of the cosine
-AZIMUTHS = 12  # in half a turn, where interfaces are brushed
-COLOURS = 3
-COS_MIN = 1e-3
-DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
-BRIGHTEST = 4.0  # by how much it is scaled at most
-VEIL_MIN = 1e-3  # energy of veils that are drawn
-FAINT = 1e-9
+#: What is interpolated are roots of roughness, or matrices of them, so that axes may turn.
+ROOTS = RoughnessMap(lambda along, across: ops.sqrt(along), lambda along, across: along * along)
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A lobe but for its columns: index of its medium, the facets that it is of and what lets it out."""
+    """A lobe but for its columns: number of its interface, index of its medium, the facets that it is of and what lets
+    it out."""
 
+    interface: int
     n: Value
     facets: PreparedInterface | None
     first: PreparedInterface | None
@@ -68,7 +60,7 @@ class Shape:
 class Columns:
     """What depends on direction: one direction's, or arrays (C, M) and (M,) over directions.
 
-    `weights`, `roughness` and `chances` are those of lobes; of the remainder `scale` and `chance`.
+    `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
     """
 
     weights: list[Value]
@@ -81,16 +73,27 @@ class Columns:
     passes: Parts | None
     passed: Value | None
 
+    @property
+    def all(self) -> list[Value]:
+        """In the order in which they are read."""
+        lobes = zip(self.weights, self.energies, self.roughness, self.chances)
+        found = [x for weight, energy, roughness, chance in lobes for x in (weight, energy, *roughness, chance)]
+        found += [self.scale, self.rest, self.chance]
+        if self.passes:
+            found += [*vars(self.passes).values(), self.passed]
+        return found
+
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a solved material, in a renderer's numbers."""
+    """One side of a solved material, in a renderer's numbers; a colour is made of `colours` channels."""
 
     curves: Any
     shapes: tuple[Shape, ...]
     polynomial: Remainder
     passage: Passage | None
     colour: Callable[..., Value]
+    colours: int
     kind: type[Variance]
 
     def at(self, w: Direction) -> Columns:
@@ -98,306 +101,239 @@ class Side:
         channels = iter(self.curves(w))
 
         def colour() -> Value:
-            return self.colour(*(next(channels) for _ in range(COLOURS)))
+            return self.colour(*(ops.channel(next(channels), k) for k in range(self.colours)))
+
+        def number() -> Value:
+            return ops.channel(next(channels))
 
         weights, roughness, chances, found = [], [], [], []
         for _ in self.shapes:
             weights.append(colour())
             found.append(colour())
-            roughness.append(tuple(next(channels) for _ in fields(self.kind)))
-            chances.append(next(channels))
-        scale, rest, chance = colour(), colour(), next(channels)
+            roughness.append(tuple(number() for _ in fields(self.kind)))
+            chances.append(number())
+        scale, rest, chance = colour(), colour(), number()
         passes, through = None, None
         if self.passage:
-            passes = Parts(colour(), colour(), colour(), *(next(channels) for _ in range(3)))
+            passes = Parts(colour(), colour(), colour(), *(number() for _ in range(3)))
             through = colour()
         return Columns(weights, roughness, chances, found, scale, chance, rest, passes, through)
+
+    def seen(self, w: Direction) -> Seen:
+        """What light from a direction above sees."""
+        return self._seen(w, self.at(w))
+
+    def _seen(self, w: Direction, columns: Columns) -> Seen:
+        azimuth = ops.arctan2(w[1], w[0])
+        lobes = []
+        for shape, weight, numbers in zip(self.shapes, columns.weights, columns.roughness):
+            u, v, rotation = self.kind(*numbers).roughness(ROOTS)
+            lobes.append(shape.lobe(weight, Roughness(u, v, rotation + azimuth)))
+        return Seen(self.shapes, lobes, self.polynomial, self.passage, columns)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A side as light from one direction sees it: its parts are lobes, the remainder, and what passes."""
+
+    shapes: tuple[Shape, ...]
+    lobes: list[OwnMediumLobe]
+    polynomial: Remainder
+    passage: Passage | None
+    columns: Columns
+
+    @property
+    def interfaces(self) -> int:
+        return 1 + max(shape.interface for shape in self.shapes)
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of the components that reflected parts belong to."""
+        return [*(shape.interface for shape in self.shapes), self.interfaces]
+
+    @property
+    def chances(self) -> list[Value]:
+        """Of the reflected parts."""
+        return [*self.columns.chances, self.columns.chance]
+
+    @property
+    def energies(self) -> list[Value]:
+        """Of the reflected parts."""
+        return [*self.columns.energies, self.columns.rest]
+
+    @property
+    def passed(self) -> Value:
+        return 0.0 if self.columns.passed is None else self.columns.passed
+
+    def only(self, asked: Asked) -> Drawn:
+        """Chances of what is asked for: as samples are shared among all parts, or by energy where some are not."""
+        passes = self.columns.passes
+        wanted = [asked.reflects(number) for number in self.numbers]
+        if all(wanted) and (asked.transmission or passes is None):
+            return Drawn(wanted, True, self.chances, passes)
+        shares = [ops.mean(e) + FAINT if w else 0.0 for w, e in zip(wanted, self.energies)]
+        through = ops.mean(self.passed) + FAINT if passes and asked.transmission else 0.0
+        total = sum(shares) + through
+        if isinstance(total, float) and total == 0:
+            return Drawn(wanted, False, shares, None)
+        if passes is not None:
+            scale = ops.divide(through / total, passes.share)
+            chances = (scale * x for x in (passes.of_straight, passes.of_bounced, passes.of_rest))
+            passes = Parts(passes.straight, passes.bounced, passes.rest, *chances)
+        return Drawn(wanted, asked.transmission, [share / total for share in shares], passes)
+
+    def part(self, k: int, i: Direction, o: Direction) -> tuple[Value, Value]:
+        """f |cos theta_o| and density of a reflected part."""
+        if k < len(self.lobes):
+            return own_medium.eval_pdf(self.lobes[k], i, o)
+        return self.columns.scale * self.polynomial.value(i, o), remainder.density(o)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Parts that are asked for: whether each one that is reflected is, and what passes; their chances."""
+
+    wanted: list[bool]
+    passing: bool
+    chances: list[Value]
+    passes: Parts | None
+
+    @property
+    def share(self) -> Value:
+        """Of samples that are drawn from what passes."""
+        return self.passes.share if self.passes else 0.0
 
 
 @dataclass(frozen=True)
 class Solved:
-    """A uniform material as a BSDF."""
+    """A material as a BSDF: a uniform one, or one with the values of a point."""
 
     above: Side
     below: Side | None
     eta: Value
-
-
-def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
-    """The BSDF of a material with constants of a renderer."""
-    material = material.solid()
-    grid, side = _Grid(variance is Isotropic), partial(_side, model=model, variance=variance, context=context)
-
-    def found(seen: Material) -> _Columns:
-        plain = seen.each(lambda address, value: _plain(value, address.colour))
-        return _columns(plain, model, variance, grid, context.tables)
-
-    if not material.transmits:
-        return Solved(side(material, found(material)), None, 1.0)
-    below = material.reversed()
-    from_above, from_below = found(material), found(below)
-    most = max(len(from_above.lobes), len(from_below.lobes))
-    eta = ops.mean(material.below) / ops.mean(material.exterior)
-    return Solved(side(material, from_above.padded(most)), side(below, from_below.padded(most)), eta)
-
-
-def _side(material: Material, found: _Columns, model: Model, variance: type[Variance], context: Context) -> Side:
-    assert context.colour is not None
-    number, isotropic = context.number, variance is Isotropic
-    # Spread the columns over the grid of a renderer
-    grid, shape = _Grid(isotropic), directional_grid.LINE if isotropic else directional_grid.PLANE
-    columns = [column for lobe in found.lobes for column in lobe.columns] + found.others
-    spread = [grid.spread(column, shape) for column in columns]
-    curves = directional_grid.curves([number(np.float32(x)) if number else x for x in spread], shape, number)
-    # Take what does not depend on direction as the renderer has it
-    each = _shapes(prepare(material, _bare(model), variance, context))
-    shapes = tuple(each[lobe.interface] for lobe in found.lobes)
-    rgb = (_rgb(x) for x in vars(_by_colour(found.polynomial)).values())
-    polynomial = Remainder(*(context.colour(*x[:, 0].tolist()) if number else x for x in rgb))
-    passage = straight_through.passage(material, variance) if material.transmits else None
-    return Side(curves, shapes, polynomial, passage, context.colour, PerAxis if isotropic else Covariance)
-
-
-def _plain(value: Value, colour: bool) -> Any:
-    found = np.asarray(value, float).reshape(-1)
-    return found[:, None] if colour else float(found[0])
-
-
-def _shapes(prepared: Prepared) -> list[Shape]:
-    """One for each interface from the top."""
-    found: list[Shape] = []
-    n: Value = 1.0
-    first: PreparedInterface | None = None
-    for layer in prepared.layers:
-        if isinstance(layer, PreparedMedium):
-            continue
-        found.append(Shape(n, layer if first is None or not layer.opaque else None, first))
-        first = first or layer
-        n = n * layer.n12
-    return found
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """Directions at which a material is solved, and how columns are spread over a finer grid."""
-
-    isotropic: bool
+    symmetric: bool
 
     @property
-    def nodes(self) -> Array:
-        return np.linspace(0, 1, COSINES)
+    def diffuse(self) -> bool:
+        """The remainder comes after the lobes."""
+        return True
 
     @property
-    def turns(self) -> int:
-        return 1 if self.isotropic else AZIMUTHS
+    def balanced(self) -> bool:
+        return self.symmetric
 
-    @property
-    def cosine(self) -> Array:
-        return np.repeat(np.maximum(self.nodes**2, COS_MIN), self.turns)
-
-    @property
-    def phi(self) -> Array:
-        return np.tile(np.pi * np.arange(self.turns) / self.turns, COSINES)
-
-    def spread(self, column: Array, shape: tuple[int, ...]) -> Array:
-        """Values at the nodes, (M,), interpolated: by splines over the cosine, by waves over the azimuth."""
-        values = column.reshape(COSINES, self.turns)
-        if not self.isotropic:
-            x, y, _ = directional_grid.directions(shape, None)
-            phi = np.arctan2(y, x).reshape(shape)[0]
-            waves = np.fft.rfft(values, axis=1) / self.turns
-            order = np.arange(waves.shape[1])
-            both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
-            values = (waves[:, None, :] * both * np.exp(2j * order * phi[:, None])).real.sum(axis=-1)
-        return np.asarray(PchipInterpolator(self.nodes, values)(np.linspace(0, 1, shape[0])).ravel())
-
-
-@dataclass(frozen=True)
-class _Drawn:
-    """A lobe: the number of its interface, and its columns in the order in which `Side.at` reads them."""
-
-    interface: int
-    columns: list[Array]
-
-
-@dataclass(frozen=True)
-class _Columns:
-    lobes: list[_Drawn]
-    others: list[Array]
-    polynomial: Remainder
-
-    def padded(self, count: int) -> _Columns:
-        """With lobes of no energy, as many as the other side has."""
-        last = self.lobes[-1]
-        dark = _Drawn(last.interface, [0 * column for column in last.columns])
-        return replace(self, lobes=[*self.lobes, *[dark] * (count - len(self.lobes))])
-
-
-def _columns(material: Material, model: Model, variance: type[Variance], grid: _Grid, known: Tables) -> _Columns:
-    """What a material is at the directions of a grid."""
-    cosine, phi, count = grid.cosine, grid.phi, len(grid.cosine)
-    sine = np.sqrt(1 - cosine * cosine)
-    wi = sine * np.cos(phi), sine * np.sin(phi), cosine
-    solved = energies(
-        material,
-        np.concatenate([cosine, INCIDENCES]),
-        np.concatenate([phi, 0 * INCIDENCES]),
-        known if model.reflectance == "fgd-multi" else None,
-        widths.nearly_straight,
-    )
-    albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
-    polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
-    lobes, veils = solved.lobes[..., :count], solved.veils[..., :count]
-    rest, straight, bounced, through = (
-        x[:, :count] for x in (solved.rest, solved.straight, solved.bounced, solved.passed)
-    )
-
-    # Draw lobes, and the veils that are seen
-    shapes, found = _shapes(prepare(material, _bare(model), variance)), parts(material)
-    tensors = widths.tensors(found, cosine, phi, lobes.mean(axis=1)) if shapes else []
-    drawn = [(k, lobes[k], tensor) for k, tensor in enumerate(tensors)]
-    drawn += [
-        (k, veils[k], widths.veil(found, k, cosine, tensor))
-        for k, tensor in enumerate(tensors)
-        if veils[k].max() > VEIL_MIN
-    ]
-
-    def weight(k: int, energy: Array, tensor: Tensor) -> Array:
-        integral = own_medium.integral(shapes[k].lobe(1.0, tensor.roughness(phi)), wi)
-        return np.where(integral > FAINT, energy / np.maximum(integral, FAINT), 1.0)
-
-    def shown(tensor: Tensor) -> list[Array]:
-        if variance is Isotropic:  # axes lie in the plane of incidence, and across it
-            return [np.minimum(tensor.width(np.array(axis)), widths.ALPHA_MAX) for axis in widths.AXES]
-        return list(vars(Covariance.of(tensor.roughness(0 * phi), AS_IT_IS)).values())
-
-    # Share samples by energies
-    shares = [energy.mean(axis=0) for _, energy, _ in drawn]
-    if material.transmits and len(drawn) == 1:
-        # What passes is sampled with the facets that reflect
-        facets = own_medium.integral(shapes[0].lobe(1.0, tensors[0].roughness(phi)), wi)
-        shares = [np.maximum(shares[0] - np.mean(facets, axis=0), 0)]
-    shares.append(rest.mean(axis=0) + FAINT)
-    total, others = sum(shares), []
-    left: Value = 1.0
-    if material.transmits:
-        passage = straight_through.passage(material, variance)
-        of = passed.parts(passage, wi, straight, bounced, through, np.array([total]))
-        left = 1 - of.share
-        others = [
-            *map(_rgb, (of.straight, of.bounced, of.rest)),
-            of.of_straight,
-            of.of_bounced,
-            of.of_rest,
-            _rgb(through),
-        ]
-    scale = np.clip(rest / np.maximum(_by_colour(polynomial).albedo(cosine), DIM), 0, BRIGHTEST)
-    columns = [
-        _Drawn(k, _flat(count, _rgb(weight(k, energy, tensor)), _rgb(energy), *shown(tensor), left * share / total))
-        for (k, energy, tensor), share in zip(drawn, shares)
-    ]
-    return _Columns(columns, _flat(count, _rgb(scale), _rgb(rest), left * shares[-1] / total, *others), polynomial)
-
-
-def _bare(model: Model) -> Model:
-    """The model without averages, which are not looked up."""
-    return replace(model, reflectance="fresnel", tir="off")
-
-
-def _by_colour(polynomial: Remainder) -> Remainder:
-    return Remainder(*(np.reshape(x, (-1, 1)) for x in vars(polynomial).values()))
-
-
-def _rgb(values: Array) -> Array:
-    """Values by colour (3, M)."""
-    return np.broadcast_to(values, (3, np.shape(values)[-1]))
-
-
-def _flat(count: int, *values: Array) -> list[Array]:
-    """Rows of numbers and of colours, one by one."""
-    return [np.broadcast_to(row, count) for each in values for row in (each if np.ndim(each) == 2 else [each])]
-
-
-# The BSDF
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """A side as light from one direction sees it."""
-
-    lobes: list[OwnMediumLobe]
-    chances: list[Value]
-    energies: list[Value]
-    polynomial: Remainder
-    scale: Value
-    rest: Value
-    chance: Value
-    passage: Passage | None
-    passes: Parts | None
-    passed: Value
-    eta: Value
-
-    @property
-    def albedo(self) -> Value:
-        return sum(self.energies) + self.rest + self.passed
-
-
-def seen(solved: Solved, wi: Direction) -> _Seen:
-    """What light from wi sees, turned up."""
-    turned = _upright(wi, wi)
-    side, columns, eta = solved.above, solved.above.at(turned), solved.eta
-    if solved.below:
+    def seen(self, wi: Direction) -> tuple[Seen, Value]:
+        """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
+        turned = upright(wi, wi)
+        if self.below is None:
+            return self.above.seen(turned), 1.0
         where = wi[2] > 0
-        columns = _select(where, columns, solved.below.at(turned))
+        columns = select(where, self.above.at(turned), self.below.at(turned))
         side = replace(
-            solved.above,
-            shapes=tuple(_either(where, a, b) for a, b in zip(solved.above.shapes, solved.below.shapes)),
-            polynomial=_select(where, solved.above.polynomial, solved.below.polynomial),
-            passage=_select(where, solved.above.passage, solved.below.passage),
+            self.above,
+            shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),
+            polynomial=select(where, self.above.polynomial, self.below.polynomial),
+            passage=select(where, self.above.passage, self.below.passage),
         )
-        eta = ops.select(where, eta, 1 / eta)
-    azimuth = ops.arctan2(turned[1], turned[0])
-    lobes = []
-    for shape, weight, numbers in zip(side.shapes, columns.weights, columns.roughness):
-        u, v, rotation = side.kind(*numbers).roughness(AS_IT_IS)
-        lobes.append(shape.lobe(weight, Roughness(u, v, rotation + azimuth)))
-    return _Seen(
-        lobes, columns.chances, columns.energies, side.polynomial, columns.scale, columns.rest, columns.chance,
-        side.passage, columns.passes, columns.passed if columns.passed is not None else 0.0, eta,
-    )  # fmt: skip
+        return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
+
+    def albedo(self, wi: Direction) -> Value:
+        """Energy of all parts, a colour."""
+        of, _ = self.seen(wi)
+        return sum(of.energies) + of.passed
+
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
+        """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
+        of, eta = self.seen(wi)
+        back = self.seen(wo)[0] if self.symmetric else None
+        return eval_pdf(of, back, eta, wi, wo, asked)
+
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ALL) -> tuple[Direction, Value]:
+        """A direction wo, and the index on its side over that on the side of wi."""
+        of, eta = self.seen(wi)
+        i, drawn = upright(wi, wi), of.only(asked)
+        wo = remainder.sample(u1, u2)
+        begin = 1 - drawn.chances[-1]
+        for lobe, chance in zip(reversed(of.lobes), reversed(drawn.chances[:-1])):
+            wo = chosen_direction(u < begin, own_medium.sample(lobe, i, u1, u2), wo)
+            begin = begin - chance
+        if of.passage is None or drawn.passes is None:
+            return wo, 1.0
+        again = ops.clip(ops.divide(u, drawn.share), 0.0, passed.BELOW_ONE)
+        through = passed.sample(of.passage, drawn.passes, i, again, u1, u2)
+        wo = chosen_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
+        return upright(wo, wi), ops.select(wo[2] < 0, eta, 1.0)
+
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = ALL) -> Value:
+        """Number of the part that `sample` drew wo from: an interface from the top, the remainder, or last what passes.
+        Light that does not pass the facets of a rough dielectric is reflected by the first one."""
+        of, _ = self.seen(wi)
+        drawn = of.only(asked)
+        kept = [(number, chance) for number, chance, w in zip(of.numbers, drawn.chances, drawn.wanted) if w]
+        last = float(of.interfaces + 1)
+        if not kept:
+            return last
+        found: Value = float(kept[0][0])
+        begin = drawn.share
+        for (_, chance), (following, _) in pairwise(kept):
+            begin = begin + chance
+            found = ops.select(u > begin, float(following), found)
+        if self.below is None:
+            return found
+        return ops.select(wi[2] * wo[2] < 0, last, found) if drawn.passing else found
 
 
-def eval_pdf(solved: Solved, wi: Direction, wo: Direction, radiance: bool) -> tuple[Value, Value]:
-    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
-    of, i, o = seen(solved, wi), _upright(wi, wi), _upright(wo, wi)
-    value = of.scale * of.polynomial.value(i, o)
-    density = of.chance * remainder.density(o)
-    for lobe, chance in zip(of.lobes, of.chances):
-        more, pdf = own_medium.eval_pdf(lobe, i, o)
-        value, density = value + more, density + chance * pdf
-    if of.passage is None or of.passes is None:
+def eval_pdf(
+    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Asked
+) -> tuple[Value, Value]:
+    """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
+    i, o, drawn = upright(wi, wi), upright(wo, wi), of.only(asked)
+    i_back, o_back = upright(wi, wo), upright(wo, wo)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    value: Value = 0.0
+    whole: Value = 0.0
+    densities: list[Value] = [0.0, 0.0, 0.0]  # of what is asked for; of all, there and back
+    for k, (wanted, chance) in enumerate(zip(drawn.wanted, drawn.chances)):
+        part, pdf = of.part(k, i, o)
+        chances = [chance, of.chances[k], 0.0]
+        pdfs = [pdf, pdf, 0.0]
+        if back:
+            other, pdfs[2] = back.part(k, o_back, i_back)
+            chances[2] = back.chances[k]
+            part = ops.sqrt(part * other * cosines)
+        densities = [total + c * each for total, c, each in zip(densities, chances, pdfs)]
+        whole = whole + part
+        value = value + (part if wanted else 0 * part)
+    columns = of.columns
+    if of.passage and columns.passes:
+        through, pdf = passed.eval_pdf(of.passage, columns.passes, i, o)
+        returned: Value = 0.0
+        if back and back.passage and back.columns.passes:
+            through, pdf, returned = exchanged(of, back, eta, wi, wo)
+            through = through * ops.sqrt(columns.passes.straight * back.columns.passes.straight)
+        share = ops.divide(drawn.share, columns.passes.share)
+        densities = [a + b for a, b in zip(densities, (share * pdf, pdf, returned))]
+        whole = whole + through
+        value = value + (through if drawn.passing else 0 * through)
+    scale = ops.select(wi[2] * wo[2] < 0, eta * eta, 1.0)
+    if back:
+        # No sample is too heavy, there and back
+        most = HEAVY * ops.minimum(densities[1], densities[2] * cosines * scale)
+        value = value * ops.minimum(ops.divide(most, whole), 1.0)
+    if of.passage is None:
         lit = wi[2] > 0
-        return ops.select(lit, value, 0.0), ops.select(lit, density, 0.0)
-    through, pdf = passed.eval_pdf(of.passage, of.passes, i, o)
-    if radiance:
-        through = through / (of.eta * of.eta)
-    return value + through, density + pdf
+        return ops.select(lit, value, 0.0), ops.select(lit, densities[0], 0.0)
+    return value / scale if asked.radiance else value, densities[0]
 
 
-def sample(solved: Solved, wi: Direction, u: Value, u1: Value, u2: Value) -> tuple[Direction, Value]:
-    """A direction wo, and the index on its side over that on the side of wi."""
-    of, i = seen(solved, wi), _upright(wi, wi)
-    wo = remainder.sample(u1, u2)
-    begin = 1 - of.chance
-    for lobe, chance in zip(reversed(of.lobes), reversed(of.chances)):
-        wo = _chosen(u < begin, own_medium.sample(lobe, i, u1, u2), wo)
-        begin = begin - chance
-    if of.passage is None or of.passes is None:
-        return wo, 1.0
-    share = of.passes.share
-    through = passed.sample(of.passage, of.passes, i, ops.clip(ops.divide(u, share), 0.0, 1 - 2**-24), u1, u2)
-    wo = _chosen(u < share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
-    return _upright(wo, wi), ops.select(wo[2] < 0, of.eta, 1.0)
+def exchanged(of: Seen, back: Seen, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value, Value]:
+    """Mean of what passes there and back, with all that goes straight through, and the densities there and back."""
+    i, o, i_back, o_back = upright(wi, wi), upright(wo, wi), upright(wi, wo), upright(wo, wo)
+    assert of.passage and of.columns.passes and back.passage and back.columns.passes
+    there, density = passed.eval_pdf(of.passage, replace(of.columns.passes, straight=1.0), i, o)
+    other, returned = passed.eval_pdf(back.passage, replace(back.columns.passes, straight=1.0), o_back, i_back)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    return 0.5 * (there + other * (cosines * eta * eta)), density, returned
 
 
 def _either(where: Value, a: Shape, b: Shape) -> Shape:
@@ -405,30 +341,21 @@ def _either(where: Value, a: Shape, b: Shape) -> Shape:
     assert a.facets and b.facets
     facets = replace(a.facets, eta=ops.select(where, a.facets.eta, b.facets.eta))
     if a.first is None and b.first is None:
-        return Shape(1.0, facets, None)
+        return Shape(a.interface, 1.0, facets, None)
     some = a.first or b.first
     assert some
     first = replace(some, eta=ops.select(where, a.first.eta if a.first else 1.0, b.first.eta if b.first else 1.0))
-    return Shape(ops.select(where, a.n, b.n), facets, first)
+    return Shape(a.interface, ops.select(where, a.n, b.n), facets, first)
 
 
-def _select(where: Value, a: Any, b: Any) -> Any:
+def select(where: Value, a: Any, b: Any) -> Any:
     """Records of values, value by value."""
     if is_dataclass(a) and not isinstance(a, type):
-        return type(a)(*(_select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
+        return type(a)(*(select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
     if isinstance(a, tuple) and hasattr(a, "_fields"):
-        return type(a)(*(_select(where, x, y) for x, y in zip(a, b)))
+        return type(a)(*(select(where, x, y) for x, y in zip(a, b)))
     if isinstance(a, (list, tuple)):
-        return type(a)(_select(where, x, y) for x, y in zip(a, b))
+        return type(a)(select(where, x, y) for x, y in zip(a, b))
     if a is None or (isinstance(a, float) and isinstance(b, float) and a == b):
         return a
     return ops.select(where, a, b)
-
-
-def _upright(w: Direction, wi: Direction) -> Direction:
-    return w[0], w[1], ops.select(wi[2] < 0, -w[2], w[2])
-
-
-def _chosen(where: Value, a: Direction, b: Direction) -> Direction:
-    x, y, z = (ops.select(where, p, q) for p, q in zip(a, b))
-    return x, y, z

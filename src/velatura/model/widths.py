@@ -120,6 +120,11 @@ class Tensor:
         u, v = (np.minimum(self.width(self.angle + turn), ALPHA_MAX) for turn in AXES)
         return Roughness(u, v, self.angle + phi)
 
+    def straight(self) -> Roughness:
+        """In the plane and across it, where these are its axes."""
+        u, v = (np.minimum(self.width(np.asarray(turn)), ALPHA_MAX) for turn in AXES)
+        return Roughness(u, v, 0.0)
+
 
 def _sum(parts: Sequence[Tensor]) -> Tensor:
     """Along the axes of the sum of all, powers q of widths add."""
@@ -216,7 +221,7 @@ def features(
         assert part.below is not None
         below = float(np.mean(part.below)) / n
         both = own_medium.integral(replace(lobe, facets=lambda c: fresnel.dielectric(c, below)), wi, COARSE)
-        reflected = both / let_out
+        reflected = both / np.maximum(let_out, 1e-9)
     brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(reflected * let_out * share, 1e-9))
     moved = max((coat.tensor.size * coat.contrast for coat in coats), key=np.max)
     axes = np.array([first.width(first.angle + turn) for turn in AXES])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -68,8 +68,8 @@ def make(mi: Any) -> type:
             shape, form = "pane" if self.transmits else "opaque", self.model.form
             if form == "forward" and self.model.recursion.has_gain:
                 form = "scaled"
-            elif self.body and self.body.scaling and shape == "opaque" and self.variance is Isotropic:
-                form = "balanced"
+            elif self.body and self.body.balanced:
+                form = "balanced" if shape == "opaque" and self.variance is Isotropic else "exchanged"
             declared = EXCEPTIONS[form, shape]
             # The albedo of a base is a sum over cosines, which hardly resolves a critical angle outside, and errs by up
             # to 2.5 % below several interfaces
@@ -93,7 +93,9 @@ def make(mi: Any) -> type:
             self.variance = variance_kind(binding.symbolic(seen))
             self.body: bsdf.Body | None = None
             if binding.uniform:
-                self.body = self._prepared(binding.uniform_material(), self._sampled())
+                self.body = self.model.recursion.body(
+                    binding.uniform_material(), self.model, self.variance, self._sampled()
+                )
                 dr.eval(self.body)
             self.spectra: spectral.Spectra | None = None
             sampled = binding.stack.interfaces and not binding.uniform and not binding.varies
@@ -112,28 +114,28 @@ def make(mi: Any) -> type:
             lobes = len(merging(self.model, len(binding.stack.interfaces)))
             self.kinds = [flags.DeltaReflection if self.delta else flags.GlossyReflection] * lobes
             components = [kind | common | one_way for kind in self.kinds]
+            if self.body.diffuse if self.body else based:
+                self.kinds += [flags.DiffuseReflection]
+                components += [self.kinds[-1] | common | (one_way if self.body else flags.Empty)]
             if self.transmits:
                 self.kinds += [flags.DeltaTransmission if self.delta else flags.GlossyTransmission]
                 components += [self.kinds[-1] | common | flags.NonSymmetric]
-            if based:
-                self.kinds += [flags.DiffuseReflection]
-                components += [self.kinds[-1] | common]
             self.has_components(components)
 
-        def _prepared(self, material: Material, context: Context) -> bsdf.Body:
+        def _prepared(self, material: Material, context: Context) -> bsdf.Lobed:
             return bsdf.body(material, self.model, self.variance, context)
 
         def _sampled(self) -> Context:
             """Samples over direction for a uniform material; scalar variants compute every direction anew."""
             if not dr.is_jit_v(mi.Float):
-                return Context(colour=None, settle=self._settled)
+                return Context(colour=mi.UnpolarizedSpectrum, settle=self._settled)
             return Context(number=mi.Float, colour=mi.UnpolarizedSpectrum, settle=self._settled)
 
         def _settled(self, value: Any) -> Any:
             dr.make_opaque(value)
             return value
 
-        def _at_wavelengths(self, wavelengths: Any) -> bsdf.Body:
+        def _at_wavelengths(self, wavelengths: Any) -> bsdf.Lobed:
             si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wavelengths))
             si.wavelengths = wavelengths
             return self._prepared(self.binding.steered(si, True), at_a_point())
@@ -150,26 +152,31 @@ def make(mi: Any) -> type:
             asked, body, wi = self._asked(ctx), self._body(si, active), tuple(si.wi)
             bs = mi.BSDFSample3f()
             if self.delta:
-                drawn, bs.eta, bs.pdf, weight = bsdf.sample_smooth(body, wi, sample1, asked)
+                smooth = cast(bsdf.Lobed, body)
+                drawn, bs.eta, bs.pdf, weight = smooth.sample_smooth(wi, sample1, asked)
                 bs.wo = mi.Vector3f(*drawn)
+                part = smooth.component(wi, drawn, sample1, asked, smooth=True)
             else:
-                drawn, bs.eta = bsdf.sample(body, wi, sample1, sample2.x, sample2.y, asked)
+                drawn, bs.eta = body.sample(wi, sample1, sample2.x, sample2.y, asked)
                 bs.wo = mi.Vector3f(*drawn)
-                value, bs.pdf = bsdf.eval_pdf(body, wi, drawn, asked)
+                value, bs.pdf = body.eval_pdf(wi, drawn, asked)
                 weight = value / dr.maximum(bs.pdf, 1e-30)
-            bs.sampled_component = mi.UInt32(bsdf.component(body, wi, sample1, asked, self.delta))
-            last = bs.sampled_component == len(self.kinds) - 1
-            bs.sampled_type = dr.select(last, mi.UInt32(+self.kinds[-1]), mi.UInt32(+self.kinds[0]))
+                part = body.component(wi, drawn, sample1, asked)
+            bs.sampled_component = mi.UInt32(part)
+            bs.sampled_type = mi.UInt32(+self.kinds[0])
+            for number, kind in enumerate(self.kinds):
+                if kind != self.kinds[0]:
+                    bs.sampled_type[bs.sampled_component == number] = +kind
             return bs, mi.depolarizer(dr.select(active & (bs.pdf > 0), spectral.carried(mi, weight), 0))
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             if self.delta:
                 return mi.Spectrum(0), mi.Float(0)
-            value, pdf = bsdf.eval_pdf(self._body(si, active), tuple(si.wi), tuple(wo), self._asked(ctx))
+            value, pdf = self._body(si, active).eval_pdf(tuple(si.wi), tuple(wo), self._asked(ctx))
             return mi.depolarizer(spectral.carried(mi, value)) & active, dr.select(active, pdf, 0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            albedo = bsdf.scattered(self._body(si, active), tuple(si.wi)).albedo
+            albedo = self._body(si, active).albedo(tuple(si.wi))
             lit = active & (si.wi.z != 0 if self.transmits else si.wi.z > 0)
             return dr.clip(spectral.carried(mi, albedo), 0, 1) & lit
 

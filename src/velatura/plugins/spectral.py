@@ -54,12 +54,12 @@ class Spectra:
     """Both sides of a stack, the lower one where it transmits; the means of a diffuse base over wavelength."""
 
     mi: Any
-    fixed: bsdf.Body
+    fixed: bsdf.Lobed
     above: Side
     below: Side | None
     means: directional_grid.Curves | None
 
-    def at(self, body: bsdf.Body, wavelengths_nm: Any) -> bsdf.Body:
+    def at(self, body: bsdf.Lobed, wavelengths_nm: Any) -> bsdf.Lobed:
         """The body for a ray, with the sampled values."""
         place = (wavelengths_nm - BEGIN_NM) / (END_NM - BEGIN_NM)
         above = self.above.at(body.above, self.mi, place)
@@ -77,7 +77,7 @@ class Spectra:
         return replace(prepared, base=means)
 
 
-def sample(mi: Any, fixed: bsdf.Body, body_at: Callable[[Any], bsdf.Body]) -> Spectra:
+def sample(mi: Any, fixed: bsdf.Lobed, body_at: Callable[[Any], bsdf.Lobed]) -> Spectra:
     """The spectra of a stack from its body for fixed wavelengths, and from that for those of rays."""
     above = _side(mi, fixed.lobes_above, lambda nm: body_at(nm).lobes_above)
     below = _side(mi, fixed.lobes_below, lambda nm: body_at(nm).lobes_below) if fixed.below else None

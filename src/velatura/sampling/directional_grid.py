@@ -58,8 +58,7 @@ def curves(columns: Sequence[Value], shape: tuple[int, ...], number: type | None
     """Functions by their values at the nodes; differentiable."""
     count = prod(shape)
     if number is None:
-        nodes = [np.broadcast_to(column, count) for column in columns]
-        return Curves(np.stack(nodes, axis=-1).reshape(*shape, -1), shape)
+        return interleaved(np.stack([np.broadcast_to(column, count) for column in columns], axis=-1), shape, None)
     import drjit as dr
 
     dialect: Any = sys.modules[number.__module__]
@@ -71,9 +70,19 @@ def curves(columns: Sequence[Value], shape: tuple[int, ...], number: type | None
     row = dr.arange(dialect.UInt32, count) * len(columns)
     for k, column in enumerate(columns):
         dr.scatter(flat, column, row + k)
+    return interleaved(flat, shape, number)
+
+
+def interleaved(flat: Any, shape: tuple[int, ...], number: type | None) -> Curves:
+    """Functions by a flat array of their values, those of one node after those of another; differentiable."""
+    if number is None:
+        return Curves(np.reshape(flat, (*shape, -1)), shape)
+    import drjit as dr
+
+    dialect: Any = sys.modules[number.__module__]
     dr.eval(flat)
     kind = getattr(dialect, f"Texture{len(shape)}f")
-    tensor = dialect.TensorXf(flat, (*shape, len(columns)))
+    tensor = dialect.TensorXf(flat, (*shape, dr.width(flat) // prod(shape)))
     return Curves(kind(tensor, use_accel=False, wrap_mode=dr.WrapMode.Clamp), shape)
 
 

@@ -48,7 +48,7 @@ class Bake:
     """
 
     columns: Sequence[Operand]
-    body: bsdf.Body
+    body: bsdf.Lobed
     nodes: tuple[int, ...]
     groups: Sequence[Group]
 
@@ -67,7 +67,7 @@ class Bake:
         return {**vars(self.tape), "tables": self.tape.tables, "nodes": self.nodes, "sides": self.sides}
 
 
-def bake(material: Material, body: bsdf.Body) -> Bake:
+def bake(material: Material, body: bsdf.Lobed) -> Bake:
     """The lobes of a body, recorded from the values of a material, over direction."""
     nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
     w = directional_grid.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
@@ -85,7 +85,7 @@ def bake(material: Material, body: bsdf.Body) -> Bake:
     return Bake([operand(x) for x in columns], _read(body, nodes, groups, facets), nodes, groups)
 
 
-def _seen(material: Material, body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
+def _seen(material: Material, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], list[bool]]:
     """The columns of all lobes at an upright direction, and whether each is drawn with facets."""
     above = number(f"{PLACE}.z") < 0.5
     if body.below is not None and material.kinds == material.kinds[::-1]:
@@ -101,7 +101,7 @@ def _seen(material: Material, body: bsdf.Body, w: Direction) -> tuple[list[Value
     return [ops.select(above, a, b) for a, b in zip(columns, _columns(body.lobes_below, body, w)[0])], facets
 
 
-def _columns(lobes: precomputed_lobes.Lobes, body: bsdf.Body, w: Direction) -> tuple[list[Value], list[bool]]:
+def _columns(lobes: precomputed_lobes.Lobes, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], list[bool]]:
     reflected, passed = lobes(w)
     seen = [*reflected, *([passed] if body.below is not None and passed is not None else [])]
     columns = [column for lobe in seen for column in precomputed_lobes.columns(lobe, body.above, _apart)]
@@ -146,7 +146,7 @@ class _Base(Base):
         return _together(r, g, b)
 
 
-def _read(body: bsdf.Body, nodes: tuple[int, ...], groups: Sequence[Group], facets: Sequence[bool]) -> bsdf.Body:
+def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], facets: Sequence[bool]) -> bsdf.Lobed:
     """A body whose lobes are read from the texture."""
     transmits, held = body.below is not None, groups[-1]
     # Light is on the side that wi is on, but for the symmetric form, which looks at others

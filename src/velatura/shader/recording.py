@@ -106,8 +106,8 @@ def record(
             body, shown = _weighed(body)
         base = body.above.base if baked is None else None  # the values read of a base hold all of it
         fields, kinds = _fields(bsdf.scattered(body, wi), base.worth if base else ())
-        value, density = bsdf.eval_pdf(body, wi, wo)
-        drawn, _ = bsdf.sample(body, wi, *u)
+        value, density = body.eval_pdf(wi, wo)
+        drawn, _ = body.sample(wi, *u)
 
     # Read the values that the lobes hold
     graph = Graph()
@@ -152,7 +152,7 @@ def structure(stack: Stack) -> type[Variance]:
     return Covariance if any("rotation" in layer.model_fields_set for layer in pairs) else PerAxis
 
 
-def _weighed(body: bsdf.Body) -> tuple[bsdf.Body, list[str]]:
+def _weighed(body: bsdf.Lobed) -> tuple[bsdf.Lobed, list[str]]:
     """A body with a weight for each reflected lobe, its base and its transmitted lobe; and their names."""
     count = len(merging(body.above.model, sum(isinstance(layer, PreparedInterface) for layer in body.above.layers)))
     names = [f"reflected[{k}]" for k in range(count)]

@@ -84,6 +84,17 @@ class Stack(Record):
         """Other layers under the same index, by the same name unless given."""
         return Stack(layers, name=self.name if name is None else name, exterior=self.exterior, thin=self.thin)
 
+    def turned(self, degrees: float) -> Stack | None:
+        """All layers turned, anticlockwise; None if no interface has axes, or one is turned by a texture."""
+        layers: list[Layer] = []
+        for each in self.layers:
+            if isinstance(each, Interface) and isinstance(each.alpha, tuple) and each.alpha[0] != each.alpha[1]:
+                if not isinstance(each.rotation, int | float):
+                    return None
+                each = each.model_copy(update={"rotation": each.rotation + degrees})
+            layers.append(each)
+        return None if layers == list(self.layers) else self.with_layers(layers)
+
     # As a file holds it ----------------------------------------------------------------------------------------------
 
     @classmethod

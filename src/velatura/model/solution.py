@@ -1,0 +1,385 @@
+"""A material, solved once for all directions: what `velatura.model.solved` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from velatura import ops
+from velatura.model import differences, exchange, own_medium, passed, remainder, straight_through, widths
+from velatura.model.context import Context, channels
+from velatura.model.models import Model
+from velatura.model.passed import Parts
+from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium, prepare
+from velatura.model.remainder import Remainder
+from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
+from velatura.model.transport.adding import parts
+from velatura.model.transport.energies import INCIDENCES, energies
+from velatura.model.transport.operators import Layer
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.model.widths import Tensor
+from velatura.ops import Value
+from velatura.sampling import directional_grid, low_discrepancy
+from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.tables import Tables
+
+Array = NDArray[np.floating]
+
+RGB = 3
+COSINES = 48  # nodes, even in the root of the cosine
+AZIMUTHS = 12  # in half a turn, where interfaces are brushed
+COS_MIN = 1e-3
+EVENLY = 377  # directions over which the remainder is integrated
+DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
+BRIGHTEST = 4.0  # by how much it is scaled at most
+VEIL_MIN = 1e-3  # energy of veils that are drawn
+EVEN = 0.2  # share of samples of the symmetric form that the remainder has at least, and of those that pass
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A lobe: the number of its interface from the top, and whether it is the veil of one."""
+
+    interface: int
+    veil: bool
+
+
+@dataclass(frozen=True)
+class SolvedSide:
+    """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; the remainder, (C,)."""
+
+    columns: Columns
+    polynomial: Remainder
+
+    @property
+    def rows(self) -> Array:
+        """All columns, (rows, M), in the order in which `Columns.read` takes them."""
+        return np.concatenate([np.atleast_2d(each) for each in self.columns.all])
+
+    @property
+    def numbers(self) -> Array:
+        """Those of the remainder, (8 C,)."""
+        return np.concatenate(list(vars(self.polynomial).values()))
+
+    def weighed(self, factors: Sequence[Array]) -> SolvedSide:
+        """With the weights of reflected parts, and of what passes, scaled by factors (C, M)."""
+        columns = self.columns
+        weights = [factor * weight for factor, weight in zip(factors, columns.weights)]
+        columns = replace(columns, weights=weights, scale=factors[len(weights)] * columns.scale)
+        if columns.passes:
+            columns = replace(columns, passes=replace(columns.passes, straight=factors[-1]))
+        return replace(self, columns=columns)
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How materials of NumPy's values are solved for the directions of a grid, in a number of colours.
+
+    Operators that materials share are `made` once.
+    """
+
+    model: Model
+    variance: type[Variance]
+    grid: Grid
+    colours: int
+    tables: Tables
+    made: dict[Hashable, Layer] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, model: Model, variance: type[Variance], context: Context) -> Solver:
+        assert context.colour is not None
+        colours = RGB if context.colour is channels else len(context.colour())
+        return cls(model, variance, Grid(variance is Isotropic), colours, context.tables)
+
+    @property
+    def isotropic(self) -> bool:
+        return self.variance is Isotropic
+
+    @property
+    def kind(self) -> type[Variance]:
+        """Of lobes; those of isotropic interfaces have axes in the plane of incidence."""
+        return PerAxis if self.isotropic else Covariance
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the grid on which a renderer has the columns."""
+        return directional_grid.LINE if self.isotropic else directional_grid.PLANE
+
+    def drawn(self, materials: Sequence[Material]) -> list[Drawn]:
+        """What is drawn of either side, for materials that differ in values."""
+        veiled: set[int] = set()
+        for material in materials:
+            veiled = veiled.union(*map(_veiled, sides(material)))
+        count = len(materials[0].interfaces)
+        return [Drawn(k, veil) for k in range(count) for veil in (False, True) if not veil or k in veiled]
+
+    def solve(self, material: Material, drawn: Sequence[Drawn]) -> list[SolvedSide]:
+        """A material with values of NumPy, each side."""
+        found = [self._side(seen, drawn) for seen in sides(material)]
+        if self.model.form == "forward":
+            return found
+        found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
+        numbers = self._numbers(material, found, drawn)
+        factors = exchange.factors(numbers, self.grid.directions, self.grid.shares, self.grid.count)
+        return [side.weighed(each) for side, each in zip(found, factors)]
+
+    def _numbers(self, material: Material, found: Sequence[SolvedSide], drawn: Sequence[Drawn]) -> Solved:
+        """The BSDF in NumPy."""
+        context, made = Context(tables=self.tables), []
+        for seen, side in zip(sides(material), found):
+            curves = directional_grid.curves(list(self.grid.spread(side.rows, self.shape)), self.shape, None)
+            polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(side.polynomial).values()))
+            made.append(self.side(seen, drawn, curves, polynomial, context))
+        return self.bsdf(material, made)
+
+    def side(
+        self, material: Material, drawn: Sequence[Drawn], curves: Any, polynomial: Remainder, context: Context
+    ) -> Side:
+        """A side of a material of a renderer's values, those of one point or of all."""
+        assert context.colour is not None
+        each = _shapes(prepare(material, geometry(self.model), self.variance, context))
+        passage = straight_through.passage(material, self.variance) if material.transmits else None
+        shapes = tuple(each[lobe.interface] for lobe in drawn)
+        return Side(curves, shapes, polynomial, passage, context.colour, self.colours, self.kind)
+
+    def bsdf(self, material: Material, made: Sequence[Side]) -> Solved:
+        """A material of one side or two."""
+        symmetric = self.model.form == "symmetric"
+        if len(made) == 1:
+            return Solved(made[0], None, 1.0, symmetric)
+        return Solved(made[0], made[1], ops.mean(material.below) / ops.mean(material.exterior), symmetric)
+
+    def _side(self, material: Material, drawn: Sequence[Drawn]) -> SolvedSide:
+        """What a material is at the directions of the grid."""
+        cosine, phi, wi, count = self.grid.cosine, self.grid.phi, self.grid.directions, self.grid.count
+        solved = energies(
+            material,
+            np.concatenate([cosine, INCIDENCES]),
+            np.concatenate([phi, 0 * INCIDENCES]),
+            self.tables if self.model.reflectance == "fgd-multi" else None,
+            widths.nearly_straight,
+        )
+        albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
+        polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
+        lobes, veils = solved.lobes[..., :count], solved.veils[..., :count]
+        rest, straight, bounced, through = (
+            x[:, :count] for x in (solved.rest, solved.straight, solved.bounced, solved.passed)
+        )
+
+        # Draw lobes and veils
+        shapes, found = _shapes(prepare(material, geometry(self.model), self.variance)), parts(material)
+        tensors = widths.tensors(found, cosine, phi, lobes.mean(axis=1))
+        shown = [
+            widths.veil(found, each.interface, cosine, tensors[each.interface])
+            if each.veil
+            else tensors[each.interface]
+            for each in drawn
+        ]
+        apart = {each.interface for each in drawn if each.veil}
+        lobes = np.array([lobes[k] + (0 if k in apart else veils[k]) for k in range(len(lobes))])
+        energy = [(veils if each.veil else lobes)[each.interface] for each in drawn]
+        whole = [
+            own_medium.integral(shapes[each.interface].lobe(1.0, tensor.roughness(phi)), wi)
+            for each, tensor in zip(drawn, shown)
+        ]
+        weights = [np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0) for e, z in zip(energy, whole)]
+        scale = np.clip(rest / np.maximum(self._albedo(polynomial), DIM), 0, BRIGHTEST)
+
+        # Share samples by energies
+        shares = [each.mean(axis=0) for each in energy]
+        if material.transmits and len(drawn) == 1:
+            # What passes is sampled with the facets that reflect
+            shares = [np.maximum(shares[0] - np.mean(whole[0], axis=0), 0)]
+        shares.append(rest.mean(axis=0) + FAINT)
+        least = EVEN if self.model.form == "symmetric" else 0.0
+        shares[-1] = np.maximum(shares[-1], least * sum(shares))
+        total, left, passes = sum(shares), np.ones(count), None
+        if material.transmits:
+            passage = straight_through.passage(material, self.variance)
+            passes = _evenly(passed.parts(passage, wi, straight, bounced, through, np.array([total])), least)
+            left = 1 - passes.share
+            straight, bounced, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
+            passes = replace(passes, straight=straight, bounced=bounced, rest=scattered)
+        columns = Columns(
+            [self._colours(weight) for weight in weights],
+            [tuple(np.broadcast_to(x, count) for x in self._roughness(tensor)) for tensor in shown],
+            [left * share / total for share in shares[:-1]],
+            [self._colours(each) for each in energy],
+            self._colours(scale),
+            left * shares[-1] / total,
+            self._colours(rest),
+            passes,
+            self._colours(through) if passes else None,
+        )
+        return SolvedSide(columns, Remainder(*(np.broadcast_to(x, self.colours) for x in vars(polynomial).values())))
+
+    def _colours(self, values: Array) -> Array:
+        return np.broadcast_to(values, (self.colours, self.grid.count))
+
+    def _albedo(self, polynomial: Remainder) -> Array:
+        """Of the remainder as it is clipped, (C, M)."""
+        numbers = Remainder(*(np.reshape(x, (-1, 1, 1)) for x in vars(polynomial).values()))
+        wi, wo = self.grid.directions, remainder.sample(*low_discrepancy.square(EVENLY))
+        value = numbers.value((wi[0][:, None], wi[1][:, None], wi[2][:, None]), wo)
+        return np.asarray((value / remainder.density(wo)).mean(axis=-1))
+
+    def _roughness(self, tensor: Tensor) -> Iterator[Array]:
+        """Of a lobe with the plane of incidence, as it is interpolated."""
+        roughness = tensor.roughness(0 * self.grid.phi)
+        if self.isotropic:  # axes lie in the plane of incidence, and across it
+            u, v = (np.minimum(tensor.width(np.array(axis)), widths.ALPHA_MAX) for axis in widths.AXES)
+            roughness = Roughness(u, v, 0.0)
+        yield from vars(self.kind.of(roughness, ROOTS)).values()
+
+
+def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
+    """The BSDF of a material with constants of a renderer; differentiable."""
+    material = material.solid()
+    solver, given = Solver.of(model, variance, context), differences.variables(material)
+    start = plain(material)
+    drawn = solver.drawn([start])
+
+    def arrays(numbers: list[float]) -> list[Array]:
+        found = solver.solve(differences.replaced(start, given, numbers), drawn)
+        spread = [solver.grid.spread(side.rows, solver.shape).T.ravel() for side in found]
+        return [each for pair in zip(spread, (side.numbers for side in found)) for each in pair]
+
+    flat, made = iter(differences.differentiable(arrays, given, context.number)), []
+    for seen in sides(material):
+        curves = directional_grid.interleaved(next(flat), solver.shape, context.number)
+        made.append(solver.side(seen, drawn, curves, _remainder(next(flat), solver, context), context))
+    return solver.bsdf(material, made)
+
+
+def _remainder(numbers: Any, solver: Solver, context: Context) -> Remainder:
+    assert context.colour is not None
+    each: list[Any]
+    if context.colour is channels:
+        each = list(numbers[:, None])
+    elif context.number is None:
+        each = numbers.tolist()
+    else:
+        import drjit as dr
+
+        each = [dr.gather(context.number, numbers, k) for k in range(dr.width(numbers))]
+    width = solver.colours
+    return Remainder(*(context.colour(*each[k : k + width]) for k in range(0, len(each), width)))
+
+
+def sides(material: Material) -> list[Material]:
+    """A material as it is seen from above and, where it transmits, from below."""
+    return [material, material.reversed()] if material.transmits else [material]
+
+
+def geometry(model: Model) -> Model:
+    """A model by which layers are prepared for no more than the laws of Snell and Fresnel."""
+    return replace(model.in_closed_form, reflectance="fresnel")
+
+
+def plain(material: Material) -> Material:
+    """A material of a renderer's constants with values of NumPy: floats, and colours (C, 1)."""
+
+    def value(found: Value, colour: bool) -> Any:
+        channels = np.asarray(found, float).reshape(-1)
+        return channels[:, None] if colour else float(channels[0])
+
+    return material.each(lambda address, found: value(found, address.colour))
+
+
+def _veiled(material: Material) -> set[int]:
+    """Interfaces below media that scatter light by little."""
+    veiled: set[int] = set()
+    above, k = False, 0
+    for layer in material.layers:
+        if isinstance(layer, MediumValues):
+            events = max(map(widths.nearly_straight, np.ravel(layer.g).tolist())) * np.max(layer.sigma_s * layer.depth)
+            above = above or bool(events > VEIL_MIN)
+        elif isinstance(layer, InterfaceValues):
+            veiled |= {k} if above else set()
+            k += 1
+    return veiled
+
+
+def _evenly(of: Parts, least: float) -> Parts:
+    """With a share of the samples of what passes at least for its rest."""
+    even = np.maximum(least * of.share - of.of_rest, 0) / np.maximum(of.share - of.of_rest, FAINT)
+    straight, bounced = (1 - even) * of.of_straight, (1 - even) * of.of_bounced
+    return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)
+
+
+def _shapes(prepared: Prepared) -> list[Shape]:
+    """One for each interface from the top."""
+    found: list[Shape] = []
+    n: Value = 1.0
+    first: PreparedInterface | None = None
+    for layer in prepared.layers:
+        if isinstance(layer, PreparedMedium):
+            continue
+        found.append(Shape(len(found), n, layer if first is None or not layer.opaque else None, first))
+        first = first or layer
+        n = n * layer.n12
+    return found
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Directions at which a material is solved, and how columns are spread over a finer grid."""
+
+    isotropic: bool
+    cosines: int = COSINES
+
+    @property
+    def nodes(self) -> Array:
+        return np.linspace(0, 1, self.cosines)
+
+    @property
+    def turns(self) -> int:
+        return 1 if self.isotropic else AZIMUTHS
+
+    @property
+    def count(self) -> int:
+        return self.cosines * self.turns
+
+    @property
+    def cosine(self) -> Array:
+        return np.repeat(np.maximum(self.nodes**2, COS_MIN), self.turns)
+
+    @property
+    def phi(self) -> Array:
+        return np.tile(np.pi * np.arange(self.turns) / self.turns, self.cosines)
+
+    @property
+    def directions(self) -> tuple[Array, Array, Array]:
+        sine = np.sqrt(1 - self.cosine * self.cosine)
+        return sine * np.cos(self.phi), sine * np.sin(self.phi), self.cosine
+
+    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
+        """Nodes and weights of the linear interpolation at directions above."""
+        place = np.sqrt(np.clip(w[2], 0, 1)) * (self.cosines - 1)
+        cell = np.minimum(place.astype(int), self.cosines - 2)
+        along = [(cell, 1 - (place - cell)), (cell + 1, place - cell)]
+        if self.isotropic:
+            return along
+        turn = (np.arctan2(w[1], w[0]) % np.pi) * (self.turns / np.pi)
+        first = turn.astype(int)
+        around = [(first % self.turns, 1 - (turn - first)), ((first + 1) % self.turns, turn - first)]
+        return [(k * self.turns + m, x * y) for k, x in along for m, y in around]
+
+    def spread(self, rows: Array, shape: tuple[int, ...]) -> Array:
+        """Values at the nodes, (..., M), interpolated, (..., prod(shape)): by splines over the cosine, by waves over
+        the azimuth."""
+        values = rows.reshape(*rows.shape[:-1], self.cosines, self.turns)
+        if not self.isotropic:
+            x, y, _ = directional_grid.directions(shape, None)
+            phi = np.arctan2(y, x).reshape(shape)[0]
+            order = np.arange(self.turns // 2 + 1)
+            both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
+            waves = np.fft.rfft(values, axis=-1) / self.turns * both
+            values = (waves @ np.exp(2j * order[:, None] * phi)).real
+        fine = PchipInterpolator(self.nodes, values, axis=-2)(np.linspace(0, 1, shape[0]))
+        return np.asarray(fine.reshape(*rows.shape[:-1], -1))
