@@ -104,7 +104,8 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     sin = np.minimum(p / n, np.sqrt(1 - GRAZING**2))[:, None]
     # Light comes from wi, and travels to -wi
     wi = (-sin * np.cos(psi)[:, None], -sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin))
-    h = ggx.sample_visible(wi, *alpha, u_2[None], u_1[None])
+    # Azimuths from the plane of incidence: the same normals from all sides, where facets have no axes
+    h = ggx.sample_visible(wi, *alpha, (u_2 + psi[:, None] / (2 * np.pi)) % 1, u_1[None])
     cosine = np.minimum(ggx.dot(wi, h), 1.0)
     share = 1 / u_1.size
 
