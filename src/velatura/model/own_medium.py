@@ -108,6 +108,8 @@ def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Valu
     column = (-1, 1)
     x, y, z, *roughness = (value if np.ndim(value) == 0 else value.reshape(column) for value in (*wi, *lobe.roughness))
     alpha_u, alpha_v, n, i = _inside(replace(lobe, roughness=Roughness(*roughness)), (x, y, z))
+    # Azimuths from the plane of incidence: the same normals, whatever a round lobe has for axes
+    u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     o = ggx.reflect(i, h)
     p2 = n * n * (o[0] * o[0] + o[1] * o[1])
