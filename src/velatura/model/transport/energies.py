@@ -99,7 +99,8 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
         return [(system if i else full).reflected[i] for i in own] or [Operator.nothing(basis.size, len(setting.p))]
 
     unscattered, veiled = (
-        np.array(np.broadcast_arrays(*map(full.energy, of_lobes(system)), reflected)[:-1]) for system in (sharp, kept)
+        np.maximum(np.broadcast_arrays(*map(full.energy, of_lobes(system)), reflected)[:-1], 0)
+        for system in (sharp, kept)
     )
     # No lobe has more than there is: what quadrature says beyond is its error
     share = np.minimum(reflected / np.maximum(veiled.sum(axis=0), TINY), 1)
