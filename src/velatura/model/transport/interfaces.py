@@ -24,7 +24,9 @@ from velatura.tables import Tables
 
 Array = NDArray[np.floating]
 
-STRAIGHT = 0.09  # step of the logarithm of the index that refracted light which meets further facets still passes
+# Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
+# often, and where such light is lost
+STRAIGHT = {True: 0.09, False: 0.01}
 STAND_IN = 144  # normals of interfaces that stand in for brushed ones
 GRAZING = 1e-4  # least cosine of light that meets an interface
 ALPHA_MIN = 1e-3
@@ -111,13 +113,14 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
 
     def escape(w: tuple[Array, Array, Array], out: Array, through: bool, often: bool) -> Array:
         towards = (w[0], w[1], np.abs(w[2]))
-        if not often:
-            return np.where(out, ggx.masking(towards, *alpha), 0)
-        there, here = _smith(towards, alpha), _smith(wi, alpha)
-        both = np.exp(np.log1p(here) + betaln(1 + here, 1 + there)) if through else (1 + here) / (1 + here + there)
+        if often:
+            there, here = _smith(towards, alpha), _smith(wi, alpha)
+            both = np.exp(np.log1p(here) + betaln(1 + here, 1 + there)) if through else (1 + here) / (1 + here + there)
+        else:
+            both = ggx.masking(towards, *alpha)
         if through:
             # Facets of a small step let light pass again and again, and hardly turn it
-            both = both + np.exp(-abs(np.log(eta)) / STRAIGHT) * (1 - both)
+            both = both + np.exp(-abs(np.log(eta)) / STRAIGHT[ways[-1]]) * (1 - both)
         return np.where(out, both, 0)
 
     def divided(w: tuple[Array, Array, Array], n: float, shares: Array, kept: Sequence[Array]) -> tuple[Light, Array]:
