@@ -2,7 +2,8 @@
 
 Three systems of layers share their interfaces. In the first, light meets all that there is. In the others a lobe has
 the light that meets one facet of each interface and is not scattered by media (sharp), or is scattered by little (its
-veil). What the first system reflects besides is the remainder.
+veil). Of light that meets facets of its interface again it has a share: all where nothing above it refracts. What the
+first system reflects besides is the remainder.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ NODES = 24
 SAMPLES = 377  # normals for light from each node, and of each beam
 MODES = 3  # of the azimuth, of the remainder
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
+UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
 AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
 
 Straight = Callable[[float], float]  # share of scattered light that counts as going straight on, by asymmetry
@@ -81,22 +83,26 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
     each = layers(everything, setting)
     full = leaving([last for _, last in each], setting)
 
-    def system(found: Sequence[Part]) -> Leaving:
+    def system(found: Sequence[Part], as_set: bool = False) -> Leaving:
         of = settings(found, setting)
-        kept = [medium(part, x) if isinstance(part, Slab) else once for part, x, (once, _) in zip(found, of, each)]
+        kept = [medium(part, x) if isinstance(part, Slab) else of_it[as_set] for part, x, of_it in zip(found, of, each)]
         return leaving(kept, setting)
 
-    sharp = system(parts(material, lambda g: 0.0)) if scatters or often else full
+    clear = parts(material, lambda g: 0.0)
+    sharp = system(clear) if scatters or often else full
     kept = system(parts(material, forward)) if scatters else sharp
+    # A lobe has all that media do not scatter where nothing above it refracts, and else a share of it
+    whole = system(clear, True) if scatters and often else full
+    shares = _undisturbed(everything)
+    more = [share * (whole.reflected[i] + -1.0 * sharp.reflected[i]) for i, share in shares.items()]
 
     # Sort what leaves
-    own = [i for i, part in enumerate(everything) if isinstance(part, Facets)]
     total = _sum(full.reflected)
     reflected = full.energy(total)
 
     def of_lobes(system: Leaving) -> list[Operator]:
-        # All that an interface reflects is one lobe, where nothing lies above it
-        return [(system if i else full).reflected[i] for i in own] or [Operator.nothing(basis.size, len(setting.p))]
+        found = [system.reflected[i] + each for i, each in zip(shares, more)]
+        return found or [Operator.nothing(basis.size, len(setting.p))]
 
     unscattered, veiled = (
         np.maximum(np.broadcast_arrays(*map(full.energy, of_lobes(system)), reflected)[:-1], 0)
@@ -120,6 +126,17 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
         remainder=remainder,
         nodes=nodes,
     )
+
+
+def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
+    """Share of the light that meets facets of an interface again, and that no step of the index above takes from its
+    lobe, by the number of the interface among the layers."""
+    shares, steps = {}, 0.0
+    for i, part in enumerate(found):
+        if isinstance(part, Facets):
+            shares[i] = float(np.exp(-steps / UNDISTURBED))
+            steps += part.step
+    return shares
 
 
 def _sum(lights: Sequence[Operator]) -> Operator:

@@ -53,8 +53,15 @@ class Facets:
     @property
     def is_smooth(self) -> bool:
         """Whether it changes no direction."""
-        stepless = self.below is not None and self.k is None and bool((self.above == self.below).all())
+        stepless = not self.opaque and bool((self.above == self.below).all())
         return max(self.alpha_u, self.alpha_v) < ALPHA_MIN or stepless
+
+    @property
+    def step(self) -> float:
+        """Of the logarithm of the index, for light that it lets through."""
+        if self.below is None or self.opaque:
+            return 0.0
+        return float(abs(np.log(np.mean(self.below) / np.mean(self.above))))
 
     def smooth(self, p: Array, transmitted: bool) -> Array:
         """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
@@ -120,7 +127,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
             both = ggx.masking(towards, *alpha)
         if through:
             # Facets of a small step let light pass again and again, and hardly turn it
-            both = both + np.exp(-abs(np.log(eta)) / STRAIGHT[ways[-1]]) * (1 - both)
+            both = both + np.exp(-facets.step / STRAIGHT[ways[-1]]) * (1 - both)
         return np.where(out, both, 0)
 
     def divided(w: tuple[Array, Array, Array], n: float, shares: Array, kept: Sequence[Array]) -> tuple[Light, Array]:

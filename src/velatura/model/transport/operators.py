@@ -46,6 +46,9 @@ class Operator:
     def __add__(self, other: Operator) -> Operator:
         return Operator(self.nodes + other.nodes, self.columns + other.columns, self.beams + other.beams)
 
+    def __rmul__(self, share: float) -> Operator:
+        return Operator(share * self.nodes, share * self.columns, share * self.beams)
+
     def repeated(self) -> Operator:
         """The sum of all of its powers, (1 - A)^-1."""
         # What smooth interfaces trap for ever no light reaches
