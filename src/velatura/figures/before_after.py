@@ -22,6 +22,9 @@ PRESETS = (
     "three-dielectrics-over-metal",
     "crossed-brushing",
     "pearl-lacquer",
+    "red-enamel",
+    "frosted-glass",
+    "coated-brushed-aluminium",
 )
 SCALE = 0.25  # difference in radiance that is drawn in full colour
 
@@ -61,8 +64,10 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     for row, modelled, seen in zip(axes, numbers["presets"], numbers["pictures"]):
         truth = np.array(seen["reference"])
         for axis, model in zip(row, MODELS):
-            canvas.show(axis, seen[model], f"{modelled['name']}\n{model}")
-        canvas.show(row[2], seen["reference"], "reference")
+            canvas.show(axis, seen[model], "")
+            axis.set_title(f"{modelled['name']}\n{model}", fontsize=8)
+        canvas.show(row[2], seen["reference"], "")
+        row[2].set_title("reference", fontsize=8)
         for axis, model in zip(row[3:], MODELS):
             difference = (np.array(seen[model]) - truth).mean(axis=-1)
             axis.imshow(difference, cmap="RdBu_r", vmin=-SCALE, vmax=SCALE)
