@@ -6,8 +6,9 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from velatura.model.lobe_statistics import StackLobes
 from velatura.model.models import DEFAULT, SWITCHES, Model, named
-from velatura.model.stack_lobes import StackLobes, stack_lobes
+from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import MaterialLike, dumps, load
 
 if TYPE_CHECKING:
@@ -51,8 +52,17 @@ def lobes(
         alpha[k]: (2, N), GGX roughness along two axes;
         rotation[k]: (N,), the angle from the tangent to the first of them, radians anticlockwise seen from outside.
 
-        `transmitted` holds the same four of what leaves below, or is None where nothing does. With
-        `channels="separate"` all but the energy have a leading axis of colours. A diffuse base is no lobe.
+        own_alpha[k], own_rotation[k]: likewise, in the medium that the lobe is drawn in. For `velatura` that is the one
+            above the interface, and light that media scatter does not count; all other models draw lobes outside.
+
+        `transmitted` holds the same of what leaves below, by half-vectors with the direction that a smooth stack would
+        refract light to; None where nothing leaves. With `channels="separate"` all but energies have a leading axis of
+        colours. A diffuse base is no lobe. All other light is in
+
+        remainder: (C, N), reflected in no lobe: by the diffuse base; for `velatura` also what media scatter, and what
+            interfaces do other than a facet of each;
+        passed: (C, N), leaves below;
+        absorbed: (C, N), what is left, which for models that lose light holds that, too.
 
     Raises:
         InvalidInput: not a valid material, a cosine outside its range, lists of different lengths, an unknown model or

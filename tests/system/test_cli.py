@@ -48,13 +48,17 @@ def test_lobes_as_json_are_those_of_python(run: Run) -> None:
     assert (status, err) == (0, "")
     found = json.loads(out)
     lobes = vt.lobes(vt.preset("coated-gold"), cos_theta=[1.0, 0.5, 0.1], tir="off", model=found["model"])
-    assert list(found) == ["model", "cos", "reflected", "transmitted"]
+    others = ["remainder", "passed", "absorbed"]
+    assert list(found) == ["model", "cos", "reflected", "transmitted", *others]
     assert (found["cos"], found["transmitted"]) == ([1.0, 0.5, 0.1], None)
     assert len(found["reflected"]) == len(lobes.energy)
     for k, lobe in enumerate(found["reflected"]):
-        for field in ("energy", "alpha", "covariance"):
+        for field in ("energy", "alpha", "covariance", "own_alpha"):
             np.testing.assert_array_equal(np.transpose(lobe[field]), getattr(lobes, field)[k])
-        np.testing.assert_array_equal(lobe["rotation"], lobes.rotation[k])
+        for field in ("rotation", "own_rotation"):
+            np.testing.assert_array_equal(lobe[field], getattr(lobes, field)[k])
+    for name in others:
+        np.testing.assert_array_equal(np.transpose(found[name]), getattr(lobes, name))
 
 
 def test_what_a_stack_transmits_is_in_the_json(run: Run) -> None:

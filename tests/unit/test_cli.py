@@ -55,9 +55,13 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             "alpha": np.array([[0.1] * n, [0.2] * n]),
             "rotation": np.full(n, math.pi / 6),
             "covariance": np.arange(3 * n).reshape(3, n) + 1.0,
+            "own_alpha": np.array([[0.3] * n, [0.4] * n]),
+            "own_rotation": np.zeros(n),
         }
         transmitted = SimpleNamespace(**lobe) if seen.get("transmits") else None
-        return SimpleNamespace(**{field: [value, value] for field, value in lobe.items()}, transmitted=transmitted)
+        lists = {field: [value, value] for field, value in lobe.items()}
+        others = {"remainder": np.full((3, n), 0.25), "passed": np.zeros((3, n)), "absorbed": np.full((3, n), 0.5)}
+        return SimpleNamespace(**lists, transmitted=transmitted, **others)
 
     def render(stack: Any, progress: Callable[[int, int], None], **options: Any) -> np.ndarray:
         seen.update(stack=stack, **options)
@@ -173,8 +177,11 @@ def test_json_of_lobes_runs_over_directions(run: Run, material: str, calls: dict
         "alpha": [[0.1, 0.2], [0.1, 0.2]],
         "rotation": [math.pi / 6, math.pi / 6],
         "covariance": [[1.0, 3.0, 5.0], [2.0, 4.0, 6.0]],
+        "own_alpha": [[0.3, 0.4], [0.3, 0.4]],
+        "own_rotation": [0.0, 0.0],
     }
-    expected = {"model": "other", "cos": [1.0, 0.5], "reflected": [lobe, lobe], "transmitted": None}
+    others = {"remainder": [[0.25] * 3] * 2, "passed": [[0.0] * 3] * 2, "absorbed": [[0.5] * 3] * 2}
+    expected = {"model": "other", "cos": [1.0, 0.5], "reflected": [lobe, lobe], "transmitted": None} | others
     assert json.loads(out) == expected
     assert err == ""
 
@@ -186,6 +193,9 @@ def test_table_of_lobes(run: Run, material: str, calls: dict[str, Any]) -> None:
     rows = [line.replace("│", " ").split() for line in out.splitlines() if "°" in line]
     assert [row[:2] for row in rows] == [[cosine, name] for cosine in ("1", "0.5") for name in ("R1", "R2", "T")]
     assert rows[0][2:] == ["0.0000", "0.2000", "0.4000", "0.1000", "0.2000", "30.0°"]
+    assert [line.replace("│", " ").split() for line in out.splitlines() if "remainder" in line] == [
+        [cosine, "remainder", "0.2500", "0.2500", "0.2500"] for cosine in ("1", "0.5")
+    ]
 
 
 def test_render_writes_the_picture_named_after_the_material(

@@ -11,7 +11,7 @@ import pytest
 from typing_extensions import assert_type
 
 import velatura as vt
-from velatura.model.stack_lobes import StackLobes
+from velatura.model.lobe_statistics import StackLobes
 from velatura.stack import dumps
 
 

@@ -14,7 +14,16 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 # A lobe's quantities in the order of the JSON, and whether their components (rgb, uv, ...) stand before the directions.
-FIELDS = {"energy": True, "alpha": True, "rotation": False, "covariance": True}
+FIELDS = {
+    "energy": True,
+    "alpha": True,
+    "rotation": False,
+    "covariance": True,
+    "own_alpha": True,
+    "own_rotation": False,
+}
+OTHER_LIGHT = ("remainder", "passed", "absorbed")
+SHOWN = 0.00005  # least energy that the table does not round to 0
 
 
 def lobes(
@@ -40,12 +49,14 @@ def lobes(
 
     if as_json:
         report = {"model": name, "cos": cosines, "reflected": [_plain(lobe) for lobe in reflected]}
-        print(json.dumps(report | {"transmitted": transmitted and _plain(transmitted)}, allow_nan=False))
+        others = {name: getattr(found, name).T.tolist() for name in OTHER_LIGHT}
+        print(json.dumps(report | {"transmitted": transmitted and _plain(transmitted)} | others, allow_nan=False))
     else:
         from rich.console import Console
 
         named = {f"R{k}": lobe for k, lobe in enumerate(reflected, 1)} | ({"T": transmitted} if transmitted else {})
-        Console().print(_table(f"{stack.name or material} ({name})", cosines, named))
+        others = {other: getattr(found, other) for other in OTHER_LIGHT if not (transmitted and other == "passed")}
+        Console().print(_table(f"{stack.name or material} ({name})", cosines, named, others))
 
 
 def _plain(lobe: dict[str, Any]) -> dict[str, Any]:
@@ -53,8 +64,9 @@ def _plain(lobe: dict[str, Any]) -> dict[str, Any]:
     return {field: (values.swapaxes(-1, -2) if FIELDS[field] else values).tolist() for field, values in lobe.items()}
 
 
-def _table(title: str, cosines: list[float], lobes: dict[str, dict[str, Any]]) -> Table:
-    """A row per direction and lobe: R1 is the first interface from the top, T what leaves below."""
+def _table(title: str, cosines: list[float], lobes: dict[str, dict[str, Any]], others: dict[str, Any]) -> Table:
+    """A row per direction and lobe: R1 is the first interface from the top, T what leaves below; then all other light
+    by name."""
     from rich.table import Table
     from rich.text import Text
 
@@ -66,6 +78,9 @@ def _table(title: str, cosines: list[float], lobes: dict[str, dict[str, Any]]) -
             energy, alpha, rotation = (lobe[field][..., i] for field in ("energy", "alpha", "rotation"))
             degrees = _cell(rotation * 180 / math.pi, ".1f")
             table.add_row(f"{cosine:g}", name, _cell(energy), _cell(alpha), f"{degrees}°")
+        for name, energy in others.items():
+            if energy[..., i].max() >= SHOWN:
+                table.add_row(f"{cosine:g}", name, _cell(energy[..., i]))
         table.add_section()
     return table
 

@@ -13,7 +13,8 @@ from velatura.figures import canvas
 from velatura.inverse import Layers, invert_stack, on_black
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.plots import FILLS
-from velatura.model.stack_lobes import StackLobes, stack_lobes
+from velatura.model.lobe_statistics import StackLobes
+from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Stack
 
 MODEL = "bati2021"

@@ -16,7 +16,8 @@ from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_t
 from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, join
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import Model, bsdf, lobes, named, prepare, variance_kind
-from velatura.model.stack_lobes import StackLobes, stack_lobes, with_axes_named
+from velatura.model.lobe_statistics import StackLobes, with_axes_named
+from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Roughness
 from velatura.stack import (
     Diffuse,

@@ -24,10 +24,10 @@ from velatura.model.variance import Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
+from velatura.sampling import low_discrepancy
 
 COS_MIN = 1e-3  # inside; what refraction does not reach meets the interface at this one
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
-GOLDEN = 0.5 * (5**0.5 - 1)  # of one to the next
 
 Reflectance = Callable[[Value], Value]
 
@@ -103,8 +103,7 @@ def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Valu
 
     A mean over visible normals on a lattice of a Fibonacci number of them; within .3 % on average.
     """
-    k = np.arange(normals)
-    u1, u2 = ((k * round(normals * GOLDEN) + 0.5) / normals) % 1, (k + 0.5) / normals
+    u1, u2 = low_discrepancy.fibonacci(normals)
     column = (-1, 1)
     x, y, z, *roughness = (value if np.ndim(value) == 0 else value.reshape(column) for value in (*wi, *lobe.roughness))
     alpha_u, alpha_v, n, i = _inside(replace(lobe, roughness=Roughness(*roughness)), (x, y, z))

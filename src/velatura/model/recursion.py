@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # recursions use records that are prepared for them
     from velatura.model.adding import Lobe
     from velatura.model.bsdf import Body
     from velatura.model.context import Context
+    from velatura.model.lobe_statistics import StackLobes
     from velatura.model.models import Model
     from velatura.model.prepare import Prepared
     from velatura.stack import Material
@@ -54,6 +55,12 @@ class Recursion(ABC):
         from velatura.model import bsdf
 
         return bsdf.body(material, model, variance, context)
+
+    def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
+        """The lobes of a material with values in NumPy, for directions wi, (N,) each."""
+        from velatura.model import stack_lobes
+
+        return stack_lobes.added(material, model, wi)
 
 
 @dataclass(frozen=True)
@@ -104,3 +111,8 @@ class Momentum(Recursion):
         if not material.interfaces or not any(layer.spreads for layer in solution.plain(material).layers):
             return super().body(material, solution.geometry(model), variance, context)
         return solution.solve(material, model, variance, context)
+
+    def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
+        from velatura.model import solved_lobes  # loads SciPy
+
+        return solved_lobes.solved_lobes(material, model, wi)

@@ -142,7 +142,7 @@ class Solver:
     ) -> Side:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
-        each = _shapes(prepare(material, geometry(self.model), self.variance, context))
+        each = shapes_of(prepare(material, geometry(self.model), self.variance, context))
         passage = straight_through.passage(material, self.variance) if material.transmits else None
         shapes = tuple(each[lobe.interface] for lobe in drawn)
         return Side(curves, shapes, polynomial, passage, context.colour, self.colours, self.kind)
@@ -172,7 +172,7 @@ class Solver:
         )
 
         # Draw lobes and veils
-        shapes, found = _shapes(prepare(material, geometry(self.model), self.variance)), parts(material)
+        shapes, found = shapes_of(prepare(material, geometry(self.model), self.variance)), parts(material)
         tensors = widths.tensors(found, cosine, phi, lobes.mean(axis=1))
         shown = [
             widths.veil(found, each.interface, cosine, tensors[each.interface])
@@ -312,7 +312,7 @@ def _evenly(of: Parts, least: float) -> Parts:
     return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)
 
 
-def _shapes(prepared: Prepared) -> list[Shape]:
+def shapes_of(prepared: Prepared) -> list[Shape]:
     """One for each interface from the top."""
     found: list[Shape] = []
     n: Value = 1.0

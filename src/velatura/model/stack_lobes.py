@@ -3,46 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura.model.adding import Lobe
+from velatura.model.diffuse import under, with_means
+from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_axis, with_axes_named
 from velatura.model.models import DEFAULT, Model, named
 from velatura.model.prepare import lobes, prepare
-from velatura.model.variance import Isotropic, Roughness
+from velatura.model.variance import Isotropic
 from velatura.optics.directions import directions
+from velatura.optics.ggx import Direction
 from velatura.stack import Material, Stack
-
-FAINTLY_BRUSHED = 0.01  # difference of two roughnesses, below which an interface hardly has axes
-
-
-@dataclass(frozen=True)
-class LobeStatistics:
-    """One lobe, for N directions and C channels.
-
-    energy (C, N); covariance (3, N): xx, xy, yy in the space of the model's roughness map, in the shading frame;
-    alpha (2, N) along two axes, the first turned from the tangent by rotation (N,), radians anticlockwise. With
-    `channels=separate` all but the energy have a leading axis of channels.
-    """
-
-    energy: np.ndarray
-    covariance: np.ndarray
-    alpha: np.ndarray
-    rotation: np.ndarray
-
-
-@dataclass(frozen=True)
-class StackLobes:
-    """Reflected lobes as lists over interfaces from the top, and the transmitted lobe (None below an opaque base)."""
-
-    energy: list[np.ndarray]
-    covariance: list[np.ndarray]
-    alpha: list[np.ndarray]
-    rotation: list[np.ndarray]
-    transmitted: LobeStatistics | None
 
 
 def stack_lobes(
@@ -55,50 +29,37 @@ def stack_lobes(
     """The lobes of a stack; see `velatura.lobes`."""
     chosen = named(model, **switches)
     x, y, z = directions(cos_theta, phi).T
-    material = Material.of(stack)
-    reflected, transmitted = lobes(prepare(material.solid(), chosen), (x, y, z))
-    in_plane = chosen.recursion.lobe_kind(Isotropic) is not Isotropic
-    axis = _axis(material, np.arctan2(y, x) if in_plane else np.zeros_like(z))
-    each = [_collect(lobe, chosen, axis) for lobe in reflected]
-    return StackLobes(
-        energy=[lobe.energy for lobe in each],
-        covariance=[lobe.covariance for lobe in each],
-        alpha=[lobe.alpha for lobe in each],
-        rotation=[lobe.rotation for lobe in each],
-        transmitted=_collect(transmitted, chosen, axis) if stack.transmits else None,
+    return chosen.recursion.statistics(Material.of(stack).solid(), chosen, (x, y, z))
+
+
+def added(material: Material, model: Model, wi: Direction) -> StackLobes:
+    """The lobes of a material with values in NumPy by a recursion that draws them outside, for directions (N,)."""
+    prepared = prepare(material, model)
+    reflected, transmitted = lobes(prepared, wi)
+    in_plane = model.recursion.lobe_kind(Isotropic) is not Isotropic
+    axis = nearer_axis(material, np.arctan2(wi[1], wi[0]) if in_plane else np.zeros_like(wi[2]))
+    base = under(with_means(prepared), wi)
+    return StackLobes.of(
+        [_collect(lobe, model, axis) for lobe in reflected],
+        _collect(transmitted, model, axis) if material.transmits else None,
+        np.broadcast_to(base.energy if base else 0.0, (3, len(wi[2]))).copy(),
     )
 
 
-def _axis(material: Material, isotropic: np.ndarray) -> np.ndarray:
-    """Azimuths (N,) to which the first axis of a lobe is the nearer one.
-
-    They are the mean axis of the interfaces, by how anisotropic each is, so that axes keep their names where a value
-    changes by little; `isotropic` where none is.
-    """
-    double = FAINTLY_BRUSHED * np.exp(2j * isotropic)
-    for layer in material.interfaces:
-        double = double + abs(layer.alpha_u - layer.alpha_v) * np.exp(2j * np.radians(layer.rotation))
-    return 0.5 * np.angle(double)
-
-
-def with_axes_named(roughness: Roughness, axis: ArrayLike) -> Roughness:
-    """The same roughness with the axis first that is nearer to a given one."""
-    u, v, rotation = roughness
-    other = np.cos(2 * (rotation - axis)) < 0
-    across = rotation - np.copysign(0.5 * np.pi, rotation)
-    return Roughness(np.where(other, v, u), np.where(other, u, v), np.where(other, across, rotation))
-
-
 def _collect(lobe: Lobe, model: Model, axis: np.ndarray) -> LobeStatistics:
+    """The statistics of a lobe that is drawn outside."""
     lead, count = (3,) if model.channels == "separate" else (), len(axis)
 
     def shaped(values: Sequence[Any], axis: int) -> np.ndarray:
         return np.stack([np.broadcast_to(v, (*lead, count)) for v in values], axis=axis)
 
-    alpha_u, alpha_v, rotation = with_axes_named(lobe.roughness, axis)
+    alpha_u, alpha_v, turned = with_axes_named(lobe.roughness, axis)
+    alpha, rotation = shaped((alpha_u, alpha_v), -2), shaped((turned,), -2)[..., 0, :]
     return LobeStatistics(
         energy=np.broadcast_to(lobe.energy, (3, count)).copy(),
         covariance=shaped(lobe.variance.matrix(), -2),
-        alpha=shaped((alpha_u, alpha_v), -2),
-        rotation=shaped((rotation,), -2)[..., 0, :],
+        alpha=alpha,
+        rotation=rotation,
+        own_alpha=alpha,
+        own_rotation=rotation,
     )

@@ -11,8 +11,8 @@ import velatura as vt
 from fuzzing import Failure
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
+from velatura.model.lobe_statistics import StackLobes
 from velatura.model.models import Model
-from velatura.model.stack_lobes import StackLobes
 
 COSINES = (1.0, 0.9, 0.7, 0.5, 0.2, 0.03, 1e-3, 1e-6)
 GAIN = 1e-3  # of energy, by which tables may err
