@@ -172,7 +172,10 @@ def test_many_smooth_layers_keep_all_energy(count: int) -> None:
 @pytest.mark.parametrize("model", ["velatura", "belcour2018", "weier2020"])
 @pytest.mark.parametrize("phi", [0.0, 1.2, 2.9])
 def test_axes_keep_their_names_where_a_value_changes_by_little(model: str, phi: float) -> None:
-    """Between isotropic, straight and turned stacks, whose lobes the model holds in different ways."""
+    """Between isotropic, straight and turned stacks, whose lobes the model holds in different ways.
+
+    Energies of brushed stacks are summed up on other nodes, which changes roughnesses by .03 %.
+    """
     stacks = [
         [Interface(eta=1.5, alpha=0.1), Interface(conductor="Au", alpha=0.3)],
         [Interface(eta=1.5, alpha=0.1), Interface(conductor="Au", alpha=(0.1, 0.3))],
@@ -184,7 +187,7 @@ def test_axes_keep_their_names_where_a_value_changes_by_little(model: str, phi: 
         flat = layers.flat()
         for name in ("layer0_alpha_u", "layer1_alpha_v", "layer0_rotation", "layer1_rotation"):
             after = stack_lobes(layers.replace(**{name: flat[name] + little}), [1.0, 0.6, 0.2], phi, model=model)
-            assert np.allclose(after.alpha, before.alpha, atol=1e-4), name
+            assert np.allclose(after.alpha, before.alpha, rtol=3e-4, atol=1e-4), name
 
 
 @pytest.mark.parametrize("model", ["velatura", "belcour2018"])
