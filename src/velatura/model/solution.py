@@ -172,7 +172,7 @@ class Solver:
         )
 
         # Draw lobes and veils
-        shapes, found = shapes_of(prepare(material, geometry(self.model), self.variance)), parts(material)
+        shapes, found = shapes_of(prepare(_slim(material), geometry(self.model), self.variance)), parts(material)
         tensors = widths.tensors(found, cosine, phi, lobes.mean(axis=1))
         shown = [
             widths.veil(found, each.interface, cosine, tensors[each.interface])
@@ -200,7 +200,7 @@ class Solver:
         shares[-1] = np.maximum(shares[-1], least * sum(shares))
         total, left, passes = sum(shares), np.ones(count), None
         if material.transmits:
-            passage = straight_through.passage(material, self.variance)
+            passage = straight_through.passage(_slim(material), self.variance)
             passes = _evenly(passed.parts(passage, wi, straight, bounced, through, np.array([total])), least)
             left = 1 - passes.share
             straight, bounced, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
@@ -289,6 +289,16 @@ def plain(material: Material) -> Material:
         return channels[:, None] if colour else float(channels[0])
 
     return material.each(lambda address, found: value(found, address.colour))
+
+
+def _slim(material: Material) -> Material:
+    """With colours of one channel where all are alike, in single precision: what integrals need."""
+
+    def slim(colour: Array) -> Array:
+        alike = (colour == colour[0]).all()
+        return np.asarray(colour[:1] if alike else colour, np.float32)
+
+    return material.each(lambda _, value: slim(value) if np.ndim(value) else value)
 
 
 def _veiled(material: Material) -> set[int]:
