@@ -6,7 +6,7 @@ import pytest
 from velatura import load, tables
 from velatura.model import named, solution
 from velatura.model.bsdf import Asked
-from velatura.model.context import Context
+from velatura.model.context import Context, channels
 from velatura.model.prepare import variance_kind
 from velatura.model.solved import Solved
 from velatura.model.transport.energies import energies
@@ -65,6 +65,21 @@ def test_densities_integrate_to_one_at_most(base: Interface) -> None:
         _, density = found.eval_pdf(from_cosine(cosine), wo, POWER)
         total, error = 4 * np.pi * density.mean(), 4 * np.pi * density.std() / np.sqrt(SAMPLES)
         assert 0.7 - 4.5 * error < total < 1 + 4.5 * error
+
+
+@pytest.mark.parametrize("form", ["forward", "symmetric"])
+def test_one_channel_is_one_of_three(form: str) -> None:
+    """A grey material has one value in all numbers of channels, to rounding."""
+    material = Material.of(Stack([Interface(eta=1.5, alpha=0.2), Interface(eta=1.2, alpha=0.3)]))
+    model, kind, wi = named("velatura", form=form), variance_kind(material), from_cosine(0.6)
+    grey = material.each(lambda address, value: value[:1] if address.colour else value)
+    one, three = (
+        solution.solve(each, model, kind, Context(colour=colour)).eval_pdf(wi, from_cosine(0.8, 3.0))
+        for each, colour in ((grey, lambda *x: np.stack(x or [0.0])), (material, channels))
+    )
+    assert len(one[0]) == 1 and len(three[0]) == 3
+    for a, b in zip(one, three):
+        np.testing.assert_allclose(np.broadcast_to(a, np.shape(b)), b, rtol=1e-9)
 
 
 def test_light_from_below_sees_the_material_turned_over() -> None:

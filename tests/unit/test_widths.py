@@ -55,6 +55,18 @@ def test_a_coat_of_the_index_outside_changes_nothing(coat: Interface) -> None:
     np.testing.assert_allclose(np.cos(2 * (lobe.rotation - np.radians(70))), 1)
 
 
+def test_a_tinted_medium_leaves_the_width_of_a_lobe_alone() -> None:
+    """What absorbs single colours is no light that bounces: as wide as without the medium, to rounding."""
+    coat, metal = Interface(eta=1.5, alpha=0.1), Interface(eta=0.2, k=3.0, alpha=0.2)
+    tint = Medium(depth=1.0, sigma_a=(0.1, 0.5, 2.0))
+    energies = smooth_energies(coat, metal)
+    inside = np.sqrt(1 - (1 - COSINES**2) / 1.5**2)
+    kept = np.exp(-2 * np.array(tint.sigma_a)[:, None] / inside).mean(axis=0)
+    clear = widths.roughnesses(found(coat, metal), COSINES, 0 * COSINES, energies)
+    tinted = widths.roughnesses(found(coat, tint, metal), COSINES, 0 * COSINES, energies * [1 + 0 * kept, kept])
+    np.testing.assert_allclose(tinted[1], clear[1], rtol=1e-9)
+
+
 def test_turning_all_layers_turns_all_lobes() -> None:
     """At the normal too, where lobes do not depend on the azimuth from which they are lit."""
 

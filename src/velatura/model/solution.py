@@ -130,7 +130,7 @@ class Solver:
 
     def _numbers(self, material: Material, found: Sequence[SolvedSide], drawn: Sequence[Drawn]) -> Solved:
         """The BSDF in NumPy."""
-        context, made = Context(tables=self.tables), []
+        context, made = Context(colour=_stacked, tables=self.tables), []
         for seen, side in zip(sides(material), found):
             curves = directional_grid.curves(list(self.grid.spread(side.rows, self.shape)), self.shape, None)
             polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(side.polynomial).values()))
@@ -269,6 +269,10 @@ def _remainder(numbers: Any, solver: Solver, context: Context) -> Remainder:
         each = [dr.gather(context.number, numbers, k) for k in range(dr.width(numbers))]
     width = solver.colours
     return Remainder(*(context.colour(*each[k : k + width]) for k in range(0, len(each), width)))
+
+
+def _stacked(*channels: Array) -> Array:
+    return np.stack(channels)
 
 
 def sides(material: Material) -> list[Material]:

@@ -171,10 +171,10 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
     """As `roughnesses`, in the plane of incidence."""
     result: list[Tensor] = []
     coats: list[_Coat] = []
-    share = np.ones_like(cos_theta)
+    share = np.ones((1, len(cos_theta)))
     for part in found:
         if isinstance(part, Slab):
-            share = share * np.exp(-2 * (part.tau_a + part.tau_s).mean() / _cosine(cos_theta, part.n))
+            share = share * np.exp(-2 * (part.tau_a + part.tau_s)[:, None] / _cosine(cos_theta, part.n))
         if not isinstance(part, Facets):
             continue
         n = float(np.mean(part.above))
@@ -188,7 +188,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
             result.append(own)
         if not part.opaque:
             assert part.below is not None
-            passed = 1 - part.reflectance(cosine).mean(axis=0)
+            passed = 1 - part.reflectance(cosine)
             share = share * passed ** (2 if coats else 1)
             coats.append(_Coat(own, n, float(np.mean(part.below)), cosine))
     return result
@@ -208,21 +208,23 @@ def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -
 def features(
     part: Facets, first: Tensor, own: Tensor, coats: Sequence[_Coat], cos_theta: Array, share: Array, energy: Array
 ) -> dict[str, Array]:
-    """Features of the correction, (M,) each, or (2, M) for the axes."""
+    """Features of the correction, (M,) each, or (2, M) for the axes; `share` (C, M) is what layers above let pass."""
     n, n_top = coats[-1].n_below, coats[0].n_below
     cosine = _cosine(cos_theta, n)
     sin2 = 1 - cos_theta * cos_theta
     wi = np.sqrt(sin2), np.zeros_like(sin2), cos_theta
     lobe = OwnMediumLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, lambda c: 1 - fresnel.dielectric(c, n_top))
     let_out = own_medium.integral(lobe, wi, COARSE)
-    reflected = part.reflectance(cosine).mean(axis=0)
+    reflected = part.reflectance(cosine)
+    expected = (reflected * share).mean(axis=0) * let_out
     below = 1.0
     if not part.opaque:
         assert part.below is not None
         below = float(np.mean(part.below)) / n
         both = own_medium.integral(replace(lobe, facets=lambda c: fresnel.dielectric(c, below)), wi, COARSE)
         reflected = both / np.maximum(let_out, 1e-9)
-    brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(reflected * let_out * share, 1e-9))
+        expected = both * share.mean(axis=0)
+    brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(expected, 1e-9))
     moved = max((coat.tensor.size * coat.contrast for coat in coats), key=np.max)
     axes = np.array([first.width(first.angle + turn) for turn in AXES])
     return {

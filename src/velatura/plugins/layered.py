@@ -163,10 +163,11 @@ def make(mi: Any) -> type:
                 weight = value / dr.maximum(bs.pdf, 1e-30)
                 part = body.component(wi, drawn, sample1, asked)
             bs.sampled_component = mi.UInt32(part)
-            bs.sampled_type = mi.UInt32(+self.kinds[0])
+            sampled = mi.UInt32(+self.kinds[0])
             for number, kind in enumerate(self.kinds):
                 if kind != self.kinds[0]:
-                    bs.sampled_type[bs.sampled_component == number] = +kind
+                    sampled = dr.select(bs.sampled_component == number, mi.UInt32(+kind), sampled)
+            bs.sampled_type = sampled
             return bs, mi.depolarizer(dr.select(active & (bs.pdf > 0), spectral.carried(mi, weight), 0))
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
