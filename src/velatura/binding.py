@@ -285,10 +285,13 @@ class Binding:
         return self.material({**{name: plain(value) for name, value in self.constants.items()}, **self.images})
 
     def symbolic(self, looked_at: Material) -> Material:
-        """The same, with differentiated values unchanged, so that they never equal another value."""
+        """The same, with differentiated values unchanged, so that none equals another value, or another variable."""
         import drjit as dr
 
         apart = {name: value for name, value in self.constants.items() if dr.grad_enabled(value)}
+        # One variable for several values, such as both axes of an interface, is one
+        numbers = {value.index_ad: value for value in apart.values() if dr.depth_v(value) == 1}
+        apart = {name: numbers[value.index_ad] if dr.depth_v(value) == 1 else value for name, value in apart.items()}
         return looked_at.each(lambda address, value: apart.get(address.name, value))
 
     def _at(self, si: Any, active: Any) -> dict[str, Any]:

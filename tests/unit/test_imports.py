@@ -48,7 +48,7 @@ IMPORTED_BY = {
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
 RENDERER = {
     "mitsuba": "kernel",
-    "drjit": "kernel ops sampling tables model binding plugins reference checks scenes",
+    "drjit": "kernel ops sampling tables binding plugins reference checks scenes",
 }
 
 # Modules -> what importing them must not load.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
-from velatura.model import differences, exchange, own_medium, passed, remainder, straight_through, widths
+from velatura.model import exchange, own_medium, passed, remainder, straight_through, widths
 from velatura.model.context import Context, channels
 from velatura.model.models import Model
 from velatura.model.passed import Parts
@@ -21,10 +21,11 @@ from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.transport.adding import parts
 from velatura.model.transport.energies import INCIDENCES, energies
 from velatura.model.transport.operators import Layer
+from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.model.widths import Tensor
 from velatura.ops import Value
-from velatura.sampling import directional_grid, low_discrepancy
+from velatura.sampling import differences, directional_grid, low_discrepancy
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.tables import Tables
 
@@ -240,33 +241,25 @@ class Solver:
 def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
     """The BSDF of a material with constants of a renderer; differentiable."""
     material = material.solid()
-    solver, given = Solver.of(model, variance, context), differences.variables(material)
+    solver, given = Solver.of(model, variance, context), Variables.of(material)
     start = plain(material)
     drawn = solver.drawn([start])
 
     def arrays(numbers: list[float]) -> list[Array]:
-        found = solver.solve(differences.replaced(start, given, numbers), drawn)
+        found = solver.solve(given.replaced(start, numbers), drawn)
         spread = [solver.grid.spread(side.rows, solver.shape).T.ravel() for side in found]
         return [each for pair in zip(spread, (side.numbers for side in found)) for each in pair]
 
-    flat, made = iter(differences.differentiable(arrays, given, context.number)), []
+    flat, made = iter(differences.differentiable(arrays, given.given, given.around, context.number)), []
     for seen in sides(material):
         curves = directional_grid.interleaved(next(flat), solver.shape, context.number)
         made.append(solver.side(seen, drawn, curves, _remainder(next(flat), solver, context), context))
     return solver.bsdf(material, made)
 
 
-def _remainder(numbers: Any, solver: Solver, context: Context) -> Remainder:
+def _remainder(flat: Any, solver: Solver, context: Context) -> Remainder:
     assert context.colour is not None
-    each: list[Any]
-    if context.colour is channels:
-        each = list(numbers[:, None])
-    elif context.number is None:
-        each = numbers.tolist()
-    else:
-        import drjit as dr
-
-        each = [dr.gather(context.number, numbers, k) for k in range(dr.width(numbers))]
+    each = list(flat[:, None]) if context.colour is channels else differences.numbers(flat, context.number)
     width = solver.colours
     return Remainder(*(context.colour(*each[k : k + width]) for k in range(0, len(each), width)))
 

@@ -11,12 +11,10 @@ from velatura import kernel, tables
 from velatura.binding import Binding, Image, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
-from velatura.model.context import Context, at_a_point
 from velatura.model.lobe_merging import merging
 from velatura.model.models import EXCEPTIONS, GAIN
 from velatura.model.variance import Isotropic
-from velatura.plugins import spectral
-from velatura.stack import Material
+from velatura.plugins import bodies, spectral
 
 
 @kernel.plugin("layered")
@@ -68,7 +66,7 @@ def make(mi: Any) -> type:
             shape, form = "pane" if self.transmits else "opaque", self.model.form
             if form == "forward" and self.model.recursion.has_gain:
                 form = "scaled"
-            elif self.body and self.body.balanced:
+            elif self.bodies.balanced:
                 form = "balanced" if shape == "opaque" and self.variance is Isotropic else "exchanged"
             declared = EXCEPTIONS[form, shape]
             # The albedo of a base is a sum over cosines, which hardly resolves a critical angle outside, and errs by up
@@ -86,24 +84,12 @@ def make(mi: Any) -> type:
 
         def _update(self) -> None:
             """Compute the values that do not depend on direction, and the flags of the surface."""
-            self.binding.update()
-            binding, based = self.binding, self.binding.stack.base is not None
+            binding = self.binding
+            binding.update()
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
             seen = binding.looked_at()
             self.variance = variance_kind(binding.symbolic(seen))
-            self.body: bsdf.Body | None = None
-            if binding.uniform:
-                self.body = self.model.recursion.body(
-                    binding.uniform_material(), self.model, self.variance, self._sampled()
-                )
-                dr.eval(self.body)
-            self.spectra: spectral.Spectra | None = None
-            sampled = binding.stack.interfaces and not binding.uniform and not binding.varies
-            if sampled and dr.is_jit_v(mi.Float):
-                fixed = self._prepared(binding.uniform_material(), self._sampled())
-                dr.eval(fixed)
-                self.spectra = spectral.sample(mi, fixed, self._at_wavelengths)
-                dr.eval(self.spectra.above, self.spectra.below, self.spectra.means)
+            self.bodies = bodies.of(mi, binding, self.model, self.variance)
             # Say how light leaves
             self.delta = not binding.varies and not any(layer.spreads for layer in seen.layers)
             self.transmits = binding.stack.transmits
@@ -114,42 +100,18 @@ def make(mi: Any) -> type:
             lobes = len(merging(self.model, len(binding.stack.interfaces)))
             self.kinds = [flags.DeltaReflection if self.delta else flags.GlossyReflection] * lobes
             components = [kind | common | one_way for kind in self.kinds]
-            if self.body.diffuse if self.body else based:
+            if self.bodies.diffuse:
                 self.kinds += [flags.DiffuseReflection]
-                components += [self.kinds[-1] | common | (one_way if self.body else flags.Empty)]
+                components += [self.kinds[-1] | common | one_way]
             if self.transmits:
                 self.kinds += [flags.DeltaTransmission if self.delta else flags.GlossyTransmission]
                 components += [self.kinds[-1] | common | flags.NonSymmetric]
             self.has_components(components)
 
-        def _prepared(self, material: Material, context: Context) -> bsdf.Lobed:
-            return bsdf.body(material, self.model, self.variance, context)
-
-        def _sampled(self) -> Context:
-            """Samples over direction for a uniform material; scalar variants compute every direction anew."""
-            if not dr.is_jit_v(mi.Float):
-                return Context(colour=mi.UnpolarizedSpectrum, settle=self._settled)
-            return Context(number=mi.Float, colour=mi.UnpolarizedSpectrum, settle=self._settled)
-
-        def _settled(self, value: Any) -> Any:
-            dr.make_opaque(value)
-            return value
-
-        def _at_wavelengths(self, wavelengths: Any) -> bsdf.Lobed:
-            si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wavelengths))
-            si.wavelengths = wavelengths
-            return self._prepared(self.binding.steered(si, True), at_a_point())
-
-        def _body(self, si: Any, active: Any) -> bsdf.Body:
-            if self.body:
-                return self.body
-            body = self._prepared(self.binding.steered(si, active), at_a_point())
-            return self.spectra.at(body, si.wavelengths) if self.spectra else body
-
         # The interface of a BSDF
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            asked, body, wi = self._asked(ctx), self._body(si, active), tuple(si.wi)
+            asked, body, wi = self._asked(ctx), self.bodies.at(si, active), tuple(si.wi)
             bs = mi.BSDFSample3f()
             if self.delta:
                 smooth = cast(bsdf.Lobed, body)
@@ -173,11 +135,11 @@ def make(mi: Any) -> type:
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
             if self.delta:
                 return mi.Spectrum(0), mi.Float(0)
-            value, pdf = self._body(si, active).eval_pdf(tuple(si.wi), tuple(wo), self._asked(ctx))
+            value, pdf = self.bodies.at(si, active).eval_pdf(tuple(si.wi), tuple(wo), self._asked(ctx))
             return mi.depolarizer(spectral.carried(mi, value)) & active, dr.select(active, pdf, 0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            albedo = self._body(si, active).albedo(tuple(si.wi))
+            albedo = self.bodies.at(si, active).albedo(tuple(si.wi))
             lit = active & (si.wi.z != 0 if self.transmits else si.wi.z > 0)
             return dr.clip(spectral.carried(mi, albedo), 0, 1) & lit
 

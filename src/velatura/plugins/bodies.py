@@ -1,0 +1,103 @@
+"""A material at the points of a surface, as BSDFs: one and the same everywhere, or one for each point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from velatura.binding import Binding
+from velatura.model import bsdf
+from velatura.model.bsdf import Body
+from velatura.model.context import Context, at_a_point
+from velatura.model.models import Model
+from velatura.model.variance import Variance
+from velatura.plugins import spectral
+from velatura.plugins.spectral import Spectra
+
+
+class Bodies(Protocol):
+    """`diffuse` and `balanced` are those of all bodies."""
+
+    @property
+    def diffuse(self) -> bool: ...
+
+    @property
+    def balanced(self) -> bool: ...
+
+    def at(self, si: Any, active: Any) -> Body:
+        """The material at a surface point."""
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """One body for all points and wavelengths."""
+
+    body: Body
+
+    @property
+    def diffuse(self) -> bool:
+        return self.body.diffuse
+
+    @property
+    def balanced(self) -> bool:
+        return self.body.balanced
+
+    def at(self, si: Any, active: Any) -> Body:
+        return self.body
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Lobes in closed form, prepared from the values of each point; where the material is uniform, with energies that
+    were sampled once over wavelengths."""
+
+    binding: Binding
+    model: Model
+    variance: type[Variance]
+    spectra: Spectra | None = None
+
+    @property
+    def diffuse(self) -> bool:
+        return self.binding.stack.base is not None
+
+    @property
+    def balanced(self) -> bool:
+        return False
+
+    def at(self, si: Any, active: Any) -> Body:
+        lobed = self.lobed(si, active)
+        return self.spectra.at(lobed, si.wavelengths) if self.spectra else lobed
+
+    def lobed(self, si: Any, active: Any) -> bsdf.Lobed:
+        return bsdf.body(self.binding.steered(si, active), self.model, self.variance, at_a_point())
+
+
+def of(mi: Any, binding: Binding, model: Model, variance: type[Variance]) -> Bodies:
+    """The material with the values that it has now."""
+    import drjit as dr
+
+    def settled(value: Any) -> Any:
+        dr.make_opaque(value)
+        return value
+
+    # Scalar variants compute every direction anew
+    number = mi.Float if dr.is_jit_v(mi.Float) else None
+    context = Context(number=number, colour=mi.UnpolarizedSpectrum, settle=settled)
+    if binding.uniform:
+        body = model.recursion.body(binding.uniform_material(), model, variance, context)
+        dr.eval(body)
+        return Uniform(body)
+    prepared = Prepared(binding, model, variance)
+    if binding.varies or number is None or not binding.stack.interfaces:
+        return prepared
+
+    def at_wavelengths(wavelengths: Any) -> bsdf.Lobed:
+        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wavelengths))
+        si.wavelengths = wavelengths
+        return prepared.lobed(si, True)
+
+    fixed = bsdf.body(binding.uniform_material(), model, variance, context)
+    dr.eval(fixed)
+    spectra = spectral.sample(mi, fixed, at_wavelengths)
+    dr.eval(spectra.above, spectra.below, spectra.means)
+    return Prepared(binding, model, variance, spectra)

@@ -1,0 +1,88 @@
+"""Gradients of materials that are solved in NumPy, against differences of the values of a BSDF."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+
+mi = kernel.mitsuba("llvm_ad_rgb")
+import drjit as dr  # noqa: E402
+
+COATED = vt.Stack(
+    [
+        vt.Interface(eta=1.5, alpha=0.1),
+        vt.Medium(depth=0.5, sigma_a=(0.1, 0.4, 0.9), sigma_s=0.3, g=0.5),
+        vt.Interface(eta=(0.15, 0.4, 1.3), k=(3.6, 2.4, 1.9), alpha=0.3),
+    ]
+)
+PANE = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=1.3, alpha=0.2)])
+BRUSHED = vt.Stack([vt.Interface(eta=0.2, k=3.9, alpha=(0.3, 0.15), rotation=20)])
+UP, DOWN = (-0.45, -0.15, 0.75), (-0.45, -0.15, -0.75)
+
+
+def value(bsdf: Any, wo: tuple[float, ...]) -> Any:
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(0.4, 0.3, 0.8))
+    dr.make_opaque(si)
+    return dr.sum(bsdf.eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(*wo))))
+
+
+def difference(stack: vt.Stack, key: str, wo: tuple[float, ...]) -> list[float]:
+    """By channel, over a step of 2 %, or 1 degree."""
+    given = stack.flat()[key]
+    colour = given if isinstance(given, tuple) else (given,)
+    found = []
+    for k, x in enumerate(colour):
+        step = 1.0 if key.endswith("rotation") else 0.02 * x
+        ends = []
+        for end in (x - step, x + step):
+            new = (*colour[:k], end, *colour[k + 1 :])
+            ends.append(float(value(vt.bsdf(stack.replace(**{key: new if len(new) > 1 else end})), wo)[0]))
+        found.append((ends[1] - ends[0]) / (2 * step))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("stack", "keys", "wo"),
+    (
+        (COATED, "layer0_eta layer1_depth layer1_sigma_a layer1_sigma_s layer1_g layer2_eta layer2_k", UP),
+        (PANE, "layer0_eta layer1_eta", DOWN),
+        (BRUSHED, "layer0_alpha_u layer0_rotation layer0_k", UP),
+    ),
+)
+def test_gradients_are_differences(stack: vt.Stack, keys: str, wo: tuple[float, ...]) -> None:
+    """To 2 %: some values change where nodes lie, and so by how much they are off."""
+    bsdf = vt.bsdf(stack)
+    parameters = mi.traverse(bsdf)
+    for key in keys.split():
+        dr.enable_grad(parameters[key])
+    parameters.update()
+    dr.backward(value(bsdf, wo))
+    for key in keys.split():
+        np.testing.assert_allclose(np.array(dr.grad(parameters[key])).ravel(), difference(stack, key, wo), rtol=0.02)
+
+
+def test_one_variable_for_both_axes_leaves_an_interface_isotropic() -> None:
+    """Two roughnesses, each one variable for both of its axes: to 2 %, or .03 of slopes that vary by 1 over .02."""
+    bsdf = vt.bsdf(COATED)
+    parameters = mi.traverse(bsdf)
+    roughness = {0: mi.Float(0.1), 2: mi.Float(0.3)}
+    dr.enable_grad(roughness)
+    for layer, alpha in roughness.items():
+        parameters[f"layer{layer}_alpha_u"] = alpha
+        parameters[f"layer{layer}_alpha_v"] = alpha
+    parameters.update()
+    assert not mi.has_flag(bsdf.flags(), mi.BSDFFlags.Anisotropic)
+    dr.backward(value(bsdf, UP))
+    for layer, alpha in roughness.items():
+        x = float(dr.detach(alpha)[0])
+        low, high = (
+            float(value(vt.bsdf(COATED.replace(**{f"layer{layer}_alpha": x + step})), UP)[0])
+            for step in (-0.005, 0.005)
+        )
+        assert np.isclose(float(dr.grad(alpha)[0]), (high - low) / 0.01, rtol=0.02, atol=0.03)
