@@ -104,11 +104,14 @@ def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> OwnMedium
         return np.asarray(facets[k].reflectance(cosine).mean(axis=0))
 
     def leaving(cosine: Array) -> Array:
-        return np.asarray(1 - facets[0].reflectance(cosine).mean(axis=0))
+        assert first is not None
+        above = np.sqrt(np.maximum(1 - (1 - cosine * cosine) / np.mean(facets[first].above) ** 2, 0))
+        return np.asarray(1 - facets[first].reflectance(above).mean(axis=0))
 
-    if k == 0:
-        return OwnMediumLobe(1.0, roughness, 1.0, reflected)
+    first = widths.first_step([each.step for each in facets[:k]])
     n = float(np.mean(facets[k].above))
+    if first is None:
+        return OwnMediumLobe(1.0, roughness, n, reflected)
     return OwnMediumLobe(1.0, roughness, n, None if facets[k].opaque else reflected, leaving)
 
 

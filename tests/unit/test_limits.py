@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from velatura import tables
+from velatura.model import named, remainder, solution
+from velatura.model.bsdf import Asked
+from velatura.model.context import Context
+from velatura.model.prepare import variance_kind
 from velatura.model.transport.energies import Energies, energies
 from velatura.model.widths import nearly_straight
+from velatura.sampling import low_discrepancy
 from velatura.stack import Interface, Material, Medium, Stack
 
 COSINES = np.array([1.0, 0.7, 0.35, 0.1])
@@ -55,3 +60,39 @@ def test_smoke_of_no_depth_changes_no_energy(depth: float) -> None:
     plain, clouded = solved([rough], True), solved([smoke, rough], True)
     assert clouded.lobes == pytest.approx(plain.lobes, abs=1e-3)
     assert clouded.rest == pytest.approx(plain.rest, abs=1e-3)
+
+
+# As they are drawn
+
+
+def drawn(layers: list[Any], cosine: float) -> np.ndarray:
+    """Light from a cosine over even directions on both sides, by colour."""
+    material = Material.of(Stack(layers)).solid()
+    found = solution.solve(material, named("velatura"), variance_kind(material), Context())
+    u, v = low_discrepancy.square(1597)
+    wo = [*remainder.sample(u, v)]
+    wi = np.full(u.size, np.sqrt(1 - cosine**2)), np.zeros(u.size), np.full(u.size, cosine)
+    both = (found.eval_pdf(wi, (wo[0], wo[1], side * wo[2]), Asked(radiance=False))[0] / wo[2] for side in (1, -1))
+    return np.concatenate([np.broadcast_to(light, (3, u.size)) for light in both], axis=1)
+
+
+BENEATH: dict[str, tuple[list[Any], list[Any]]] = {
+    "over gold": ([], [GOLD]),
+    "over coated gold": ([], [COAT, GOLD]),
+    "in coated gold": ([COAT], [GOLD]),
+    "over glass": ([], [COAT]),
+    "under glass": ([COAT], []),
+    "in a pane": ([COAT], [Interface(eta=1.0, alpha=0.2)]),
+    "under a pane": ([COAT, Interface(eta=1.0, alpha=0.2)], []),
+}
+
+
+@pytest.mark.parametrize("name", BENEATH)
+def test_a_rough_interface_of_almost_no_step_changes_no_lobe(name: str) -> None:
+    """Total variation."""
+    above, below = BENEATH[name]
+    n = above[-1].eta if above else 1.0
+    plain = drawn([*above, *below], 0.5)
+    for step, bound in ((0.0, 1e-4), (1e-6, 1e-3), (1e-3, 0.01)):
+        stepped = drawn([*above, Interface(eta=n * (1 + step), alpha=0.4), *below], 0.5)
+        assert 0.5 * np.abs(stepped - plain).sum() < bound * plain.sum()

@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,28 +55,28 @@ class Rest:
 
 
 def bounced(passage: Passage, wi: Direction) -> OwnMediumLobe | None:
-    """The lobe of light from wi, above, that bounces between interfaces; None for a single one."""
-    count = len(passage.crossings)
-    if count == 1:
+    """The lobe of light from wi, above, that bounces between the last two interfaces; None for a single one."""
+    if not passage.bounces:
         return None
-    faces = passage.crossings[-2].width + passage.crossings[-1].width
-    return _lobe(passage, entered(passage, wi), count - 1, faces * BOUNCES)
+    faces = _sum(passage.faces, [crossing.width for crossing in passage.crossings])
+    return _lobe(passage, entered(passage, wi), passage.under, faces * BOUNCES)
 
 
 def rest(passage: Passage, wi: Direction) -> Rest:
     """The light from wi, above, that is scattered by media, or often by facets."""
-    count = len(passage.crossings)
+    n, last = passage.indices, len(passage.crossings) - 1
     cloudy = [l for l, slab in enumerate(passage.slabs) if not _is_none(slab.scattering)]
-    last = min(cloudy[-1], count - 1) if cloudy else count - 1
-    n = passage.indices
-    bound, leaving = reduce(ops.minimum, n[last:]) / n[-1], _leaving(passage, last)
     if not cloudy:
-        return Rest(None, 1.0, bound, leaving)
+        under = passage.under
+        return Rest(None, 1.0, ops.minimum(_above(under, n) / n[-1], 1.0), _leaving(passage, under))
+    last = min(cloudy[-1], last)
+    under = _from(last, passage)
+    bound, leaving = reduce(ops.minimum, n[last:]) / n[-1], _leaving(passage, under)
     i = entered(passage, wi)
     alpha = _turned([(passage.slabs[l], i.bounded[l]) for l in cloudy])
     diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
     width = type(passage.crossings[0].width).uniform(WIDTHS.variance(alpha))
-    return Rest(_lobe(passage, i, last, width), diffuse, bound, leaving)
+    return Rest(_lobe(passage, i, under, width), diffuse, bound, leaving)
 
 
 def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
@@ -89,30 +90,51 @@ def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
     return ops.sqrt((1 - cos_theta) / (1 + cos_theta))
 
 
-def _lobe(passage: Passage, i: Crossed, slab: int, inside: Variance) -> OwnMediumLobe:
-    """The lobe in a slab, of the widths of refractions and those that light takes on inside."""
-    n = passage.indices
-    scale = 1 / (2 * n[slab] * ops.maximum(i.bounded[slab], COS_MIN))
+def _lobe(passage: Passage, i: Crossed, under: Sequence[Value], inside: Variance) -> OwnMediumLobe:
+    """The lobe in the slab above the interfaces that are `under` it, of the widths of refractions and those that light
+    takes on inside."""
+    n = _above(under, passage.indices)
+    scale = 1 / (2 * n * ops.maximum(_above(under, i.bounded), COS_MIN))
     for crossing, step in zip(passage.crossings, i.steps):
         inside = inside + crossing.width * ops.power(ops.maximum(ops.absolute(step) * scale, ops.TINY), EXPONENT)
     u, v, rotation = inside.roughness(WIDTHS)
     roughness = Roughness(ops.minimum(u, ALPHA_MAX), ops.minimum(v, ALPHA_MAX), rotation)
-    return OwnMediumLobe(1.0, roughness, n[slab] / n[-1], leaving=_leaving(passage, slab))
+    return OwnMediumLobe(1.0, roughness, n / passage.indices[-1], leaving=_leaving(passage, under))
 
 
-def _leaving(passage: Passage, slab: int) -> Callable[[Value], Value]:
-    """Share (a colour) that smooth interfaces below a slab let pass, by the cosine below all of them."""
+def _leaving(passage: Passage, under: Sequence[Value]) -> Callable[[Value], Value]:
+    """Share (a colour) that smooth interfaces let pass, by the cosine below all of them."""
     n, crossings = passage.indices, passage.crossings
 
     def leaving(cos_o: Value) -> Value:
         p2 = 1 - cos_o * cos_o
-        ratios = [x / n[-1] for x in n[slab:-1]]
-        cosines = [*(ops.sqrt(1 - p2 / (ratio * ratio)) for ratio in ratios), cos_o]
-        pairs = zip(cosines, cosines[1:], crossings[slab:])
-        passes = [1 - fresnel.dielectric_between(above, below, c.eta) for above, below, c in pairs]
-        return reduce(lambda a, b: a * b, passes)
+        passes: Value = 1.0
+        for l, (flag, crossing) in enumerate(zip(under, crossings)):
+            if isinstance(flag, float) and flag == 0.0:
+                continue
+            above, below = (ops.sqrt(1 - p2 * (n[-1] / x) * (n[-1] / x)) for x in n[l : l + 2])
+            below = cos_o if l == len(crossings) - 1 else below
+            passes = passes * (1 - flag * fresnel.dielectric_between(above, below, crossing.eta))
+        return passes
 
     return leaving
+
+
+def _above(under: Sequence[Value], values: Sequence[Value]) -> Value:
+    """Of values of slabs that of the one above some interfaces."""
+    first = [flag - before for flag, before in zip(under, (0.0, *under))]
+    return _sum(first, values)
+
+
+def _from(slab: int, passage: Passage) -> tuple[float, ...]:
+    """The interfaces under a slab."""
+    return tuple(float(k >= slab) for k in range(len(passage.crossings)))
+
+
+def _sum(flags: Sequence[Value], values: Sequence[Any]) -> Any:
+    """Of the values whose flags are 1."""
+    kept = [(flag, x) for flag, x in zip(flags, values) if not (isinstance(flag, float) and flag == 0.0)]
+    return reduce(operator.add, (x if isinstance(flag, float) else x * flag for flag, x in kept))
 
 
 def _is_none(x: Value) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,10 +15,10 @@ from velatura.model import exchange, own_medium, passed, remainder, straight_thr
 from velatura.model.context import Context, channels
 from velatura.model.models import Model
 from velatura.model.passed import Parts
-from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium, prepare
+from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
 from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
-from velatura.model.transport.adding import parts
+from velatura.model.transport.adding import interfaces, parts
 from velatura.model.transport.energies import INCIDENCES, energies
 from velatura.model.transport.operators import Layer
 from velatura.model.variables import Variables
@@ -44,10 +44,20 @@ EVEN = 0.2  # share of samples of the symmetric form that the remainder has at l
 
 @dataclass(frozen=True)
 class Drawn:
-    """A lobe: the number of its interface from the top, and whether it is the veil of one."""
+    """A lobe: the number of its interface from the top, that of the one that shapes its light on the way out, None
+    where none does, and whether it is the veil of one."""
 
     interface: int
+    first: int | None
     veil: bool
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The lobes of a side, and the interfaces that make a step of the index."""
+
+    lobes: list[Drawn]
+    stepped: list[int]
 
 
 @dataclass(frozen=True)
@@ -111,42 +121,38 @@ class Solver:
         """Of the grid on which a renderer has the columns."""
         return directional_grid.LINE if self.isotropic else directional_grid.PLANE
 
-    def drawn(self, materials: Sequence[Material]) -> list[Drawn]:
-        """What is drawn of either side, for materials that differ in values."""
+    def layouts(self, materials: Sequence[Material]) -> list[Layout]:
+        """Of each side, for materials that differ in values."""
         veiled: set[int] = set()
         for material in materials:
             veiled = veiled.union(*map(_veiled, sides(material)))
-        count = len(materials[0].interfaces)
-        return [Drawn(k, veil) for k in range(count) for veil in (False, True) if not veil or k in veiled]
+        return [layout_of(seen, veiled) for seen in zip(*map(sides, materials))]
 
-    def solve(self, material: Material, drawn: Sequence[Drawn]) -> list[SolvedSide]:
+    def solve(self, material: Material, layouts: Sequence[Layout]) -> list[SolvedSide]:
         """A material with values of NumPy, each side."""
-        found = [self._side(seen, drawn) for seen in sides(material)]
+        found = [self._side(*each) for each in zip(sides(material), layouts)]
         if self.model.form == "forward":
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
-        numbers = self._numbers(material, found, drawn)
+        numbers = self._numbers(material, found, layouts)
         factors = exchange.factors(numbers, self.grid.directions, self.grid.shares, self.grid.count)
         return [side.weighed(each) for side, each in zip(found, factors)]
 
-    def _numbers(self, material: Material, found: Sequence[SolvedSide], drawn: Sequence[Drawn]) -> Solved:
+    def _numbers(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
         """The BSDF in NumPy."""
         context, made = Context(colour=_stacked, tables=self.tables), []
-        for seen, side in zip(sides(material), found):
+        for seen, side, layout in zip(sides(material), found, layouts):
             curves = directional_grid.curves(list(self.grid.spread(side.rows, self.shape)), self.shape, None)
             polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(side.polynomial).values()))
-            made.append(self.side(seen, drawn, curves, polynomial, context))
+            made.append(self.side(seen, layout, curves, polynomial, context))
         return self.bsdf(material, made)
 
-    def side(
-        self, material: Material, drawn: Sequence[Drawn], curves: Any, polynomial: Remainder, context: Context
-    ) -> Side:
+    def side(self, material: Material, layout: Layout, curves: Any, polynomial: Remainder, context: Context) -> Side:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
-        each = shapes_of(prepare(material, geometry(self.model), self.variance, context))
-        passage = straight_through.passage(material, self.variance) if material.transmits else None
-        shapes = tuple(each[lobe.interface] for lobe in drawn)
-        return Side(curves, shapes, polynomial, passage, context.colour, self.colours, self.kind)
+        shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
+        passage = straight_through.passage(material, self.variance, layout.stepped) if material.transmits else None
+        return Side(curves, tuple(shapes), polynomial, passage, context.colour, self.colours, self.kind)
 
     def bsdf(self, material: Material, made: Sequence[Side]) -> Solved:
         """A material of one side or two."""
@@ -155,8 +161,9 @@ class Solver:
             return Solved(made[0], None, 1.0, symmetric)
         return Solved(made[0], made[1], ops.mean(material.below) / ops.mean(material.exterior), symmetric)
 
-    def _side(self, material: Material, drawn: Sequence[Drawn]) -> SolvedSide:
+    def _side(self, material: Material, layout: Layout) -> SolvedSide:
         """What a material is at the directions of the grid."""
+        drawn = layout.lobes
         cosine, phi, wi, count = self.grid.cosine, self.grid.phi, self.grid.directions, self.grid.count
         solved = energies(
             material,
@@ -173,7 +180,7 @@ class Solver:
         )
 
         # Draw lobes and veils
-        shapes, found = shapes_of(prepare(_slim(material), geometry(self.model), self.variance)), parts(material)
+        shapes, found = shapes_of(prepare(_slim(material), geometry(self.model), self.variance), drawn), parts(material)
         tensors = widths.tensors(found, cosine, phi, lobes.mean(axis=1))
         shown = [
             widths.veil(found, each.interface, cosine, tensors[each.interface])
@@ -185,8 +192,7 @@ class Solver:
         lobes = np.array([lobes[k] + (0 if k in apart else veils[k]) for k in range(len(lobes))])
         energy = [(veils if each.veil else lobes)[each.interface] for each in drawn]
         whole = [
-            own_medium.integral(shapes[each.interface].lobe(1.0, tensor.roughness(phi)), wi)
-            for each, tensor in zip(drawn, shown)
+            own_medium.integral(shape.lobe(1.0, tensor.roughness(phi)), wi) for shape, tensor in zip(shapes, shown)
         ]
         weights = [np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0) for e, z in zip(energy, whole)]
         scale = np.clip(rest / np.maximum(self._albedo(polynomial), DIM), 0, BRIGHTEST)
@@ -201,7 +207,7 @@ class Solver:
         shares[-1] = np.maximum(shares[-1], least * sum(shares))
         total, left, passes = sum(shares), np.ones(count), None
         if material.transmits:
-            passage = straight_through.passage(_slim(material), self.variance)
+            passage = straight_through.passage(_slim(material), self.variance, layout.stepped)
             passes = _evenly(passed.parts(passage, wi, straight, bounced, through, np.array([total])), least)
             left = 1 - passes.share
             straight, bounced, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
@@ -243,17 +249,17 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     material = material.solid()
     solver, given = Solver.of(model, variance, context), Variables.of(material)
     start = plain(material)
-    drawn = solver.drawn([start])
+    layouts = solver.layouts([start])
 
     def arrays(numbers: list[float]) -> list[Array]:
-        found = solver.solve(given.replaced(start, numbers), drawn)
+        found = solver.solve(given.replaced(start, numbers), layouts)
         spread = [solver.grid.spread(side.rows, solver.shape).T.ravel() for side in found]
         return [each for pair in zip(spread, (side.numbers for side in found)) for each in pair]
 
     flat, made = iter(differences.differentiable(arrays, given.given, given.around, context.number)), []
-    for seen in sides(material):
+    for seen, layout in zip(sides(material), layouts):
         curves = directional_grid.interleaved(next(flat), solver.shape, context.number)
-        made.append(solver.side(seen, drawn, curves, _remainder(next(flat), solver, context), context))
+        made.append(solver.side(seen, layout, curves, _remainder(next(flat), solver, context), context))
     return solver.bsdf(material, made)
 
 
@@ -266,6 +272,13 @@ def _remainder(flat: Any, solver: Solver, context: Context) -> Remainder:
 
 def _stacked(*channels: Array) -> Array:
     return np.stack(channels)
+
+
+def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> Layout:
+    """Of materials that differ in values, as light from above sees them."""
+    steps = np.max([[facets.step for facets in interfaces(parts(each))] for each in materials], axis=0)
+    both = [(k, veil) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
+    return Layout([Drawn(k, widths.first_step(steps[:k]), veil) for k, veil in both], widths.stepped(steps))
 
 
 def sides(material: Material) -> list[Material]:
@@ -319,18 +332,19 @@ def _evenly(of: Parts, least: float) -> Parts:
     return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)
 
 
-def shapes_of(prepared: Prepared) -> list[Shape]:
-    """One for each interface from the top."""
-    found: list[Shape] = []
-    n: Value = 1.0
-    first: PreparedInterface | None = None
-    for layer in prepared.layers:
-        if isinstance(layer, PreparedMedium):
-            continue
-        found.append(Shape(len(found), n, layer if first is None or not layer.opaque else None, first))
-        first = first or layer
-        n = n * layer.n12
-    return found
+def shapes_of(prepared: Prepared, drawn: Sequence[Drawn]) -> list[Shape]:
+    """One for each lobe."""
+    found = [layer for layer in prepared.layers if isinstance(layer, PreparedInterface)]
+    indices: list[Value] = [1.0]
+    for layer in found:
+        indices.append(indices[-1] * layer.n12)
+    shapes = []
+    for lobe in drawn:
+        own, k = found[lobe.interface], lobe.first
+        facets = own if k is None or not own.opaque else None
+        out = (1.0, None) if k is None else (indices[k], found[k])
+        shapes.append(Shape(lobe.interface, indices[lobe.interface], facets, *out))
+    return shapes
 
 
 @dataclass(frozen=True)

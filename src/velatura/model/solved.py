@@ -39,12 +39,13 @@ ROOTS = RoughnessMap(lambda along, across: ops.sqrt(along), lambda along, across
 
 @dataclass(frozen=True)
 class Shape:
-    """A lobe but for its columns: number of its interface, index of its medium, the facets that it is of and what lets
-    it out."""
+    """A lobe but for its columns: number of its interface, index of its medium, the facets that it is of, and what
+    lets it out, with the index above that."""
 
     interface: int
     n: Value
     facets: PreparedInterface | None
+    n_first: Value
     first: PreparedInterface | None
 
     def lobe(self, weight: Value, roughness: Roughness) -> OwnMediumLobe:
@@ -53,6 +54,9 @@ class Shape:
 
     def _leaving(self, cosine: Value) -> Value:
         assert self.first
+        n = self.n_first
+        if not (isinstance(n, float) and n == 1.0):
+            cosine = ops.sqrt((n * n - 1 + cosine * cosine) / (n * n))
         return 1 - self.first.reflect(cosine)
 
 
@@ -341,11 +345,11 @@ def _either(where: Value, a: Shape, b: Shape) -> Shape:
     assert a.facets and b.facets
     facets = replace(a.facets, eta=ops.select(where, a.facets.eta, b.facets.eta))
     if a.first is None and b.first is None:
-        return Shape(a.interface, 1.0, facets, None)
+        return Shape(a.interface, select(where, a.n, b.n), facets, 1.0, None)
     some = a.first or b.first
     assert some
     first = replace(some, eta=ops.select(where, a.first.eta if a.first else 1.0, b.first.eta if b.first else 1.0))
-    return Shape(a.interface, ops.select(where, a.n, b.n), facets, first)
+    return Shape(a.interface, select(where, a.n, b.n), facets, select(where, a.n_first, b.n_first), first)
 
 
 def select(where: Value, a: Any, b: Any) -> Any:
@@ -356,6 +360,6 @@ def select(where: Value, a: Any, b: Any) -> Any:
         return type(a)(*(select(where, x, y) for x, y in zip(a, b)))
     if isinstance(a, (list, tuple)):
         return type(a)(select(where, x, y) for x, y in zip(a, b))
-    if a is None or (isinstance(a, float) and isinstance(b, float) and a == b):
+    if a is None or (isinstance(a, (bool, float)) and isinstance(b, (bool, float)) and a == b):
         return a
     return ops.select(where, a, b)

@@ -13,7 +13,7 @@ from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_ax
 from velatura.model.models import Model
 from velatura.model.prepare import prepare, variance_kind
 from velatura.model.roughness_maps import MAPS
-from velatura.model.solution import geometry, shapes_of
+from velatura.model.solution import Layout, geometry, layout_of, shapes_of
 from velatura.model.solved import Shape
 from velatura.model.transport.adding import Part, parts
 from velatura.model.transport.energies import Energies, energies
@@ -50,8 +50,9 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
     def collect(energy: Array, own: Roughness, seen: Roughness) -> LobeStatistics:
         return _lobe(energy, with_axes_named(own, axis), with_axes_named(seen, axis), model)
 
+    layout = layout_of([material])
     facets = [place for place, part in enumerate(found) if isinstance(part, Facets)]
-    drawn = shapes_of(prepare(material, geometry(model), kind))
+    drawn = shapes_of(prepare(material, geometry(model), kind), layout.lobes)
     tensors = widths.tensors(found, cos_theta, phi, solved.lobes.mean(axis=1)) if facets else []
     reflected = []
     for k, (place, shape, tensor) in enumerate(zip(facets, drawn, tensors)):
@@ -63,7 +64,7 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
         reflected.append(collect(solved.lobes[k] + solved.veils[k], own, seen))
     transmitted = None
     if material.transmits:
-        through = _passed(material, found, kind, solved, wi)
+        through = _passed(material, layout, found, kind, solved, wi)
         transmitted = collect(solved.passed, through, through)
     return StackLobes.of(reflected, transmitted, _colours(solved.rest, phi))
 
@@ -127,7 +128,9 @@ def _seen(
     return outside.roughness(outside.together(light), axis)
 
 
-def _passed(material: Material, found: list[Part], kind: type[Variance], solved: Energies, wi: Direction) -> Roughness:
+def _passed(
+    material: Material, layout: Layout, found: list[Part], kind: type[Variance], solved: Energies, wi: Direction
+) -> Roughness:
     """The roughness of light that passes, in the medium beyond."""
     phi = np.arctan2(wi[1], wi[0])
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in found)
@@ -135,7 +138,7 @@ def _passed(material: Material, found: list[Part], kind: type[Variance], solved:
         return Roughness(0 * phi, 0 * phi, phi)
     if kind is Isotropic:
         wi = np.hypot(wi[0], wi[1]), 0 * wi[1], wi[2]  # alike in all planes
-    passage = straight_through.passage(material, kind)
+    passage = straight_through.passage(material, kind, layout.stepped)
     straight, bounced, all_ = (np.maximum(energy, DARK) for energy in (solved.straight, solved.bounced, solved.passed))
     shares = passed.parts(passage, wi, straight, bounced, all_, np.zeros((1, len(phi))))
     samples = outside.of_passed(passage, shares, wi)

@@ -92,10 +92,17 @@ class Slab(ops.Named):
 
 @dataclass(frozen=True)
 class Passage:
-    """Interfaces from the top, and the slabs 0 to K above, between and below them."""
+    """Interfaces from the top, and the slabs 0 to K above, between and below them.
+
+    `faces` are 1 for the last two interfaces that make a step of the index, or for the only one, else 0; `under` are 1
+    from the last of them on.
+    """
 
     crossings: tuple[Crossing, ...]
     slabs: tuple[Slab, ...]
+    faces: tuple[Value, ...]
+    under: tuple[Value, ...]
+    bounces: bool
 
     @property
     def indices(self) -> list[Value]:
@@ -103,8 +110,9 @@ class Passage:
         return [self.crossings[0].n_1, *(crossing.n_2 for crossing in self.crossings)]
 
 
-def passage(material: Material, kind: type[Variance]) -> Passage:
-    """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`."""
+def passage(material: Material, kind: type[Variance], stepped: Sequence[int] | None = None) -> Passage:
+    """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`. `stepped` are the
+    interfaces that make a step of the index; None for all."""
     above, n = material.exterior, 1.0
     crossings: list[Crossing] = []
     slabs = [Slab()]
@@ -117,7 +125,11 @@ def passage(material: Material, kind: type[Variance]) -> Passage:
         crossings.append(_crossing(layer, above, n, kind))
         slabs.append(Slab())
         above, n = layer.eta, crossings[-1].n_2
-    return Passage(tuple(crossings), tuple(slabs))
+    count = len(crossings)
+    lower, *others = reversed(range(count) if stepped is None else stepped or [count - 1])
+    faces = tuple(float(k in (lower, *others[:1])) for k in range(count))
+    under = tuple(float(k >= lower) for k in range(count))
+    return Passage(tuple(crossings), tuple(slabs), faces, under, bool(others))
 
 
 def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance]) -> Crossing:

@@ -43,6 +43,8 @@ ASYMMETRY_MIN = 0.05  # of media that have a veil
 COARSE = 144  # normals
 AXES = (0.0, 0.5 * np.pi)  # of a tensor
 LARGEST = 1.5  # logarithm of a correction
+SLIGHT = 0.2  # step of the index over the greatest one, that does not count
+LEAST_STEP = 0.02  # of the logarithm of the index, that counts at all
 FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade
 # Pairs of features; of their product, what it adds to the logarithm of the width along an axis, and what, times sin^2,
 # it adds to that of the width in the plane and takes from that across it
@@ -136,16 +138,21 @@ def _sum(parts: Sequence[Tensor]) -> Tensor:
 
 @dataclass(frozen=True)
 class _Coat:
-    """An interface above others, of a tensor, with its indices and the cosine above it."""
+    """An interface above others, of a tensor, with its indices, the cosine above it, and what it lets pass there."""
 
     tensor: Tensor
     n: float
     n_below: float
     cosine: Array
+    passed: Array
 
     @property
     def contrast(self) -> float:
         return abs(float(np.log(self.n_below / self.n)))
+
+    def leaving(self, cos_theta: Array) -> Array:
+        """Share that it lets pass, at cosines outside."""
+        return np.asarray(1 - fresnel.dielectric(_cosine(cos_theta, self.n), self.n_below / self.n))
 
     def moved(self) -> Tensor:
         """Displacement of momentum in a refraction."""
@@ -154,6 +161,18 @@ class _Coat:
             for cos2 in _steeper(self.cosine, np.sqrt(self.tensor.xx), STEEPNESS)
         )
         return self.tensor.stretched(np.abs(x), np.abs(y))
+
+
+def stepped(steps: Sequence[float]) -> list[int]:
+    """Numbers of the interfaces that make a step of the index, for the steps of the logarithm of all: slight ones
+    beside greater ones do not count."""
+    most = max(steps, default=0.0)
+    return [k for k, step in enumerate(steps) if step > SLIGHT * most] if most > LEAST_STEP else []
+
+
+def first_step(steps: Sequence[float]) -> int | None:
+    """Number of the interface that shapes light on its way out: the outermost step; None without one."""
+    return next(iter(stepped(steps)), None)
 
 
 def roughnesses(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Roughness]:
@@ -189,8 +208,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
         if not part.opaque:
             assert part.below is not None
             passed = 1 - part.reflectance(cosine)
-            share = share * passed ** (2 if coats else 1)
-            coats.append(_Coat(own, n, float(np.mean(part.below)), cosine))
+            coats.append(_Coat(own, n, float(np.mean(part.below)), cosine, passed))
     return result
 
 
@@ -208,12 +226,15 @@ def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -
 def features(
     part: Facets, first: Tensor, own: Tensor, coats: Sequence[_Coat], cos_theta: Array, share: Array, energy: Array
 ) -> dict[str, Array]:
-    """Features of the correction, (M,) each, or (2, M) for the axes; `share` (C, M) is what layers above let pass."""
-    n, n_top = coats[-1].n_below, coats[0].n_below
+    """Features of the correction, (M,) each, or (2, M) for the axes; `share` is what media let pass."""
+    n, opener = coats[-1].n_below, coats[first_step([coat.contrast for coat in coats]) or 0]
+    share = share * opener.passed
+    for coat in coats:
+        share = share * (1 if coat is opener else coat.passed**2)
     cosine = _cosine(cos_theta, n)
     sin2 = 1 - cos_theta * cos_theta
     wi = np.sqrt(sin2), np.zeros_like(sin2), cos_theta
-    lobe = OwnMediumLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, lambda c: 1 - fresnel.dielectric(c, n_top))
+    lobe = OwnMediumLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, opener.leaving)
     let_out = own_medium.integral(lobe, wi, COARSE)
     reflected = part.reflectance(cosine)
     expected = (reflected * share).mean(axis=0) * let_out
@@ -240,7 +261,7 @@ def features(
         "reflected": np.ones_like(sin2) if part.opaque else reflected,
         "rarer": np.full_like(sin2, max(1 - below, 0.0)),
         "near": np.minimum((1 - cosine * cosine) / below**2, 1) * (not part.opaque),
-        "lost": 1 - let_out / np.maximum(1 - fresnel.dielectric(cos_theta, n_top), 1e-3),
+        "lost": 1 - let_out / np.maximum(opener.leaving(cos_theta), 1e-3),
         "metal": np.full_like(sin2, float(part.opaque)),
     }
 

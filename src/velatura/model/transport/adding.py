@@ -120,6 +120,10 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
     return found
 
 
+def interfaces(found: Sequence[Part]) -> list[Facets]:
+    return [part for part in found if isinstance(part, Facets)]
+
+
 def indices(found: Sequence[Part]) -> list[float]:
     """Indices of all media that light may be in."""
     values = [1.0]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.transport.adding import Leaving, Part, indices, layers, leaving, parts, settings
+from velatura.model.transport.adding import Leaving, Part, indices, interfaces, layers, leaving, parts, settings
 from velatura.model.transport.interfaces import Facets, Setting
 from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.modes import TINY, Basis, Even, Relative
@@ -69,8 +69,7 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
     into veils.
     """
     everything = parts(material)
-    facets = [part for part in everything if isinstance(part, Facets)]
-    brushed = any(part.alpha_u != part.alpha_v for part in facets)
+    brushed = any(facets.alpha_u != facets.alpha_v for facets in interfaces(everything))
     azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
     cosines = np.concatenate([cos_theta, np.tile(INCIDENCES, len(azimuths))])
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(INCIDENCES))])
