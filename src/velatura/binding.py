@@ -51,6 +51,9 @@ _SPECTRA = (
     "BlackBodySpectrum",
 )
 
+LOOKED = 64  # points along either axis at which textures without texels are looked at
+MOVED = 1e-3  # by which texels that are being differentiated may move, at least
+
 #: The value in the stack in place of a texture object of a plugin, if its parameter declares no typical one.
 _STAND_IN = 0.5
 
@@ -274,6 +277,52 @@ class Binding:
     def uniform_material(self) -> Material:
         """The material of values that are the same everywhere; spectra are at fixed wavelengths."""
         return self.material({**self._colours(), **self.steering})
+
+    def tabulated(
+        self, unknown: Mapping[str, tuple[float, float]]
+    ) -> tuple[Material, list[tuple[list[Address], float, float]]]:
+        """The material with some value of every texture; and for each texture that is not the same everywhere, or is
+        being differentiated, the values that it gives, and the least and the greatest of them. `unknown` are those, by
+        key, of what is only known on a shape.
+        """
+        given: dict[int, list[Address]] = {}
+        for name, image in self.images.items():
+            given.setdefault(id(image), []).append(self.addresses[name])
+        values, found = self._colours(), []
+        for addresses in given.values():
+            texels = self._texels(addresses[0], unknown)
+            if (texels != texels[:, :1]).any():
+                found.append((addresses, float(texels.min()), float(texels.max())))
+            first = texels[:, 0].tolist()
+            for address in addresses:
+                values[address.name] = self.mi.UnpolarizedSpectrum(first) if address.colour else self.mi.Float(first[0])
+        return self.material(values), found
+
+    def _texels(self, address: Address, unknown: Mapping[str, tuple[float, float]]) -> Any:
+        """Values that a texture gives, (channels, ...): all texels if it has any, else those of some points."""
+        import drjit as dr
+
+        mi, image = self.mi, self.images[address.name]
+        if isinstance(image, Field):
+            return np.array([[-180.0, 180.0]])
+        channels = len(mi.UnpolarizedSpectrum()) if image.colour else 1
+        if image.texture.class_name().startswith("BitmapTexture"):
+            data = mi.traverse(image.texture)["data"]
+            texels = np.array(dr.detach(data)).reshape(-1, data.shape[-1]).T
+            if dr.grad_enabled(data):
+                texels = np.concatenate([texels, texels * (1 + MOVED) + MOVED], axis=1)
+        else:
+            u, v = np.meshgrid(*[(np.arange(LOOKED) + 0.5) / LOOKED] * 2)
+            si = dr.zeros(mi.SurfaceInteraction3f, u.size)
+            si.uv = mi.Point2f(u.ravel(), v.ravel())
+            try:
+                texels = np.array((image.texture.eval if image.colour else image.texture.eval_1)(si)).reshape(
+                    -1, u.size
+                )
+            except RuntimeError:
+                return np.tile([unknown.get(address.key, address.declared.within)], (channels, 1))
+        texels = np.broadcast_to(texels if len(texels) == channels else texels[:1], (channels, texels.shape[-1]))
+        return np.clip(texels * image.scale + image.offset, image.low, image.high)
 
     def looked_at(self) -> Material:
         """The material with its numeric constants as plain numbers, and its images unchanged."""

@@ -119,14 +119,15 @@ def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
 
 def variance_kind(material: Material) -> type[Variance]:
     """The cheapest kind of variance that holds all interfaces; values are only compared, never computed."""
-    same = [_same(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
-    straight = [_same(layer.rotation, 0.0) for layer in material.interfaces]
+    same = [is_same(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
+    straight = [is_same(layer.rotation, 0.0) for layer in material.interfaces]
     if all(same):
         return Isotropic
     return PerAxis if all(s or t for s, t in zip(same, straight)) else Covariance
 
 
-def _same(a: object, b: object) -> bool:
+def is_same(a: object, b: object) -> bool:
+    """Whether two values are known to be the same."""
     return a is b or (isinstance(a, float) and isinstance(b, float) and a == b)
 
 

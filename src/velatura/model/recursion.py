@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from velatura.model.calibration import Calibration
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # recursions use records that are prepared for them
     from velatura.model.lobe_statistics import StackLobes
     from velatura.model.models import Model
     from velatura.model.prepare import Prepared
+    from velatura.model.textured import Textured
     from velatura.stack import Material
 
 
@@ -55,6 +56,11 @@ class Recursion(ABC):
         from velatura.model import bsdf
 
         return bsdf.body(material, model, variance, context)
+
+    def textured(self, material: Material, *values: Any) -> Textured | None:
+        """A material with textures, by the other values of `velatura.model.textured.textured`; None where it has to be
+        prepared at every point."""
+        return None
 
     def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
         """The lobes of a material with values in NumPy, for directions wi, (N,) each."""
@@ -111,6 +117,11 @@ class Momentum(Recursion):
         if not material.interfaces or not any(layer.spreads for layer in solution.plain(material).layers):
             return super().body(material, solution.geometry(model), variance, context)
         return solution.solve(material, model, variance, context)
+
+    def textured(self, material: Material, *values: Any) -> Textured | None:
+        from velatura.model import textured
+
+        return textured.textured(material, *values) if material.interfaces else None
 
     def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
         from velatura.model import solved_lobes  # loads SciPy

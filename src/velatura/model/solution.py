@@ -259,14 +259,17 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     flat, made = iter(differences.differentiable(arrays, given.given, given.around, context.number)), []
     for seen, layout in zip(sides(material), layouts):
         curves = directional_grid.interleaved(next(flat), solver.shape, context.number)
-        made.append(solver.side(seen, layout, curves, _remainder(next(flat), solver, context), context))
+        column = next(flat)
+        numbers = column[:, None] if context.colour is channels else differences.numbers(column, context.number)
+        made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context))
     return solver.bsdf(material, made)
 
 
-def _remainder(flat: Any, solver: Solver, context: Context) -> Remainder:
+def remainder_of(numbers: Sequence[Value], solver: Solver, context: Context) -> Remainder:
+    """The remainder of a renderer's numbers."""
     assert context.colour is not None
-    each = list(flat[:, None]) if context.colour is channels else differences.numbers(flat, context.number)
     width = solver.colours
+    each = [ops.channel(x, k % width) for k, x in enumerate(numbers)]
     return Remainder(*(context.colour(*each[k : k + width]) for k in range(0, len(each), width)))
 
 

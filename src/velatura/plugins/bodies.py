@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from velatura.binding import Binding
-from velatura.model import bsdf
+from velatura.model import axes, bsdf
 from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
+from velatura.model.textured import Textured
 from velatura.model.variance import Variance
 from velatura.plugins import spectral
 from velatura.plugins.spectral import Spectra
@@ -72,8 +73,27 @@ class Prepared:
         return bsdf.body(self.binding.steered(si, active), self.model, self.variance, at_a_point())
 
 
-def of(mi: Any, binding: Binding, model: Model, variance: type[Variance]) -> Bodies:
-    """The material with the values that it has now."""
+@dataclass(frozen=True)
+class Tabulated:
+    """Bodies by tables over what textures change."""
+
+    binding: Binding
+    textured: Textured
+
+    @property
+    def diffuse(self) -> bool:
+        return True
+
+    @property
+    def balanced(self) -> bool:
+        return self.textured.balanced
+
+    def at(self, si: Any, active: Any) -> Body:
+        return self.textured.at(self.binding.at(si, active))
+
+
+def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before: Bodies | None) -> Bodies:
+    """The material with the values that it has now, by what was made `before` of other ones where that holds them."""
     import drjit as dr
 
     def settled(value: Any) -> Any:
@@ -88,6 +108,13 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance]) -> Bod
         dr.eval(body)
         return Uniform(body)
     prepared = Prepared(binding, model, variance)
+    if binding.varies and not mi.is_spectral:
+        material, ranges = binding.tabulated(axes.UNKNOWN)
+        known = before.textured if isinstance(before, Tabulated) else None
+        symbolic = binding.symbolic(binding.looked_at())
+        textured = model.recursion.textured(material, ranges, symbolic, model, variance, context, known)
+        if textured:
+            return Tabulated(binding, textured)
     if binding.varies or number is None or not binding.stack.interfaces:
         return prepared
 

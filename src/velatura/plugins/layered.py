@@ -58,7 +58,7 @@ def make(mi: Any) -> type:
             if dr.is_jit_v(mi.Float):
                 tables.load().upload(sys.modules[mi.Float.__module__])
             self.binding = Binding(mi, properties, {"model", *SWITCHES})
-            self._update()
+            self._update(None)
 
         @property
         def exceptions(self) -> frozenset[str]:
@@ -80,16 +80,16 @@ def make(mi: Any) -> type:
         # The material, and what follows from it
 
         def parameters_changed(self, keys: list[str]) -> None:
-            self._update()
+            self._update(self.bodies)
 
-        def _update(self) -> None:
+        def _update(self, before: bodies.Bodies | None) -> None:
             """Compute the values that do not depend on direction, and the flags of the surface."""
             binding = self.binding
             binding.update()
             dr.make_opaque(binding.constants)  # a changed value needs no new kernel
             seen = binding.looked_at()
             self.variance = variance_kind(binding.symbolic(seen))
-            self.bodies = bodies.of(mi, binding, self.model, self.variance)
+            self.bodies = bodies.of(mi, binding, self.model, self.variance, before)
             # Say how light leaves
             self.delta = not binding.varies and not any(layer.spreads for layer in seen.layers)
             self.transmits = binding.stack.transmits

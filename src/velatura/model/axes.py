@@ -1,0 +1,115 @@
+"""Axes of tables over what textures change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from velatura import ops
+from velatura.ops import Value
+from velatura.stack import Address, Material
+
+Array = NDArray[np.floating]
+Range = tuple[Sequence[Address], float, float]  # values that one texture gives, its least and its greatest
+
+NODES_MAX = 9
+ALONE_MAX = 17  # of the only axis
+FINE = 4  # places of a table from one node to the next
+ROOTS = frozenset({"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k"})  # of which nodes are even in the root
+STEPS = {"rotation": 22.5, "g": 0.2}
+STEP = 0.1
+QUARTER = 90.0  # of a turn, to either side
+
+#: What textures span that cannot be looked at, by key; values beyond take the nearest.
+UNKNOWN = {"eta": (1.0, 2.5), "k": (0.0, 6.25), "depth": (0.0, 6.25), "sigma_a": (0.0, 6.25), "sigma_s": (0.0, 6.25)}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The values that one texture gives, and the least and the greatest of its coordinates.
+
+    A coordinate is a value, or the root of one, in which energies and widths vary smoothly. Nodes lie on a fixed
+    lattice, so that a texture that changes by little keeps its axis.
+    """
+
+    addresses: tuple[Address, ...]
+    low: float
+    high: float
+    count: int
+
+    @classmethod
+    def of(cls, given: Range, alone: bool) -> Axis:
+        """The axis of a texture; `alone` where it is the only one."""
+        addresses, *ends = given
+        first = addresses[0]
+        if first.key == "rotation":
+            return cls(tuple(addresses), -QUARTER, QUARTER, round(2 * QUARTER / STEPS["rotation"]) + 1)
+        least, most = (_coordinate(first, end) for end in first.declared.within)
+        low, high = (_coordinate(first, end) for end in ends)
+        step = STEPS.get(first.key, STEP)
+        while high - low > step * ((ALONE_MAX if alone else NODES_MAX) - 2):
+            step *= 2
+        begin, end = np.floor(low / step + 1e-6) * step, np.ceil(high / step - 1e-6) * step
+        end = max(end, begin + step)
+        if end > most:
+            begin, end = min(begin, most - step), most
+        begin = max(begin, least)
+        return cls(tuple(addresses), float(begin), float(end), max(2, round((end - begin) / step) + 1))
+
+    def covers(self, other: Axis) -> bool:
+        return self.addresses == other.addresses and self.low <= other.low and other.high <= self.high
+
+    @property
+    def values(self) -> list[float]:
+        """At the nodes."""
+        nodes = np.linspace(self.low, self.high, self.count)
+        return (nodes**2 if self.addresses[0].key in ROOTS else nodes).tolist()
+
+    @property
+    def places(self) -> int:
+        return FINE * (self.count - 1) + 1
+
+    def at(self, material: Material) -> Value:
+        """The place of a material's value, from 0 to 1."""
+        address = self.addresses[0]
+        x = _coordinate(address, material.flat()[address.name])
+        if address.key == "rotation":
+            double = x * (pi / QUARTER)
+            x = ops.arctan2(ops.sin(double), ops.cos(double)) * (QUARTER / pi)
+        return (x - self.low) / (self.high - self.low)
+
+    def refined(self, values: Array, axis: int) -> Array:
+        """Values at the nodes, at all places."""
+        nodes = np.linspace(0, 1, self.count)
+        return np.asarray(CubicSpline(nodes, values, axis=axis)(np.linspace(0, 1, self.places)))
+
+
+def _coordinate(address: Address, value: Value) -> Value:
+    return ops.sqrt(value) if address.key in ROOTS else value
+
+
+def refined(values: Array, axes: Sequence[Axis]) -> Array:
+    """Values at the nodes of all axes, (nodes, ...), at all places: the axes are the leading ones."""
+    found = values.reshape(*(axis.count for axis in axes), *values.shape[1:])
+    for k, axis in enumerate(axes):
+        found = axis.refined(found, k)
+    return found
+
+
+def placed(material: Material, axes: Sequence[Axis], values: Iterable[float]) -> Material:
+    """A material of NumPy's values with others on some axes."""
+    changed: dict[str, float] = {}
+    for axis, x in zip(axes, values):
+        changed.update({address.name: x for address in axis.addresses})
+
+    def value(address: Address, old: Any) -> Any:
+        new = changed.get(address.name)
+        return old if new is None else np.full((1, 1), new) if address.colour else new
+
+    return material.each(value)

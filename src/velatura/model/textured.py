@@ -1,0 +1,286 @@
+"""Materials whose values come from textures: solved for some of those values, and interpolated between.
+
+Each texture is an axis. Columns over direction are solved at all nodes of two axes together, splines refine them, and a
+renderer interpolates linearly; so do gradients. A third texture, or a second one where interfaces are brushed, adds
+what it changes by itself, at the middle of the others. A texture of the rotation that all brushed interfaces share
+turns directions, and is no axis.
+
+Of a texture of colours, each channel has its own coordinate, and solves are of grey values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from math import pi
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model import axes, solution
+from velatura.model.axes import Axis, Range
+from velatura.model.bsdf import Body
+from velatura.model.context import Context, at_a_point
+from velatura.model.models import Model
+from velatura.model.passed import Parts
+from velatura.model.prepare import is_same
+from velatura.model.solution import Layout, Solver
+from velatura.model.solved import FAINT, Columns, Side, Solved
+from velatura.model.turned import Turned
+from velatura.model.variables import Variables
+from velatura.model.variance import Isotropic, Variance
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+from velatura.sampling import differences, directional_grid
+from velatura.sampling.directional_grid import Curves
+from velatura.stack import InterfaceValues, Material
+
+Array = NDArray[np.floating]
+
+COSINES = {True: 24, False: 16}  # at which isotropic materials are solved, and others
+SHAPES = {True: (96,), False: (48, 33)}  # places over direction
+TOGETHER = {True: 2, False: 1}  # axes of one table
+
+
+class Textured(Protocol):
+    """A material with textures; bodies at all points are `balanced`, or none is."""
+
+    @property
+    def balanced(self) -> bool: ...
+
+    def at(self, material: Material) -> Body:
+        """With the values of a point."""
+
+
+@dataclass(frozen=True)
+class Same:
+    """A body whose textures are the same everywhere."""
+
+    body: Body
+
+    @property
+    def balanced(self) -> bool:
+        return self.body.balanced
+
+    def at(self, material: Material) -> Body:
+        return self.body
+
+
+@dataclass(frozen=True)
+class Turning:
+    """A material that a texture turns, by the rotation of one of its layers."""
+
+    straight: Textured
+    layer: int
+
+    @property
+    def balanced(self) -> bool:
+        return self.straight.balanced
+
+    def at(self, material: Material) -> Body:
+        angle = material.flat()[f"layer{self.layer}_rotation"]
+        return Turned(self.straight.at(_straight(material)), angle * (pi / 180))
+
+
+@dataclass(frozen=True)
+class Term:
+    """What some axes change: tables over direction and them, for either side, and of the remainder over them."""
+
+    axes: tuple[Axis, ...]
+    columns: tuple[Curves, ...]
+    polynomials: tuple[Curves, ...]
+
+    def places(self, material: Material) -> list[Value]:
+        return [axis.at(material) for axis in self.axes]
+
+
+@dataclass(frozen=True)
+class Tables:
+    """A material by the sum of some terms; `fixed` are the values that it was solved for, beside those of textures."""
+
+    terms: tuple[Term, ...]
+    layouts: list[Layout]
+    solver: Solver
+    context: Context
+    fixed: bytes
+
+    @property
+    def balanced(self) -> bool:
+        return self.solver.model.form == "symmetric"
+
+    def at(self, material: Material) -> Solved:
+        material = material.solid()
+        places, made = [term.places(material) for term in self.terms], []
+        for k, (seen, layout) in enumerate(zip(solution.sides(material), self.layouts)):
+            curves = partial(_summed, [term.columns[k] for term in self.terms], places)
+            numbers = _sums([ops.interpolate(term.polynomials[k], *at) for term, at in zip(self.terms, places)])
+            polynomial = solution.remainder_of(numbers, self.solver, self.context)
+            side = self.solver.side(seen, layout, curves, polynomial, self.context)
+            made.append(_Interpolated(**vars(side), summed=len(self.terms) > 1))
+        return self.solver.bsdf(material, made)
+
+    def holds(self, solver: Solver, wanted: Sequence[Axis], fixed: bytes) -> bool:
+        """Whether it is what would be solved, for values of textures in these ranges."""
+        known = [axis for term in self.terms for axis in term.axes]
+        covered = len(known) == len(wanted) and all(a.covers(b) for a, b in zip(known, wanted))
+        return covered and fixed == self.fixed and solver.variance is self.solver.variance
+
+
+@dataclass(frozen=True)
+class _Interpolated(Side):
+    """A side whose columns are interpolated, and may miss their bounds by little; sums of several terms by more."""
+
+    summed: bool = False
+
+    def at(self, w: Direction) -> Columns:
+        return _bounded(super().at(w), self.summed)
+
+
+OF_PASSED = 0.05  # share of what passes by which each part of it is sampled at least, where terms are summed
+
+
+def _bounded(found: Columns, summed: bool) -> Columns:
+    """Without negative weights and chances; chances that are summed up belong to energies."""
+    *chances, chance = (ops.maximum(x, 0.0) for x in (*found.chances, found.chance))
+    chance = chance + FAINT
+    passes: list[Value] = []
+    of = found.passes
+    if of:
+        passes = [ops.maximum(x, 0.0) for x in (of.of_straight, of.of_bounced, of.of_rest)]
+    if summed:
+        energies = [0.5 * ops.maximum(ops.mean(x), 0.0) for x in (*found.energies, found.rest)]
+        *chances, chance = (ops.maximum(a, b) for a, b in zip((*chances, chance), energies))
+        passes = [ops.maximum(x, OF_PASSED * ops.maximum(ops.mean(found.passed), 0.0)) for x in passes]
+    total = sum(chances) + chance + sum(passes)
+    if of:
+        weights = (ops.maximum(x, 0.0) for x in (of.straight, of.bounced, of.rest))
+        of = Parts(*weights, *(x / total for x in passes))
+    return replace(
+        found,
+        weights=[ops.maximum(x, 0.0) for x in found.weights],
+        scale=ops.maximum(found.scale, 0.0),
+        chances=[x / total for x in chances],
+        chance=chance / total,
+        passes=of,
+    )
+
+
+def _summed(curves: Sequence[Curves], places: Sequence[Sequence[Value]], w: Direction) -> list[Value]:
+    """The columns of all terms, for a direction."""
+    return _sums([each(w, *at) for each, at in zip(curves, places)])
+
+
+def _sums(found: Sequence[Sequence[Value]]) -> list[Value]:
+    return [sum(each[1:], each[0]) for each in zip(*found)]
+
+
+def textured(
+    material: Material,
+    ranges: Sequence[Range],
+    symbolic: Material,
+    model: Model,
+    variance: type[Variance],
+    context: Context,
+    before: Textured | None = None,
+) -> Textured:
+    """A material of a renderer's constants with textures, whose values in `material` may be any.
+
+    `symbolic` is the same material with values that may be compared. `before`, of the same material, is returned where
+    it has all that is needed.
+    """
+    layer = _turning(symbolic)
+    if layer is None:
+        return _tabulated(material, ranges, model, variance, context, before)
+    inner = before.straight if isinstance(before, Turning) and before.layer == layer else None
+    others = [given for given in ranges if given[0][0].key != "rotation"]
+    straight = _tabulated(_straight(material), others, model, variance, context, inner)
+    return before if straight is inner and before else Turning(straight, layer)
+
+
+def _tabulated(
+    material: Material,
+    ranges: Sequence[Range],
+    model: Model,
+    variance: type[Variance],
+    context: Context,
+    before: Textured | None,
+) -> Textured:
+    if not ranges:
+        return Same(solution.solve(material, model, variance, context))
+    isotropic = variance is Isotropic
+    spanned = [Axis.of(each, alone=len(ranges) == 1) for each in ranges]
+    material = material.solid()
+    middle = [axis.values[axis.count // 2] for axis in spanned]
+    start = axes.placed(solution.plain(material), spanned, middle)
+    solver = Solver.of(model, variance, context)
+    solver = replace(solver, grid=replace(solver.grid, cosines=COSINES[isotropic]))
+    textures = {address.name for axis in spanned for address in axis.addresses}
+    fixed = b"".join(np.asarray(x).tobytes() for address, x in start.values() if address.name not in textures)
+    given = Variables.of(material)
+    if isinstance(before, Tables) and not given.given and before.holds(solver, spanned, fixed):
+        return before
+    size, shape = TOGETHER[isotropic], SHAPES[isotropic]
+    groups = [tuple(spanned[k : k + size]) for k in range(0, len(spanned), size)]
+    ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
+    layouts = solver.layouts([start, *(axes.placed(start, spanned, values) for values in ends)])
+
+    def solved(made: Material, group: Sequence[Axis]) -> list[tuple[Array, Array]]:
+        """Columns and numbers of each side, (nodes, ...)."""
+        nodes = [axes.placed(made, group, values) for values in product(*(axis.values for axis in group))]
+        by_side = zip(*(solver.solve(node, layouts) for node in nodes))
+        return [(np.array([x.rows for x in side]), np.array([x.numbers for x in side])) for side in by_side]
+
+    def tables(numbers: list[float]) -> list[Array]:
+        made, found = given.replaced(start, numbers), []
+        at_middle = solved(made, ()) if len(groups) > 1 else None
+        for k, group in enumerate(groups):
+            for s, (columns, polynomials) in enumerate(solved(made, group)):
+                if k and at_middle:
+                    columns, polynomials = columns - at_middle[s][0], polynomials - at_middle[s][1]
+                found += [_flat(solver.grid.spread(columns, shape), group), _flat(polynomials, group)]
+        return found
+
+    flat = iter(differences.differentiable(tables, given.given, given.around, context.number))
+    terms = []
+    for group in groups:
+        places = tuple(axis.places for axis in group)
+        made = [
+            directional_grid.interleaved(next(flat), (*directions, *places), context.number)
+            for _ in layouts
+            for directions in (shape, ())
+        ]
+        terms.append(Term(group, tuple(made[::2]), tuple(made[1::2])))
+    point = replace(at_a_point(), colour=context.colour, tables=context.tables)
+    return Tables(tuple(terms), layouts, solver, point, fixed)
+
+
+def _flat(values: Array, group: Sequence[Axis]) -> Array:
+    """Values (nodes, channels, directions) or (nodes, channels), at all places, and interleaved: flat, with the nodes
+    of directions first and channels last."""
+    fine = axes.refined(values, group)
+    count = len(group)
+    return np.transpose(fine, (*range(count + 1, fine.ndim), *range(count + 1))).ravel()
+
+
+def _turning(material: Material) -> int | None:
+    """The layer whose rotation, from a texture, all interfaces share that have axes; None without one. Values are only
+    compared."""
+    brushed = {
+        k: layer.rotation
+        for k, layer in enumerate(material.layers)
+        if isinstance(layer, InterfaceValues) and not is_same(layer.alpha_u, layer.alpha_v)
+    }
+    if not brushed:
+        return None
+    first, rotation = next(iter(brushed.items()))
+    alike = all(is_same(each, rotation) for each in brushed.values())
+    return first if alike else None
+
+
+def _straight(material: Material) -> Material:
+    """Without rotations."""
+    return material.each(lambda address, value: 0.0 if address.key == "rotation" else value)

@@ -1,0 +1,203 @@
+"""Textures on materials that are solved in NumPy: as the uniform material of a point, with gradients to texels."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+
+mi = kernel.mitsuba("llvm_ad_rgb")
+import drjit as dr  # noqa: E402
+
+vt.register()
+
+COATED = vt.Stack(
+    [
+        vt.Interface(eta=1.5, alpha=0.1),
+        vt.Medium(depth=0.5, sigma_a=(0.1, 0.4, 0.9), sigma_s=0.3, g=0.5),
+        vt.Interface(eta=(0.15, 0.4, 1.3), k=(3.6, 2.4, 1.9), alpha=0.3),
+    ]
+)
+PANE = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=1.3, alpha=0.2)])
+PAINT = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Diffuse(albedo=0.5)])
+NODES = 48  # along either axis of the disc of directions
+U = 0.3  # where textures are read
+
+
+def texture(low: Any, high: Any, texels: int = 16) -> Any:
+    """Texels in a row from one value to another."""
+    row = np.linspace(low, high, texels, dtype=np.float32).reshape(1, texels, -1).repeat(2, 0)
+    return {"type": "bitmap", "bitmap": mi.Bitmap(row), "raw": True, "filter_type": "nearest"}
+
+
+def made(stack: vt.Stack, **textures: Any) -> Any:
+    """The plugin with textures in place of some values."""
+    values: dict[str, Any] = {}
+    for key, value in stack.flat().items():
+        if key != "exterior" and key not in textures and key[:-2] not in textures:
+            values[key] = {"type": "rgb", "value": list(value)} if isinstance(value, tuple) else value
+    return kernel.load_dict({"type": "layered", **values, **textures})
+
+
+def at_a_point(bsdf: Any, stack: vt.Stack) -> Any:
+    """The uniform material of the values there."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.uv = mi.Point2f(U, 0.5)
+    found = {name: np.array(image.at(si, True), float).ravel() for name, image in bsdf.binding.images.items()}
+    values = {name: tuple(x.tolist()) if len(set(x)) > 1 else float(x[0]) for name, x in found.items()}
+    return vt.bsdf(stack.replace(**values))
+
+
+def light(bsdf: Any, cosine: float) -> np.ndarray:
+    """Energy of cells of the disc of directions on both sides, (3, cells)."""
+    x, y = np.meshgrid(*[(np.arange(NODES) + 0.5) * (2 / NODES) - 1] * 2)
+    z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-9))
+    si, sine, found = dr.zeros(mi.SurfaceInteraction3f, x.size), float(np.sqrt(1 - cosine * cosine)), []
+    si.uv, si.wi = mi.Point2f(U, 0.5), mi.Vector3f(0.8 * sine, 0.6 * sine, cosine)
+    for side in (z, -z):
+        wo = mi.Vector3f(x.ravel(), y.ravel(), side.ravel())
+        value = np.array(bsdf.eval(mi.BSDFContext(), si, wo)) / z.ravel()
+        found.append(np.where((x * x + y * y).ravel() < 1, value, 0) * (2 / NODES) ** 2)
+    return np.concatenate(found, axis=1)
+
+
+@pytest.mark.parametrize(
+    ("stack", "textures"),
+    (
+        (COATED, {"layer0_alpha": (0.13, 0.13), "layer2_alpha": (0.22, 0.22)}),
+        (COATED, {"layer0_alpha": (0.02, 0.5), "layer2_alpha": (0.05, 0.6)}),
+        (COATED, {"layer1_depth": (0.1, 2.0), "layer0_eta": (1.2, 1.7)}),
+        (PANE, {"layer1_alpha": (0.05, 0.6)}),
+        (PAINT, {"layer1_albedo": ((0.1, 0.5, 0.7), (0.6, 0.2, 0.8))}),
+    ),
+)
+def test_a_texel_is_the_uniform_material(stack: vt.Stack, textures: dict[str, Any]) -> None:
+    """Constant and varying textures, one and two: albedo within .003, and total variation within .005."""
+    bsdf = made(stack, **{key: texture(*ends) for key, ends in textures.items()})
+    uniform = at_a_point(bsdf, stack)
+    for cosine in (1.0, 0.7, 0.35):
+        found, expected = light(bsdf, cosine), light(uniform, cosine)
+        assert np.abs(found.sum(axis=1) - expected.sum(axis=1)).max() < 0.003
+        assert 0.5 * np.abs(found - expected).sum() < 0.005 * expected.sum()
+
+
+def test_three_textures_are_near_the_uniform_material() -> None:
+    """The third adds what it changes by itself."""
+    textures = {"layer1_depth": (0.1, 2.0), "layer0_eta": (1.2, 1.7), "layer0_alpha": (0.02, 0.5)}
+    bsdf = made(COATED, **{key: texture(*ends) for key, ends in textures.items()})
+    uniform = at_a_point(bsdf, COATED)
+    for cosine in (1.0, 0.7, 0.35):
+        found, expected = light(bsdf, cosine), light(uniform, cosine)
+        assert 0.5 * np.abs(found - expected).sum() < 0.03 * expected.sum()
+
+
+def seen(bsdf: Any) -> Any:
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi, si.uv = dr.normalize(mi.Vector3f(0.4, 0.3, 0.8)), mi.Point2f(U, 0.5)
+    dr.make_opaque(si)
+    return dr.sum(bsdf.eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(-0.45, -0.15, 0.75))))
+
+
+def test_gradients_to_texels_are_differences() -> None:
+    """Of two textures: of the tables to 3 %, since slopes are constant from place to place, and of uniform materials
+    over a step that is large enough for the errors of solves, to 10 %."""
+    ends = {"layer0_alpha": (0.02, 0.5), "layer2_alpha": (0.05, 0.6)}
+    bsdf, column = made(COATED, **{key: texture(*each) for key, each in ends.items()}), int(U * 16)
+    parameters, names = mi.traverse(bsdf), {key: f"{key}_u.data" for key in ends}
+    at = {key: float(np.linspace(*each, 16)[column]) for key, each in ends.items()}
+
+    def shifted(key: str, step: float) -> float:
+        before = mi.TensorXf(parameters[names[key]])
+        texels = np.array(before)
+        texels[:, column] += step
+        parameters[names[key]] = mi.TensorXf(texels)
+        parameters.update()
+        found = float(seen(bsdf)[0])
+        parameters[names[key]] = before
+        parameters.update()
+        return found
+
+    slopes = {key: (shifted(key, 0.01) - shifted(key, -0.01)) / 0.02 for key in ends}
+    for name in names.values():
+        dr.enable_grad(parameters[name])
+    parameters.update()
+    dr.backward(seen(bsdf))
+    for key, x in at.items():
+        gradient = np.array(dr.grad(parameters[names[key]])).ravel()
+        assert np.count_nonzero(gradient) == 1
+        assert np.isclose(gradient.sum(), slopes[key], rtol=0.03), key
+        low, high = (float(seen(vt.bsdf(COATED.replace(**{**at, key: x + s})))[0]) for s in (-0.1 * x, 0.1 * x))
+        assert np.isclose(gradient.sum(), (high - low) / (0.2 * x), rtol=0.1), key
+
+
+def test_gradients_to_constants_beside_a_texture() -> None:
+    bsdf = made(COATED, layer2_alpha=texture(0.18, 0.24))
+    parameters, keys = mi.traverse(bsdf), ("layer1_depth", "layer1_sigma_s")
+    for key in keys:
+        dr.enable_grad(parameters[key])
+    parameters.update()
+    dr.backward(seen(bsdf))
+    point = COATED.replace(layer2_alpha=float(np.linspace(0.18, 0.24, 16)[int(U * 16)]))
+    for key in keys:
+        x = COATED.flat()[key]
+        low, high = (float(seen(vt.bsdf(point.replace(**{key: s * x})))[0]) for s in (0.98, 1.02))
+        assert np.isclose(float(dr.grad(parameters[key])[0]), (high - low) / (0.04 * x), rtol=0.05), key
+
+
+def test_tables_stay_while_textures_stay_within_them() -> None:
+    bsdf = made(COATED, layer2_alpha=texture(0.1, 0.3))
+    parameters, tables = mi.traverse(bsdf), bsdf.bodies.textured
+    for high, kept in ((0.35, True), (0.8, False)):
+        parameters["layer2_alpha_u.data"] = mi.TensorXf(np.linspace(0.1, high, 32, dtype=np.float32).reshape(2, 16, 1))
+        parameters.update()
+        assert (bsdf.bodies.textured is tables) == kept
+
+
+def test_two_textured_roughnesses_are_prepared_soon() -> None:
+    """3 s of processor time, of the 2 cores that a machine has at least."""
+    begin = time.process_time()
+    made(COATED, layer0_alpha=texture(0.02, 0.5), layer2_alpha=texture(0.05, 0.6))
+    assert time.process_time() - begin < 6
+
+
+BRUSHED = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=0.2, k=3.9, alpha=(0.3, 0.15), rotation=20)])
+
+
+def test_a_textured_rotation_turns_a_brushed_metal() -> None:
+    """With its roughness from another texture; and with gradients, against differences of texels."""
+    bsdf = made(BRUSHED, layer1_alpha_u=texture(0.2, 0.3), layer1_rotation=texture(0, 60))
+    uniform = at_a_point(bsdf, BRUSHED)
+    found, expected = light(bsdf, 0.7), light(uniform, 0.7)
+    assert 0.5 * np.abs(found - expected).sum() < 0.005 * expected.sum()
+    parameters, name = mi.traverse(bsdf), "layer1_rotation.data"
+    texels, ends = np.array(parameters[name]), []
+    for step in (-1.0, 1.0):
+        parameters[name] = mi.TensorXf(texels + np.float32(step))
+        parameters.update()
+        ends.append(float(seen(bsdf)[0]))
+    parameters[name] = mi.TensorXf(texels)
+    dr.enable_grad(parameters[name])
+    parameters.update()
+    dr.backward(seen(bsdf))
+    assert np.isclose(np.array(dr.grad(parameters[name])).sum(), (ends[1] - ends[0]) / 2, rtol=0.03)
+
+
+def test_samples_have_the_energy_of_values() -> None:
+    """A pane of two textured roughnesses, from both sides: means of weights against values at directions that are
+    even over the sphere, 2^18 each, to 2 %; the density integrates to 1 or less."""
+    bsdf = made(PANE, layer0_alpha=texture(0.1, 0.5), layer1_alpha=texture(0.2, 0.4))
+    count, ctx = 2**18, mi.BSDFContext(mi.TransportMode.Importance)
+    for cosine in (0.9, 0.35, -0.6):
+        si, random = dr.zeros(mi.SurfaceInteraction3f, count), mi.PCG32(count)
+        si.uv, si.wi = mi.Point2f(U, 0.5), mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0, cosine)
+        pair = mi.Point2f(random.next_float32(), random.next_float32())
+        weights = np.array(bsdf.sample(ctx, si, random.next_float32(), pair)[1])
+        even = mi.warp.square_to_uniform_sphere(mi.Point2f(random.next_float32(), random.next_float32()))
+        values, density = (np.array(x) * 4 * np.pi for x in bsdf.eval_pdf(ctx, si, even))
+        assert np.isclose(weights.mean(), values.mean(), rtol=0.02)
+        assert density.mean() < 1.02 and weights.max() < 3
