@@ -189,24 +189,29 @@ class Solver:
         apart = {each.interface for each in drawn if each.veil}
         lobes = np.array([lobes[k] + (0 if k in apart else veils[k]) for k in range(len(lobes))])
         energy = [(veils if each.veil else lobes)[each.interface] for each in drawn]
-        whole = [
-            own_medium.integral(shape.lobe(1.0, tensor.roughness(phi)), wi) for shape, tensor in zip(shapes, shown)
-        ]
-        weights = [np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0) for e, z in zip(energy, whole)]
-        scale = np.clip(rest / np.maximum(_albedo(polynomial, folded), DIM), 0, BRIGHTEST)
+        weights, heaviest = [], []
+        for shape, tensor, e in zip(shapes, shown, energy):
+            z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi)
+            weights.append(np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0))
+            heaviest.append(weights[-1] * largest)
+        z, largest = _integrals(polynomial, folded)
+        scale = np.clip(rest / np.maximum(z, DIM), 0, BRIGHTEST)
+        heaviest.append(scale * largest)
 
         # Share samples by energies
-        shares = [each.mean(axis=0) for each in energy]
+        shares, facets = [each.mean(axis=0) for each in energy], None
         if material.transmits and len(drawn) == 1:
             # What passes is sampled with the facets that reflect
-            shares = [np.maximum(shares[0] - np.mean(whole[0], axis=0), 0)]
+            shares, facets, heaviest[0] = [np.zeros(count)], energy[0], np.zeros_like(energy[0])
         shares.append(rest.mean(axis=0) + FAINT)
         least = EVEN if self.model.form == "symmetric" else 0.0
         shares[-1] = np.maximum(shares[-1], least * sum(shares))
+        shares = [passed.light(share, sum(shares), each) for share, each in zip(shares, heaviest)]
         total, left, passes = sum(shares), np.ones(count), None
         if material.transmits:
             passage = straight_through.passage(_slim(material), self.variance, layout.stepped)
-            passes = _evenly(passed.parts(passage, wi, straight, bounced, through, np.array([total])), least)
+            passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
+            passes = _evenly(passes, least)
             left = 1 - passes.share
             straight, bounced, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
             passes = replace(passes, straight=straight, bounced=bounced, rest=scattered)
@@ -306,13 +311,13 @@ def _slim(material: Material) -> Material:
     return material.each(lambda _, value: slim(value) if np.ndim(value) else value)
 
 
-def _albedo(polynomial: Remainder, folded: Folded) -> Array:
-    """Of the remainder as it is clipped, (C, M); it depends on the cosine alone."""
+def _integrals(polynomial: Remainder, folded: Folded) -> list[Array]:
+    """Mean and largest weight of samples of the remainder as it is clipped, (C, M); they depend on the cosine alone."""
     numbers = Remainder(*(np.reshape(x, (-1, 1, 1)) for x in vars(polynomial).values()))
-    wo = remainder.sample(*low_discrepancy.square(EVENLY))
     x, y, z = (each.reshape(-1, len(folded.kept))[:, :1] for each in folded.directions)
-    value = numbers.value((x, y, z), wo)
-    return np.repeat((value / remainder.density(wo)).mean(axis=-1), len(folded.kept), axis=-1)
+    wo = numbers.sample((x, y, z), *low_discrepancy.square(EVENLY))
+    weights = numbers.value((x, y, z), wo) / numbers.density((x, y, z), wo)
+    return [np.repeat(each, len(folded.kept), axis=-1) for each in (weights.mean(axis=-1), weights.max(axis=-1))]
 
 
 def _veiled(material: Material) -> set[int]:
