@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 TRAPPED = 1e-9  # share that is lost at each bounce
+ALONE = 2**18  # multiplications that OpenBLAS leaves to one thread
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Operator:
         return cls(nodes, columns, np.zeros((1, 1, 1, columns.shape[-1])))
 
     def __matmul__(self, first: Operator) -> Operator:
-        nodes, columns = self.nodes @ first.nodes, self.nodes @ first.columns
+        nodes, columns = self.nodes @ first.nodes, _product(self.nodes, first.columns)
         if self.columns.shape[-1] and first.columns.shape[-1]:
             return Operator(nodes, columns + self.columns * first.beams, self.beams * first.beams)
         return Operator.of(nodes, columns)
@@ -54,7 +55,16 @@ class Operator:
         # What smooth interfaces trap for ever no light reaches
         inverse = np.linalg.inv((1 + TRAPPED) * np.eye(self.nodes.shape[-1]) - self.nodes)
         beams = 1 / np.maximum(1 - self.beams, TRAPPED)
-        return Operator(inverse, (inverse @ self.columns) * beams, beams)
+        return Operator(inverse, _product(inverse, self.columns) * beams, beams)
+
+
+def _product(nodes: Array, columns: Array) -> Array:
+    """Matrix products, block by block: larger ones BLAS would share among threads, which wait for a busy machine."""
+    width = max(ALONE // nodes[0, 0].size, 1)
+    count = columns.shape[-1]
+    if count <= width:
+        return np.asarray(nodes @ columns)
+    return np.concatenate([nodes @ columns[..., k : k + width] for k in range(0, count, width)], axis=-1)
 
 
 @dataclass(frozen=True)
