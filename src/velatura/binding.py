@@ -324,6 +324,20 @@ class Binding:
         texels = np.broadcast_to(texels if len(texels) == channels else texels[:1], (channels, texels.shape[-1]))
         return np.clip(texels * image.scale + image.offset, image.low, image.high)
 
+    def at_wavelengths(self, nm: Sequence[float]) -> Material:
+        """The same, with spectra in channels at these wavelengths, as many as a multiple of those of a ray."""
+        import drjit as dr
+
+        carried = len(self.mi.UnpolarizedSpectrum())
+        spectra: dict[str, list[Any]] = {name: [] for name in self.steering}
+        for k in range(0, len(nm), carried):
+            si = dr.zeros(self.mi.SurfaceInteraction3f)
+            si.wavelengths = type(si.wavelengths)(*nm[k : k + carried])
+            dr.make_opaque(si)
+            for name, channels in spectra.items():
+                channels.extend(self.images[name].at(si, True))
+        return self.material({**self.constants, **{name: self.mi.ArrayXf(x) for name, x in spectra.items()}})
+
     def looked_at(self) -> Material:
         """The material with its numeric constants as plain numbers, and its images unchanged."""
         import drjit as dr

@@ -10,7 +10,8 @@ inside a renderer and is differentiable. The types of the arguments choose the d
   (the recorder's, which print as shader code).
 
 Colour is the leading axis of an array; a float is the same in all channels. A Dr.Jit array with any number of channels
-is a spectrum: half of it at fixed wavelengths, whose `mean` stands for all light, and half at those of a ray. `sqrt`
+is a spectrum: half of it at fixed wavelengths, whose `mean` stands for all light, and half at those of a ray. An array
+of NumPy with more than four channels is one, too: the first `FIXED` are at those wavelengths. `sqrt`
 and `divide` clamp arguments outside their domain instead of answering NaN, so that the branch which a `select` throws
 away poisons neither value nor gradient.
 """
@@ -28,6 +29,7 @@ import numpy as np
 
 Value = Any  # a float, a NumPy array, a Dr.Jit array or a recorded symbol
 
+FIXED = 4  # wavelengths that stand for all light
 TINY = 1e-15  # whose square, in gradients of quotients, single precision still holds
 
 
@@ -69,7 +71,7 @@ class _Numpy(Unrolled):
 
     @staticmethod
     def mean(x: Value) -> Value:
-        return np.mean(x, axis=0) if np.ndim(x) else x
+        return np.mean(x[:FIXED], axis=0) if np.ndim(x) else x
 
     @staticmethod
     def interpolate(table: Any, coordinates: Sequence[Value]) -> list[Value]:

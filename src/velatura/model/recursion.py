@@ -51,6 +51,10 @@ class Recursion(ABC):
         """Reflectances for which it is calibrated; None if all switches may have any value."""
         return None
 
+    def solves(self, material: Material) -> bool:
+        """Whether a material with constants of a renderer is solved for all directions at once."""
+        return False
+
     def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
         """A material as a BSDF, with constants of a renderer."""
         from velatura.model import bsdf
@@ -111,10 +115,15 @@ class Momentum(Recursion):
     def reflectances(self) -> tuple[str, ...]:
         return tuple(self.calibrations)
 
+    def solves(self, material: Material) -> bool:
+        from velatura.model import solution
+
+        return bool(material.interfaces) and any(layer.spreads for layer in solution.plain(material).layers)
+
     def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
         from velatura.model import solution
 
-        if not material.interfaces or not any(layer.spreads for layer in solution.plain(material).layers):
+        if not self.solves(material):
             return super().body(material, solution.geometry(model), variance, context)
         return solution.solve(material, model, variance, context)
 

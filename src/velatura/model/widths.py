@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
 from velatura.model import own_medium
 from velatura.model.mixture import ALPHA_MIN
 from velatura.model.own_medium import OwnMediumLobe
@@ -196,7 +197,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
             share = share * np.exp(-2 * (part.tau_a + part.tau_s)[:, None] / _cosine(cos_theta, part.n))
         if not isinstance(part, Facets):
             continue
-        n = float(np.mean(part.above))
+        n = float(ops.mean(part.above))
         cosine = _cosine(cos_theta, n)
         own = Tensor.of(part, phi)
         if coats:
@@ -208,7 +209,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
         if not part.opaque:
             assert part.below is not None
             passed = 1 - part.reflectance(cosine)
-            coats.append(_Coat(own, n, float(np.mean(part.below)), cosine, passed))
+            coats.append(_Coat(own, n, float(ops.mean(part.below)), cosine, passed))
     return result
 
 
@@ -237,14 +238,14 @@ def features(
     lobe = OwnMediumLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, opener.leaving)
     let_out = own_medium.integral(lobe, wi, COARSE)
     reflected = part.reflectance(cosine)
-    expected = (reflected * share).mean(axis=0) * let_out
+    expected = ops.mean(reflected * share) * let_out
     below = 1.0
     if not part.opaque:
         assert part.below is not None
-        below = float(np.mean(part.below)) / n
+        below = float(ops.mean(part.below)) / n
         both = own_medium.integral(replace(lobe, facets=lambda c: fresnel.dielectric(c, below)), wi, COARSE)
         reflected = both / np.maximum(let_out, 1e-9)
-        expected = both * share.mean(axis=0)
+        expected = both * ops.mean(share)
     brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(expected, 1e-9))
     moved = max((coat.tensor.size * coat.contrast for coat in coats), key=np.max)
     axes = np.array([first.width(first.angle + turn) for turn in AXES])
@@ -285,16 +286,16 @@ def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Ten
     At small angles Henyey and Greenstein's function is a Cauchy distribution, for which widths of events add; of the
     light of the veil, each has been scattered at least once.
     """
-    n = [float(np.mean(part.above)) for part in found if isinstance(part, Facets)][k]
+    n = [float(ops.mean(part.above)) for part in found if isinstance(part, Facets)][k]
     mean, width = np.zeros_like(cos_theta), np.zeros_like(cos_theta)
     above = 0
     for part in found:
         above += isinstance(part, Facets)
         if above > k or not isinstance(part, Slab):
             continue
-        g = float(part.g.mean())
+        g = float(ops.mean(part.g))
         cosine = _cosine(cos_theta, part.n)
-        events = 2 * nearly_straight(g) * part.tau_s.mean() / cosine
+        events = 2 * nearly_straight(g) * ops.mean(part.tau_s) / cosine
         mean = mean + events
         width = width + events * _of_event(g) * part.n * cosine / (n * _cosine(cos_theta, n))
     width = width / np.maximum(-np.expm1(-mean), np.finfo(float).tiny)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from velatura.binding import Binding
-from velatura.model import axes, bsdf
+import numpy as np
+
+from velatura.binding import STEERING_NM, Binding
+from velatura.model import axes, bsdf, solved_spectra
 from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
@@ -92,6 +94,25 @@ class Tabulated:
         return self.textured.at(self.binding.at(si, active))
 
 
+@dataclass(frozen=True)
+class OverWavelengths:
+    """A uniform material that was solved over wavelengths."""
+
+    mi: Any
+    binding: Binding
+    spectra: solved_spectra.Spectra
+
+    diffuse = True
+
+    @property
+    def balanced(self) -> bool:
+        return self.spectra.symmetric
+
+    def at(self, si: Any, active: Any) -> Body:
+        places = self.mi.ArrayXf([*spectral.places(STEERING_NM), *spectral.places(si.wavelengths)])
+        return self.spectra.at(self.binding.steered(si, active), places)
+
+
 def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before: Bodies | None) -> Bodies:
     """The material with the values that it has now, by what was made `before` of other ones where that holds them."""
     import drjit as dr
@@ -107,6 +128,12 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         body = model.recursion.body(binding.uniform_material(), model, variance, context)
         dr.eval(body)
         return Uniform(body)
+    if not binding.varies and model.recursion.solves(binding.uniform_material()):
+        nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, solved_spectra.NODES).tolist()]
+        material, places = binding.at_wavelengths(nm), np.array(spectral.places(nm))
+        solved = solved_spectra.solve(material, places, model, variance, context)
+        dr.eval(solved.sides)
+        return OverWavelengths(mi, binding, solved)
     prepared = Prepared(binding, model, variance)
     if binding.varies and not mi.is_spectral:
         material, ranges = binding.tabulated(axes.UNKNOWN)

@@ -5,7 +5,7 @@ Their shapes are those of fixed wavelengths, and so is the share of samples that
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,7 +61,7 @@ class Spectra:
 
     def at(self, body: bsdf.Lobed, wavelengths_nm: Any) -> bsdf.Lobed:
         """The body for a ray, with the sampled values."""
-        place = (wavelengths_nm - BEGIN_NM) / (END_NM - BEGIN_NM)
+        (place,) = places([wavelengths_nm])
         above = self.above.at(body.above, self.mi, place)
         if self.below is None or body.below is None:
             return replace(body, above=self._with_means(body.above, place), lobes_above=above, lobes_below=above)
@@ -124,6 +124,11 @@ def _over_wavelengths(mi: Any, colour: Value, times: int) -> Any:
 
     carries = len(mi.UnpolarizedSpectrum())
     return dr.ravel(carried(mi, colour) + dr.zeros(mi.UnpolarizedSpectrum, times * NODES // carries))
+
+
+def places(wavelengths_nm: Iterable[Value]) -> list[Value]:
+    """Wavelengths by their places on the spectrum, from 0 to 1."""
+    return [(nm - BEGIN_NM) / (END_NM - BEGIN_NM) for nm in wavelengths_nm]
 
 
 def carried(mi: Any, colour: Value) -> Any:

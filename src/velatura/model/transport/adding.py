@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
 from velatura.model.transport.interfaces import Facets, Setting, interface
 from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.operators import Layer, Operator
@@ -99,7 +100,7 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
     `straight` gives the share of scattered light that goes straight on by the asymmetry g, for light that is in a lobe;
     None follows all light.
     """
-    outside = float(np.mean(material.exterior))
+    outside = float(ops.mean(_colours(material.exterior)))
     found: list[Part] = []
     above = _colours(material.exterior) / outside
     for each in material.solid().layers:
@@ -107,9 +108,9 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
             tau_a, tau_s = (_colours(each.depth * sigma) for sigma in (each.sigma_a, each.sigma_s))
             g = _colours(each.g)
             kept = None if straight is None else np.array([straight(x) for x in g])
-            found.append(Slab(float(np.mean(above)), tau_a, tau_s, g, kept))
+            found.append(Slab(float(ops.mean(above)), tau_a, tau_s, g, kept))
         elif isinstance(each, DiffuseValues):
-            found.append(Lambert(float(np.mean(above)), _colours(each.albedo)))
+            found.append(Lambert(float(ops.mean(above)), _colours(each.albedo)))
         else:
             below = None if each.kind == "mirror" else _colours(each.eta) / outside
             k = _colours(each.k) / outside if each.kind == "conductor" else None
@@ -129,9 +130,9 @@ def indices(found: Sequence[Part]) -> list[float]:
     values = [1.0]
     for part in found:
         if isinstance(part, Facets):
-            values.append(float(np.mean(part.above)))
+            values.append(float(ops.mean(part.above)))
             if part.below is not None and part.k is None:
-                values.append(float(np.mean(part.below)))
+                values.append(float(ops.mean(part.below)))
     return values
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaln
 
-from velatura import tables
+from velatura import ops, tables
 from velatura.model.transport.modes import TINY, Basis, Light
 from velatura.model.transport.operators import Layer, Operator
 from velatura.optics import fresnel, ggx
@@ -61,11 +61,11 @@ class Facets:
         """Of the logarithm of the index, for light that it lets through."""
         if self.below is None or self.opaque:
             return 0.0
-        return float(abs(np.log(np.mean(self.below) / np.mean(self.above))))
+        return float(abs(np.log(ops.mean(self.below) / ops.mean(self.above))))
 
     def smooth(self, p: Array, transmitted: bool) -> Array:
         """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
-        n = float(np.mean(self.above))
+        n = float(ops.mean(self.above))
         cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, GRAZING**2))
         r = self.reflectance(cosine)
         return 1 - r if transmitted else r
@@ -81,7 +81,7 @@ class Facets:
             return np.ones((1, *np.shape(cosine)))
         eta = (self.below / self.above).reshape(shape)
         if self.k is None:
-            cos_t = fresnel.cos_transmitted(cosine, float(np.mean(self.below) / np.mean(self.above)))
+            cos_t = fresnel.cos_transmitted(cosine, float(ops.mean(self.below) / ops.mean(self.above)))
             return np.asarray(fresnel.dielectric_between(cosine, cos_t, eta))
         return np.asarray(fresnel.conductor(cosine, eta, (self.k / self.above).reshape(shape)))
 
@@ -107,7 +107,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     Momenta are of the direction of travel, which a mirror leaves alone. `ways` says whether masking is correlated with
     the height of facets, as what follows needs (Heitz et al. 2016); otherwise it is separable.
     """
-    n = float(np.mean(facets.above))
+    n = float(ops.mean(facets.above))
     alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
     u_1, u_2 = fibonacci(samples)
     sin = np.minimum(p / n, np.sqrt(1 - GRAZING**2))[:, None]
@@ -140,7 +140,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     reflected, blocked = divided(o, n, reflectance * share, kept)
     if facets.below is None or facets.k is not None:
         return _Events(reflected, None, blocked, np.zeros_like(blocked), whole)
-    below = float(np.mean(facets.below))
+    below = float(ops.mean(facets.below))
     eta = below / n
     along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
     t = along * h[0] - wi[0] / eta, along * h[1] - wi[1] / eta, along * h[2] - wi[2] / eta
@@ -255,7 +255,7 @@ class _Side:
         if setting.often is None:
             return cls(r, t, None)
         shares = [_again_shares(facets, setting.often, q, e) for q, e in ((p, at_nodes), (setting.p, of_beams))]
-        weights = basis.nodes.weights(float(np.mean(facets.above)))
+        weights = basis.nodes.weights(float(ops.mean(facets.above)))
         blocked = []
         for nodes, beams in zip(*shares):
             rows = basis.rows(nodes, turn)
@@ -279,7 +279,7 @@ def _again_shares(facets: Facets, known: Tables, p: Array, events: _Events) -> t
     if facets.below is None:
         return events.whole, np.zeros_like(events.whole)
     mean = float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
-    cosine = np.sqrt(np.maximum(1 - (p / np.mean(facets.above)) ** 2, GRAZING**2))
+    cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
     ratio = (facets.below / facets.above)[:, None]
     if facets.k is None:
         row = tables.dielectric_row(known, ratio, True, True)

@@ -1,0 +1,164 @@
+"""A material with values that depend on wavelength, solved once over direction and wavelength.
+
+It is solved in channels (`velatura.model.solution`): those of the fixed wavelengths that stand for all light, and those
+of wavelengths between which its values bend little. Colours are kept over direction and wavelength; numbers, which
+shape lobes and share samples among them, over direction alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from velatura import ops
+from velatura.model.context import Context
+from velatura.model.models import Model
+from velatura.model.remainder import Remainder
+from velatura.model.solution import Grid, Layout, SolvedSide, Solver, plain, sides
+from velatura.model.solved import Solved
+from velatura.model.transport.adding import Lambert, Part, parts
+from velatura.model.transport.interfaces import Facets
+from velatura.model.variables import Variables
+from velatura.model.variance import Isotropic, Variance
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+from velatura.sampling import differences, directional_grid
+from velatura.sampling.directional_grid import Curves
+from velatura.stack import Material
+
+Array = NDArray[np.floating]
+
+NODES = 64  # even over the spectrum, between which colours are interpolated linearly
+CLOSE = 0.002  # reflectances and transmittances between wavelengths for which the material is solved
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """Numbers over direction, colours over direction and wavelength, and those of the remainder over wavelength.
+
+    `order` says which columns are colours.
+    """
+
+    order: Sequence[bool]
+    numbers: Curves
+    colours: Curves
+    polynomial: Curves
+
+
+@dataclass(frozen=True, eq=False)
+class _OfRay:
+    """The columns of a side for a direction, at the wavelengths of a ray."""
+
+    side: _Side
+    places: Value
+    width: int
+
+    def __call__(self, w: Direction) -> Iterator[Value]:
+        numbers, colours = iter(self.side.numbers(w)), iter(self.side.colours(w, self.places))
+        for is_colour in self.side.order:
+            yield from [next(colours)] * self.width if is_colour else [next(numbers)]
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Both sides of a material, the lower one where it transmits."""
+
+    solver: Solver
+    layouts: Sequence[Layout]
+    sides: Sequence[_Side]
+
+    @property
+    def symmetric(self) -> bool:
+        return self.solver.model.form == "symmetric"
+
+    def at(self, material: Material, places: Value) -> Solved:
+        """The BSDF at the wavelengths of a ray, by their places on the spectrum from 0 to 1; `material` has its values
+        there. The fixed wavelengths come first, in both."""
+        material, spectrum = material.solid(), type(places)
+        solver = replace(self.solver, colours=len(places))
+        context = Context(constant=False, colour=lambda *channels: spectrum(list(channels)), tables=solver.tables)
+        made = []
+        for seen, layout, side in zip(sides(material), self.layouts, self.sides):
+            curves = _OfRay(side, places, solver.colours)
+            polynomial = Remainder(*ops.interpolate(side.polynomial, places))
+            made.append(solver.side(seen, layout, curves, polynomial, context))
+        return solver.bsdf(material, made)
+
+
+def solve(material: Material, places: Array, model: Model, variance: type[Variance], context: Context) -> Spectra:
+    """A material with constants of a renderer, solved over the spectrum; differentiable.
+
+    Colours have channels at `places` on the spectrum from 0 to 1 (C,): the fixed ones, and then `NODES` even ones.
+    """
+    material = material.solid()
+    chosen = _chosen(plain(material), places)
+    material, places = material.each(lambda _, value: _channels(value, chosen)), places[chosen]
+    given, start, grid = Variables.of(material), plain(material), Grid(variance is Isotropic)
+    solver = Solver(model, variance, grid, len(places), context.tables)
+    layouts = solver.layouts([start])
+    orders: list[Sequence[bool]] = []
+
+    def arrays(numbers: list[float]) -> list[Array]:
+        found = solver.solve(given.replaced(start, numbers), layouts)
+        orders[:] = [[len(np.atleast_2d(each)) > 1 for each in side.columns.all] for side in found]
+        return [flat for side in found for flat in _flat(side, solver, places)]
+
+    flat = iter(differences.differentiable(arrays, given.given, given.around, context.number))
+    shapes = solver.shape, (*solver.shape, NODES), (NODES,)
+    made = []
+    for order in orders:
+        curves = (directional_grid.interleaved(next(flat), shape, context.number) for shape in shapes)
+        made.append(_Side(order, *curves))
+    return Spectra(solver, layouts, made)
+
+
+def _flat(side: SolvedSide, solver: Solver, places: Array) -> list[Array]:
+    """The numbers, the colours and the remainder of a side, at nodes, flat."""
+    columns = [np.atleast_2d(each) for each in side.columns.all]
+    numbers = np.concatenate([each for each in columns if len(each) == 1])
+    colours = np.array([each for each in columns if len(each) > 1])
+    polynomial = np.array(list(vars(side.polynomial).values()))
+    spread = over_nodes(solver.grid.spread(colours, solver.shape).swapaxes(1, 2), places)
+    return [
+        solver.grid.spread(numbers, solver.shape).T.ravel(),
+        np.moveaxis(spread, 0, -1).ravel(),
+        over_nodes(polynomial, places).T.ravel(),
+    ]
+
+
+def over_nodes(values: Array, places: Array) -> Array:
+    """Values at places on the spectrum, (..., C), interpolated at the nodes, (..., NODES)."""
+    places, first = np.unique(places, return_index=True)
+    return np.asarray(PchipInterpolator(places, values[..., first], axis=-1)(np.linspace(0, 1, NODES)))
+
+
+def _channels(value: Value, chosen: Sequence[int]) -> Value:
+    """A colour in some of its channels; one that is the same in all, and a number, as it is."""
+    return type(value)([value[k] for k in chosen]) if np.ndim(value) and len(value) > 1 else value
+
+
+def _chosen(material: Material, places: Array) -> list[int]:
+    """Channels that represent all: the fixed ones, and others in order, until what layers reflect and transmit along
+    the normal is close to its interpolation everywhere."""
+    rows = [np.broadcast_to(row, len(places)) for part in parts(material) for row in _seen(part)]
+    light = np.array([row for row in rows if np.ptp(row)] or [np.zeros(len(places))])
+    even = list(range(ops.FIXED, len(places)))
+    chosen = [*range(ops.FIXED), even[0], even[-1]]
+    while True:
+        error = np.abs(over_nodes(light[:, chosen], places[chosen]) - light[:, even]).max(axis=0)
+        if error.max() < CLOSE:
+            return chosen
+        chosen.append(even[int(error.argmax())])
+
+
+def _seen(part: Part) -> list[Array]:
+    """Reflectances and transmittances (C,) along the normal."""
+    if isinstance(part, Facets):
+        return [part.reflectance(np.ones(1))[:, 0]]
+    if isinstance(part, Lambert):
+        return [part.albedo]
+    return [np.exp(-part.tau_a), np.exp(-part.tau_s)]
