@@ -48,6 +48,7 @@ WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns
 COS_MIN = 0.02  # in slabs that light crosses, and in those that it cannot enter
 GRAZING = 1e-4  # cosine outside
 NODES = (16, 24)  # of the quadrature
+BLOCK = 1 << 15  # of them at a time, which a processor's cache holds
 EDGE = 0.98  # of the disc of momenta that can leave, where light from beyond it is looked for
 WEIGHT_MIN = 1e-12  # squared width that decides the shares where no interface has any
 
@@ -393,6 +394,13 @@ def integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int
     By quadrature on rays of p_o from p_i, or from the point next to it that can leave, with nodes that crowd as the
     tails of GGX do; their numbers are those along a ray, and of rays.
     """
+    size = max(BLOCK // (nodes[0] * nodes[1]), 1)
+    blocks = [tuple(x[k : k + size] for x in wi) for k in range(0, len(wi[2]), size)]
+    energy, share = zip(*(_integrals(passage, (x, y, z), nodes) for x, y, z in blocks))
+    return np.concatenate(energy, axis=-1), np.concatenate(share)
+
+
+def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int]) -> tuple[Array, Array]:
     n = passage.indices
     i = entered(passage, wi)
     widths = [c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(passage.crossings, i.steps)]
@@ -426,6 +434,7 @@ def integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int
     area = area / (n_out * n_out * z)
     shape = x.shape
     spread = [np.broadcast_to(w[:, None, None], shape).ravel() for w in wi]
-    value, density = eval_pdf(passage, (spread[0], spread[1], spread[2]), (x.ravel(), y.ravel(), -z.ravel()))
+    i_x, i_y, i_z, o_x, o_y, o_z = (w.astype(np.float32) for w in (*spread, x.ravel(), y.ravel(), -z.ravel()))
+    value, density = eval_pdf(passage, (i_x, i_y, i_z), (o_x, o_y, o_z))
     energy = np.sum(value.reshape(-1, *shape) * area, axis=(-2, -1))
     return energy, np.sum(density.reshape(shape) * area, axis=(-2, -1))
