@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaln
+from scipy.special import gammaln
 
 from velatura import ops, tables
 from velatura.model.transport.modes import TINY, Basis, Light
@@ -30,6 +31,7 @@ STRAIGHT = {True: 0.09, False: 0.01}
 STAND_IN = 144  # normals of interfaces that stand in for brushed ones
 GRAZING = 1e-4  # least cosine of light that meets an interface
 ALPHA_MIN = 1e-3
+BLOCK = 1 << 15  # samples at a time
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
 
@@ -90,12 +92,13 @@ class Facets:
 class _Events:
     """What first events make of light: reflected and refracted samples, by colour, and what they block of either.
 
-    Weights are (C, sources, samples), for all ways to mask light, one after the other; blocked shares (C, sources) are
-    those of the last way; `whole` is what would be blocked if all light were reflected.
+    Weights are (C, sources, samples), for all ways to mask light, one after the other. Shares (C, sources) are those of
+    the last way: what is reflected (`kept`), what they block, and what they would if they reflected all (`whole`).
     """
 
     reflected: Light
     refracted: Light | None
+    kept: Array
     blocked_reflected: Array
     blocked_refracted: Array
     whole: Array
@@ -122,7 +125,11 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
         towards = (w[0], w[1], np.abs(w[2]))
         if often:
             there, here = _smith(towards, alpha), _smith(wi, alpha)
-            both = np.exp(np.log1p(here) + betaln(1 + here, 1 + there)) if through else (1 + here) / (1 + here + there)
+            both = (
+                np.exp(gammaln(2 + here) + gammaln(1 + there) - gammaln(2 + here + there))
+                if through
+                else (1 + here) / (1 + here + there)
+            )
         else:
             both = ggx.masking(towards, *alpha)
         if through:
@@ -138,15 +145,16 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     kept = [escape(o, o[2] > 0, False, often) for often in ways]
     whole = (1 - kept[-1]).sum(axis=-1)[None] * share
     reflected, blocked = divided(o, n, reflectance * share, kept)
+    back = reflected.weight[-len(blocked) :].sum(axis=-1)
     if facets.below is None or facets.k is not None:
-        return _Events(reflected, None, blocked, np.zeros_like(blocked), whole)
+        return _Events(reflected, None, back, blocked, np.zeros_like(blocked), whole)
     below = float(ops.mean(facets.below))
     eta = below / n
     along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
     t = along * h[0] - wi[0] / eta, along * h[1] - wi[1] / eta, along * h[2] - wi[2] / eta
     kept = [escape(t, t[2] < 0, True, often) for often in ways]
     refracted, not_refracted = divided(t, below, (1 - reflectance) * share, kept)
-    return _Events(reflected, refracted, blocked, not_refracted, whole)
+    return _Events(reflected, refracted, back, blocked, not_refracted, whole)
 
 
 def _smith(w: tuple[Array, Array, Array], alpha: tuple[float, float]) -> Array:
@@ -167,6 +175,11 @@ class Setting:
     phi: Array
     samples: int
     often: Tables | None = None
+
+    @property
+    def ways(self) -> list[bool]:
+        """How light is masked, as of `_events`."""
+        return [False] if self.often is None else [False, True]
 
     @property
     def dark(self) -> Setting:
@@ -226,6 +239,35 @@ class _Blocked:
 
 
 @dataclass(frozen=True)
+class _Met:
+    """First events of all sources: what they reflect and refract, deposited (C, modes, N, sources) for all ways to mask
+    light; of the last one what is reflected of all light, and what they block, (C, sources) as of `_Events`."""
+
+    reflected: Array
+    refracted: Array | None
+    kept: Array
+    blocked_reflected: Array
+    blocked_refracted: Array
+    whole: Array
+
+    @classmethod
+    def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
+        """In blocks of sources that a processor's cache holds."""
+        size = max(BLOCK // setting.samples, 1)
+
+        def met(first: int) -> _Met:
+            each, basis = slice(first, first + size), setting.basis
+            found = _events(facets, p[each], psi[each], setting.samples, setting.ways)
+            refracted = None if found.refracted is None else basis.deposited(found.refracted)
+            blocked = found.blocked_reflected, found.blocked_refracted, found.whole
+            return cls(basis.deposited(found.reflected), refracted, found.kept, *blocked)
+
+        every = [vars(met(first)).values() for first in range(0, len(p), size)]
+        whole: list[Any] = [None if each[0] is None else np.concatenate(each, axis=-1) for each in zip(*every)]
+        return cls(*whole)
+
+
+@dataclass(frozen=True)
 class _Side:
     """What becomes of light from one side of an interface at first events, with facets met once, and as the setting
     says; and what the latter block, that in the end is reflected, and that passes.
@@ -238,27 +280,26 @@ class _Side:
     @classmethod
     def of(cls, facets: Facets, setting: Setting) -> _Side:
         basis, turn = setting.basis, facets.rotation
-        p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
-        ways = [False] if setting.often is None else [False, True]
-        at_nodes = _events(facets, p, psi, setting.samples, ways)
-        of_beams = _events(facets, setting.p, basis.relative(setting.phi, turn), setting.samples, ways)
+        p = np.concatenate([np.tile(basis.nodes.p, len(basis.azimuths)), setting.p])
+        psi = np.concatenate([np.repeat(basis.azimuths, basis.nodes.count), basis.relative(setting.phi, turn)])
+        met = _Met.of(facets, p, psi, setting)
+        count = len(p) - len(setting.p)
 
-        def operators(nodes: Light | None, beams: Light | None) -> tuple[Operator, Operator]:
-            if nodes is None or beams is None:
+        def operators(light: Array | None) -> tuple[Operator, Operator]:
+            if light is None:
                 nothing = Operator.nothing(basis.size, len(setting.p))
                 return nothing, nothing
-            both = basis.operators(nodes, turn), basis.columns(beams, turn)
-            found = [Operator.of(*each) for each in zip(*(np.split(x, len(ways)) for x in both))]
+            both = basis.operators(light[..., :count], turn), basis.columns(light[..., count:], turn)
+            found = [Operator.of(*each) for each in zip(*(np.split(x, len(setting.ways)) for x in both))]
             return found[0], found[-1]
 
-        r, t = operators(at_nodes.reflected, of_beams.reflected), operators(at_nodes.refracted, of_beams.refracted)
+        r, t = operators(met.reflected), operators(met.refracted)
         if setting.often is None:
             return cls(r, t, None)
-        shares = [_again_shares(facets, setting.often, q, e) for q, e in ((p, at_nodes), (setting.p, of_beams))]
         weights = basis.nodes.weights(float(ops.mean(facets.above)))
         blocked = []
-        for nodes, beams in zip(*shares):
-            rows = basis.rows(nodes, turn)
+        for share in _again_shares(facets, setting.often, p, met):
+            rows, beams = basis.rows(share[:, :count], turn), share[:, count:]
             emitted = rows * weights
             blocked.append(_Blocked(rows, beams, emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)))
         return cls(r, t, (blocked[0], blocked[1]))
@@ -270,7 +311,7 @@ def _again(taken: _Blocked, there: _Blocked, setting: Setting) -> Operator:
     return Operator.of(outer(there.emitted, taken.nodes), outer(there.emitted, taken.beams))
 
 
-def _again_shares(facets: Facets, known: Tables, p: Array, events: _Events) -> tuple[Array, Array]:
+def _again_shares(facets: Facets, known: Tables, p: Array, events: _Met) -> tuple[Array, Array]:
     """Shares (C, sources) of light of lengths p that first events block and that in the end is reflected, or passes.
 
     Of blocked light, it is reflected in the share that an isotropic interface of the mean roughness reflects: by the
@@ -287,10 +328,10 @@ def _again_shares(facets: Facets, known: Tables, p: Array, events: _Events) -> t
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
     found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean)))
     often = found.reshape(len(events.blocked_reflected), -1)
-    stand_in = events
+    stand_in: _Met | _Events = events
     if facets.alpha_u != facets.alpha_v:
         stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, STAND_IN, [True])
-    once = stand_in.reflected.weight[-len(stand_in.blocked_reflected) :].sum(axis=-1)
+    once = stand_in.kept
     blocked: Array
     little: Array
     if facets.k is None:

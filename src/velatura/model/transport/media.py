@@ -66,7 +66,12 @@ def _thin(slab: Slab, depth: Array, setting: Setting) -> tuple[Operator, Operato
             _scattered(slab.n, float(slab.g[channels][0]), *source, share[channels if len(share) > 1 else slice(None)])
             for source, share in zip(sources, shares)
         )
-        found.append([Operator.of(basis.operators(a, 0.0), basis.columns(b, 0.0)) for a, b in zip(nodes, beams)])
+        found.append(
+            [
+                Operator.of(basis.operators(basis.deposited(a), 0.0), basis.columns(basis.deposited(b), 0.0))
+                for a, b in zip(nodes, beams)
+            ]
+        )
     up, down = (
         Operator.of(np.concatenate([x.nodes for x in each]), np.concatenate([x.columns for x in each]))
         for each in zip(*found)

@@ -21,6 +21,7 @@ Array = NDArray[np.floating]
 
 ROOT = np.sqrt(2)
 TINY = np.finfo(float).tiny
+SHORT = 1e-150  # least length of momentum that has an azimuth
 
 
 @dataclass(frozen=True)
@@ -53,12 +54,16 @@ class Basis(ABC):
         """Azimuths of beams from the first axis of an interface."""
 
     @abstractmethod
-    def operators(self, light: Light, rotation: float) -> Array:
-        """Matrices (C, families, n, n) of what becomes of light from the nodes, azimuth by azimuth."""
+    def deposited(self, light: Light) -> Array:
+        """Sums over the samples of each source, (C, modes, N, sources)."""
 
     @abstractmethod
-    def columns(self, light: Light, rotation: float) -> Array:
-        """What becomes of single directions, (C, families, n, M)."""
+    def operators(self, light: Array, rotation: float) -> Array:
+        """Matrices (C, families, n, n) of what becomes of light from the nodes, azimuth by azimuth, as deposited."""
+
+    @abstractmethod
+    def columns(self, light: Array, rotation: float) -> Array:
+        """What becomes of single directions, (C, families, n, M), as deposited."""
 
     @abstractmethod
     def rows(self, values: Array, rotation: float) -> Array:
@@ -96,10 +101,13 @@ class Relative(Basis):
     def relative(self, phi: Array, rotation: float) -> Array:
         return np.zeros_like(phi)
 
-    def columns(self, light: Light, rotation: float) -> Array:
-        cosine = light.x / np.maximum(np.hypot(light.x, light.y), TINY)
+    def deposited(self, light: Light) -> Array:
+        length, cosine, _ = _polar(light)
         angular = [np.ones_like(cosine), cosine, 2 * cosine * cosine - 1][: self.count]
-        return _deposited(self.nodes, light, angular, [m % 2 == 1 for m in range(self.count)])
+        return _deposited(self.nodes, light, length, angular, [m % 2 == 1 for m in range(self.count)])
+
+    def columns(self, light: Array, rotation: float) -> Array:
+        return light
 
     operators = columns
 
@@ -144,21 +152,31 @@ class Even(Basis):
     def azimuths(self) -> Array:  # type: ignore[override]
         return (np.arange(self.quarter) + 0.5) * np.pi / (2 * self.quarter)
 
-    def columns(self, light: Light, rotation: float) -> Array:
-        found = self._turned(rotation).T @ self._deposited(light).reshape(len(light.weight), self.modes, -1)
+    def deposited(self, light: Light) -> Array:
+        length, cosine, sine = _polar(light)
+        turn = [cosine * cosine - sine * sine, 2 * cosine * sine]
+        waves = [turn]
+        for _ in self.orders[1:]:
+            c, s = waves[-1]
+            waves.append([c * turn[0] - s * turn[1], c * turn[1] + s * turn[0]])
+        angular = [np.ones_like(cosine), *(ROOT * part for wave in waves for part in wave)]
+        return _deposited(self.nodes, light, length, angular, [False] * self.modes)
+
+    def columns(self, light: Array, rotation: float) -> Array:
+        found = self._turned(rotation).T @ light.reshape(len(light), self.modes, -1)
         return found.reshape(len(found), 1, self.modes * self.nodes.count, -1)
 
-    def operators(self, light: Light, rotation: float) -> Array:
+    def operators(self, light: Array, rotation: float) -> Array:
         n, modes, azimuths = self.nodes.count, self.modes, self.azimuths
-        found = self._deposited(light).reshape(-1, modes, n, len(azimuths), n)
-        matrix = np.einsum("cajqn,bq->cajbn", found, self._basis(azimuths)) / len(azimuths)
+        found = light.reshape(-1, modes, n, len(azimuths), n)
+        matrix = self._basis(azimuths) @ found / len(azimuths)
         # Cosines and sines do not mix, by the mirror symmetry of the axes
         sine = np.arange(modes) % 2 == 0
         sine[0] = False
         matrix *= (sine[:, None] == sine)[None, :, None, :, None]
-        turn = self._turned(rotation)
-        matrix = np.einsum("ax,cajbn,by->cxjyn", turn, matrix, turn)
-        return matrix.reshape(len(matrix), 1, modes * n, modes * n)
+        turn = self._turned(rotation).T
+        matrix = turn @ (turn @ matrix.reshape(-1, modes, n * modes * n)).reshape(-1, modes * n, modes, n)
+        return matrix.reshape(-1, 1, modes * n, modes * n)
 
     def rows(self, values: Array, rotation: float) -> Array:
         each = values.reshape(len(values), len(self.azimuths), self.nodes.count)
@@ -181,11 +199,6 @@ class Even(Basis):
         waves = [ROOT * wave(m * azimuth) for m in self.orders for wave in (np.cos, np.sin)]
         return np.stack([np.ones_like(azimuth), *waves])
 
-    def _deposited(self, light: Light) -> Array:
-        turn = (light.x + 1j * light.y) / np.maximum(np.hypot(light.x, light.y), TINY)
-        waves = [ROOT * part(turn**m) for m in self.orders for part in (np.real, np.imag)]
-        return _deposited(self.nodes, light, [np.ones_like(light.x), *waves], [False] * self.modes)
-
     def _turned(self, rotation: float) -> Array:
         """Coefficients in a frame that is turned."""
         found = np.eye(self.modes)
@@ -195,17 +208,27 @@ class Even(Basis):
         return found
 
 
-def _deposited(nodes: Nodes, light: Light, angular: Sequence[Array], odd: Sequence[bool]) -> Array:
+def _polar(light: Light) -> tuple[Array, Array, Array]:
+    """Lengths of momenta, and cosine and sine of their azimuths."""
+    length = np.sqrt(light.x * light.x + light.y * light.y)
+    scale = 1 / np.maximum(length, SHORT)
+    return length, light.x * scale, light.y * scale
+
+
+def _deposited(nodes: Nodes, light: Light, length: Array, angular: Sequence[Array], odd: Sequence[bool]) -> Array:
     """Sums over the samples of each source, (C, modes, N, sources)."""
-    sources, samples = light.x.shape
-    index, shares, beyond = nodes.shares(np.hypot(light.x, light.y))
+    sources, samples = length.shape
+    index, shares = nodes.stencils(length)
     # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
-    rows = np.where(beyond, nodes.count, index) * sources + np.arange(sources)[:, None]
+    rows = index * np.int32(sources) + np.arange(sources, dtype=np.int32)[:, None, None]
     shape = (nodes.count + 1) * sources, sources * samples
-    last = (1, 2, 0)
-    entries = shares.transpose(last).ravel(), rows.transpose(last).ravel(), np.arange(0, shares.size + 1, len(shares))
-    weights = np.stack([(each * values).ravel() for each in light.weight for values in angular], axis=-1)
-    found = (csc_array(entries, shape) @ weights).T.reshape(len(light.weight), len(angular), nodes.count + 1, sources)
+    entries = shares.ravel(), rows.ravel(), np.arange(0, shares.size + 1, shares.shape[-1], dtype=np.int32)
+    weights = np.empty((sources, samples, len(light.weight), len(angular)))
+    for c, each in enumerate(light.weight):
+        for m, values in enumerate(angular):
+            np.multiply(each, values, out=weights[..., c, m])
+    found = (csc_array(entries, shape) @ weights.reshape(shape[1], len(light.weight) * len(angular))).T
+    found = found.reshape(len(light.weight), len(angular), nodes.count + 1, sources)
     sign = np.where(odd, -1, 1)[:, None]
     found[:, :, 1] += sign * found[:, :, -1]
     return found[:, :, :-1]

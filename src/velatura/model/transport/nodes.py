@@ -61,33 +61,42 @@ class Nodes:
 
     def shares(self, p: Array) -> tuple[NDArray[np.integer], Array, NDArray[np.bool_]]:
         """Nodes (4, ...) that light of length p goes to, its shares, and which of them lie on the far side of 0."""
+        index, shares = self.stencils(p)
+        index = np.moveaxis(index, -1, 0)
+        beyond = index == self.count
+        return np.where(beyond, 1, index), np.moveaxis(shares, -1, 0), beyond
+
+    def stencils(self, p: Array) -> tuple[NDArray[np.integer], Array]:
+        """Nodes (..., 4) that light of length p goes to, and its shares; that of number `count` is node 1 on the far
+        side of 0."""
         ends, cells = np.array(self.ends), np.array(self.cells)
-        first = np.concatenate([[0], np.cumsum(cells)[:-1]])
         # In many samples and few parts, the ends that light lies beyond are faster counted than searched
         part = np.zeros(np.shape(p), np.intp)
         for end in self.ends[1:-1]:
             part += p > end
-        lo, size = ends[part] ** 2, (ends[1:] ** 2 - ends[:-1] ** 2)[part]
-        share = np.clip((p * p - lo) / size, 0, 1)
-        u = np.arcsin(np.sqrt(share)) * (2 / np.pi * cells)[part]
-        start = np.minimum(u.astype(int), cells[part] - 1) - 1
-        start = np.clip(start, np.where(part > 0, 0, -1), cells[part] - STENCIL + 1)
+
+        def of_part(values: Array) -> Array:
+            return values[0] if len(cells) == 1 else values.take(part, mode="clip")
+
+        squares = ends * ends
+        share = np.clip((p * p - of_part(squares[:-1])) * of_part(1 / np.diff(squares)), 0, 1)
+        u = np.arcsin(np.sqrt(share)) * of_part(2 / np.pi * cells)
+        lowest, highest = np.r_[-1, np.zeros(len(cells) - 1)], cells - STENCIL + 1.0
+        start = np.clip(np.floor(np.minimum(u, of_part(cells - 1.0))) - 1, of_part(lowest), of_part(highest))
         t = u - start
         t_1, t_2, t_3 = t - 1, t - 2, t - 3
-        outer, inner = t_2 * t_3, t * t_1
-        shares = np.stack([-t_1 * outer / 6, t * outer / 2, -inner * t_3 / 2, inner * t_2 / 6])
-        index = start + np.arange(STENCIL).reshape(-1, *(1,) * np.ndim(p))
-        beyond = index < 0
-        return first[part] + np.abs(index), shares, beyond
+        outer, inner = t_2 * t_3 / 6, t * t_1 / 2
+        shares, index = np.empty((*np.shape(p), STENCIL)), np.empty((*np.shape(p), STENCIL), np.int32)
+        for k, each in enumerate((-t_1 * outer, 3 * t * outer, -inner * t_3, inner * t_2 / 3)):
+            shares[..., k] = each
+        first = start.astype(np.int32) + of_part(np.r_[0, np.cumsum(cells)[:-1]].astype(np.int32))
+        for k in range(STENCIL):
+            index[..., k] = first + np.int32(k)
+        index[..., 0] = np.where(first < 0, self.count, first)
+        return index, shares
 
     def weights(self, n: float) -> Array:
         """Integrals over p^2 in [0, n^2] of the functions that light is shared by, (N,)."""
         p2 = (np.arange(QUADRATURE) + 0.5) / QUADRATURE * n * n
         index, shares, _ = self.shares(np.sqrt(p2))
         return np.bincount(index.ravel(), shares.ravel(), self.count) * (n * n / QUADRATURE)
-
-    def interpolated(self, values: Array, p: Array, odd: bool = False) -> Array:
-        """A function given at the nodes, (..., N), at lengths p; `odd` in p, where it is not even."""
-        index, shares, beyond = self.shares(p)
-        sign = np.where(beyond, -1.0, 1.0) if odd else 1.0
-        return np.asarray((values[..., index] * (sign * shares)).sum(axis=-1 - np.ndim(p)))
