@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from velatura import tables
-from velatura.model import named, remainder, solution
+from velatura.model import named, solution
 from velatura.model.bsdf import Asked
 from velatura.model.context import Context
 from velatura.model.prepare import variance_kind
@@ -70,7 +70,8 @@ def drawn(layers: list[Any], cosine: float) -> np.ndarray:
     material = Material.of(Stack(layers)).solid()
     found = solution.solve(material, named("velatura"), variance_kind(material), Context())
     u, v = low_discrepancy.square(1597)
-    wo = [*remainder.sample(u, v)]
+    radius, phi = np.sqrt(u), 2 * np.pi * v
+    wo = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - u)
     wi = np.full(u.size, np.sqrt(1 - cosine**2)), np.zeros(u.size), np.full(u.size, cosine)
     both = (found.eval_pdf(wi, (wo[0], wo[1], side * wo[2]), Asked(radiance=False))[0] / wo[2] for side in (1, -1))
     return np.concatenate([np.broadcast_to(light, (3, u.size)) for light in both], axis=1)

@@ -25,6 +25,7 @@ Direction = tuple[Any, Any, Any]
 NODES = Nodes.of([1.0, 1.5], 24)
 COSINES = np.sqrt((np.arange(8) + 0.5) / 8)
 SOME = Remainder(0.1, 0.2, -0.05, 0.3, -0.1, 0.05, 0.1, 0.05)
+BRIGHT_HORIZON = Remainder(0.1, -0.05, 0.1, 0.05, -0.1, 0.3, 0.05, 0.0)
 
 
 def random_directions(count: int, seed: int) -> Direction:
@@ -100,13 +101,20 @@ def test_it_takes_what_media_and_facets_scatter() -> None:
 
 
 @pytest.mark.parametrize("cosine", [1.0, 0.7, 0.2])
-def test_samples_give_the_albedo(cosine: float) -> None:
-    """Within 4 standard errors; nothing of `SOME` is clipped."""
+@pytest.mark.parametrize("polynomial", [SOME, BRIGHT_HORIZON])
+def test_samples_give_the_albedo(polynomial: Remainder, cosine: float) -> None:
+    """Within 4 standard errors; nothing of either is clipped. Cosines have the density that is reported."""
     n = 100_000
-    wo = remainder.sample(*np.random.default_rng(2).random((2, n)))
-    weights = SOME.value(incident(cosine, n), wo) / remainder.density(wo)
-    assert abs(weights.mean() - SOME.albedo(cosine)) < 4 * weights.std() / np.sqrt(n) + 1e-9
-    np.testing.assert_allclose(np.mean(wo[2] ** 2), 0.5, atol=0.01)
+    wi = incident(cosine, n)
+    wo = polynomial.sample(wi, *np.random.default_rng(2).random((2, n)))
+    weights = polynomial.value(wi, wo) / polynomial.density(wi, wo)
+    assert abs(weights.mean() - polynomial.albedo(cosine)) < 4 * weights.std() / np.sqrt(n) + 1e-9
+    assert weights.max() < 2.5 * polynomial.albedo(cosine)
+    z = (np.arange(4000) + 0.5) / 4000
+    rim = np.sqrt(1 - z * z), 0 * z, z
+    expected = 2 * np.pi * polynomial.density(incident(cosine, 4000), rim).reshape(8, -1).mean(axis=1) / 8
+    counts, _ = np.histogram(wo[2], 8, (0, 1))
+    np.testing.assert_allclose(counts / n, expected, atol=5 * 0.5 / np.sqrt(n))
 
 
 def test_it_is_reciprocal_positive_and_turns() -> None:

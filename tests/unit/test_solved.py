@@ -18,7 +18,7 @@ PRESETS = ("coated-rough-metal", "varnished-paint", "scattering-medium-over-gold
 BRUSHED = ("coated-gold",)
 COSINES = (1.0, 0.7, 0.35)
 SAMPLES = 1 << 13
-HEAVIEST = 4.0  # sample
+HEAVIEST = 3.0  # sample
 POWER = Asked(radiance=False)
 
 
@@ -50,7 +50,29 @@ def test_samples_carry_the_energies_of_the_stack(preset: str) -> None:
         for share, expected in (((wo[2] > 0), back), ((wo[2] < 0), true.passed)):
             mean, error = (weight * share).mean(axis=-1), (weight * share).std(axis=-1) / np.sqrt(SAMPLES)
             assert np.all(np.abs(mean - expected[:, 0]) < 0.015 * expected[:, 0] + 4.5 * error + 1e-3), (preset, cosine)
-        assert weight.mean(axis=0).max() < HEAVIEST
+        assert weight.max() < HEAVIEST
+
+
+@pytest.mark.parametrize(
+    "layers",
+    [
+        [Interface(eta=1.38, alpha=(0.34, 0.034), rotation=125), Interface(eta=1.0, alpha=(0.34, 0.034), rotation=144)],
+        [Interface(eta=1.9, alpha=(0.42, 0.042), rotation=95)],
+        [Interface(eta=1.45, alpha=(0.012, 0.12), rotation=81), Interface(eta=1.0, alpha=(0.41, 0.041), rotation=58)],
+    ],
+)
+def test_samples_of_brushed_panes_are_light(layers: list[Interface]) -> None:
+    """From either side; what keeps them light takes 2 % of the light at most, beside 4 standard errors (false alarms 1
+    in 2000)."""
+    _, found = body(Stack(layers))
+    for i, cosine in enumerate((0.98, 0.5, 0.1, -0.1, -0.5, -0.98)):
+        wi = from_cosine(abs(cosine), 1.1 * i)
+        wi = (wi[0], wi[1], np.sign(cosine) * wi[2])
+        wo, _ = found.sample(wi, *uniform(i))
+        value, density = found.eval_pdf(wi, wo, POWER)
+        weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)[0]
+        assert weight.max() < HEAVIEST
+        assert abs(weight.mean() - 1) < 0.02 + 4 * weight.std() / np.sqrt(SAMPLES), cosine
 
 
 @pytest.mark.parametrize("base", [Interface(eta=0.2, k=3.5, alpha=0.6), Interface(eta=1.2, alpha=0.6)])

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from velatura.errors import InvalidInput, NoSolution
-from velatura.inverse import interface
+from velatura.inverse import interface, requests
 from velatura.inverse.descent import written
 from velatura.inverse.equivalence import dislike
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_tint
 from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, join
 from velatura.inverse.stacks import Partial, pruned
-from velatura.model import Model, bsdf, lobes, named, prepare, variance_kind
+from velatura.model import Model, lobes, named, prepare, variance_kind
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
 from velatura.model.stack_lobes import stack_lobes
-from velatura.model.variance import Roughness
+from velatura.model.variance import Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import (
     Diffuse,
     Interface,
@@ -32,6 +32,7 @@ from velatura.stack import (
 )
 
 KEEP = 64  # partial stacks that are followed
+SMALL = 0.01  # energy or variance that is added to those of the goal, for units in which they are missed
 
 
 @dataclass(frozen=True)
@@ -109,13 +110,50 @@ def coat(
 
 def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
     """Layers whose lobes below a coat equal those of the bare stack."""
-    # Read the lobes of the bare stack
     material = Material.of(stack)
     kind = variance_kind(material)
-    wanted, _ = lobes(prepare(material, model, kind), NORMAL)
-
-    # Solve for its interfaces, from the top
     above, _ = Above.nothing(model, stack.exterior, kind).below(top)
+    bare, _ = lobes(prepare(material, above.model, kind), NORMAL)
+    wanted = [(np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)) for lobe in bare]
+    if model.recursion.closed_form or not wanted:
+        return _solved(stack, above, eta_max, wanted)
+
+    # Ask for other lobes, until the model itself reads those of the bare stack
+    def ask(request: Array) -> tuple[Layer, ...] | None:
+        try:
+            return _solved(stack, above, eta_max, [_lobe(numbers, kind) for numbers in request.reshape(-1, 6)])
+        except NoSolution:
+            return None
+
+    def read(layers: tuple[Layer, ...]) -> Array:
+        coat = top.written(0)
+        return _numbers(stack_lobes(stack.with_layers([*coat, *layers]), 1.0, model=model))[6 * len(coat) :]
+
+    goal, first = _numbers(stack_lobes(stack, 1.0, model=model)), np.array([_entries(*lobe) for lobe in wanted]).ravel()
+    kept = requests.met(ask, read, first, goal, np.abs(goal) + SMALL)
+    return kept if kept is not None else _solved(stack, above, eta_max, wanted)
+
+
+def _numbers(found: StackLobes) -> Array:
+    """Energy (3,) and covariance (3,) of one lobe after the other."""
+    return np.concatenate([np.r_[e[:, 0], s[:, 0]] for e, s in zip(found.energy, found.covariance)])
+
+
+def _entries(energy: Array, variance: Variance) -> Array:
+    return np.r_[energy[:, 0], [float(np.ravel(x)[0]) for x in variance.matrix()]]
+
+
+def _lobe(numbers: Array, kind: type[Variance]) -> tuple[Array, Variance]:
+    """Energy (3, 1) and variance of a lobe from its numbers."""
+    xx, xy, yy = (np.atleast_1d(x) for x in numbers[3:])
+    entries = {Isotropic: (0.5 * (xx + yy),), PerAxis: (xx, yy)}.get(kind, (xx, xy, yy))
+    return numbers[:3, None], kind(*entries)
+
+
+def _solved(stack: Stack, above: Above, eta_max: float, wanted: Sequence[tuple[Array, Variance]]) -> tuple[Layer, ...]:
+    """Layers with lobes of these energies and variances below a coat."""
+    material = Material.of(stack)
+    # Solve for its interfaces, from the top
     paths, remaining = Partial(above, (), np.zeros(1)), iter(wanted)
     for n, (layer, values) in enumerate(zip(stack.layers, material.layers)):
         where = f"layer {n} ({type(layer).__name__.lower()})"
@@ -123,8 +161,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Laye
             if np.any(values.sigma_s > 0):
                 raise NoSolution(f"{where}: scatters light; an appearance is kept of media that only absorb")
         elif isinstance(layer, Interface):
-            lobe, own = next(remaining), _choices(material, n, eta_max)
-            energy, variance = np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)
+            (energy, variance), own = next(remaining), _choices(material, n, eta_max)
             found = []
             for rank, choice in enumerate(own):
                 part = interface.solve(paths.above, energy, variance, choice)
@@ -149,12 +186,14 @@ def scattered(stack: Stack, model: Model) -> Array:
 
 def _scattered(stack: Stack, model: Model, *albedos: float) -> Array:
     """Energy of a diffuse base at normal incidence, its own or of N albedos, (3, N)."""
-    material = Material.of(stack)
-    if albedos:
-        material = material.with_layer(-1, albedo=np.tile(albedos, (3, 1)))
-    base = bsdf.body(material, model.with_switches(form="forward")).base(NORMAL)
-    assert base is not None
-    return np.broadcast_to(base.energy, (3, max(len(albedos), 1)))
+    assert stack.base
+
+    def reflected(base: Diffuse) -> Array:
+        found = stack_lobes(stack.with_layers([*stack.layers[:-1], base]), 1.0, model=model)
+        return np.sum([found.remainder, *found.energy], axis=0)
+
+    bases = [Diffuse(albedo=albedo) for albedo in albedos] or [stack.base]
+    return np.hstack([reflected(base) for base in bases]) - reflected(Diffuse(albedo=0.0))
 
 
 def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:

@@ -15,13 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import Model, adding, lobes, operators, prepare
+from velatura.model import Model, adding, operators, prepare
 from velatura.model.diffuse import Base
+from velatura.model.lobe_statistics import StackLobes
 from velatura.model.prepare import Prepared, PreparedInterface
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
-from velatura.stack import Interface, InterfaceValues, Kind, Layer, LayerValues, Material, Medium, MediumValues
+from velatura.stack import (
+    DiffuseValues,
+    Interface,
+    InterfaceValues,
+    Kind,
+    Layer,
+    LayerValues,
+    Material,
+    Medium,
+    MediumValues,
+)
 from velatura.tables import load
 
 Array = NDArray[np.float64]
@@ -83,7 +94,7 @@ class Above(Batch):
     """N stacks that end in a medium of absolute index eta, (1, N) or a number.
 
     `over` is the index above their last interface, which total internal reflection depends on; None where there is no
-    interface yet. `exterior` and `path`, index and layers above, serve a model that reads whole stacks only.
+    interface yet. `model` is one in closed form: that asked for, or the nearest to it.
     """
 
     model: Model
@@ -91,30 +102,23 @@ class Above(Batch):
     eta: Value
     over: Value | None = None
     variance: type[Variance] = Isotropic
-    exterior: Value = 1.0
-    path: tuple[Layers, ...] = ()
 
     @classmethod
     def nothing(cls, model: Model, exterior: Value = 1.0, variance: type[Variance] = Isotropic) -> Above:
         """Only the exterior medium."""
-        prepared = Prepared(model, (), variance, MAPS[model.map], load())
-        return cls(model, adding.top(prepared, 1.0), exterior, None, variance, exterior)
+        prepared = Prepared(model.adder, (), variance, MAPS[model.map], load())
+        return cls(model.adder, adding.top(prepared, 1.0), exterior, None, variance)
 
     @property
     def f(self) -> RoughnessMap:
         """The model's roughness map."""
         return MAPS[self.model.map]
 
-    @property
-    def adder(self) -> Model:
-        """The model, or if it has no closed form, the nearest that has one, as a start of solutions."""
-        return self.model if self.model.recursion.closed_form else self.model.in_closed_form
-
     def prepared(self, layers: Layers, reflectance: Value | None = None) -> Prepared:
         """The interfaces as the next layer of each stack; `reflectance` if it is known already."""
-        model = self.adder if reflectance is None else dataclasses.replace(self.adder, reflectance="fresnel")
+        model = self.model if reflectance is None else dataclasses.replace(self.model, reflectance="fresnel")
         material = Material((_interface(layers),), self.eta)
-        if self.over is not None and self.adder.tir != "off":
+        if self.over is not None and self.model.tir != "off":
             # The interface above is there for its indices alone, which total reflection depends on
             smooth = InterfaceValues("dielectric", 0.0, 0.0, 0.0, self.eta)
             material = Material((smooth, *material.layers), self.over)
@@ -164,16 +168,7 @@ class Above(Batch):
         prepared = above.prepared(layers, reflectance)
         state, lobe = adding.add(prepared, above.state, prepared.layers[-1], NORMAL)
         assert lobe is not None
-        below = dataclasses.replace(above, state=state, eta=layers.eta, over=self.eta)
-        if self.model.recursion.closed_form:
-            return below, lobe
-        path = (*self.path, layers)
-        return dataclasses.replace(below, path=path), self._read(path)
-
-    def _read(self, path: tuple[Layers, ...]) -> adding.Lobe:
-        """The last lobe of whole stacks."""
-        lobe = lobes(prepare(whole(path, self.exterior), self.model, self.variance), NORMAL)[0][-1]
-        return dataclasses.replace(lobe, variance=self.variance_of(lobe.roughness))
+        return dataclasses.replace(above, state=state, eta=layers.eta, over=self.eta), lobe
 
     def variance_of(self, roughness: Roughness) -> Variance:
         """The variance of a GGX lobe, along the axes of the frame where there are two."""
@@ -195,6 +190,16 @@ def whole(path: Sequence[Layers], exterior: Value) -> Material:
             layers.append(MediumValues(depth=1.0, sigma_a=part.tau, sigma_s=0.0, g=0.0))
         layers.append(_interface(part))
     return Material(tuple(layers), exterior)
+
+
+def read_whole(path: Sequence[Layers], exterior: float, model: Model) -> StackLobes:
+    """The reflected lobes of one stack of interfaces and the media above them, by a model without a closed form."""
+    from velatura.model.solution import plain  # loads SciPy
+
+    # Nothing passes that would be summed up
+    material = whole(path, exterior)
+    material = dataclasses.replace(material, layers=(*material.layers, DiffuseValues(0.0)))
+    return model.recursion.statistics(plain(material), model, (np.zeros(1), np.zeros(1), np.ones(1)))
 
 
 def _interface(layers: Layers) -> InterfaceValues:

@@ -7,7 +7,7 @@ possible layers below, so that many partial stacks are followed at once.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 from pathlib import Path
@@ -62,11 +62,21 @@ class Solution:
         return Stack(written, name=self.target.name, exterior=self.target.exterior)
 
     @cached_property
+    def in_closed_form(self) -> Solution:
+        """The same stack, and its lobes as the nearest model in closed form reads them."""
+        if self.model.recursion.closed_form:
+            return self
+        from velatura.inverse.drag import seen  # which solves with this
+
+        return Solution(seen(self.stack, self.target, self.model.adder), self.model.adder, self.layers)
+
+    @cached_property
     def classes(self) -> tuple[EquivalenceClass, ...]:
-        """The equivalence class of every lobe, below the layers chosen above it."""
-        above, layers, found = start(self.target, self.model), iter(self.layers), []
-        for n, lobe in enumerate(self.target.lobes):
-            found.append(class_of(above, lobe, self.target, first=n == 0))
+        """The equivalence class of every lobe, below the layers chosen above it, by that model in closed form."""
+        target, layers, found = self.in_closed_form.target, iter(self.layers), []
+        above = start(target, self.model)
+        for n, lobe in enumerate(target.lobes):
+            found.append(class_of(above, lobe, target, first=n == 0))
             for _ in range(lobe.interfaces):
                 above, _read = above.below(next(layers))
         return tuple(found)
@@ -106,17 +116,31 @@ def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EF
     """The preferred stack, of those found at the lowest effort that finds any."""
     if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
         return None
+    if not model.recursion.closed_form:
+        from velatura.inverse import refined  # which begins with this
+
+        return refined.search(target, model)
+    paths = found(target, model, efforts)
+    return next(solutions(target, model, paths, [int(np.argmin(paths.cost))]), None) if paths else None
+
+
+def found(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Partial | None:
+    """The stacks of a model in closed form that are found at the lowest effort that finds any."""
     for spread, keep in efforts:
         paths = None
         for paths in follow(target, model, spread, keep):
             if not len(paths.cost):
                 break
         if paths is not None and len(paths.cost):
-            best = paths.take(np.array([np.argmin(paths.cost)]))
-            return Solution(target, model, best.layers)
+            return paths
         if not any(_open(lobe) for lobe in target.lobes):
             break
     return None
+
+
+def solutions(target: Target, model: Model, paths: Partial, which: Iterable[int]) -> Iterator[Solution]:
+    """Some of the stacks of a target."""
+    return (Solution(target, model, paths.take(np.array([n])).layers) for n in which)
 
 
 def alternatives(
@@ -136,14 +160,25 @@ def alternatives(
     first = invert_stack(target, model, **switches)
     rng = np.random.default_rng(seed)
     found = [first]
-    *_, paths = follow(first.target, first.model, *EFFORTS[1])
-    for n in rng.integers(len(paths.cost), size=4 * count):
+    near = first.in_closed_form
+    *_, paths = follow(near.target, near.model, *EFFORTS[1])
+    for drawn in solutions(near.target, near.model, paths, rng.integers(len(paths.cost), size=4 * count).tolist()):
         if len(found) == count:
             break
-        drawn = _last_redrawn(Solution(first.target, first.model, paths.take(np.array([n])).layers), rng)
-        if drawn is not None and all(drawn.stack != other.stack for other in found):
-            found.append(drawn)
+        other = _met(_last_redrawn(drawn, rng), first)
+        if other is not None and all(other.stack != each.stack for each in found):
+            found.append(other)
     return found
+
+
+def _met(drawn: Solution | None, first: Solution) -> Solution | None:
+    """What is drawn, moved to where the model of the first stack reads its lobes; None if there is no such stack."""
+    if drawn is None or first.model.recursion.closed_form:
+        return drawn
+    from velatura.inverse import refined
+
+    met = refined.moved(drawn, first.target, first.model)
+    return met if isinstance(met, Solution) else None
 
 
 def _last_redrawn(solution: Solution, rng: np.random.Generator) -> Solution | None:

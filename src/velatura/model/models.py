@@ -88,6 +88,11 @@ class Model:
         """The nearest model by the recursion of the papers, without total internal reflection."""
         return dataclasses.replace(self, recursion=ADDING, tir="off")
 
+    @property
+    def adder(self) -> Model:
+        """This model, or where an interface does not follow from its lobe, the nearest one of which it does."""
+        return self if self.recursion.closed_form else self.in_closed_form
+
     def with_switches(self, /, **switches: str) -> Model:
         """This model with some choices changed.
 

@@ -104,17 +104,23 @@ def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Valu
 
     A mean over visible normals on a lattice of a Fibonacci number of them, in single precision; within .3 % on average.
     """
+    return lobe.weight * integrals(lobe, wi, normals)[0]
+
+
+def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value]:
+    """Mean and largest weight of samples, as `integral`, for a weight of 1."""
     count, size = len(wi[2]), max(BLOCK // normals, 1)
     blocks = [
-        _integral(replace(lobe, n=_single(lobe.n), roughness=Roughness(*roughness)), (x, y, z), normals)
+        _integrals(replace(lobe, n=_single(lobe.n), roughness=Roughness(*roughness)), (x, y, z), normals)
         for x, y, z, *roughness in (
             [_single(value, slice(k, k + size)) for value in (*wi, *lobe.roughness)] for k in range(0, count, size)
         )
     ]
-    return lobe.weight * np.concatenate(blocks, axis=-1)
+    mean, largest = (np.concatenate(each, axis=-1) for each in zip(*blocks))
+    return mean, largest
 
 
-def _integral(lobe: OwnMediumLobe, wi: Direction, normals: int) -> Value:
+def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value, Value]:
     """For columns of directions (N, 1)."""
     u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
@@ -129,7 +135,7 @@ def _integral(lobe: OwnMediumLobe, wi: Direction, normals: int) -> Value:
         value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h), 0.0, 1.0))
     if lobe.leaving:
         value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
-    return np.mean(value, axis=-1, dtype=float)
+    return np.mean(value, axis=-1, dtype=float), np.max(value, axis=-1)
 
 
 def _single(x: Value, part: slice = slice(None)) -> Value:

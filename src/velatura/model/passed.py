@@ -25,6 +25,9 @@ OF_BOUNCED = 0.5
 MOST = 2.0  # energy over integral
 LEAST = 0.05  # share of samples of what passes that are scattered, for what all others miss
 
+LIGHT = 2.5  # weight of samples of a part, where it can be kept
+RARE = 3.0  # times as often as by its energy that a part is sampled at most
+
 PASSES_MIN = 0.05  # share of facets that let light pass, where samples are shared
 BELOW_ONE = 1 - 2**-24
 
@@ -50,14 +53,20 @@ class Parts(ops.Named):
 
 
 def parts(
-    passage: Passage, wi: tuple[Array, Array, Array], straight: Array, bounces: Array, passed: Array, reflected: Array
+    passage: Passage,
+    wi: tuple[Array, Array, Array],
+    straight: Array,
+    bounces: Array,
+    passed: Array,
+    reflected: Array,
+    facets: Array | None = None,
 ) -> Parts:
     """In NumPy, for directions wi above, (N,) each, and energies (C, N): of light that passes straight through and
     after bounces, where it meets facets once and is not scattered; of all that passes; and of what is reflected, but
-    for the facets of a single interface."""
+    for the `facets` of a single interface: samples of these are those of a rough dielectric."""
     i, lobe, found = bounced.seen_below(passage, wi), bounced.bounced(passage, wi), bounced.rest(passage, wi)
-    straight = np.minimum(straight, passed)
-    bounces = np.minimum(bounces, passed - straight)
+    straight = np.clip(straight, 0, passed)  # waves over the azimuth may lie below 0
+    bounces = np.clip(bounces, 0, passed - straight)
     if found.lobe is None:
         bounces = bounces + OF_BOUNCED * (passed - straight - bounces)
     # Divide energies by integrals, and hand over what they lack
@@ -74,8 +83,17 @@ def parts(
     if lobe:
         scattered = np.maximum(scattered, LEAST * (straightly + bouncing))
     drawn = ops.divide(straightly, np.clip(passes, PASSES_MIN, 1.0))
+    if facets is not None:
+        drawn = straightly + ops.mean(facets)
+    total = np.maximum(drawn + bouncing + scattered + back, ops.TINY)
+    bouncing, scattered = light(bouncing, total, weight_bounced), light(scattered, total, weight_rest)
     total = np.maximum(drawn + bouncing + scattered + back, ops.TINY)
     return Parts(weight_straight, weight_bounced, weight_rest, drawn / total, bouncing / total, scattered / total)
+
+
+def light(share: Array, total: Array, heaviest: Array) -> Array:
+    """A share of samples, raised where by itself it would give weights (C, N) above `LIGHT`; the rarest ones may be."""
+    return np.maximum(share, np.minimum(np.max(heaviest, axis=0) * total / LIGHT, RARE * share))
 
 
 def eval_pdf(passage: Passage, of: Parts, wi: Direction, wo: Direction) -> tuple[Value, Value]:

@@ -29,6 +29,7 @@ MOMENTS = (1.0, 2 / 3, 1 / 15)  # means of u over the projected disc
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # a and b, of C_ab
 EXACT = 3.0  # weight of the energy of a direction beside that of nodes
 DARK = 1e-6  # albedo
+BRIGHT = 0.5  # share of samples by the root of the cosine, for a horizon that is twice as bright as all
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,29 @@ class Remainder(ops.Named):
         """Energy for light from a cosine, a colour, without clipping."""
         return sum(k * moment for k, moment in zip(self._at(cos_theta), MOMENTS))
 
+    def density(self, wi: Direction, wo: Direction) -> Value:
+        """Density of `sample`, of directions above."""
+        z, low = ops.maximum(wo[2], 0.0), self._low(wi)
+        return ((1 - low) * z + 0.75 * low * ops.sqrt(z)) * (1 / pi)
+
+    def sample(self, wi: Direction, u1: Value, u2: Value) -> Direction:
+        """A direction wo from uniform numbers, with a density proportional to the cosine or, where most light leaves at
+        grazing directions, to its root."""
+        low = self._low(wi)
+        grazing = u1 < low
+        u1 = ops.clip(ops.divide(ops.select(grazing, u1, u1 - low), ops.select(grazing, low, 1 - low)), 0.0, 1.0)
+        z = ops.power(ops.maximum(u1, ops.TINY), ops.select(grazing, 2 / 3, 0.5))
+        radius, phi = ops.sqrt(1 - z * z), 2 * pi * u2
+        return radius * ops.cos(phi), radius * ops.sin(phi), z
+
+    def _low(self, wi: Direction) -> Value:
+        """Share of samples by the root of the cosine: by how bright the horizon is, on the side of the mirror
+        direction, beside the mean of all directions."""
+        k, p2 = self._at(wi[2]), 1 - wi[2] * wi[2]
+        horizon = ops.mean(k[0] + k[2] + self.b * ops.sqrt(p2) + self.a * p2)
+        everywhere = ops.mean(sum(each * moment for each, moment in zip(k, MOMENTS)))
+        return ops.clip(BRIGHT * (ops.divide(horizon, everywhere) - 1), 0.0, 1.0)
+
     def _at(self, z: Value) -> tuple[Value, Value, Value]:
         """Coefficients of u at the other cosine."""
         w = _grazing(z)
@@ -68,17 +92,6 @@ class Remainder(ops.Named):
             self.c_01 + z * self.c_11 + w * self.c_12,
             self.c_02 + z * self.c_12 + w * self.c_22,
         )
-
-
-def density(wo: Direction) -> Value:
-    """Density of `sample`: the cosine over pi."""
-    return ops.maximum(wo[2], 0.0) * (1 / pi)
-
-
-def sample(u1: Value, u2: Value) -> Direction:
-    """A direction from uniform numbers, with a density proportional to its cosine."""
-    radius, phi = ops.sqrt(u1), 2 * pi * u2
-    return radius * ops.cos(phi), radius * ops.sin(phi), ops.sqrt(1 - u1)
 
 
 def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remainder:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
 from velatura.model import exchange, own_medium, passed, remainder, straight_through, widths
@@ -18,6 +17,7 @@ from velatura.model.passed import Parts
 from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
 from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
+from velatura.model.solved_grid import Folded, Grid
 from velatura.model.transport.adding import interfaces, parts
 from velatura.model.transport.energies import INCIDENCES, energies
 from velatura.model.transport.operators import Layer
@@ -32,9 +32,6 @@ from velatura.tables import Tables
 Array = NDArray[np.floating]
 
 RGB = 3
-COSINES = 48  # nodes, even in the root of the cosine
-AZIMUTHS = 12  # in half a turn, where interfaces are brushed
-COS_MIN = 1e-3
 EVENLY = 377  # directions over which the remainder is integrated
 DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
 BRIGHTEST = 4.0  # by how much it is scaled at most
@@ -105,7 +102,7 @@ class Solver:
     def of(cls, model: Model, variance: type[Variance], context: Context) -> Solver:
         assert context.colour is not None
         colours = RGB if context.colour is channels else len(context.colour())
-        return cls(model, variance, Grid(variance is Isotropic), colours, context.tables)
+        return cls(model, variance, Grid.of(variance is Isotropic), colours, context.tables)
 
     @property
     def isotropic(self) -> bool:
@@ -164,7 +161,8 @@ class Solver:
     def _side(self, material: Material, layout: Layout) -> SolvedSide:
         """What a material is at the directions of the grid."""
         drawn = layout.lobes
-        cosine, phi, wi, count = self.grid.cosine, self.grid.phi, self.grid.directions, self.grid.count
+        folded = Folded.of(self.grid, material)
+        cosine, phi, wi, count = folded.cosine, folded.phi, folded.directions, folded.count
         solved = energies(
             material,
             np.concatenate([cosine, INCIDENCES]),
@@ -191,24 +189,29 @@ class Solver:
         apart = {each.interface for each in drawn if each.veil}
         lobes = np.array([lobes[k] + (0 if k in apart else veils[k]) for k in range(len(lobes))])
         energy = [(veils if each.veil else lobes)[each.interface] for each in drawn]
-        whole = [
-            own_medium.integral(shape.lobe(1.0, tensor.roughness(phi)), wi) for shape, tensor in zip(shapes, shown)
-        ]
-        weights = [np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0) for e, z in zip(energy, whole)]
-        scale = np.clip(rest / np.maximum(self._albedo(polynomial), DIM), 0, BRIGHTEST)
+        weights, heaviest = [], []
+        for shape, tensor, e in zip(shapes, shown, energy):
+            z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi)
+            weights.append(np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0))
+            heaviest.append(weights[-1] * largest)
+        z, largest = _integrals(polynomial, folded)
+        scale = np.clip(rest / np.maximum(z, DIM), 0, BRIGHTEST)
+        heaviest.append(scale * largest)
 
         # Share samples by energies
-        shares = [ops.mean(each) for each in energy]
+        shares, facets = [ops.mean(each) for each in energy], None
         if material.transmits and len(drawn) == 1:
             # What passes is sampled with the facets that reflect
-            shares = [np.maximum(shares[0] - ops.mean(whole[0]), 0)]
+            shares, facets, heaviest[0] = [np.zeros(count)], energy[0], np.zeros_like(energy[0])
         shares.append(ops.mean(rest) + FAINT)
         least = EVEN if self.model.form == "symmetric" else 0.0
         shares[-1] = np.maximum(shares[-1], least * sum(shares))
+        shares = [passed.light(share, sum(shares), each) for share, each in zip(shares, heaviest)]
         total, left, passes = sum(shares), np.ones(count), None
         if material.transmits:
             passage = straight_through.passage(_slim(material), self.variance, layout.stepped)
-            passes = _evenly(passed.parts(passage, wi, straight, bounced, through, np.array([total])), least)
+            passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
+            passes = _evenly(passes, least)
             left = 1 - passes.share
             straight, bounced, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
             passes = replace(passes, straight=straight, bounced=bounced, rest=scattered)
@@ -223,21 +226,15 @@ class Solver:
             passes,
             self._colours(through) if passes else None,
         )
+        columns = folded.unfolded(columns)
         return SolvedSide(columns, Remainder(*(np.broadcast_to(x, self.colours) for x in vars(polynomial).values())))
 
     def _colours(self, values: Array) -> Array:
-        return np.broadcast_to(values, (self.colours, self.grid.count))
-
-    def _albedo(self, polynomial: Remainder) -> Array:
-        """Of the remainder as it is clipped, (C, M)."""
-        numbers = Remainder(*(np.reshape(x, (-1, 1, 1)) for x in vars(polynomial).values()))
-        wi, wo = self.grid.directions, remainder.sample(*low_discrepancy.square(EVENLY))
-        value = numbers.value((wi[0][:, None], wi[1][:, None], wi[2][:, None]), wo)
-        return np.asarray((value / remainder.density(wo)).mean(axis=-1))
+        return np.broadcast_to(values, (self.colours, np.shape(values)[-1]))
 
     def _roughness(self, tensor: Tensor) -> Iterator[Array]:
         """Of a lobe with the plane of incidence, as it is interpolated."""
-        roughness = tensor.roughness(0 * self.grid.phi)
+        roughness = tensor.roughness(np.zeros_like(tensor.xx))
         if self.isotropic:  # axes lie in the plane of incidence, and across it
             u, v = (np.minimum(tensor.width(np.array(axis)), widths.ALPHA_MAX) for axis in widths.AXES)
             roughness = Roughness(u, v, 0.0)
@@ -314,6 +311,15 @@ def _slim(material: Material) -> Material:
     return material.each(lambda _, value: slim(value) if np.ndim(value) else value)
 
 
+def _integrals(polynomial: Remainder, folded: Folded) -> list[Array]:
+    """Mean and largest weight of samples of the remainder as it is clipped, (C, M); they depend on the cosine alone."""
+    numbers = Remainder(*(np.reshape(x, (-1, 1, 1)) for x in vars(polynomial).values()))
+    x, y, z = (each.reshape(-1, len(folded.kept))[:, :1] for each in folded.directions)
+    wo = numbers.sample((x, y, z), *low_discrepancy.square(EVENLY))
+    weights = numbers.value((x, y, z), wo) / numbers.density((x, y, z), wo)
+    return [np.repeat(each, len(folded.kept), axis=-1) for each in (weights.mean(axis=-1), weights.max(axis=-1))]
+
+
 def _veiled(material: Material) -> set[int]:
     """Interfaces below media that scatter light by little."""
     veiled: set[int] = set()
@@ -348,62 +354,3 @@ def shapes_of(prepared: Prepared, drawn: Sequence[Drawn]) -> list[Shape]:
         out = (1.0, None) if k is None else (indices[k], found[k])
         shapes.append(Shape(lobe.interface, indices[lobe.interface], facets, *out))
     return shapes
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Directions at which a material is solved, and how columns are spread over a finer grid."""
-
-    isotropic: bool
-    cosines: int = COSINES
-
-    @property
-    def nodes(self) -> Array:
-        return np.linspace(0, 1, self.cosines)
-
-    @property
-    def turns(self) -> int:
-        return 1 if self.isotropic else AZIMUTHS
-
-    @property
-    def count(self) -> int:
-        return self.cosines * self.turns
-
-    @property
-    def cosine(self) -> Array:
-        return np.repeat(np.maximum(self.nodes**2, COS_MIN), self.turns)
-
-    @property
-    def phi(self) -> Array:
-        return np.tile(np.pi * np.arange(self.turns) / self.turns, self.cosines)
-
-    @property
-    def directions(self) -> tuple[Array, Array, Array]:
-        sine = np.sqrt(1 - self.cosine * self.cosine)
-        return sine * np.cos(self.phi), sine * np.sin(self.phi), self.cosine
-
-    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
-        """Nodes and weights of the linear interpolation at directions above."""
-        place = np.sqrt(np.clip(w[2], 0, 1)) * (self.cosines - 1)
-        cell = np.minimum(place.astype(int), self.cosines - 2)
-        along = [(cell, 1 - (place - cell)), (cell + 1, place - cell)]
-        if self.isotropic:
-            return along
-        turn = (np.arctan2(w[1], w[0]) % np.pi) * (self.turns / np.pi)
-        first = turn.astype(int)
-        around = [(first % self.turns, 1 - (turn - first)), ((first + 1) % self.turns, turn - first)]
-        return [(k * self.turns + m, x * y) for k, x in along for m, y in around]
-
-    def spread(self, rows: Array, shape: tuple[int, ...]) -> Array:
-        """Values at the nodes, (..., M), interpolated, (..., prod(shape)): by splines over the cosine, by waves over
-        the azimuth."""
-        values = rows.reshape(*rows.shape[:-1], self.cosines, self.turns)
-        if not self.isotropic:
-            x, y, _ = directional_grid.directions(shape, None)
-            phi = np.arctan2(y, x).reshape(shape)[0]
-            order = np.arange(self.turns // 2 + 1)
-            both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
-            waves = np.fft.rfft(values, axis=-1) / self.turns * both
-            values = (waves @ np.exp(2j * order[:, None] * phi)).real
-        fine = PchipInterpolator(self.nodes, values, axis=-2)(np.linspace(0, 1, shape[0]))
-        return np.asarray(fine.reshape(*rows.shape[:-1], -1))

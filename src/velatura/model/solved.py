@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from velatura import ops
-from velatura.model import own_medium, passed, remainder
+from velatura.model import own_medium, passed
 from velatura.model.bsdf import Asked, chosen_direction, upright
 from velatura.model.own_medium import OwnMediumLobe
 from velatura.model.passed import Parts
@@ -31,7 +31,7 @@ from velatura.optics.ggx import Direction
 ALL = Asked()
 FAINT = 1e-9  # energy of a part that is drawn even where it has none
 GRAZING = 1e-6  # cosine
-HEAVY = 2.9  # weight of a sample, in the symmetric form
+HEAVY = 2.9  # weight of a sample
 
 #: What is interpolated are roots of roughness, or matrices of them, so that axes may turn.
 ROOTS = RoughnessMap(lambda along, across: ops.sqrt(along), lambda along, across: along * along)
@@ -190,7 +190,7 @@ class Seen:
         """f |cos theta_o| and density of a reflected part."""
         if k < len(self.lobes):
             return own_medium.eval_pdf(self.lobes[k], i, o)
-        return self.columns.scale * self.polynomial.value(i, o), remainder.density(o)
+        return self.columns.scale * self.polynomial.value(i, o), self.polynomial.density(i, o)
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ class Solved:
         """A direction wo, and the index on its side over that on the side of wi."""
         of, eta = self.seen(wi)
         i, drawn = upright(wi, wi), of.only(asked)
-        wo = remainder.sample(u1, u2)
+        wo = of.polynomial.sample(i, u1, u2)
         begin = 1 - drawn.chances[-1]
         for lobe, chance in zip(reversed(of.lobes), reversed(drawn.chances[:-1])):
             wo = chosen_direction(u < begin, own_medium.sample(lobe, i, u1, u2), wo)
@@ -320,10 +320,9 @@ def eval_pdf(
         whole = whole + through
         value = value + (through if drawn.passing else 0 * through)
     scale = ops.select(wi[2] * wo[2] < 0, eta * eta, 1.0)
-    if back:
-        # No sample is too heavy, there and back
-        most = HEAVY * ops.minimum(densities[1], densities[2] * cosines * scale)
-        value = value * ops.minimum(ops.divide(most, whole), 1.0)
+    # No sample is too heavy, there and, in the symmetric form, back
+    most = ops.minimum(densities[1], densities[2] * cosines * scale) if back else densities[1]
+    value = value * ops.minimum(ops.divide(HEAVY * most, whole), 1.0)
     if of.passage is None:
         lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, densities[0], 0.0)

@@ -18,8 +18,9 @@ from velatura import ops
 from velatura.model.context import Context
 from velatura.model.models import Model
 from velatura.model.remainder import Remainder
-from velatura.model.solution import Grid, Layout, SolvedSide, Solver, plain, sides
+from velatura.model.solution import Layout, SolvedSide, Solver, plain, sides
 from velatura.model.solved import Solved
+from velatura.model.solved_grid import Grid
 from velatura.model.transport.adding import Lambert, Part, parts
 from velatura.model.transport.interfaces import Facets
 from velatura.model.variables import Variables
@@ -97,7 +98,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     material = material.solid()
     chosen = _chosen(plain(material), places)
     material, places = material.each(lambda _, value: _channels(value, chosen)), places[chosen]
-    given, start, grid = Variables.of(material), plain(material), Grid(variance is Isotropic)
+    given, start, grid = Variables.of(material), plain(material), Grid.of(variance is Isotropic)
     solver = Solver(model, variance, grid, len(places), context.tables)
     layouts = solver.layouts([start])
     orders: list[Sequence[bool]] = []

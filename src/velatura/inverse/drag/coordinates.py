@@ -7,6 +7,7 @@ coordinates, too, that are kept as long as they can be.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import (
@@ -24,7 +26,7 @@ from velatura.inverse.interface import (
     conductor_index,
     conductor_tint,
 )
-from velatura.inverse.partial_stack import NORMAL, Array, Layers, whole
+from velatura.inverse.partial_stack import NORMAL, Array, Layers, read_whole, whole
 from velatura.inverse.target import Target
 from velatura.model import Model, lobes, prepare
 from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
@@ -128,22 +130,52 @@ class Space:
 
     def read(self, x: Array) -> Array:
         """Energies of all lobes, then variances of all interfaces, (3 K + I, N), of N points."""
+        if not self.model.recursion.closed_form:
+            return np.stack([self._solved(point[:, None]) for point in x.T], axis=-1)
         material = whole(self.layers(x), self.exterior)
         reflected, _ = lobes(prepare(material, self.model, Isotropic), NORMAL)
+        return self._sorted(x, [(lobe.energy, lobe.roughness.alpha_u) for lobe in reflected])
+
+    def _solved(self, x: Array) -> Array:
+        """The same of one point (D, 1), by a model that reads one material at a time, (3 K + I,)."""
+        found = read_whole(self.layers(x), self.exterior, self.model)
+        return self._sorted(x, [(energy, alpha[0]) for energy, alpha in zip(found.energy, found.alpha)])[:, 0]
+
+    def _sorted(self, x: Array, reflected: Sequence[tuple[Value, Value]]) -> Array:
+        """Energies and roughnesses of interfaces as they are read."""
         energy = np.zeros((3 * self.lobes, x.shape[1]))
         variance = np.empty((len(self.interfaces), x.shape[1]))
-        for n, (own, lobe) in enumerate(zip(self.interfaces, reflected)):
-            energy[3 * own.lobe : 3 * own.lobe + 3] += lobe.energy
-            variance[n] = self._brightest(own, x, MAPS[self.model.map].variance(lobe.roughness.alpha_u))
+        for n, (own, (reflects, alpha)) in enumerate(zip(self.interfaces, reflected)):
+            energy[3 * own.lobe : 3 * own.lobe + 3] += reflects
+            variance[n] = self._brightest(own, x, MAPS[self.model.map].variance(alpha))
         return np.vstack([energy, np.minimum(variance, VARIANCE_MAX)])
 
-    def reading(self, x: Array, free: Array) -> tuple[Reading, Array]:
-        """The reading at a point, by differences along some coordinates, and the points (D, 1 + free) of these."""
+    def points(self, x: Array, free: Array) -> Array:
+        """A point, and those of differences along some coordinates, (D, 1 + free)."""
         points = np.repeat(x[:, None], len(free) + 1, axis=1)
-        steps = STEP * (np.abs(x[free]) + 0.01)
-        points[free, 1 + np.arange(len(free))] += steps
-        read = self.read(points)
-        return Reading(read[:, 0], (read[:, 1:] - read[:, :1]) / steps), points
+        points[free, 1 + np.arange(len(free))] += STEP * (np.abs(x[free]) + 0.01)
+        return points
+
+    def reading(self, x: Array, free: Array, before: tuple[Array, Reading] | None = None) -> Reading:
+        """The reading at a point, by differences along some coordinates.
+
+        Of a model that is slow, the differences are those of the nearest one that adds up layers, in proportion; or, if
+        another point and its reading `before` are given, Broyden's, which follow from the change of the reading.
+        """
+        closed = self.model.recursion.closed_form
+        if before and not closed:
+            value, step = self.read(x[:, None])[:, 0], x[free] - before[0][free]
+            along = step / (np.abs(x[free]) + 0.01) ** 2
+            missed = value - before[1].value - before[1].slopes @ step
+            return Reading(value, before[1].slopes + np.outer(missed, ops.divide(along, along @ step)))
+        points = self.points(x, free)
+        read = dataclasses.replace(self, model=self.model.adder).read(points)
+        slopes = (read[:, 1:] - read[:, :1]) / (points[free, 1 + np.arange(len(free))] - x[free])
+        if closed:
+            return Reading(read[:, 0], slopes)
+        value = self.read(x[:, None])[:, 0]
+        ratio = value / np.maximum(read[:, 0], ENERGY_MIN)
+        return Reading(value, slopes * np.clip(ratio, 0.1, 10)[:, None])
 
     def _brightest(self, own: InterfaceCoordinates, x: Array, s: Array) -> Array:
         """The variance of the channel in which the lobe must reflect most, if every channel has its own."""
@@ -221,7 +253,7 @@ class Point:
     @cached_property
     def reading(self) -> Reading:
         """The model's reading of it."""
-        return self.known or self.space.reading(self.x, self.space.free)[0]
+        return self.known or self.space.reading(self.x, self.space.free)
 
     @cached_property
     def layers(self) -> list[Layers]:

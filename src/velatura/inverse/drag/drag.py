@@ -159,11 +159,15 @@ class DraggedStack:
 
         None for the bound where the target is met.
         """
-        problem = self._problem(self._wanted(wish))
-        found = self._met(problem)
-        if isinstance(found, Solution):
-            return self._at(found).renamed(wish), None
-        return self._part_of_the_way(wish, problem, found)
+        found = self.met(wish)
+        if isinstance(found, DraggedStack):
+            return found, None
+        return self._part_of_the_way(wish, self._problem(self._wanted(wish)), found)
+
+    def met(self, wish: Target) -> DraggedStack | Bound:
+        """The stack with the lobes of a target of the same form, or the bound that is in the way."""
+        found = self._met(self._problem(self._wanted(wish)))
+        return self._at(found).renamed(wish) if isinstance(found, Solution) else found
 
     def far(self, wish: Target) -> bool:
         """Whether the lobes of a target are far away."""

@@ -12,6 +12,7 @@ from velatura.inverse.partial_stack import Array
 
 ROUNDS = 8
 ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
+SLOW_ROUNDS = 16  # the same by Broyden's method, for models that are slow
 
 
 @dataclass(frozen=True)
@@ -45,16 +46,20 @@ class Problem:
     def solve(self, compromise: Compromise | None = None) -> Solution | Bound:
         """The stack that meets the goal; the violated bound if there is none."""
         space, bound = self.start.space, compromise.bound if compromise else None
+        closed = space.model.recursion.closed_form
+        enough = ENOUGH if bound and closed else ALMOST
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, set[int]()
-        for n in range(ROUNDS):
+        before = None
+        for n in range(ROUNDS if closed else SLOW_ROUNDS):
             # See what is missing, and how that changes
             known = n == 0 and bound is None
-            reading, points = (self.start.reading, x[:, None]) if known else space.reading(x, free)
+            reading = self.start.reading if known else space.reading(x, free, before)
+            before = x, reading
             missing, slopes = self._missing(reading, part), self._scaled(reading.slopes)
             if compromise:
-                missing, slopes = self._on_bound(compromise, missing, slopes, points, free)
-            if not np.all(np.isfinite(slopes)):
+                missing, slopes = self._on_bound(compromise, missing, slopes, space.points(x, free), free)
+            if not np.all(np.isfinite(slopes)) or not np.all(np.isfinite(missing)):
                 break
 
             # Move, within bounds
@@ -65,7 +70,7 @@ class Problem:
             outside = {int(c) for c in free if abs(full[c] - x[c]) > SLACK}
 
             # End where nothing is missing, or where a coordinate meets its bound for the second time
-            met = n > 0 and np.max(np.abs(missing)) < (ENOUGH if bound else ALMOST)
+            met = n > 0 and np.max(np.abs(missing)) < enough
             if met and not outside and abs(full_part - part) <= SLACK:
                 found = Reading(self._on_the_way(part), reading.slopes[:, : len(space.free)])
                 return space.broken(x, bound) or Solution(Point(space, x, found), part)

@@ -1,0 +1,152 @@
+"""Directions at which a material is solved: cosines times azimuths, even in the root of the cosine and in half a turn.
+
+Stacks look alike from opposite sides, and mirrored in the axes that all of their brushed interfaces share.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from velatura.model.passed import Parts
+from velatura.model.solved import Columns
+from velatura.sampling import directional_grid
+from velatura.stack import Material
+
+Array = NDArray[np.floating]
+
+COSINES = {True: 32, False: 20}  # where all interfaces are isotropic, and where some are brushed
+AZIMUTHS = 12  # in half a turn, where some are brushed
+COS_MIN = 1e-3
+ALIKE = 1e-6  # steps between azimuths, by which axes may differ
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All directions, and how columns are spread over a finer grid."""
+
+    isotropic: bool
+    cosines: int
+
+    @classmethod
+    def of(cls, isotropic: bool) -> Grid:
+        return cls(isotropic, COSINES[isotropic])
+
+    @property
+    def nodes(self) -> Array:
+        return np.linspace(0, 1, self.cosines)
+
+    @property
+    def turns(self) -> int:
+        return 1 if self.isotropic else AZIMUTHS
+
+    @property
+    def count(self) -> int:
+        return self.cosines * self.turns
+
+    @property
+    def cosine(self) -> Array:
+        return np.repeat(np.maximum(self.nodes**2, COS_MIN), self.turns)
+
+    @property
+    def phi(self) -> Array:
+        return np.tile(np.pi * np.arange(self.turns) / self.turns, self.cosines)
+
+    @property
+    def directions(self) -> tuple[Array, Array, Array]:
+        sine = np.sqrt(1 - self.cosine * self.cosine)
+        return sine * np.cos(self.phi), sine * np.sin(self.phi), self.cosine
+
+    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
+        """Nodes and weights of the linear interpolation at directions above."""
+        place = np.sqrt(np.clip(w[2], 0, 1)) * (self.cosines - 1)
+        cell = np.minimum(place.astype(int), self.cosines - 2)
+        along = [(cell, 1 - (place - cell)), (cell + 1, place - cell)]
+        if self.isotropic:
+            return along
+        turn = (np.arctan2(w[1], w[0]) % np.pi) * (self.turns / np.pi)
+        first = turn.astype(int)
+        around = [(first % self.turns, 1 - (turn - first)), ((first + 1) % self.turns, turn - first)]
+        return [(k * self.turns + m, x * y) for k, x in along for m, y in around]
+
+    def spread(self, rows: Array, shape: tuple[int, ...]) -> Array:
+        """Values at the nodes, (..., M), interpolated, (..., prod(shape)): by splines over the cosine, by waves over
+        the azimuth."""
+        values = rows.reshape(*rows.shape[:-1], self.cosines, self.turns)
+        if not self.isotropic:
+            x, y, _ = directional_grid.directions(shape, None)
+            phi = np.arctan2(y, x).reshape(shape)[0]
+            order = np.arange(self.turns // 2 + 1)
+            both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
+            waves = np.fft.rfft(values, axis=-1) / self.turns * both
+            values = (waves @ np.exp(2j * order[:, None] * phi)).real
+        fine = PchipInterpolator(self.nodes, values, axis=-2)(np.linspace(0, 1, shape[0]))
+        return np.asarray(fine.reshape(*rows.shape[:-1], -1))
+
+
+@dataclass(frozen=True)
+class Folded:
+    """The directions of a grid but for mirror images of others: those at the azimuths of numbers `kept`. The azimuth of
+    every number looks like the one that `source` numbers among these, or, where `mirrored`, like its mirror image."""
+
+    grid: Grid
+    kept: NDArray[np.integer]
+    source: NDArray[np.integer]
+    mirrored: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, grid: Grid, material: Material) -> Folded:
+        """For a material of numbers, whose axes the azimuths are mirrored in where they lie on one or between two."""
+        turns = grid.turns
+        brushed = [layer for layer in material.interfaces if layer.alpha_u != layer.alpha_v]
+        axes = [(layer.rotation * turns / 90) % turns for layer in brushed] or [0.0]  # the sum of those mirrored
+        steps = round(axes[0])
+        numbers = np.arange(turns)
+        image = (steps - numbers) % turns
+        if any(abs((axis - steps + ALIKE) % turns) > 2 * ALIKE for axis in axes):
+            image = numbers
+        kept, source = np.unique(np.minimum(numbers, image), return_inverse=True)
+        return cls(grid, kept, source, image < numbers)
+
+    @property
+    def count(self) -> int:
+        return self.grid.cosines * len(self.kept)
+
+    @property
+    def cosine(self) -> Array:
+        return self._of(self.grid.cosine)
+
+    @property
+    def phi(self) -> Array:
+        return self._of(self.grid.phi)
+
+    @property
+    def directions(self) -> tuple[Array, Array, Array]:
+        x, y, z = map(self._of, self.grid.directions)
+        return x, y, z
+
+    def _of(self, values: Array) -> Array:
+        return values.reshape(-1, self.grid.turns)[:, self.kept].ravel()
+
+    def unfolded(self, columns: Columns) -> Columns:
+        """Columns at these directions, at all of the grid; the middle entries of matrices change sign in mirrors."""
+
+        def each(values: Any) -> Any:
+            if values is None:
+                return None
+            if isinstance(values, (list, tuple)):
+                return type(values)(each(x) for x in values)
+            if isinstance(values, Parts):
+                return Parts(*(each(x) for x in vars(values).values()))
+            found = values.reshape(*values.shape[:-1], self.grid.cosines, len(self.kept))[..., self.source]
+            return found.reshape(*values.shape[:-1], self.grid.count)
+
+        found = Columns(*(each(x) for x in vars(columns).values()))
+        if self.grid.isotropic:
+            return found
+        sign = np.tile(np.where(self.mirrored, -1, 1), self.grid.cosines)
+        return replace(found, roughness=[(xx, sign * xy, yy) for xx, xy, yy in found.roughness])
