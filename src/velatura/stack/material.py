@@ -93,8 +93,8 @@ class Material:
 
     @property
     def transmits(self) -> bool:
-        """Whether light passes: the last layer is a dielectric."""
-        return bool(self.layers) and self.kinds[-1] == "dielectric"
+        """Whether light passes: all layers are dielectrics and media, as seen from either side."""
+        return "dielectric" in self.kinds and set(self.kinds) <= {"dielectric", "medium"}
 
     @property
     def below(self) -> Value:
