@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from velatura.inverse import Solution, Target, TargetLobe
     from velatura.model import Model
 
+SHOWN = 5e-5  # difference of energies or roughnesses that four digits show
 ENDINGS = (".yaml", ".yml", ".json")
 
 TargetFile = Annotated[str, typer.Argument(metavar="TARGET", help="A target file (YAML or JSON).")]
@@ -93,12 +94,15 @@ def invert(
         classes = [members.to_dict() for members in first.classes]
         answer = {"stack": first.stack.to_dict(), "class": {"lobes": classes}}
         report = {"feasible": True, "model": first.model.name, **answer}
+        report |= {"reached": first.reached.to_dict()} if first.reached else {}
         print(json.dumps(report | ({"stacks": [s.stack.to_dict() for s in found]} if count > 1 else {})))
         return
     from rich.console import Console
 
     for solution in found:
         Console().print(_table(solution))
+        for line in _missed(solution):
+            print(line)
     say_for_which(found[0].model)
     for path in [*paths, *([picture] if picture else [])]:
         print(path)
@@ -207,6 +211,20 @@ def _table(solution: Solution) -> Table:
             table.add_row(str(n) if k == 0 else "", part.kind, *cells)
         table.add_section()
     return table
+
+
+def _missed(solution: Solution) -> list[str]:
+    """A line for each lobe that the stack misses since too much is fixed."""
+    if solution.reached is None:
+        return []
+    lines = []
+    for n, lobes in enumerate(zip(solution.target.lobes, solution.reached.lobes), 1):
+        asked, has = ((*lobe.colour, lobe.roughness) for lobe in lobes)
+        if max(abs(a - b) for a, b in zip(asked, has)) > SHOWN:
+            lines.append(
+                f"lobe {n}: has energy {_cell(has[:3])} and alpha {_cell(has[3])}; what is fixed allows no more"
+            )
+    return lines
 
 
 def _cell(value: Any) -> str:

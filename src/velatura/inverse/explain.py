@@ -59,16 +59,24 @@ class Infeasible(NoSolution):
 
 def infeasible(target: Target, model: Model) -> Infeasible:
     """The error for a target without a stack, with the nearest targets that have one."""
+    if not model.recursion.closed_form:
+        from velatura.inverse import refined  # which drags, for reasons that stand here
+
+        return refined.refused(target, model)
     total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
     if total > 1:
         directions = [d for d in [_scaled(target, model)] if d]
         return Infeasible(TOO_MUCH.format(total=total), 0, "sum", directions)
-    lobe, constraint = _binding(target, model)
-    why = f"lobe {lobe + 1}: {REASONS[constraint].format(eta_max=target.eta_max)}"
-    return Infeasible(why, lobe + 1, constraint, _directions(target, model, lobe))
+    lobe, constraint = why_not(target, model)
+    return Infeasible(because(lobe, constraint, target), lobe + 1, constraint, _directions(target, model, lobe))
 
 
-def _binding(target: Target, model: Model) -> tuple[int, str]:
+def because(lobe: int, constraint: str, target: Target) -> str:
+    """The reason in words."""
+    return f"lobe {lobe + 1}: {REASONS[constraint].format(eta_max=target.eta_max)}"
+
+
+def why_not(target: Target, model: Model) -> tuple[int, str]:
     """The first lobe without a solution, and the constraint that the best attempt violates most."""
     spread, keep = EFFORT[-1]
     paths = stacks.beginning(target, model)
@@ -103,7 +111,7 @@ def _directions(target: Target, model: Model, n: int) -> list[Direction]:
             t = _first(target, model, lambda x: energies(np.exp(sign * x * which)), 4.0)  # noqa: B023
             if t is not None:
                 change = abs(float(np.sum(np.log(np.array(t.lobes[n].colour) / np.array(lobe.colour)))))
-                found.append(Direction(what, f"{what} {_digits(t.lobes[n].energy)}", change, t))
+                found.append(Direction(what, f"{what} {digits(t.lobes[n].energy)}", change, t))
 
     def blurred(x: float) -> Target:
         return target.with_lobe(n, alpha=None, variance=float(max(s * np.exp(x), 0.0)))
@@ -113,7 +121,7 @@ def _directions(target: Target, model: Model, n: int) -> list[Direction]:
         t = _first(target, model, lambda x: blurred(sign * x), 4.0)  # noqa: B023
         if t is not None:
             now = t.lobes[n]
-            words = f"lobe {n + 1} variance {_digits(now.variance or 0.0)}"
+            words = f"lobe {n + 1} variance {digits(now.variance or 0.0)}"
             found.append(Direction(f"lobe {n + 1} variance", words, abs(float(np.log((now.variance or 0) / s))), t))
     return found
 
@@ -152,5 +160,6 @@ def _first(target: Target, model: Model, along: Callable[[float], Target], far: 
     return along(float(end))
 
 
-def _digits(value: float | tuple[float, ...]) -> str:
+def digits(value: float | tuple[float, ...]) -> str:
+    """A number or colour in a message."""
     return f"{value:.4g}" if isinstance(value, float) else "[" + ", ".join(f"{x:.4g}" for x in value) + "]"

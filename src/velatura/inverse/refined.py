@@ -13,18 +13,27 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from velatura.inverse import requests, stacks
-from velatura.inverse.drag import Bound, DraggedStack, seen
-from velatura.inverse.interface import ENERGY_MIN
+from velatura.errors import InvalidInput
+from velatura.inverse import interface, requests, stacks
+from velatura.inverse.drag import Bound, DraggedStack, pinned, seen
+from velatura.inverse.explain import TOO_MUCH, Direction, Infeasible, digits, infeasible
+from velatura.inverse.interface import ENERGY_MIN, Choice
 from velatura.inverse.partial_stack import Array
 from velatura.inverse.stacks import Solution
 from velatura.inverse.target import BLUR, Target
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
+from velatura.model.variance import Isotropic
 
+GREY = Bound(0, "colour", 1, 0.0)  # one index for all channels
 EFFORT = stacks.EFFORTS[:1]  # to find a stack near which the model is met
 STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
+INSIDE = (0.99, 0.9)  # shares of the way to a bound, of which the first that has a stack again is offered
+SAID = 1e-3  # changes of quantities that are mentioned, as logarithms
 TRIES = 4  # stacks that are begun with, of all that are found
+SAME = 0.03  # logarithm by which models differ about the energy of an index
+HARDLY = 1e6  # unit of what cannot be met, so that it hardly counts
+MISSED = 1e-4  # energy or variance that is mentioned
 SMALL = 0.01  # variance that is added to that of a goal, for units in which it is missed
 
 
@@ -37,8 +46,8 @@ def search(target: Target, model: Model) -> Solution | None:
 def _candidates(target: Target, model: Model) -> Iterator[Solution]:
     """Stacks with the lobes of a target, or of one from which it is approached: preferred ones, then ones from all
     over."""
-    for start in starts(target):
-        paths = stacks.found(start, model, stacks.EFFORTS if start is target else EFFORT)
+    for n, start in enumerate(starts(target)):
+        paths = stacks.found(_as_fixed(start, model), model, EFFORT if n else stacks.EFFORTS)
         if paths:
             order = np.argsort(paths.cost, kind="stable")
             some = np.unique(np.linspace(0, len(order) - 1, TRIES - 1, dtype=int))
@@ -47,11 +56,56 @@ def _candidates(target: Target, model: Model) -> Iterator[Solution]:
 
 def moved(found: Solution, target: Target, model: Model) -> Solution | Bound:
     """A stack near one that is found, with the lobes of a target; the bound that is in the way if there is none."""
-    dragged = DraggedStack.of(found.stack, target, model)
-    if dragged is None:
+    if any(pinned(lobe, first=n == 0) for n, lobe in enumerate(target.lobes)):
         return _requested(found, target, model)
+    dragged = _dragged(found, target, model)
+    if dragged is None or dragged.achromatic(target) is not target:
+        return GREY
     there = dragged.met(target)
     return there if isinstance(there, Bound) else Solution(target, model, tuple(there.point.layers))
+
+
+def refused(target: Target, model: Model) -> Infeasible:
+    """The error for a target without a stack, with the nearest target on the way from what is found; where nothing is,
+    with those of the nearest model in closed form."""
+    total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
+    dragged = next(filter(None, (_dragged(found, target, model) for found in _candidates(target, model.adder))), None)
+    if dragged is None:
+        error = infeasible(target, model.adder)
+        nearest = sorted(error.directions, key=lambda way: way.change)[:TRIES]
+        ways = [way for way in nearest if search(way.target, model) is not None]
+        return Infeasible(error.why, error.lobe, error.constraint, ways)
+    possible = dragged.achromatic(target)
+    there, bound = dragged.towards(possible)
+    inside = (dragged.between(there.target, share) for share in INSIDE)
+    near = next((near for near in inside if search(near, model) is not None), None)
+    ways = [_way(target, near, model)] if near else []
+    if total > 1:
+        return Infeasible(TOO_MUCH.format(total=total), 0, "sum", ways)
+    if possible is not target or bound is None:
+        bound = GREY
+    return Infeasible(bound.why(target), bound.lobe + 1, bound.reason, ways)
+
+
+def _dragged(found: Solution, target: Target, model: Model) -> DraggedStack | None:
+    """A stack that is found, with the form of a target; None where it has an index beyond those of materials."""
+    try:
+        return DraggedStack.of(found.stack, target, model)
+    except InvalidInput:
+        return None
+
+
+def _way(target: Target, near: Target, model: Model) -> Direction:
+    """A nearest target, in words."""
+    words, changes = [], [0.0]
+    for k, (asked, lobe) in enumerate(zip(target.lobes, near.lobes), 1):
+        energies = np.array([asked.colour, lobe.colour]) + ENERGY_MIN
+        variances = np.array([float(MAPS[model.map].variance(each.roughness)) for each in (asked, lobe)]) + SMALL
+        of_energy, of_variance = (float(np.abs(np.log(x[1] / x[0])).max()) for x in (energies, variances))
+        words += [f"lobe {k} energy {digits(lobe.colour)}"] if of_energy > SAID else []
+        words += [f"lobe {k} alpha {digits(lobe.roughness)}"] if of_variance > SAID else []
+        changes += [of_energy, of_variance]
+    return Direction("all lobes", ", ".join(words), max(changes), near)
 
 
 def starts(wish: Target) -> Iterator[Target]:
@@ -67,8 +121,22 @@ def starts(wish: Target) -> Iterator[Target]:
         yield start
 
 
-def _requested(found: Solution, target: Target, model: Model) -> Solution:
-    """The stack of other requests of the model in closed form, whose lobes are nearest to a target."""
+def _as_fixed(target: Target, model: Model) -> Target:
+    """The target, with the energy that a fixed index of the first lobe gives by the model, where that is as asked."""
+    lobe = target.lobes[0]
+    eta = lobe.fixed.of("eta", 0)
+    if eta is None or lobe.interfaces > 1 or lobe.base != "dielectric":
+        return target
+    above, asked = stacks.start(target, model), np.array(lobe.colour)[:, None] + ENERGY_MIN
+    variance = Isotropic(np.atleast_1d(above.f.variance(lobe.roughness)))
+    own = interface.solve(above, asked, variance, Choice(eta=eta, absorbs=False)).energy
+    same = np.abs(np.log(own / asked)).max() < SAME
+    return target.with_lobe(0, energy=tuple(np.broadcast_to(own, (3, 1))[:, 0].tolist())) if same else target
+
+
+def _requested(found: Solution, target: Target, model: Model) -> Solution | Bound:
+    """The stack of other requests to the model in closed form whose lobes are nearest to a target; a bound if there is
+    none."""
     f, count = MAPS[model.map], len(target.lobes)
 
     def numbers(of: Target) -> Array:
@@ -76,15 +144,23 @@ def _requested(found: Solution, target: Target, model: Model) -> Solution:
         return np.array([*energies, *(float(f.variance(lobe.roughness)) for lobe in of.lobes)])
 
     def ask(request: Array) -> Solution | None:
-        asked = target
+        asked, first = target, target.lobes[0].colour
         for k, s in enumerate(np.maximum(request[3 * count :], 0)):
             energy = tuple(np.maximum(request[3 * k : 3 * k + 3], 0).tolist())
             asked = asked.with_lobe(k, energy=energy, alpha=float(f.roughness(s)), variance=None)
+        asked = _as_fixed(asked.with_lobe(0, energy=first), found.model) if held else asked
         return stacks.search(asked, found.model, EFFORT)
 
     def read(solution: Solution) -> Array:
         return numbers(seen(solution.stack, target, model))
 
     goal = numbers(target)
-    best = requests.met(ask, read, goal, goal, np.r_[np.maximum(goal[: 3 * count], 1e-3), goal[3 * count :] + SMALL])
-    return dataclasses.replace(best or found, target=target, model=model)
+    scale = np.r_[np.maximum(goal[: 3 * count], 1e-3), goal[3 * count :] + SMALL]
+    if held := _as_fixed(target, found.model) is not target:
+        scale[:3] = HARDLY
+    best = requests.met(ask, read, goal, goal, scale)
+    if best is None:
+        return Bound(count - 1, "fixed", 1, 0.0)
+    reached = seen(best.stack, target, model)
+    missed = np.abs(numbers(reached) - goal).max() > MISSED
+    return dataclasses.replace(best, target=target, model=model, reached=reached if missed else None)

@@ -44,8 +44,8 @@ def met(
             continue
         value = read(found)
         missing = (goal - value) / scale
-        if np.max(np.abs(missing)) < least:
-            best, least = found, float(np.max(np.abs(missing)))
+        if np.linalg.norm(missing) < least:
+            best, least = found, float(np.linalg.norm(missing))
         if least < ENOUGH:
             break
         if last is None:

@@ -49,11 +49,15 @@ class Partial(Batch):
 
 @dataclass(frozen=True)
 class Solution:
-    """A stack with the lobes of a target, and the classes that its parts are chosen from."""
+    """A stack with the lobes of a target, and the classes that its parts are chosen from.
+
+    reached: the lobes of the stack, where these miss the target by more than rounding since so much is fixed.
+    """
 
     target: Target
     model: Model
     layers: tuple[Layers, ...]
+    reached: Target | None = None
 
     @cached_property
     def stack(self) -> Stack:

@@ -17,7 +17,7 @@ import numpy as np
 
 from velatura import ops
 from velatura.errors import InvalidInput
-from velatura.inverse.explain import REASONS
+from velatura.inverse.explain import because
 from velatura.inverse.interface import (
     CONDUCTOR_MAX,
     CONDUCTOR_MIN,
@@ -81,7 +81,7 @@ class Bound:
 
     def why(self, target: Target) -> str:
         """The reason, in words, why a target is not met."""
-        return f"lobe {self.lobe + 1}: {REASONS[self.reason].format(eta_max=target.eta_max)}"
+        return because(self.lobe, self.reason, target)
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ class DraggedStack:
         """
         layers = plain(stack)
         if len(layers) != sum(lobe.interfaces for lobe in target.lobes) or any(
-            _pinned(lobe, n == 0) for n, lobe in enumerate(target.lobes)
+            pinned(lobe, n == 0) for n, lobe in enumerate(target.lobes)
         ):
             return None
         reader = Reader(target, model)
@@ -321,7 +321,7 @@ def _scaled_to(reflectances: Array, most: float) -> Array:
     return max(most, ENERGY_MIN) * (reflectances / now if now > 0 else np.ones_like(reflectances))
 
 
-def _pinned(lobe: TargetLobe, first: bool) -> bool:
+def pinned(lobe: TargetLobe, first: bool) -> bool:
     """Whether more is fixed of a lobe than what is a constant here: media above the first and of pairs, their index."""
     last = lobe.interfaces - 1
     pins = [("eta", last), ("k", last), *(("alpha", n) for n in range(lobe.interfaces))]

@@ -12,7 +12,7 @@ from velatura.inverse.partial_stack import Array
 
 ROUNDS = 8
 ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
-SLOW_ROUNDS = 16  # the same by Broyden's method, for models that are slow
+SLOW_ROUNDS, PATIENCE = 16, 3  # for models that are slow: of Broyden's method, and of these at a bound
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Problem:
         closed = space.model.recursion.closed_form
         enough = ENOUGH if bound and closed else ALMOST
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
-        x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, set[int]()
+        x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, dict[int, int]()
         before = None
         for n in range(ROUNDS if closed else SLOW_ROUNDS):
             # See what is missing, and how that changes
@@ -69,14 +69,14 @@ class Problem:
             x, part = space.clipped(full), min(max(full_part, 0.0), 1.0)
             outside = {int(c) for c in free if abs(full[c] - x[c]) > SLACK}
 
-            # End where nothing is missing, or where a coordinate meets its bound for the second time
+            # End where nothing is missing, or where a coordinate keeps meeting its bound
             met = n > 0 and np.max(np.abs(missing)) < enough
             if met and not outside and abs(full_part - part) <= SLACK:
                 found = Reading(self._on_the_way(part), reading.slopes[:, : len(space.free)])
                 return space.broken(x, bound) or Solution(Point(space, x, found), part)
-            if outside & blocked:
-                return space.bound_at(min(outside & blocked), full)
-            blocked = outside
+            blocked = {c: blocked.get(c, 0) + 1 for c in outside}
+            if held := [c for c, times in blocked.items() if times > (1 if closed else PATIENCE)]:
+                return space.bound_at(min(held), full)
         return space.broken(x, bound) or bound or space.bounds[0]
 
     @cached_property
