@@ -51,7 +51,7 @@ _SPECTRA = (
     "BlackBodySpectrum",
 )
 
-LOOKED = 64  # points along either axis at which textures without texels are looked at
+_TEXELS = ("data", "value")  # of textures, in `traverse`
 MOVED = 1e-3  # by which texels that are being differentiated may move, at least
 
 #: The value in the stack in place of a texture object of a plugin, if its parameter declares no typical one.
@@ -299,29 +299,26 @@ class Binding:
         return self.material(values), found
 
     def _texels(self, address: Address, unknown: Mapping[str, tuple[float, float]]) -> Any:
-        """Values that a texture gives, (channels, ...): all texels if it has any, else those of some points."""
+        """Values that a texture gives, (channels, ...): its texels, or the ends of what is `unknown`, as of meshes."""
         import drjit as dr
 
         mi, image = self.mi, self.images[address.name]
         if isinstance(image, Field):
             return np.array([[-180.0, 180.0]])
         channels = len(mi.UnpolarizedSpectrum()) if image.colour else 1
-        if image.texture.class_name().startswith("BitmapTexture"):
-            data = mi.traverse(image.texture)["data"]
-            texels = np.array(dr.detach(data)).reshape(-1, data.shape[-1]).T
-            if dr.grad_enabled(data):
-                texels = np.concatenate([texels, texels * (1 + MOVED) + MOVED], axis=1)
-        else:
-            u, v = np.meshgrid(*[(np.arange(LOOKED) + 0.5) / LOOKED] * 2)
-            si = dr.zeros(mi.SurfaceInteraction3f, u.size)
-            si.uv = mi.Point2f(u.ravel(), v.ravel())
-            try:
-                texels = np.array((image.texture.eval if image.colour else image.texture.eval_1)(si)).reshape(
-                    -1, u.size
-                )
-            except RuntimeError:
-                return np.tile([unknown.get(address.key, address.declared.within)], (channels, 1))
-        texels = np.broadcast_to(texels if len(texels) == channels else texels[:1], (channels, texels.shape[-1]))
+        read = mi.traverse(image.texture)
+        found = []
+        for value in [value for name, value in read if name.split(".")[-1] in _TEXELS]:
+            texels = np.atleast_2d(np.array(dr.detach(value), float))
+            if isinstance(value, mi.TensorXf):
+                texels = texels.reshape(-1, texels.shape[-1]).T
+            # One number for all colours lies between them
+            texels = texels[:channels] if 1 < channels <= len(texels) else texels.reshape(1, -1)
+            moved = [texels * (1 + MOVED) + MOVED] if dr.grad_enabled(value) else []
+            found += [np.broadcast_to(each, (channels, each.shape[-1])) for each in (texels, *moved)]
+        if not found:
+            return np.tile([unknown.get(address.key, address.declared.within)], (channels, 1))
+        texels = np.concatenate(found, axis=1)
         return np.clip(texels * image.scale + image.offset, image.low, image.high)
 
     def at_wavelengths(self, nm: Sequence[float]) -> Material:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -18,9 +18,8 @@ from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
 from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved_grid import Folded, Grid
-from velatura.model.transport.adding import interfaces, parts
+from velatura.model.transport.adding import Made, interfaces, parts
 from velatura.model.transport.energies import INCIDENCES, energies
-from velatura.model.transport.operators import Layer
 from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.model.widths import Tensor
@@ -96,7 +95,7 @@ class Solver:
     grid: Grid
     colours: int
     tables: Tables
-    made: dict[Hashable, Layer] = field(default_factory=dict)
+    made: Made = field(default_factory=dict)
 
     @classmethod
     def of(cls, model: Model, variance: type[Variance], context: Context) -> Solver:
@@ -169,6 +168,7 @@ class Solver:
             np.concatenate([phi, 0 * INCIDENCES]),
             self.tables if self.model.reflectance == "fgd-multi" else None,
             widths.nearly_straight,
+            self.made,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)

@@ -9,7 +9,7 @@ out, a layer that reflects R and transmits T adds
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +34,7 @@ class Lambert:
 
 
 Part = Facets | Slab | Lambert
+Made = dict[Hashable, tuple[Layer, Layer]]
 
 
 @dataclass(frozen=True)
@@ -66,9 +67,10 @@ def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
     return Leaving(tuple(reflected), d, straight, setting)
 
 
-def layers(found: Sequence[Part], setting: Setting) -> list[tuple[Layer, Layer]]:
-    """What each layer does to light, where facets are met once, and as the setting says."""
-    return [_layer(part, of) for part, of in zip(found, settings(found, setting))]
+def layers(found: Sequence[Part], setting: Setting, made: Made | None = None) -> list[tuple[Layer, Layer]]:
+    """What each layer does to light, where facets are met once, and as the setting says; interfaces are `made` once."""
+    made = {} if made is None else made
+    return [_layer(part, of, made) for part, of in zip(found, settings(found, setting))]
 
 
 def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
@@ -77,9 +79,12 @@ def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
     return [setting.dark if any(ends[:i]) else setting for i in range(len(found))]
 
 
-def _layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
+def _layer(part: Part, setting: Setting, made: Made) -> tuple[Layer, Layer]:
     if isinstance(part, Facets):
-        return interface(part, setting)
+        key = part.key, setting.key
+        if key not in made:
+            made[key] = interface(part, setting)
+        return made[key]
     alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
     return alike, alike
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.transport.adding import Leaving, Part, indices, interfaces, layers, leaving, parts, settings
+from velatura.model.transport.adding import Leaving, Made, Part, indices, interfaces, layers, leaving, parts, settings
 from velatura.model.transport.interfaces import Facets, Setting
 from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.modes import TINY, Basis, Even, Relative
@@ -62,12 +62,15 @@ class Energies:
     nodes: Nodes
 
 
-def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | None, forward: Straight) -> Energies:
+def energies(
+    material: Material, cos_theta: Array, phi: Array, often: Tables | None, forward: Straight, made: Made | None = None
+) -> Energies:
     """Energies for beams at cosines and azimuths (M,).
 
     `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
-    into veils.
+    into veils. `made` keeps what materials may share.
     """
+    made = {} if made is None else made
     everything = parts(material)
     brushed = any(facets.alpha_u != facets.alpha_v for facets in interfaces(everything))
     azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
@@ -79,7 +82,7 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
-    each = layers(everything, setting)
+    each = layers(everything, setting, made)
     full = leaving([last for _, last in each], setting)
 
     def system(found: Sequence[Part], as_set: bool = False) -> Leaving:
@@ -113,7 +116,7 @@ def energies(material: Material, cos_theta: Array, phi: Array, often: Tables | N
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
     count = np.size(cos_theta)
     in_lobes = _sum(of_lobes(kept))
-    remainder = _remainder(total, in_lobes, rest[:, count:], basis, material, often, forward)
+    remainder = _remainder(total, in_lobes, rest[:, count:], basis, material, often, forward, made)
     straight = sharp.energy(sharp.straight)
     return Energies(
         lobes=lobes[..., :count],
@@ -148,9 +151,9 @@ def _remainder(total: Operator, in_lobes: Operator, energy: Array, basis: Basis,
     """
     if isinstance(basis, Relative):
         return np.asarray((total.columns - in_lobes.columns)[..., -len(INCIDENCES) :])
-    material, often, forward = solved
+    material, *others = solved
     stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
-    found = energies(stand_in, INCIDENCES, np.zeros(len(INCIDENCES)), often, forward)
+    found = energies(stand_in, INCIDENCES, np.zeros(len(INCIDENCES)), *others)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
     return found.remainder * (mean / np.maximum(found.rest, TINY))[:, None, None]
 

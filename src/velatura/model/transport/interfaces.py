@@ -7,7 +7,7 @@ tables of multiple scattering say.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -47,6 +47,11 @@ class Facets:
     alpha_u: float
     alpha_v: float
     rotation: float = 0.0
+
+    @property
+    def key(self) -> Hashable:
+        """All that it is."""
+        return tuple(None if x is None else np.asarray(x).tobytes() for x in vars(self).values())
 
     @property
     def opaque(self) -> bool:
@@ -180,6 +185,12 @@ class Setting:
     def ways(self) -> list[bool]:
         """How light is masked, as of `_events`."""
         return [False] if self.often is None else [False, True]
+
+    @property
+    def key(self) -> Hashable:
+        """All that it is, but for the tables."""
+        known = type(self.basis), self.basis.nodes, self.samples, self.often is None
+        return *known, self.p.tobytes(), self.phi.tobytes()
 
     @property
     def dark(self) -> Setting:
