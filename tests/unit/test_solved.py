@@ -11,7 +11,7 @@ from velatura.model.prepare import variance_kind
 from velatura.model.solved import Solved
 from velatura.model.transport.energies import energies
 from velatura.model.widths import nearly_straight
-from velatura.stack import Interface, Material, MaterialLike, Stack
+from velatura.stack import Interface, Material, MaterialLike, Medium, Stack
 
 PRESETS = ("coated-rough-metal", "varnished-paint", "scattering-medium-over-gold", "three-dielectrics-over-metal",
            "frosted-glass", "opal-glass")  # fmt: skip
@@ -104,8 +104,14 @@ def test_one_channel_is_one_of_three(form: str) -> None:
         np.testing.assert_allclose(np.broadcast_to(a, np.shape(b)), b, rtol=1e-9)
 
 
-def test_light_from_below_sees_the_material_turned_over() -> None:
-    material, found = body("frosted-glass")
+MILK = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=1.2, alpha=0.3), Medium(sigma_s=0.9, g=0.7),
+              Interface(eta=1.9, alpha=0.3)])  # fmt: skip
+
+
+@pytest.mark.parametrize("stack", ["frosted-glass", MILK], ids=["glass", "milk"])
+def test_light_from_below_sees_the_material_turned_over(stack: MaterialLike) -> None:
+    """Media that scatter, too, that lie elsewhere as seen from below."""
+    material, found = body(stack)
     turned = solution.solve(material.reversed(), named("velatura"), variance_kind(material), Context())
     i, o = from_cosine(0.6), from_cosine(0.5, 2.0)
     below = found.eval_pdf((i[0], i[1], -i[2]), (o[0], o[1], -o[2]), POWER)

@@ -7,8 +7,9 @@ as seen at a reflection, 2 m c; a share `BOUNCES` of both faces of the last slab
 scattered light, of optical depth x = tau_s / c, the width of N = x / (1 - exp(-x)) scatterings of asymmetry g^N in all,
 whose median angle theta follows from a fit, as that of a mirror with facets of alpha = tan(theta / 2).
 
-Scattering that is wider than GGX can be, and what facets met often add, is diffuse: even over all momenta that can
-leave. All that is seen here is in the frame of the outside below: directions are turned up, indices relative to it.
+Scattering that is wider than GGX can be is diffuse: even over all momenta that can leave. What facets met often add
+is even below the last rough interface, but for a tilt to the side that light goes to. All that is seen here is in the
+frame of the outside below: directions are turned up, indices relative to it.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model import own_medium
 from velatura.model.own_medium import OwnMediumLobe
-from velatura.model.straight_through import EXPONENT, WIDTHS, Crossed, Passage, Slab, entered
+from velatura.model.straight_through import EXPONENT, WIDTHS, Crossed, Passage, Slab, entered, is_none
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
@@ -36,6 +37,8 @@ BOUNCES = 0.3  # of the two faces of the slab that light bounces in
 COS_MIN = 0.22  # at which slabs are crossed, for widths
 ALPHA_MAX = 1.5
 DIFFUSE = 0.75  # roughness of scattering that is diffuse
+TILTED = 1.0  # tilt of the light of repeated facets
+FAR = 1e3  # index
 THIN = 1e-4  # optical depth of scattering that no light meets twice
 NO_LOBE = 1e-6  # asymmetry
 NODES = 48
@@ -46,10 +49,12 @@ Array = NDArray[np.floating]
 @dataclass(frozen=True)
 class Rest:
     """Light that is scattered: a lobe, None without one, with a diffuse share of `diffuse` over momenta up to `bound`,
-    relative to the index below, of which the smooth interfaces below let `leaving` pass."""
+    relative to the index below, of which the smooth interfaces below let `leaving` pass; by `tilt`, more of it leaves
+    on the side that light goes to."""
 
     lobe: OwnMediumLobe | None
     diffuse: Value
+    tilt: float
     bound: Value
     leaving: Callable[[Value], Value]
 
@@ -64,19 +69,17 @@ def bounced(passage: Passage, wi: Direction) -> OwnMediumLobe | None:
 
 def rest(passage: Passage, wi: Direction) -> Rest:
     """The light from wi, above, that is scattered by media, or often by facets."""
-    n, last = passage.indices, len(passage.crossings) - 1
-    cloudy = [l for l, slab in enumerate(passage.slabs) if not _is_none(slab.scattering)]
-    if not cloudy:
-        under = passage.under
-        return Rest(None, 1.0, ops.minimum(_above(under, n) / n[-1], 1.0), _leaving(passage, under))
-    last = min(cloudy[-1], last)
-    under = _from(last, passage)
-    bound, leaving = reduce(ops.minimum, n[last:]) / n[-1], _leaving(passage, under)
+    n, under = passage.indices, passage.scattered
+    lowest = reduce(ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(n, (*under, 1.0))))
+    bound, leaving = lowest / n[-1], _leaving(passage, under)
+    if not passage.is_cloudy:
+        return Rest(None, 1.0, TILTED, bound, leaving)
     i = entered(passage, wi)
-    alpha = _turned([(passage.slabs[l], i.bounded[l]) for l in cloudy])
+    scattering = [(slab, cosine) for slab, cosine in zip(passage.slabs, i.bounded) if not is_none(slab.scattering)]
+    alpha = _turned(scattering)
     diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
     width = type(passage.crossings[0].width).uniform(WIDTHS.variance(alpha))
-    return Rest(_lobe(passage, i, under, width), diffuse, bound, leaving)
+    return Rest(_lobe(passage, i, under, width), diffuse, 0.0, bound, leaving)
 
 
 def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
@@ -126,19 +129,10 @@ def _above(under: Sequence[Value], values: Sequence[Value]) -> Value:
     return _sum(first, values)
 
 
-def _from(slab: int, passage: Passage) -> tuple[float, ...]:
-    """The interfaces under a slab."""
-    return tuple(float(k >= slab) for k in range(len(passage.crossings)))
-
-
 def _sum(flags: Sequence[Value], values: Sequence[Any]) -> Any:
     """Of the values whose flags are 1."""
     kept = [(flag, x) for flag, x in zip(flags, values) if not (isinstance(flag, float) and flag == 0.0)]
     return reduce(operator.add, (x if isinstance(flag, float) else x * flag for flag, x in kept))
-
-
-def _is_none(x: Value) -> bool:
-    return isinstance(x, float | np.ndarray) and not np.any(x)
 
 
 def seen_below(passage: Passage, wi: Direction) -> Direction:
@@ -153,7 +147,7 @@ def seen_below(passage: Passage, wi: Direction) -> Direction:
 def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value]:
     """f |cos theta_o|, a colour, and the density of `sample_rest`, in the frame of `seen_below`."""
     cos_o = ops.maximum(o[2], 0.0)
-    even = cos_o / (pi * found.bound * found.bound)
+    even = cos_o / (pi * found.bound * found.bound) * _tilted(found, i, o)
     reached = o[0] * o[0] + o[1] * o[1] < found.bound * found.bound
     density = ops.select(reached, found.diffuse * even, 0.0)
     value = density * found.leaving(cos_o)
@@ -168,10 +162,16 @@ def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Di
     r, phi = found.bound * ops.sqrt(u1), 2 * pi * u2
     even = r * ops.cos(phi), r * ops.sin(phi), ops.sqrt(1 - r * r)
     if not found.lobe:
-        return even
+        side = ops.select(2 * u < _tilted(found, i, even), 1.0, -1.0)
+        return side * even[0], side * even[1], even[2]
     other = own_medium.sample(found.lobe, i, u1, u2)
     x, y, z = (ops.select(u < found.diffuse, a, b) for a, b in zip(even, other))
     return x, y, z
+
+
+def _tilted(found: Rest, i: Direction, o: Direction) -> Value:
+    """Density of diffuse light over its mean: 1 plus a part that is odd."""
+    return 1 - found.tilt * (i[0] * o[0] + i[1] * o[1]) / found.bound
 
 
 def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
@@ -181,5 +181,5 @@ def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
     r2 = (np.asarray(found.bound)[..., None] ** 2) * (1 - (0.5 * (x + 1)) ** 2)
     diffuse = np.sum(found.leaving(np.sqrt(1 - r2)) * (weight * 0.5 * (x + 1)), axis=-1)[..., None]
     if not found.lobe:
-        return np.asarray(diffuse + np.zeros(len(i[2])))
+        return np.asarray(diffuse + np.zeros((1, len(i[2]))))
     return np.asarray((1 - found.diffuse) * own_medium.integral(found.lobe, i) + found.diffuse * diffuse)

@@ -21,7 +21,7 @@ from velatura.model.straight_through import Passage
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
-OF_BOUNCED = 0.5
+OF_BOUNCED = 0.25
 MOST = 2.0  # energy over integral
 LEAST = 0.05  # share of samples of what passes that are scattered, for what all others miss
 

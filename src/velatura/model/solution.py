@@ -50,10 +50,11 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Layout:
-    """The lobes of a side, and the interfaces that make a step of the index."""
+    """The lobes of a side, the interfaces that make a step of the index, and the last one whose facets turn light."""
 
     lobes: list[Drawn]
     stepped: list[int]
+    rough: int | None
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,11 @@ class Solver:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
         shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
-        passage = straight_through.passage(material, self.variance, layout.stepped) if material.transmits else None
+        passage = (
+            straight_through.passage(material, self.variance, layout.stepped, layout.rough)
+            if material.transmits
+            else None
+        )
         return Side(curves, tuple(shapes), polynomial, passage, context.colour, self.colours, self.kind)
 
     def bsdf(self, material: Material, made: Sequence[Side]) -> Solved:
@@ -209,7 +214,7 @@ class Solver:
         shares = [passed.light(share, sum(shares), each) for share, each in zip(shares, heaviest)]
         total, left, passes = sum(shares), np.ones(count), None
         if material.transmits:
-            passage = straight_through.passage(_slim(material), self.variance, layout.stepped)
+            passage = straight_through.passage(_slim(material), self.variance, layout.stepped, layout.rough)
             passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
             passes = _evenly(passes, least)
             left = 1 - passes.share
@@ -276,9 +281,13 @@ def _stacked(*channels: Array) -> Array:
 
 def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> Layout:
     """Of materials that differ in values, as light from above sees them."""
-    steps = np.max([[facets.step for facets in interfaces(parts(each))] for each in materials], axis=0)
+    each = [interfaces(parts(material)) for material in materials]
+    steps = np.max([[facets.step for facets in found] for found in each], axis=0)
+    turns = np.max([[facets.step * max(facets.alpha_u, facets.alpha_v) for facets in found] for found in each], axis=0)
     both = [(k, veil) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
-    return Layout([Drawn(k, widths.first_step(steps[:k]), veil) for k, veil in both], widths.stepped(steps))
+    rough = widths.stepped(turns, widths.LEAST_TURN)
+    lobes = [Drawn(k, widths.first_step(steps[:k]), veil) for k, veil in both]
+    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None)
 
 
 def sides(material: Material) -> list[Material]:

@@ -95,15 +95,17 @@ class Slab(ops.Named):
 class Passage:
     """Interfaces from the top, and the slabs 0 to K above, between and below them.
 
-    `faces` are 1 for the last two interfaces that make a step of the index, or for the only one, else 0; `under` are 1
-    from the last of them on.
+    Of interfaces, `faces` are 1 for the last two that make a step of the index, or for the only one, else 0; `under`
+    are 1 from the last of them on; `scattered` are 1 below the last medium that scatters, or the last rough interface.
     """
 
     crossings: tuple[Crossing, ...]
     slabs: tuple[Slab, ...]
     faces: tuple[Value, ...]
     under: tuple[Value, ...]
+    scattered: tuple[Value, ...]
     bounces: bool
+    is_cloudy: bool
 
     @property
     def indices(self) -> list[Value]:
@@ -111,9 +113,12 @@ class Passage:
         return [self.crossings[0].n_1, *(crossing.n_2 for crossing in self.crossings)]
 
 
-def passage(material: Material, kind: type[Variance], stepped: Sequence[int] | None = None) -> Passage:
+def passage(
+    material: Material, kind: type[Variance], stepped: Sequence[int] | None = None, rough: int | None = None
+) -> Passage:
     """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`. `stepped` are the
-    interfaces that make a step of the index; None for all."""
+    interfaces that make a step of the index, `rough` is the last one whose facets turn light; None for all, and for the
+    last one."""
     above, n = material.exterior, 1.0
     crossings: list[Crossing] = []
     slabs = [Slab()]
@@ -130,7 +135,14 @@ def passage(material: Material, kind: type[Variance], stepped: Sequence[int] | N
     lower, *others = reversed(range(count) if stepped is None else stepped or [count - 1])
     faces = tuple(float(k in (lower, *others[:1])) for k in range(count))
     under = tuple(float(k >= lower) for k in range(count))
-    return Passage(tuple(crossings), tuple(slabs), faces, under, bool(others))
+    cloudy = [l for l, slab in enumerate(slabs) if not is_none(slab.scattering)]
+    last = min(cloudy[-1], count - 1) if cloudy else 1 + (count - 1 if rough is None else rough)
+    scattered = tuple(float(k >= last) for k in range(count))
+    return Passage(tuple(crossings), tuple(slabs), faces, under, scattered, bool(others), bool(cloudy))
+
+
+def is_none(x: Value) -> bool:
+    return isinstance(x, float | np.ndarray) and not np.any(x)
 
 
 def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance]) -> Crossing:

@@ -46,6 +46,7 @@ AXES = (0.0, 0.5 * np.pi)  # of a tensor
 LARGEST = 1.5  # logarithm of a correction
 SLIGHT = 0.2  # step of the index over the greatest one, that does not count
 LEAST_STEP = 0.02  # of the logarithm of the index, that counts at all
+LEAST_TURN = 1e-3  # step times alpha, of facets that turn light
 FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade
 # Pairs of features; of their product, what it adds to the logarithm of the width along an axis, and what, times sin^2,
 # it adds to that of the width in the plane and takes from that across it
@@ -164,11 +165,11 @@ class _Coat:
         return self.tensor.stretched(np.abs(x), np.abs(y))
 
 
-def stepped(steps: Sequence[float]) -> list[int]:
+def stepped(steps: Sequence[float], least: float = LEAST_STEP) -> list[int]:
     """Numbers of the interfaces that make a step of the index, for the steps of the logarithm of all: slight ones
     beside greater ones do not count."""
     most = max(steps, default=0.0)
-    return [k for k, step in enumerate(steps) if step > SLIGHT * most] if most > LEAST_STEP else []
+    return [k for k, step in enumerate(steps) if step > SLIGHT * most] if most > least else []
 
 
 def first_step(steps: Sequence[float]) -> int | None:
