@@ -55,6 +55,10 @@ class Recursion(ABC):
         """Whether a material with constants of a renderer is solved for all directions at once."""
         return False
 
+    def unsolved(self, model: Model) -> Model:
+        """The model by which materials are prepared that are not solved."""
+        return model
+
     def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
         """A material as a BSDF, with constants of a renderer."""
         from velatura.model import bsdf
@@ -120,11 +124,16 @@ class Momentum(Recursion):
 
         return bool(material.interfaces) and any(layer.spreads for layer in solution.plain(material).layers)
 
+    def unsolved(self, model: Model) -> Model:
+        from velatura.model import solution
+
+        return solution.geometry(model)
+
     def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
         from velatura.model import solution
 
         if not self.solves(material):
-            return super().body(material, solution.geometry(model), variance, context)
+            return super().body(material, self.unsolved(model), variance, context)
         return solution.solve(material, model, variance, context)
 
     def textured(self, material: Material, *values: Any) -> Textured | None:

@@ -134,6 +134,8 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         solved = solved_spectra.solve(material, places, model, variance, context)
         dr.eval(solved.sides)
         return OverWavelengths(mi, binding, solved)
+    if not binding.varies:
+        model = model.recursion.unsolved(model)
     prepared = Prepared(binding, model, variance)
     if binding.varies and not mi.is_spectral:
         material, ranges = binding.tabulated(axes.UNKNOWN)
