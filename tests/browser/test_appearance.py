@@ -259,8 +259,11 @@ def test_handles_move_by_pointer_and_by_keys(visit: Open) -> None:
     handle.focus()
     handle.press("ArrowRight")
     answered(page)
+    before = lobes(page)
+    handle.press("ArrowRight")
+    answered(page)
     start = lobes(page)
-    assert start.alpha[-1][0, 0] == pytest.approx(0.4627 + 0.01, abs=1e-3)
+    assert start.alpha[-1][0, 0] == pytest.approx(before.alpha[-1][0, 0] + 0.01, abs=1e-3)
 
     box = handle.locator("circle").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

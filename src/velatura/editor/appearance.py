@@ -58,6 +58,15 @@ def held(material: Answer, target: Target, model: Model) -> DraggedStack | None:
         return None
 
 
+def dragged(body: Body, target: Target) -> DraggedStack | None:
+    """The material as it is dragged, by a model in closed form where it is told which lobes it has."""
+    model, material, read = reader_of(body, target), body.get("material") or {}, body.get("read")
+    if read is None or model.recursion.closed_form:
+        return held(material, target, model)
+    near = held(material, target, model.adder)
+    return near and near.known(Target.from_dict(read))
+
+
 def described(target: Target) -> Answer:
     """A target as a body holds it, all of its lobes' keys written out."""
     rows = []
@@ -176,15 +185,18 @@ def _shown(stack: Stack, model: Model, says: str) -> Answer:
 
 
 def invert(body: Body) -> Answer:
-    """The stack with the lobes of a target, or of the nearest on the way there; near `material` if that is given."""
+    """The stack with the lobes of a target, or of the nearest on the way there; near `material` if that is given.
+
+    With `read`, the lobes that the material has, a model without a closed form is approximated: `rough` says so.
+    """
     wish = Target.from_dict(body.get("target"))
     model, material = reader_of(body, wish), body.get("material")
-    near = held(material, wish, model) if material else None
+    near = dragged(body, wish) if material else None
     if near is None:
         return _fresh(wish, model)
     possible = near.achromatic(wish)
     found, bound = near.towards(possible)
-    if bound is not None:
+    if bound is not None and not near.rough:
         other = _elsewhere(possible, near)
         if other is not None:
             found, bound = other, None
@@ -199,12 +211,13 @@ def invert(body: Body) -> Answer:
 
 def answered(found: DraggedStack, snapped: str | None) -> Answer:
     """A stack as an answer: the requested one, or the nearest one, with the reason as `snapped`."""
-    return _answer(_under(found), found.target, found.model, snapped)
+    stack = _under(found)
+    target = found.now(found.target) if found.rough else seen(stack, found.target, found.model)
+    return _answer(stack, target, found.model, snapped) | ({"rough": True} if found.rough else {})
 
 
 def _answer(stack: Stack, target: Target, model: Model, snapped: str | None) -> Answer:
-    """A stack, and the lobes of a target as the stack has them."""
-    target = seen(stack, target, model)
+    """A stack, and the lobes of a target that the stack has."""
     return {
         "feasible": True,
         "material": document(stack),
@@ -273,7 +286,7 @@ def _pinned(wish: Target, model: Model) -> Answer:
         if error.nearest is None:
             return {"feasible": False, "why": error.why}
         found, says = invert_stack(error.nearest, model), error.why
-    return _answer(found.stack, found.target, model, says)
+    return _answer(found.stack, seen(found.stack, found.target, model), model, says)
 
 
 # Coats, and the figures ----------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.editor.appearance import answered, held, lobe_of, reader_of
+from velatura.editor.appearance import answered, dragged, lobe_of
 from velatura.editor.messages import Answer, Body, Verb, array
 from velatura.errors import InvalidInput
 from velatura.inverse import EquivalenceClass, Target, interface, stacks
@@ -81,7 +81,7 @@ def member(body: Body) -> Answer:
 def _held(body: Body) -> tuple[Target, DraggedStack, int]:
     """The target, the material that has it, and the requested lobe."""
     target = Target.from_dict(body.get("target"))
-    near = held(body.get("material") or {}, target, reader_of(body, target))
+    near = dragged(body, target)
     if near is None:
         raise InvalidInput("material: does not have the interfaces of the target")
     return target, near.renamed(target), lobe_of(body, target)

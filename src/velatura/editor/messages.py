@@ -171,6 +171,7 @@ def _point(name: str, value: Any) -> list[float]:
 KEYS: dict[str, Parameter] = {
     "material": Fields("of a material", entries="layers", most=LAYERS),
     "target": Fields("of a target", entries="lobes", most=LOBES),
+    "read": Fields("of the lobes that a material has", entries="lobes", most=LOBES),
     "model": Words("of a model"),
     "switches": Fields("of the model"),
     "lobe": Whole("which lobe of the target", high=LOBES - 1),

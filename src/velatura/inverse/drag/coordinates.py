@@ -96,13 +96,15 @@ class Reading:
 class Space:
     """The space of coordinates of stacks of one form, below an index `exterior`, as a model reads them.
 
-    Points x have shape (D,), or (D, N) for N stacks.
+    Points x have shape (D,), or (D, N) for N stacks. factors: of readings, (3 K + I,), where a model in closed form
+    stands in for another one.
     """
 
     model: Model
     exterior: float
     interfaces: tuple[InterfaceCoordinates, ...]
     bounds: tuple[Bound, ...]
+    factors: Array | None = None
 
     # Points as layers, and as the model reads them -------------------------------------------------------------------
 
@@ -148,7 +150,8 @@ class Space:
         for n, (own, (reflects, alpha)) in enumerate(zip(self.interfaces, reflected)):
             energy[3 * own.lobe : 3 * own.lobe + 3] += reflects
             variance[n] = self._brightest(own, x, MAPS[self.model.map].variance(alpha))
-        return np.vstack([energy, np.minimum(variance, VARIANCE_MAX)])
+        found = np.vstack([energy, np.minimum(variance, VARIANCE_MAX)])
+        return found if self.factors is None else self.factors[:, None] * found
 
     def points(self, x: Array, free: Array) -> Array:
         """A point, and those of differences along some coordinates, (D, 1 + free)."""

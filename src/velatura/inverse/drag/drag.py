@@ -91,6 +91,17 @@ class DraggedStack:
         seen = dataclasses.replace(self, point=point)
         return seen.renamed(seen.now(self.target))
 
+    @property
+    def rough(self) -> bool:
+        """Whether its lobes are approximate."""
+        return self.space.factors is not None
+
+    def known(self, lobes: Target) -> DraggedStack:
+        """The same stack, its lobes known: what the model reads is scaled to be those."""
+        read, wanted = self.point.reading.value, self._wanted(lobes)
+        factors = np.where(read > ENERGY_MIN, wanted / np.maximum(read, ENERGY_MIN), 1.0)
+        return dataclasses.replace(self, point=Point(dataclasses.replace(self.space, factors=factors), self.point.x))
+
     # What it is, and what the model reads ----------------------------------------------------------------------------
 
     @property

@@ -39,6 +39,7 @@ export function mountAppearance(element, services) {
   let asked = null; // target that was wished for, where it could not be had, or not yet
   let refused = null; // why it could not: {lobe, text}
   let held = false;
+  let rough = null; // wish whose answer is approximate
   let chosen = 0;
   let coat = COAT;
   let coatSays = '';
@@ -86,17 +87,21 @@ export function mountAppearance(element, services) {
 
   // Wishes: one is asked for at a time, and it starts from the material that is there then
 
-  const wishes = oneAtATime(async ({ verb, body, command }) => {
+  const wishes = oneAtATime(async (wish) => {
+    const { verb, body, command } = wish;
     const before = now();
     try {
-      const answer = await ask(verb, { ...body, ...question() });
+      // While it is held, an answer may be approximate: from the lobes that the material is known to have
+      const known = held && read.target ? { read: read.target } : {};
+      const answer = await ask(verb, { ...body, ...question(), ...known });
       if (!answer || before !== now()) return;
+      rough = answer.rough ? wish : null;
       accept(answer, command);
       messages.forgive('appearance');
     } catch (error) {
       messages.fail('appearance', error);
     }
-  }, () => held || settle());
+  }, () => held || comeToRest());
 
   function accept({ material, target, haze, snapped, why }, command) {
     refused = snapped || why ? about(snapped ?? why) : null;
@@ -116,7 +121,15 @@ export function mountAppearance(element, services) {
   /** Ends a step once the last wish is answered. */
   function letGo() {
     held = false;
-    if (!wishes.busy) settle();
+    if (!wishes.busy) comeToRest();
+  }
+
+  /** Asks again for what was answered approximately; then ends the step. */
+  function comeToRest() {
+    if (!rough) return settle();
+    const wish = rough;
+    rough = null;
+    wishes.want(wish);
   }
 
   function settle() {
