@@ -19,9 +19,21 @@ from velatura.inverse.stacks import alternatives, model_of
 from velatura.inverse.target import Target, read
 from velatura.model import Model, named, variance_kind
 from velatura.model.variance import Isotropic
-from velatura.stack import Diffuse, Interface, Layer, Material, MaterialLike, Medium, Stack, as_described, load
+from velatura.stack import (
+    Diffuse,
+    Interface,
+    InterfaceValues,
+    Layer,
+    Material,
+    MaterialLike,
+    Medium,
+    Stack,
+    as_described,
+    load,
+)
 
 STARTS = 4
+BRUSHED, BRUSHING = (22.5, 67.5, 112.5, 157.5), 1.5  # degrees, and by which ratios, fits of brushed samples start
 TRIED = 3  # sets of interfaces from which simplification descends
 
 
@@ -45,8 +57,12 @@ def fit_target(
     """
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)
-    found = alternatives(wanted, starts, chosen, seed)
-    return fit(table, [_with_media(solution.stack) for solution in found], chosen, wanted.eta_max)
+    found = [_with_media(solution.stack) for solution in alternatives(wanted, starts, chosen, seed)]
+    if table.directions.brushed:
+        turned = [_brushed(stack, angle) for stack in found for angle in BRUSHED]
+        errors = [_error(table, start, chosen) for start in turned]
+        found = [turned[n] for n in np.argsort(errors, kind="stable")[:starts]]
+    return fit(table, found, chosen, wanted.eta_max, _with_one_less)
 
 
 def simplify(
@@ -85,7 +101,7 @@ def simplify(
 def _error(table: ReflectanceTable, start: Stack, model: Model) -> float:
     """The error of a stack, unchanged."""
     value, cosine = angles.table_of(start, table.directions, model).value, table.directions.wo[2]
-    return float(np.mean((np.log1p(value * cosine) - np.log1p(table.value * cosine)) ** 2))
+    return float(np.mean((angles.compressed(value * cosine) - angles.compressed(table.value * cosine)) ** 2))
 
 
 def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
@@ -124,3 +140,20 @@ def _merged(media: Sequence[Medium]) -> Medium:
 def _with_media(stack: Stack) -> Stack:
     """The stack with a medium, clear if there was none, between all of its interfaces."""
     return _of_some(stack, range(len(stack.interfaces)))
+
+
+def _brushed(stack: Stack, angle: float) -> Stack:
+    """The stack with all of its rough interfaces brushed along a direction."""
+    changed: dict[str, float] = {}
+    for n, layer in enumerate(Material.of(stack).layers):
+        if isinstance(layer, InterfaceValues) and layer.alpha_u > 0:
+            u, v = layer.alpha_u / BRUSHING, min(layer.alpha_v * BRUSHING, 1.0)
+            changed |= {f"layer{n}_alpha_u": u, f"layer{n}_alpha_v": v, f"layer{n}_rotation": angle}
+    return stack.replace(**changed)
+
+
+def _with_one_less(stack: Stack) -> list[Stack]:
+    """The stacks that lack one of the interfaces, an opaque last one excepted."""
+    count = len(stack.interfaces)
+    left_out = range(count - stack.interfaces[-1].opaque) if count > 1 else ()
+    return [_of_some(stack, [n for n in range(count) if n != out]) for out in left_out]
