@@ -82,8 +82,11 @@ def show(found: Fit, output: Path | None, as_json: bool) -> None:
     from rich.console import Console
 
     console = Console()
-    for table in (_table(found), _parameters(found)):
-        console.print(table)
+    console.print(_table(found))
+    if found.energies:
+        console.print(_energies(found))
+    if found.estimates:
+        console.print(_parameters(found))
     for one, two, correlation in found.trades[:MOST]:
         print(f"{one} and {two} trade places (correlation {correlation:+.3f})")
     if len(found.trades) > MOST:
@@ -132,6 +135,19 @@ def _table(found: Fit) -> Any:
     for row in found.by_angle:
         cells = (f"{row['theta_i']:g}°", f"{row['wanted']:.4g}", f"{row['error']:.2g}", f"{row['relative']:.2%}")
         table.add_row(*cells)
+    return table
+
+
+def _energies(found: Fit) -> Any:
+    """A row per angle of incidence, of the energy of each colour before and after."""
+    from rich.table import Table
+
+    table = Table("angle of incidence", title="Energy that is reflected", title_justify="left")
+    for column in ("before", "after"):
+        table.add_column(column, justify="right")
+    for row in found.energies:
+        cells = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("before", "after"))
+        table.add_row(f"{row['theta_i']:g}°", *cells)
     return table
 
 

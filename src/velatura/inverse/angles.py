@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,10 +108,14 @@ class Directions:
 
 @dataclass(frozen=True)
 class ReflectanceTable:
-    """Reflectance f in 1/sr, without the cosine, of N pairs of directions: (3, N)."""
+    """Reflectance f in 1/sr, without the cosine, of N pairs of directions: (3, N).
+
+    energy: of all that is reflected from each of M directions wi, `directions.lit`, (3, M), where that counts.
+    """
 
     directions: Directions
     value: Array
+    energy: Array | None = None
 
 
 def compressed(x: Array) -> Array:
@@ -118,27 +123,34 @@ def compressed(x: Array) -> Array:
     return np.asarray(np.sign(x) * np.log1p(np.abs(x)))
 
 
-def table_of(stack: MaterialLike, directions: Directions, model: str | Model) -> ReflectanceTable:
+def table_of(
+    stack: MaterialLike, directions: Directions, model: str | Model, with_energy: bool = False
+) -> ReflectanceTable:
     """Reflectance of a material by a model (a stack, a file, or a preset's name).
 
     Raises:
         InvalidInput: not a valid material, an unknown model, or a texture, which has no one value.
     """
-    stack = load(stack)
-    seen = bsdf.body(Material.of(stack), named(model))
-    value = radiance(seen, directions) / directions.wo[2]
-    return ReflectanceTable(directions, np.broadcast_to(value, (3, len(directions.theta_i))))
+    value, energy = radiance(bsdf.body(Material.of(load(stack)), named(model)), directions)
+    value = np.broadcast_to(value / directions.wo[2], (3, len(directions.theta_i)))
+    return ReflectanceTable(
+        directions, value, np.broadcast_to(energy, (3, directions.lit.shape[1])) if with_energy else None
+    )
 
 
-def radiance(seen: bsdf.Body, directions: Directions) -> Value:
-    """f(wi, wo) cos theta_o of a stack that is prepared: colours, over directions on the last axis."""
+def radiance(seen: bsdf.Body, directions: Directions) -> tuple[Value, Value]:
+    """f(wi, wo) cos theta_o of a stack that is prepared, and the energy that it reflects from each lit direction.
+
+    Both are colours, over directions on the last axis.
+    """
     wi, wo = tuple(directions.wi), tuple(directions.wo)
-    if seen.above.model.form == "symmetric":
-        return bsdf.eval_pdf(seen, wi, wo, bsdf.Asked(transmission=False))[0]
     # The lobes depend on wi alone, which many pairs have in common
     lit = bsdf.scattered(seen, tuple(directions.lit))
+    energy = sum(part.energy for part in (*lit.reflected, lit.base) if part)
+    if seen.above.model.form == "symmetric":
+        return bsdf.eval_pdf(seen, wi, wo, bsdf.Asked(transmission=False))[0], energy
     reflected, base = take((tuple(lit.reflected), lit.base), directions.which, directions.lit.shape[-1])
-    return mixture.eval_pdf(reflected, base, wi, wo)[0]
+    return mixture.eval_pdf(reflected, base, wi, wo)[0], energy
 
 
 def report(wanted: ReflectanceTable, found: ReflectanceTable) -> list[dict[str, float]]:
@@ -159,6 +171,16 @@ def report(wanted: ReflectanceTable, found: ReflectanceTable) -> list[dict[str, 
 def _direction(theta: Array, phi: Array | float) -> Array:
     sine, azimuth = np.sin(np.radians(theta)), np.radians(phi)
     return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(np.radians(theta))])
+
+
+def energies(before: ReflectanceTable, after: ReflectanceTable) -> list[dict[str, Any]]:
+    """For every angle of incidence `theta_i` the energies of two tables, [r, g, b], of the mean azimuth."""
+    theta_i, rows = np.round(np.degrees(np.arccos(np.clip(before.directions.lit[2], -1, 1))), 6), []
+    assert before.energy is not None and after.energy is not None
+    for angle in np.unique(theta_i):
+        one, other = (table[:, theta_i == angle].mean(axis=1).tolist() for table in (before.energy, after.energy))
+        rows.append({"theta_i": float(angle), "before": one, "after": other})
+    return rows
 
 
 def grouped(theta_i: Array) -> Array:

@@ -7,7 +7,7 @@ call of the model.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any
@@ -42,6 +42,7 @@ CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of it
 DEPTH_MAX = 10.0  # of a medium
 AS_WELL, EXACT = 1.05, 1e-6  # of the smallest error, and beside it: other stacks fit as well
 LIKELY, DRAWN = 0.95, 4000  # the probability of an interval, and the points that it is taken from
+FIRST, DARK = 10.0, 1e-3  # weight of energies beside all else, and energies that have no hue
 LEAST = 1e-4  # error that a table is taken to have: no model is known better
 FEW = 4  # angles of incidence; where there are fewer, directions have as many groups at each
 TRADED = 0.9  # correlation of parameters that trade places
@@ -76,7 +77,8 @@ class Fit:
     error: root mean square of the difference of log(1 + f cos theta_o). by_angle: as `angles.report` has it. errors:
     the results of the descents from all starts, the best first. estimates: of the parameters that were free. trades:
     pairs of them with their correlation, where that is strong: one makes up for a change of the other. others: stacks
-    outside these intervals, or of another form, that fit about as well.
+    outside these intervals, or of another form, that fit about as well. energies: of a simplification, for every angle
+    of incidence all that is reflected, before and after.
     """
 
     stack: Stack
@@ -84,9 +86,10 @@ class Fit:
     error: float
     by_angle: list[dict[str, float]]
     errors: list[float]
-    estimates: list[Estimate]
-    trades: list[tuple[str, str, float]]
-    others: list[Other]
+    estimates: list[Estimate] = field(default_factory=list)
+    trades: list[tuple[str, str, float]] = field(default_factory=list)
+    others: list[Other] = field(default_factory=list)
+    energies: list[dict[str, Any]] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """The report of a fit as JSON has it."""
@@ -95,6 +98,7 @@ class Fit:
             "error": self.error,
             "by_angle": self.by_angle,
             "errors": self.errors,
+            **({"energies": self.energies} if self.energies else {}),
             "parameters": [vars(estimate) for estimate in self.estimates],
             "trades": [{"between": list(pair), "correlation": r} for *pair, r in self.trades],
             "others": [{"stack": other.stack.to_dict(), "error": other.error} for other in self.others],
@@ -151,20 +155,23 @@ def fit(
         InvalidInput: not a valid material, an unknown model, or a texture in a start, which has no one value.
     """
     model = named(model)
-
-    def descended(starts: Sequence[MaterialLike]) -> list[End]:
-        ends = [Descent(table, load(start), model, eta_max).run() for start in starts]
-        return sorted(ends, key=lambda end: end.error)
-
-    best, *rest = ends = descended(starts)
+    best, *rest = ends = descended(table, starts, model, eta_max)
     by_angle = angles.report(table, angles.table_of(best.stack, table.directions, model))
     estimates, trades = best.estimated()
     found = [best]
-    for end in sorted([*rest, *descended(simpler(best.stack))], key=lambda end: end.error):
+    for end in sorted([*rest, *descended(table, simpler(best.stack), model, eta_max)], key=lambda end: end.error):
         if end.error <= AS_WELL * best.error + EXACT and all(end.apart(other) for other in found):
             found.append(end)
     others = [Other(end.stack, end.error) for end in found[1:]]
     return Fit(best.stack, model, best.error, by_angle, [end.error for end in ends], estimates, trades, others)
+
+
+def descended(
+    table: ReflectanceTable, starts: Sequence[MaterialLike], model: Model, eta_max: float, darkest: float = 0.0
+) -> list[End]:
+    """The ends of descents from all starts, the closest first."""
+    ends = (Descent(table, load(start), model, eta_max, darkest).run() for start in starts)
+    return sorted(ends, key=lambda end: end.cost)
 
 
 @dataclass(frozen=True)
@@ -175,10 +182,15 @@ class End:
     x: Array
     residuals: Array
 
+    @property
+    def cost(self) -> float:
+        """The sum of the squares of the residuals."""
+        return float(np.sum(self.residuals**2))
+
     @cached_property
     def error(self) -> float:
-        """The root mean square of the residuals."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
+        """The root mean square of the residuals, those of energies excepted."""
+        return float(np.sqrt(np.mean(self.residuals[: self.descent.wanted.size] ** 2)))
 
     @cached_property
     def stack(self) -> Stack:
@@ -263,12 +275,16 @@ class End:
 
 @dataclass(frozen=True)
 class Descent:
-    """A descent from one stack: its indices, roughnesses, absorption and albedo change; all else stays."""
+    """A descent from one stack: its indices, roughnesses, absorption and albedo change; all else stays.
+
+    darkest: the least `share` of conductors; 0 for metals, k >= eta.
+    """
 
     table: ReflectanceTable
     start: Stack
     model: Model
     eta_max: float
+    darkest: float = 0.0
 
     @cached_property
     def material(self) -> Material:
@@ -284,7 +300,7 @@ class Descent:
         found: list[Free] = []
         for n, layer in enumerate(self.material.layers):
             if type(layer) in FREE:
-                found += FREE[type(layer)](n, layer, self.eta_max)
+                found += FREE[type(layer)](n, layer, self.eta_max, self.darkest)
         return found
 
     @cached_property
@@ -300,16 +316,22 @@ class Descent:
             which = FEW * which.ravel() + np.searchsorted(np.quantile(tilt, np.arange(1, FEW) / FEW), tilt)
         return np.asarray(np.tile(which.ravel(), 3))
 
+    @cached_property
+    def start_end(self) -> End:
+        """The start, as far as it lies within the bounds."""
+        x = np.array([free.coordinate(self._first(free)) for free in self.free])
+        return End(self, x, self.residuals(x[None])[0])
+
     def run(self) -> End:
         """The end of the descent."""
         from scipy.optimize import least_squares
 
         bounds = np.transpose([free.bounds for free in self.free])
-        x = np.array([free.coordinate(self._first(free)) for free in self.free])
+        first = self.start_end
         inset = 1e-9 * (bounds[1] - bounds[0])
         found = least_squares(
             lambda x: self.residuals(x[None])[0],
-            np.clip(x, bounds[0] + inset, bounds[1] - inset),
+            np.clip(first.x, bounds[0] + inset, bounds[1] - inset),
             jac=self.jacobian,
             bounds=bounds,
             x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
@@ -319,12 +341,15 @@ class Descent:
             max_nfev=ROUNDS,
         )
         # Keep the start where the descent has gained nothing
-        first = self.residuals(x[None])[0]
-        best, residuals = (x, first) if np.sum(first**2) <= 2 * found.cost else (found.x, found.fun)
-        return End(self, self._smaller_first(best), residuals)
+        best = first if first.cost <= 2 * found.cost else End(self, found.x, found.fun)
+        return replace(best, x=self._smaller_first(best.x))
 
     def residuals(self, x: Array) -> Array:
-        """Errors of log(1 + f cos), (P, 3 N), at P points x (P, free) (Low et al. 2012)."""
+        """Errors of log(1 + f cos), (P, 3 N), at P points x (P, free) (Low et al. 2012).
+
+        Where energies count, their errors follow, (P, 3 M): as shares of the energy at that angle, so that the hue
+        counts in dark channels too, and weighted so that they come first.
+        """
         material = self.material
         for n, free in enumerate(self.free):
             layer, shown = material.layers[free.layer], free.shown(x[:, n, None])
@@ -332,10 +357,18 @@ class Descent:
             material = material.with_layer(free.layer, **changed)
         variance = variance_kind(Material.of(self.start, as_described))
         seen = bsdf.body(_metals(material, lambda layer: extinction(layer.eta, layer.k)), self.model, variance)
-        value = radiance(seen, self.table.directions)
-        shape = (3, len(x), len(self.table.directions.theta_i))
-        missed = np.log1p(np.broadcast_to(value, shape)) - self.wanted[:, None]
-        return np.moveaxis(missed, 0, 1).reshape(len(x), -1)
+        value, energy = radiance(seen, self.table.directions)
+
+        def missed(value: Value, wanted: Array) -> Array:
+            apart = np.broadcast_to(value, (3, len(x), wanted.shape[-1])) - wanted[:, None]
+            return np.moveaxis(apart, 0, 1).reshape(len(x), -1)
+
+        found = missed(np.log1p(value), self.wanted)
+        if self.table.energy is None:
+            return found
+        scale = np.mean(self.table.energy, axis=0) + DARK
+        weight = FIRST * np.sqrt(self.wanted.size / self.table.energy.size)
+        return np.concatenate([found, weight * missed(energy / scale, self.table.energy / scale)], axis=1)
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (3 N, free)."""
@@ -381,17 +414,17 @@ class Descent:
         return float(np.mean(value) if free.channel is None else value[free.channel])
 
 
-def _of_base(n: int, layer: DiffuseValues, eta_max: float) -> list[Free]:
+def _of_base(n: int, layer: DiffuseValues, eta_max: float, darkest: float) -> list[Free]:
     return [Free(n, ("albedo",), c, 0.0, 1.0, False) for c in range(3)]
 
 
-def _of_medium(n: int, layer: MediumValues, eta_max: float) -> list[Free]:
+def _of_medium(n: int, layer: MediumValues, eta_max: float, darkest: float) -> list[Free]:
     if layer.depth <= 0:
         return []
     return [Free(n, ("sigma_a",), c, 0.0, DEPTH_MAX / layer.depth, False) for c in range(3)]
 
 
-def _of_interface(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
+def _of_interface(n: int, layer: InterfaceValues, eta_max: float, darkest: float) -> list[Free]:
     axes = [("alpha_u", "alpha_v")] if layer.alpha_u == layer.alpha_v else [("alpha_u",), ("alpha_v",)]
     found = [Free(n, keys, None, ALPHA_MIN, 1.0, True) for keys in axes]
     if layer.alpha_u != layer.alpha_v and layer.rotation != 0:
@@ -401,9 +434,9 @@ def _of_interface(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
         channels = range(3) if np.ptp(eta) > 0 else (None,)
         found += [Free(n, ("eta",), c, min(1.0, eta.min()), max(eta_max, eta.max()), True) for c in channels]
     if layer.kind == "conductor":
-        # A conductor has k >= eta, unless it begins with less
+        # A conductor has k >= eta, unless it begins with less, or may be as dark as any absorbing base
         found += [Free(n, ("eta",), c, *CONDUCTOR, True) for c in range(3)]
-        found += [Free(n, ("k",), c, min(float(np.ravel(layer.k)[c]), 0.0), 1.0, False) for c in range(3)]
+        found += [Free(n, ("k",), c, min(float(np.ravel(layer.k)[c]), darkest), 1.0, False) for c in range(3)]
     return found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.inverse import angles
 from velatura.inverse.angles import Directions, ReflectanceTable
-from velatura.inverse.descent import Fit, fit, written
+from velatura.inverse.descent import Descent, Fit, descended, fit, written
 from velatura.inverse.interface import MODEL
 from velatura.inverse.stacks import alternatives, model_of
 from velatura.inverse.target import Target, read
@@ -34,6 +34,7 @@ from velatura.stack import (
 
 STARTS = 4
 BRUSHED, BRUSHING = (22.5, 67.5, 112.5, 157.5), 1.5  # degrees, and by which ratios, fits of brushed samples start
+DARKEST = -0.5  # share of a conductor's reflectance, with which its k is 0: a base may be darker than any metal
 TRIED = 3  # sets of interfaces from which simplification descends
 
 
@@ -60,8 +61,7 @@ def fit_target(
     found = [_with_media(solution.stack) for solution in alternatives(wanted, starts, chosen, seed)]
     if table.directions.brushed:
         turned = [_brushed(stack, angle) for stack in found for angle in BRUSHED]
-        errors = [_error(table, start, chosen) for start in turned]
-        found = [turned[n] for n in np.argsort(errors, kind="stable")[:starts]]
+        found = _closest(table, turned, chosen, wanted.eta_max, starts)
     return fit(table, found, chosen, wanted.eta_max, _with_one_less)
 
 
@@ -71,7 +71,8 @@ def simplify(
     """The stack of fewer interfaces whose reflectance comes closest to that of a stack, at all angles.
 
     It keeps some of the interfaces, the last one if nothing passes it, and a diffuse base; their values, and absorption
-    below each but the last, then descend. Only what is reflected is compared.
+    below each but the last, then descend. Only what is reflected is compared: first the energy in every colour at
+    every angle of incidence, then how it is spread.
 
     Args:
         stack: a material (a stack, a file, or a preset's name).
@@ -87,21 +88,23 @@ def simplify(
             f"interfaces: must be at least 1, and fewer than the {count} that there are, got {interfaces}"
         )
     turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
-    table = angles.table_of(stack, Directions.about_lobes(turned), chosen)
+    table = angles.table_of(stack, Directions.about_lobes(turned), chosen, with_energy=True)
 
     # Descend from the sets of interfaces that are closest before any change
     opaque = stack.interfaces[-1].opaque
     sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
     starts = [_of_some(stack, kept) for kept in sets]
-    errors = [_error(table, start, chosen) for start in starts]
-    best = [starts[n] for n in np.argsort(errors, kind="stable")[:TRIED]]
-    return fit(table, best, chosen, eta_max)
+    ends = descended(table, _closest(table, starts, chosen, eta_max, TRIED), chosen, eta_max, DARKEST)
+    best = ends[0]
+    found = angles.table_of(best.stack, table.directions, chosen, with_energy=True)
+    errors, by_angle = [end.error for end in ends], angles.report(table, found)
+    return Fit(best.stack, chosen, best.error, by_angle, errors, energies=angles.energies(table, found))
 
 
-def _error(table: ReflectanceTable, start: Stack, model: Model) -> float:
-    """The error of a stack, unchanged."""
-    value, cosine = angles.table_of(start, table.directions, model).value, table.directions.wo[2]
-    return float(np.mean((angles.compressed(value * cosine) - angles.compressed(table.value * cosine)) ** 2))
+def _closest(table: ReflectanceTable, starts: list[Stack], model: Model, eta_max: float, count: int) -> list[Stack]:
+    """The starts that are closest before any descent."""
+    costs = [Descent(table, start, model, eta_max).start_end.cost for start in starts]
+    return [starts[n] for n in np.argsort(costs, kind="stable")[:count]]
 
 
 def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
