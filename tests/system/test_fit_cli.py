@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,6 +42,31 @@ def test_a_table_becomes_a_material(run: Run, folder: Path) -> None:
     assert out.splitlines()[-1] == "found.yaml"
     (found,) = vt.load("found.yaml").interfaces
     assert (found.eta, found.alpha) == pytest.approx((1.8, 0.2), rel=1e-4)
+
+
+def test_a_fit_says_what_the_table_determines(run: Run, folder: Path) -> None:
+    """Expected: every parameter with its interval, as a table and as JSON; pairs that trade places; other stacks."""
+    out = run("fit", "table.csv", "target.yaml")[1]
+    assert "layer0_alpha" in out and "layer0_eta" in out
+    report = json.loads(run("fit", "table.csv", "target.yaml", "--json")[1])
+    assert [one["name"] for one in report["parameters"]] == ["layer0_alpha", "layer0_eta"]
+    assert all(one["low"] <= one["value"] <= one["high"] for one in report["parameters"])
+    assert {"trades", "others"} <= report.keys()
+
+
+def test_a_brushed_table_is_read(run: Run, folder: Path) -> None:
+    """Expected: azimuths of both directions are read from seven columns, and the material is brushed."""
+    true = Stack([Interface(conductor="Al", alpha=(0.1, 0.3), rotation=120)])
+    at = Directions.about_lobes(True)
+    value = table_of(true, at, named("bati2021")).value
+    angles = np.degrees([x for w in (at.wi, at.wo) for x in (np.arccos(w[2]), np.arctan2(w[1], w[0]))])
+    rows = [",".join(map(str, [*angles[:, n], *value[:, n]])) for n in range(value.shape[1])]
+    Path("brushed.csv").write_text("\n".join(["theta_i,phi_i,theta_o,phi_o,r,g,b", *rows]))
+    Path("metal.yaml").write_text("lobes:\n  - {energy: 0.85, alpha: 0.2, base: conductor}\n")
+    status, _, err = run("fit", "brushed.csv", "metal.yaml", "--starts", "1", "-o", "found.yaml")
+    assert (status, err) == (0, "")
+    found: Any = vt.load("found.yaml").interfaces[0]
+    assert (*found.alpha, found.rotation) == pytest.approx((0.1, 0.3, 120), rel=1e-2)
 
 
 def test_a_material_becomes_a_simpler_one(run: Run, folder: Path) -> None:

@@ -61,6 +61,23 @@ def test_classes_have_axes_and_a_legend(run: Run, drawn: list[Figure]) -> None:
         assert legend and any(text.get_text().startswith("chosen") for text in legend.get_texts())
 
 
+def test_a_fit_is_drawn_beside_its_table(run: Run, drawn: list[Figure]) -> None:
+    """Expected: a panel for each angle of incidence, then the parameters by name, and those that trade places."""
+    rows = [f"{i},{o},180,{r},{r},{r}" for i in (0, 40) for o, r in ((0, 0.2), (30, 0.1), (40, 0.3), (60, 0.05))]
+    Path("table.csv").write_text("\n".join(["theta_i,theta_o,phi,r,g,b", *rows]))
+    Path("one.yaml").write_text("name: Satin\nlobes:\n  - {energy: 0.1, alpha: 0.2}\n")
+    status, out, err = run("fit", "table.csv", "one.yaml", "--plot", "--starts", "1", "--model", "bati2021")
+    assert (status, err, out.splitlines()[-1]) == (0, "", "table.png")
+    (figure,) = drawn
+    assert title(figure).startswith("Satin: the closest stack, by bati2021, error of log(1 + f cos)")
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles[:3] == ["incidence at 0°", "incidence at 40°", "parameters"] and "trade places" in titles[3]
+    assert figure.axes[0].get_xlabel() == "tilt of the half-vector (degrees)"
+    assert figure.axes[0].get_legend() is not None
+    names = [tick.get_text().split(" = ")[0] for tick in figure.axes[2].get_yticklabels()]
+    assert names == ["layer0_alpha", "layer0_eta"]
+
+
 def test_a_sheet_names_its_stacks(run: Run, drawn: list[Figure]) -> None:
     """Expected: the target, the model, what the differences are; under each sphere its indices and difference."""
     status, _, err = run("explore", "target.yaml", "--count", "2", "--sheet", "--size", "16", "--spp", "1")

@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "plugins": "stack optics tables model ops kernel binding sampling",
     "shader": "stack optics tables model ops sampling",
     "exports": "stack model shader",
-    "inverse": "stack optics tables model ops",
+    "inverse": "stack optics tables model ops kernel",
     "reference": "stack optics ops kernel binding sampling",
     "checks": "kernel",
     "scenes": "kernel",

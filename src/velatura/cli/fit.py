@@ -11,13 +11,22 @@ import typer
 from velatura.cli import invert, options
 
 if TYPE_CHECKING:
-    from velatura.inverse import Fit
+    from velatura.inverse import Fit, ReflectanceTable
 
 Output = Annotated[Path | None, typer.Option("--output", "-o", metavar="F", help="The material (YAML or JSON).")]
 
+MOST = 10  # pairs of parameters that are printed
+
 
 def fit(
-    table: Annotated[str, typer.Argument(metavar="TABLE", help="CSV: theta_i, theta_o, phi in degrees, and r, g, b.")],
+    table: Annotated[
+        str,
+        typer.Argument(
+            metavar="TABLE",
+            help="CSV (theta_i,theta_o,phi,r,g,b or theta_i,phi_i,theta_o,phi_o,r,g,b, in degrees and 1/sr), "
+            "or a file of the MERL (.binary) or RGL (_rgb.bsdf) database.",
+        ),
+    ],
     target: Annotated[
         str,
         typer.Argument(
@@ -28,18 +37,29 @@ def fit(
     starts: Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Stacks to descend from.")] = 4,
     output: Output = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of these stacks.")] = 0,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw table and fit to TABLE, ending in .png, here.")] = False,
     model: invert.ModelName = None,
     settings: invert.Switches = None,
     as_json: options.Json = False,
 ) -> None:
-    """Find the stack closest to a table of reflectance over angles."""
+    """Find the stack closest to a table of reflectance over angles.
+
+    Reports the interval of each parameter (95 %), the parameters of which one makes up for the other, and other
+    stacks that fit as well.
+    """
     # Refuse what cannot work before anything slow begins
     from velatura import inverse
 
     wanted, name, switches = invert.read(target, model, settings)
     rows = inverse.load_table(table)
     check(output)
-    show(inverse.fit_target(rows, wanted, starts, name, seed, **switches), output, as_json)
+    picture = invert.picture(table) if plot else None
+    found = inverse.fit_target(rows, wanted, starts, name, seed, **switches)
+    if picture:
+        _draw(rows, found, wanted.name or Path(table).name, picture)
+    show(found, output, as_json)
+    if picture and not as_json:
+        print(picture)
 
 
 def check(output: Path | None) -> None:
@@ -57,14 +77,51 @@ def show(found: Fit, output: Path | None, as_json: bool) -> None:
     if output:
         save(found.stack, output)
     if as_json:
-        answer = {"stack": found.stack.to_dict(), "error": found.error, "by_angle": found.by_angle}
-        print(json.dumps({"model": found.model.name, **answer, "errors": found.errors}, allow_nan=False))
+        print(json.dumps({"model": found.model.name, **found.to_dict()}, allow_nan=False))
         return
     from rich.console import Console
 
-    Console().print(_table(found))
+    console = Console()
+    console.print(_table(found))
+    if found.energies:
+        console.print(_energies(found))
+    if found.estimates:
+        console.print(_parameters(found))
+    for one, two, correlation in found.trades[:MOST]:
+        print(f"{one} and {two} trade places (correlation {correlation:+.3f})")
+    if len(found.trades) > MOST:
+        print(f"and {len(found.trades) - MOST} more pairs: --json")
+    for n, other in enumerate(found.others, 1):
+        count = len(other.stack.interfaces)
+        layers = " | ".join(_written(layer) for layer in other.stack.layers)
+        print(f"Fits as well ({n}): error {other.error:.2g}, {count} interface{'s' * (count > 1)}: {layers}")
     invert.say_for_which(found.model)
     print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
+
+
+def _written(layer: Any) -> str:
+    """A layer in a line: its values that are not those by default."""
+
+    def digits(value: Any) -> str:
+        return f"{value:.3g}" if isinstance(value, float) else "[" + ", ".join(f"{x:.3g}" for x in value) + "]"
+
+    values = layer.to_dict()
+    return layer.kind + "".join(
+        f" {key} {digits(value)}" for key, value in values.items() if not isinstance(value, str)
+    )
+
+
+def _draw(rows: ReflectanceTable, found: Fit, title: str, path: Path) -> None:
+    """A picture of the table and the fit, written whole or not at all."""
+    from matplotlib.figure import Figure
+
+    from velatura import files
+    from velatura.inverse import plots
+
+    figure = Figure(figsize=(13, 9), layout="constrained")
+    plots.draw_fit(figure, rows, found, title)
+    with files.whole(path) as unfinished:
+        figure.savefig(unfinished, dpi=110)
 
 
 def _table(found: Fit) -> Any:
@@ -78,6 +135,31 @@ def _table(found: Fit) -> Any:
     for row in found.by_angle:
         cells = (f"{row['theta_i']:g}°", f"{row['wanted']:.4g}", f"{row['error']:.2g}", f"{row['relative']:.2%}")
         table.add_row(*cells)
+    return table
+
+
+def _energies(found: Fit) -> Any:
+    """A row per angle of incidence, of the energy of each colour before and after."""
+    from rich.table import Table
+
+    table = Table("angle of incidence", title="Energy that is reflected", title_justify="left")
+    for column in ("before", "after"):
+        table.add_column(column, justify="right")
+    for row in found.energies:
+        cells = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("before", "after"))
+        table.add_row(f"{row['theta_i']:g}°", *cells)
+    return table
+
+
+def _parameters(found: Fit) -> Any:
+    """A row per parameter, with its interval."""
+    from rich.table import Table
+
+    table = Table("parameter", title="What the table says of each (95 %)", title_justify="left")
+    for column in ("value", "from", "to"):
+        table.add_column(column, justify="right")
+    for one in found.estimates:
+        table.add_row(one.name, *(f"{x:.4g}" for x in (one.value, one.low, one.high)))
     return table
 
 

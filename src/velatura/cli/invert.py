@@ -75,7 +75,7 @@ def invert(
 
     wanted, name, switches = read(target, model, settings)
     folder = _folder(output, count)
-    picture = _picture(target) if plot else None
+    drawn = picture(target) if plot else None
 
     try:
         found = inverse.alternatives(wanted, count, name, seed, **switches)
@@ -86,8 +86,8 @@ def invert(
             print(json.dumps(report, allow_nan=False))
         raise
     paths = _write(found, output, folder, Path(target).stem)
-    if picture:
-        draw_classes(found[0], picture)
+    if drawn:
+        draw_classes(found[0], drawn)
 
     if as_json:
         first = found[0]
@@ -104,7 +104,7 @@ def invert(
         for line in _missed(solution):
             print(line)
     say_for_which(found[0].model)
-    for path in [*paths, *([picture] if picture else [])]:
+    for path in [*paths, *([drawn] if drawn else [])]:
         print(path)
 
 
@@ -171,12 +171,13 @@ def _folder(output: Path | None, count: int) -> Path | None:
     return output
 
 
-def _picture(target: str) -> Path:
+def picture(source: str) -> Path:
+    """Where `--plot` draws: the name of a file, ending in .png, in the working folder."""
     from velatura import files
 
     with needs("plots"):
         import matplotlib  # noqa: F401  (before what is slow)
-    return files.check_writable(Path(f"{Path(target).stem}.png"), "a picture", (".png",))
+    return files.check_writable(Path(f"{Path(source).stem}.png"), "a picture", (".png",))
 
 
 def _write(found: list[Solution], output: Path | None, folder: Path | None, stem: str) -> list[Path]:

@@ -5,9 +5,9 @@ read by the model's own recursion, so that what is found holds for the model tha
 """
 
 from velatura.inverse import smooth_pair
-from velatura.inverse.angles import Directions, ReflectanceTable, load_table, table_of
+from velatura.inverse.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.coats import Coated, coat
-from velatura.inverse.descent import Fit, fit
+from velatura.inverse.descent import Estimate, Fit, Other, fit
 from velatura.inverse.equivalence import EquivalenceClass
 from velatura.inverse.explain import Direction, Infeasible
 from velatura.inverse.fitting import fit_target, simplify
@@ -15,6 +15,7 @@ from velatura.inverse.interface import MODEL, Choice, invert_interface
 from velatura.inverse.pair import Pair, invert_pair
 from velatura.inverse.partial_stack import Above, Layers
 from velatura.inverse.stacks import Solution, alternatives, grazing, invert_stack, on_black
+from velatura.inverse.table_files import load_table
 from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
 
 __all__ = [
@@ -25,10 +26,12 @@ __all__ = [
     "Direction",
     "Directions",
     "EquivalenceClass",
+    "Estimate",
     "Fit",
     "Fixed",
     "Infeasible",
     "Layers",
+    "Other",
     "Pair",
     "ReflectanceTable",
     "Solution",

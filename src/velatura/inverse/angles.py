@@ -1,28 +1,26 @@
-"""Reflectance over angles: pairs of directions, tables of reflectance in files, and the reflectance of a model."""
+"""Reflectance over angles: pairs of directions, tables of reflectance, and the reflectance of a model."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.errors import InvalidInput
 from velatura.inverse.partial_stack import Array, take
-from velatura.model import Model, bsdf, mixture, named
+from velatura.model import Model, bsdf, mixture, named, variance_kind
+from velatura.model.context import Context
 from velatura.ops import Value
 from velatura.stack import Material, MaterialLike, load
 
-COLUMNS = ("theta_i", "theta_o", "phi", "r", "g", "b")
-GRAZING, BRIGHTEST = 90.0, 1e9  # degrees: directions must be above the surface; 1/sr: more than any lobe has
 TILTS = (0.0, *np.geomspace(0.006, 1.6, 10))  # of half-vectors, as slopes: so that every lobe is met, sharp or blurred
 TURNS = 4  # azimuths of half-vectors over half a turn
 ANGLES = (0.0, 20.0, 40.0, 55.0, 70.0)  # of incidence, where stacks are compared
 AZIMUTHS = (0.0, 45.0, 100.0)  # of incidence, where a stack has a direction
+LOWEST = 1e-3  # cosine of directions
+GROUPS, GROUP = 12, 10.0  # angles of incidence that are reported one by one; degrees of a group where there are more
 
 
 @dataclass(frozen=True)
@@ -63,79 +61,117 @@ class Directions:
         for angle in ANGLES:
             for azimuth in AZIMUTHS if turned else (0.0,):
                 i = _direction(np.full(len(tilt), angle), azimuth)
-                o = 2 * np.sum(i * h, axis=0) * h - i
-                kept = (o[2] > 1e-3) & (np.sum(i * h, axis=0) > 0)
+                o = _mirrored(i, h)
+                kept = (o[2] > LOWEST) & (np.sum(i * h, axis=0) > 0)
                 wi.append(i[:, kept])
                 wo.append(o[:, kept])
                 theta.append(np.full(np.count_nonzero(kept), angle))
         return cls(np.concatenate(wi, axis=1), np.concatenate(wo, axis=1), np.concatenate(theta))
 
+    @classmethod
+    def about_halves(cls, tilt: Array, apart: Array, turn: Array) -> Directions:
+        """Of half-vectors at `tilt` and wi at (`apart`, `turn`) from those, in degrees (Rusinkiewicz 1998).
+
+        The azimuth of wi is 0. Some may lie below the surface.
+        """
+        h, i = _direction(tilt, 0.0), _direction(apart, turn)
+        i = np.array([i[0] * h[2] + i[2] * h[0], i[1], i[2] * h[2] - i[0] * h[0]])
+        azimuth = np.degrees(np.arctan2(i[1], i[0]))
+        return cls(i, _mirrored(i, h), np.degrees(np.arccos(np.clip(i[2], -1, 1)))).turned(-azimuth)
+
+    @property
+    def above(self) -> NDArray[np.bool_]:
+        """Whether both directions lie above the surface, (N,)."""
+        return np.asarray(np.minimum(self.wi[2], self.wo[2]) > LOWEST)
+
+    @property
+    def brushed(self) -> bool:
+        """Whether light comes from several azimuths, so that the direction of brushing shows."""
+        tilted = self.wi[:, np.hypot(*self.wi[:2]) > LOWEST]
+        return tilted.shape[1] > 0 and bool(np.ptp(np.arctan2(tilted[1], tilted[0])) > LOWEST)
+
+    @cached_property
+    def tilt(self) -> Array:
+        """The angle from the normal to the half-vector, in degrees, (N,)."""
+        h = self.wi + self.wo
+        return np.asarray(np.degrees(np.arctan2(np.hypot(h[0], h[1]), h[2])))
+
+    def take(self, kept: NDArray[np.bool_]) -> Directions:
+        """Some of the pairs."""
+        return Directions(self.wi[:, kept], self.wo[:, kept], self.theta_i[kept])
+
+    def turned(self, azimuth: Array | float) -> Directions:
+        """The pairs turned about the normal, by degrees."""
+        c, s = np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth))
+        wi, wo = (np.array([c * w[0] - s * w[1], s * w[0] + c * w[1], w[2]]) for w in (self.wi, self.wo))
+        return Directions(wi, wo, self.theta_i)
+
 
 @dataclass(frozen=True)
 class ReflectanceTable:
-    """Reflectance f in 1/sr, without the cosine, of N pairs of directions: (3, N)."""
+    """Reflectance f in 1/sr, without the cosine, of N pairs of directions: (3, N).
+
+    energy: of all that is reflected from each of M directions wi, `directions.lit`, (3, M), where that counts.
+    """
 
     directions: Directions
     value: Array
+    energy: Array | None = None
 
 
-def load_table(path: str | Path) -> ReflectanceTable:
-    """The table in a CSV file whose first line is `theta_i,theta_o,phi,r,g,b`.
-
-    Angles in degrees, theta in 0 to 90 (excluded), phi the azimuth from wi to wo (180: the mirror direction); r, g, b
-    the BRDF in 1/sr, without the cosine.
-
-    Raises:
-        InvalidInput: no such file, or a line that is none of that; one line that names file, line and column.
-    """
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file))
-    except UnicodeDecodeError as error:
-        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
-    except (OSError, ValueError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidInput(f"{path}: cannot be read: {reason.lower()}") from None
-    if not lines or tuple(cell.strip() for cell in lines[0]) != COLUMNS:
-        raise InvalidInput(f"{path}: line 1: must be {','.join(COLUMNS)}")
-    rows = [_row(f"{path}: line {n}", line) for n, line in enumerate(lines[1:], 2) if line]
-    if not rows:
-        raise InvalidInput(f"{path}: holds no directions")
-    theta_i, theta_o, phi, *value = np.array(rows).T
-    return ReflectanceTable(Directions.of(theta_i, theta_o, phi), np.array(value))
+def compressed(x: Array) -> Array:
+    """log(1 + x) of f cos theta_o, continued as an odd function to what noise makes negative (Low et al. 2012)."""
+    return np.asarray(np.sign(x) * np.log1p(np.abs(x)))
 
 
-def table_of(stack: MaterialLike, directions: Directions, model: str | Model) -> ReflectanceTable:
+def table_of(
+    stack: MaterialLike, directions: Directions, model: str | Model, with_energy: bool = False
+) -> ReflectanceTable:
     """Reflectance of a material by a model (a stack, a file, or a preset's name).
 
     Raises:
         InvalidInput: not a valid material, an unknown model, or a texture, which has no one value.
     """
-    stack = load(stack)
-    seen = bsdf.body(Material.of(stack), named(model))
-    value = radiance(seen, directions) / directions.wo[2]
-    return ReflectanceTable(directions, np.broadcast_to(value, (3, len(directions.theta_i))))
+    value, energy = read(Material.of(load(stack)), directions, named(model))
+    value = np.broadcast_to(value / directions.wo[2], (3, len(directions.theta_i)))
+    return ReflectanceTable(
+        directions, value, np.broadcast_to(energy, (3, directions.lit.shape[1])) if with_energy else None
+    )
 
 
-def radiance(seen: bsdf.Lobed, directions: Directions) -> Value:
-    """f(wi, wo) cos theta_o of a stack that is prepared: colours, over directions on the last axis."""
+def read(material: Material, directions: Directions, model: Model) -> tuple[Value, Value]:
+    """As `radiance`, of a material with values of NumPy by any model."""
+    seen = model.recursion.body(material, model, variance_kind(material), Context())
+    if isinstance(seen, bsdf.Lobed):
+        return radiance(seen, directions)
+    value, _ = seen.eval_pdf(tuple(directions.wi), tuple(directions.wo), bsdf.Asked(transmission=False))
+    solved: Any = seen
+    return value, sum(solved.seen(tuple(directions.lit))[0].energies)
+
+
+def radiance(seen: bsdf.Lobed, directions: Directions) -> tuple[Value, Value]:
+    """f(wi, wo) cos theta_o of a stack that is prepared, and the energy that it reflects from each lit direction.
+
+    Both are colours, over directions on the last axis.
+    """
     wi, wo = tuple(directions.wi), tuple(directions.wo)
-    if seen.above.model.form == "symmetric":
-        return seen.eval_pdf(wi, wo, bsdf.Asked(transmission=False))[0]
     # The lobes depend on wi alone, which many pairs have in common
     lit = bsdf.scattered(seen, tuple(directions.lit))
+    energy = sum(part.energy for part in (*lit.reflected, lit.base) if part)
+    if seen.above.model.form == "symmetric":
+        return seen.eval_pdf(wi, wo, bsdf.Asked(transmission=False))[0], energy
     reflected, base = take((tuple(lit.reflected), lit.base), directions.which, directions.lit.shape[-1])
-    return mixture.eval_pdf(reflected, base, wi, wo)[0]
+    return mixture.eval_pdf(reflected, base, wi, wo)[0], energy
 
 
 def report(wanted: ReflectanceTable, found: ReflectanceTable) -> list[dict[str, float]]:
     """For every angle of incidence `theta_i`: root mean squares of f cos theta_o (`wanted`), and of its error.
 
-    `error` is that of all of it, `relative` its share of `wanted`.
+    `error` is that of all of it, `relative` its share of `wanted`. Many angles are put into groups, by their middle.
     """
-    cosine, rows = wanted.directions.wo[2], []
-    for angle in np.unique(wanted.directions.theta_i):
-        own = wanted.directions.theta_i == angle
+    cosine, rows, theta_i = wanted.directions.wo[2], [], grouped(wanted.directions.theta_i)
+    for angle in np.unique(theta_i):
+        own = theta_i == angle
         one, other = (x.value[:, own] * cosine[own] for x in (wanted, found))
         size, error = (float(np.sqrt(np.mean(x * x))) for x in (one, other - one))
         relative = error / size if size > 0 else 0.0
@@ -148,27 +184,22 @@ def _direction(theta: Array, phi: Array | float) -> Array:
     return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(np.radians(theta))])
 
 
-def _row(where: str, line: Sequence[str]) -> list[float]:
-    """The numbers of a line."""
-    if len(line) != len(COLUMNS):
-        raise InvalidInput(f"{where}: must hold {len(COLUMNS)} numbers, {','.join(COLUMNS)}, got {len(line)}")
-    numbers: Mapping[str, float] = {name: _number(f"{where}: {name}", cell) for name, cell in zip(COLUMNS, line)}
-    for name in ("theta_i", "theta_o"):
-        if not 0 <= numbers[name] < GRAZING:
-            raise InvalidInput(f"{where}: {name}: must lie in 0 to 90 (excluded) degrees, got {numbers[name]:g}")
-    if not -360 <= numbers["phi"] <= 360:
-        raise InvalidInput(f"{where}: phi: must lie in -360 to 360 degrees, got {numbers['phi']:g}")
-    for name in "rgb":
-        if not 0 <= numbers[name] <= BRIGHTEST:
-            raise InvalidInput(f"{where}: {name}: must lie in 0 to {BRIGHTEST:g}, got {numbers[name]:g}")
-    return list(numbers.values())
+def energies(before: ReflectanceTable, after: ReflectanceTable) -> list[dict[str, Any]]:
+    """For every angle of incidence `theta_i` the energies of two tables, [r, g, b], of the mean azimuth."""
+    theta_i, rows = np.round(np.degrees(np.arccos(np.clip(before.directions.lit[2], -1, 1))), 6), []
+    assert before.energy is not None and after.energy is not None
+    for angle in np.unique(theta_i):
+        one, other = (table[:, theta_i == angle].mean(axis=1).tolist() for table in (before.energy, after.energy))
+        rows.append({"theta_i": float(angle), "before": one, "after": other})
+    return rows
 
 
-def _number(where: str, text: str) -> float:
-    try:
-        found = float(text)
-    except ValueError:
-        found = float("nan")
-    if not np.isfinite(found):
-        raise InvalidInput(f"{where}: must be a finite number, got {text.strip()!r}")
-    return found
+def grouped(theta_i: Array) -> Array:
+    """Angles of incidence as they are reported: as they are where they are few, else the middles of groups."""
+    if len(np.unique(np.round(theta_i, 6))) <= GROUPS:
+        return np.round(theta_i, 6)
+    return GROUP * (np.floor(theta_i / GROUP) + 0.5)
+
+
+def _mirrored(w: Array, h: Array) -> Array:
+    return 2 * np.sum(w * h, axis=0) * h - w

@@ -1,23 +1,28 @@
 """Descent: the values of a stack whose reflectance over angles comes closest to a table.
 
 All that is free changes at once, by least squares with the model's own derivatives: differences, of all values in one
-call of the model.
+call of the model. Where a model has no closed form, the nearest one that has stands in for it, corrected at every end.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import combinations
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from velatura.inverse import angles
-from velatura.inverse.angles import ReflectanceTable, radiance
+from velatura.inverse.angles import ReflectanceTable, radiance, read
+from velatura.inverse.interface import conductor_extinction
 from velatura.inverse.partial_stack import CLEAR, Array
 from velatura.model import Model, bsdf, named, variance_kind
 from velatura.model.mixture import ALPHA_MIN
 from velatura.ops import Value
+from velatura.optics import fresnel
 from velatura.stack import (
     RGB,
     DiffuseValues,
@@ -32,9 +37,38 @@ from velatura.stack import (
 )
 
 STEP = 1e-5  # of a value, to see how the model changes
+MAPPED = 5  # readings by a model without a closed form, between descents of the one that stands in for it
 ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: the relative change in a round
-CONDUCTOR, RATIO = (0.02, 30.0), (1e-3, 30.0)  # bounds of a metal's eta, and of its k over that
+CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
 DEPTH_MAX = 10.0  # of a medium
+AS_WELL, EXACT = 1.05, 1e-6  # of the smallest error, and beside it: other stacks fit as well
+LIKELY, DRAWN = 0.95, 4000  # the probability of an interval, and the points that it is taken from
+FIRST, DARK = 10.0, 1e-3  # weight of energies beside all else, and energies that have no hue
+LEAST = 1e-4  # error that a table is taken to have: no model is known better
+FEW = 4  # angles of incidence; where there are fewer, directions have as many groups at each
+TRADED = 0.9  # correlation of parameters that trade places
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter of a fitted stack, by flat name (and channel, r, g or b), and the interval that is likely to hold it.
+
+    The interval is one of 95 %, from how the parameter changes where an angle of incidence is left out: so it holds the
+    errors of the model as well as noise. A parameter that the table does not determine has its whole range.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Other:
+    """Another stack that approximates a table about as well, and its error."""
+
+    stack: Stack
+    error: float
 
 
 @dataclass(frozen=True)
@@ -42,7 +76,10 @@ class Fit:
     """A stack that approximates a table, and its error.
 
     error: root mean square of the difference of log(1 + f cos theta_o). by_angle: as `angles.report` has it. errors:
-    the results of the descents from all starts, the best first.
+    the results of the descents from all starts, the best first. estimates: of the parameters that were free. trades:
+    pairs of them with their correlation, where that is strong: one makes up for a change of the other. others: stacks
+    outside these intervals, or of another form, that fit about as well. energies: of a simplification, for every angle
+    of incidence all that is reflected, before and after.
     """
 
     stack: Stack
@@ -50,6 +87,23 @@ class Fit:
     error: float
     by_angle: list[dict[str, float]]
     errors: list[float]
+    estimates: list[Estimate] = field(default_factory=list)
+    trades: list[tuple[str, str, float]] = field(default_factory=list)
+    others: list[Other] = field(default_factory=list)
+    energies: list[dict[str, Any]] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report of a fit as JSON has it."""
+        return {
+            "stack": self.stack.to_dict(),
+            "error": self.error,
+            "by_angle": self.by_angle,
+            "errors": self.errors,
+            **({"energies": self.energies} if self.energies else {}),
+            "parameters": [vars(estimate) for estimate in self.estimates],
+            "trades": [{"between": list(pair), "correlation": r} for *pair, r in self.trades],
+            "others": [{"stack": other.stack.to_dict(), "error": other.error} for other in self.others],
+        }
 
 
 @dataclass(frozen=True)
@@ -63,70 +117,238 @@ class Free:
     high: float
     logarithmic: bool
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Of its coordinate."""
+        return self.coordinate(self.low), self.coordinate(self.high)
+
+    def name(self, layer: int) -> str:
+        """The flat name in a stack where it belongs to that layer, and the channel."""
+        key = "alpha" if len(self.keys) > 1 else self.keys[0]
+        return f"layer{layer}_{key}" + ("" if self.channel is None else f" {'rgb'[self.channel]}")
+
     def shown(self, x: Value) -> Value:
         """The value of a coordinate."""
         return np.exp(x) if self.logarithmic else x
 
-    def written(self, x: float) -> float:
-        """As `shown`; a roughness at its lower bound is written as smooth."""
-        value = float(self.shown(x))
-        return 0.0 if self.low == ALPHA_MIN and value < 1.001 * ALPHA_MIN else value
+    def rounded(self, value: float) -> float:
+        """The value as it is written: a roughness at its lower bound is smooth."""
+        return 0.0 if self.low == ALPHA_MIN and value < 1.001 * ALPHA_MIN else float(value)
 
     def coordinate(self, value: float) -> float:
         kept = min(max(value, self.low), self.high)
         return float(np.log(kept)) if self.logarithmic else kept
 
 
-def fit(table: ReflectanceTable, starts: Sequence[MaterialLike], model: str | Model, eta_max: float = 4.0) -> Fit:
+def fit(
+    table: ReflectanceTable,
+    starts: Sequence[MaterialLike],
+    model: str | Model,
+    eta_max: float = 4.0,
+    simpler: Callable[[Stack], Sequence[Stack]] = lambda stack: (),
+) -> Fit:
     """The closest of the stacks found by descents from all starts (stacks, files, or presets' names).
+
+    Args:
+        simpler: starts of other forms than that of the closest stack, which may fit as well.
 
     Raises:
         InvalidInput: not a valid material, an unknown model, or a texture in a start, which has no one value.
     """
     model = named(model)
-    ends = sorted((Descent(table, load(start), model, eta_max).run() for start in starts), key=lambda end: end[0])
-    stack = ends[0][1]
-    by_angle = angles.report(table, angles.table_of(stack, table.directions, model))
-    return Fit(stack, model, ends[0][0], by_angle, [error for error, _ in ends])
+    best, *rest = ends = descended(table, starts, model, eta_max)
+    by_angle = angles.report(table, angles.table_of(best.stack, table.directions, model))
+    estimates, trades = best.estimated()
+    found = [best]
+    for end in sorted([*rest, *descended(table, simpler(best.stack), model, eta_max)], key=lambda end: end.error):
+        if end.error <= AS_WELL * best.error + EXACT and all(end.apart(other) for other in found):
+            found.append(end)
+    others = [Other(end.stack, end.error) for end in found[1:]]
+    return Fit(best.stack, model, best.error, by_angle, [end.error for end in ends], estimates, trades, others)
+
+
+def descended(
+    table: ReflectanceTable, starts: Sequence[MaterialLike], model: Model, eta_max: float, darkest: float = 0.0
+) -> list[End]:
+    """The ends of descents from all starts, the closest first."""
+    ends = (Descent(table, load(start), model.adder, eta_max, darkest).run() for start in starts)
+    return sorted((end.of(model) for end in ends), key=lambda end: end.cost)
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a descent ends: a point (free,), and its residuals."""
+
+    descent: Descent
+    x: Array
+    residuals: Array
+
+    @property
+    def cost(self) -> float:
+        """The sum of the squares of the residuals."""
+        return float(np.sum(self.residuals**2))
+
+    @cached_property
+    def error(self) -> float:
+        """The root mean square of the residuals, those of energies excepted."""
+        return float(np.sqrt(np.mean(self.residuals[: self.descent.wanted.size] ** 2)))
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The material, without clear media."""
+        stack, kept = self.descent.placed(self.x)
+        return stack.with_layers(stack.layers[n] for n in kept)
+
+    def of(self, model: Model) -> End:
+        """The end for a model without a closed form, near that for the one which stands in for it.
+
+        What the two differ by at one end is added to the residuals of the next descent (Bandler et al. 1994).
+        """
+        end = self
+        for n in range(0 if model.recursion.closed_form else MAPPED):
+            stack, _ = end.descent.placed(end.x)
+            value, energy = read(Material.of(stack), self.descent.table.directions, model)
+            true = end.descent.missed(1, value[:, None], energy[:, None])[0]
+            start = replace(end.descent, start=stack, gap=0.0).start_end
+            mapped = replace(start.descent, gap=true - start.residuals)
+            end = mapped.run() if n + 1 < MAPPED else mapped.start_end
+        return end
+
+    def apart(self, other: End) -> bool:
+        """Whether it has another form than another end, or a value outside the intervals of that one."""
+        if [replace(free, low=0, high=0) for free in self.descent.free] != [
+            replace(free, low=0, high=0) for free in other.descent.free
+        ]:
+            return True
+        return bool(np.any(np.abs(self.x - other.x) > 2 * np.sqrt(np.diag(other.covariance)) + EXACT))
+
+    def estimated(self) -> tuple[list[Estimate], list[tuple[str, str, float]]]:
+        """The parameters of the stack with their intervals, and those that trade places."""
+        free, (_, kept) = self.descent.free, self.descent.placed(self.x)
+        names = {n: one.name(kept.index(one.layer)) for n, one in enumerate(free) if one.layer in kept}
+        found, drawn = self.descent.values(self.x[None])[0], self.descent.values(self._drawn())
+        within = np.quantile(drawn, [(1 - LIKELY) / 2, (1 + LIKELY) / 2], axis=0)
+        estimates = [
+            Estimate(name, *(one.rounded(x) for x in (found[n], min(low, found[n]), max(high, found[n]))))
+            for n, (one, (low, high)) in enumerate(zip(free, within.T))
+            if (name := names.get(n))
+        ]
+        of_noise = np.linalg.inv(self.information)
+        sigma = np.sqrt(np.diag(of_noise))
+        correlation = of_noise / np.outer(sigma, sigma)
+        pairs = [(a, b) for a, b in combinations(names, 2) if abs(correlation[a, b]) > TRADED]
+        pairs.sort(key=lambda pair: -abs(correlation[pair]))
+        return estimates, [(names[a], names[b], float(correlation[a, b])) for a, b in pairs]
+
+    def _drawn(self) -> Array:
+        """Points (DRAWN, free) within the bounds, as likely as the covariance makes them."""
+        rng, bounds = np.random.default_rng(0), [one.bounds for one in self.descent.free]
+        return np.clip(rng.multivariate_normal(self.x, self.covariance, DRAWN), *np.transpose(bounds))
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Derivatives of the residuals, (3 N, free)."""
+        return self.descent.jacobian(self.x)
+
+    @property
+    def variance(self) -> float:
+        """Of the residuals."""
+        count, free = self.slopes.shape
+        return max(float(np.sum(self.residuals**2)) / max(count - free, 1), LEAST**2)
+
+    @cached_property
+    def information(self) -> Array:
+        """What is known of the coordinates, (free, free), as a multiple of the inverse variance of the residuals.
+
+        By the table, and by the bounds: as much as an even distribution between them has.
+        """
+        known = np.diag([12 / np.ptp(one.bounds) ** 2 for one in self.descent.free])
+        return np.asarray(self.slopes.T @ self.slopes + self.variance * known)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the coordinates, (free, free), by leaving out one group of directions after the other.
+
+        So it holds the errors of the model, which are alike within a group, as well as noise: a jackknife, linearised
+        (Bell & McCaffrey 2002), as wide as Student's distribution asks of so few. A coordinate that the table does not
+        determine is as uncertain as its bounds leave it.
+        """
+        from scipy.stats import norm, t
+
+        slopes, residuals, information, groups = self.slopes, self.residuals, self.information, self.descent.groups
+        moved = []
+        for group in np.unique(groups):
+            own = groups == group
+            moved.append(np.linalg.solve(information - slopes[own].T @ slopes[own], slopes[own].T @ residuals[own]))
+        few = len(moved) - 1
+        noise = self.variance * np.linalg.inv(information)
+        if not few:
+            return np.asarray(noise)
+        wider = (t.ppf((1 + LIKELY) / 2, few) / norm.ppf((1 + LIKELY) / 2)) ** 2
+        alike = np.transpose(moved) @ np.array(moved) * few / (few + 1)
+        return np.asarray(wider * alike + noise)
 
 
 @dataclass(frozen=True)
 class Descent:
-    """A descent from one stack: its indices, roughnesses, absorption and albedo change; all else stays."""
+    """A descent from one stack: its indices, roughnesses, absorption and albedo change; all else stays.
+
+    darkest: the least `share` of conductors; 0 for metals, k >= eta. gap: added to all residuals, (3 N,).
+    """
 
     table: ReflectanceTable
     start: Stack
     model: Model
     eta_max: float
+    darkest: float = 0.0
+    gap: Array | float = 0.0
 
     @cached_property
     def material(self) -> Material:
-        """Of the start: a colour (3, 1, 1), for channels, points and directions, or a float; k over eta for k."""
+        """Of the start: a colour (3, 1, 1), for channels, points and directions, or a float.
+
+        For k of a metal it has its reflectance, as a share of what eta allows: that is what absorption trades with.
+        """
         material = Material.of(self.start).each(lambda address, value: value[..., None] if address.colour else value)
-        return _metals(material, lambda layer: layer.k / layer.eta)
+        return _metals(material, lambda layer: share(layer.eta, layer.k))
 
     @cached_property
     def free(self) -> list[Free]:
         found: list[Free] = []
         for n, layer in enumerate(self.material.layers):
             if type(layer) in FREE:
-                found += FREE[type(layer)](n, layer, self.eta_max)
+                found += FREE[type(layer)](n, layer, self.eta_max, self.darkest)
         return found
 
     @cached_property
     def wanted(self) -> Array:
-        return np.log1p(self.table.value * self.table.directions.wo[2])
+        return angles.compressed(self.table.value * self.table.directions.wo[2])
 
-    def run(self) -> tuple[float, Stack]:
-        """The final error, and the stack."""
+    @cached_property
+    def groups(self) -> NDArray[np.intp]:
+        """The group of each residual: its angle of incidence, and where there are few, how near it is to the mirror."""
+        theta_i, tilt = angles.grouped(self.table.directions.theta_i), self.table.directions.tilt
+        _, which = np.unique(theta_i, return_inverse=True)
+        if which.max() + 1 < FEW:
+            which = FEW * which.ravel() + np.searchsorted(np.quantile(tilt, np.arange(1, FEW) / FEW), tilt)
+        return np.asarray(np.tile(which.ravel(), 3))
+
+    @cached_property
+    def start_end(self) -> End:
+        """The start, as far as it lies within the bounds."""
+        x = np.array([free.coordinate(self._first(free)) for free in self.free])
+        return End(self, x, self.residuals(x[None])[0])
+
+    def run(self) -> End:
+        """The end of the descent."""
         from scipy.optimize import least_squares
 
-        bounds = np.array([[free.coordinate(free.low), free.coordinate(free.high)] for free in self.free]).T
-        x = np.array([free.coordinate(self._first(free)) for free in self.free])
+        bounds = np.transpose([free.bounds for free in self.free])
+        first = self.start_end
         inset = 1e-9 * (bounds[1] - bounds[0])
         found = least_squares(
             lambda x: self.residuals(x[None])[0],
-            np.clip(x, bounds[0] + inset, bounds[1] - inset),
+            np.clip(first.x, bounds[0] + inset, bounds[1] - inset),
             jac=self.jacobian,
             bounds=bounds,
             x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
@@ -136,23 +358,37 @@ class Descent:
             max_nfev=ROUNDS,
         )
         # Keep the start where the descent has gained nothing
-        first = self.residuals(x[None])[0]
-        best, residuals = (x, first) if np.sum(first**2) <= 2 * found.cost else (found.x, found.fun)
-        return float(np.sqrt(np.mean(residuals**2))), self.stack(best)
+        best = first if first.cost <= 2 * found.cost else End(self, found.x, found.fun)
+        return replace(best, x=self._smaller_first(best.x))
 
     def residuals(self, x: Array) -> Array:
-        """Errors of log(1 + f cos), (P, 3 N), at P points x (P, free) (Low et al. 2012)."""
+        """As `missed`, at P points x (P, free), with the gap."""
         material = self.material
         for n, free in enumerate(self.free):
             layer, shown = material.layers[free.layer], free.shown(x[:, n, None])
             changed = {key: _changed(getattr(layer, key), free, shown) for key in free.keys}
             material = material.with_layer(free.layer, **changed)
         variance = variance_kind(Material.of(self.start, as_described))
-        seen = bsdf.body(_metals(material, lambda layer: layer.k * layer.eta), self.model, variance)
-        value = radiance(seen, self.table.directions)
-        shape = (3, len(x), len(self.table.directions.theta_i))
-        missed = np.log1p(np.broadcast_to(value, shape)) - self.wanted[:, None]
-        return np.moveaxis(missed, 0, 1).reshape(len(x), -1)
+        seen = bsdf.body(_metals(material, lambda layer: extinction(layer.eta, layer.k)), self.model, variance)
+        return self.missed(len(x), *radiance(seen, self.table.directions)) + self.gap
+
+    def missed(self, count: int, value: Value, energy: Value) -> Array:
+        """Errors of log(1 + f cos), (P, 3 N), of a number P of points (Low et al. 2012).
+
+        Where energies count, their errors follow, (P, 3 M): as shares of the energy at that angle, so that the hue
+        counts in dark channels too, and weighted so that they come first.
+        """
+
+        def apart(value: Value, wanted: Array) -> Array:
+            found = np.broadcast_to(value, (3, count, wanted.shape[-1])) - wanted[:, None]
+            return np.moveaxis(found, 0, 1).reshape(count, -1)
+
+        found = apart(np.log1p(value), self.wanted)
+        if self.table.energy is None:
+            return found
+        scale = np.mean(self.table.energy, axis=0) + DARK
+        weight = FIRST * np.sqrt(self.wanted.size / self.table.energy.size)
+        return np.concatenate([found, weight * apart(energy / scale, self.table.energy / scale)], axis=1)
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (3 N, free)."""
@@ -160,47 +396,67 @@ class Descent:
         ahead, behind = np.split(self.residuals(np.concatenate([x + steps, x - steps])), 2)
         return ((ahead - behind) / (2 * STEP)).T
 
-    def stack(self, x: Array) -> Stack:
-        """The material at a point, without clear media."""
+    def values(self, x: Array) -> Array:
+        """The values of points (P, free), a metal's k among them."""
+        value = np.transpose([free.shown(own) for free, own in zip(self.free, x.T)])
+        of = {(free.layer, free.channel): n for n, free in enumerate(self.free) if free.keys == ("eta",)}
+        for n, free in enumerate(self.free):
+            if free.keys == ("k",):
+                value[:, n] = extinction(value[:, of[free.layer, free.channel]], value[:, n])
+        return np.asarray(value)
+
+    def placed(self, x: Array) -> tuple[Stack, list[int]]:
+        """The material at a point, and its layers that are no clear media."""
         material = self.material.each(lambda address, value: np.ravel(value))
         for free, coordinate in zip(self.free, x):
             for key in free.keys:
                 own = np.array(getattr(material.layers[free.layer], key))
-                own[slice(None) if free.channel is None else free.channel] = free.written(coordinate)
+                own[slice(None) if free.channel is None else free.channel] = free.rounded(free.shown(coordinate))
                 material = material.with_layer(free.layer, **{key: own})
         changed = {(free.layer, key) for free in self.free for key in free.keys}
-        values = _metals(material, lambda layer: layer.k * layer.eta).values()
+        values = _metals(material, lambda layer: extinction(layer.eta, layer.k)).values()
         found = self.start.replace(**{at.name: written(x) for at, x in values if (at.layer, at.key) in changed})
-        pairs = zip(found.layers, Material.of(found).layers)
-        return found.with_layers(layer for layer, values in pairs if not _clear(values))
+        return found, [n for n, layer in enumerate(Material.of(found).layers) if not _clear(layer)]
+
+    def _smaller_first(self, x: Array) -> Array:
+        """The same point, turned interfaces with the smaller roughness along their first axis, turned by 0 to 180."""
+        x, of = x.copy(), {(free.layer, free.keys): n for n, free in enumerate(self.free)}
+        for (layer, keys), n in of.items():
+            if keys == ("rotation",):
+                u, v = (of[layer, (key,)] for key in ("alpha_u", "alpha_v"))
+                if x[u] > x[v]:
+                    x[u], x[v], x[n] = x[v], x[u], x[n] + 90
+                x[n] %= 180
+        return x
 
     def _first(self, free: Free) -> float:
         value = np.ravel(getattr(self.material.layers[free.layer], free.keys[0]))
         return float(np.mean(value) if free.channel is None else value[free.channel])
 
 
-def _of_base(n: int, layer: DiffuseValues, eta_max: float) -> list[Free]:
+def _of_base(n: int, layer: DiffuseValues, eta_max: float, darkest: float) -> list[Free]:
     return [Free(n, ("albedo",), c, 0.0, 1.0, False) for c in range(3)]
 
 
-def _of_medium(n: int, layer: MediumValues, eta_max: float) -> list[Free]:
+def _of_medium(n: int, layer: MediumValues, eta_max: float, darkest: float) -> list[Free]:
     if layer.depth <= 0:
         return []
     return [Free(n, ("sigma_a",), c, 0.0, DEPTH_MAX / layer.depth, False) for c in range(3)]
 
 
-def _of_interface(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
+def _of_interface(n: int, layer: InterfaceValues, eta_max: float, darkest: float) -> list[Free]:
     axes = [("alpha_u", "alpha_v")] if layer.alpha_u == layer.alpha_v else [("alpha_u",), ("alpha_v",)]
     found = [Free(n, keys, None, ALPHA_MIN, 1.0, True) for keys in axes]
+    if layer.alpha_u != layer.alpha_v and layer.rotation != 0:
+        found.append(Free(n, ("rotation",), None, layer.rotation - 180, layer.rotation + 180, False))
     if layer.kind == "dielectric":
         eta = layer.eta
         channels = range(3) if np.ptp(eta) > 0 else (None,)
         found += [Free(n, ("eta",), c, min(1.0, eta.min()), max(eta_max, eta.max()), True) for c in channels]
     if layer.kind == "conductor":
-        # A conductor has k >= eta, unless it begins with less
-        ratio = np.ravel(layer.k)
+        # A conductor has k >= eta, unless it begins with less, or may be as dark as any absorbing base
         found += [Free(n, ("eta",), c, *CONDUCTOR, True) for c in range(3)]
-        found += [Free(n, ("k",), c, float(np.clip(ratio[c], RATIO[0], 1)), RATIO[1], True) for c in range(3)]
+        found += [Free(n, ("k",), c, min(float(np.ravel(layer.k)[c]), darkest), 1.0, False) for c in range(3)]
     return found
 
 
@@ -210,6 +466,18 @@ FREE: dict[type, Callable[..., list[Free]]] = {
     MediumValues: _of_medium,
     InterfaceValues: _of_interface,
 }
+
+
+def share(eta: Value, k: Value) -> Value:
+    """The reflectance of a metal in air, from that of k = eta (0) to `BRIGHTEST` (1)."""
+    least = fresnel.normal_incidence(eta, eta)
+    return (fresnel.normal_incidence(eta, k) - least) / (BRIGHTEST - least)
+
+
+def extinction(eta: Value, share: Value) -> Value:
+    """The k that reflects this share."""
+    least = fresnel.normal_incidence(eta, eta)
+    return conductor_extinction(least + share * (BRIGHTEST - least), eta)
 
 
 def _metals(material: Material, k: Callable[[InterfaceValues], Value]) -> Material:

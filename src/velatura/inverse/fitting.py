@@ -13,15 +13,28 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.inverse import angles
 from velatura.inverse.angles import Directions, ReflectanceTable
-from velatura.inverse.descent import Fit, fit, written
+from velatura.inverse.descent import Descent, Fit, descended, fit, written
 from velatura.inverse.interface import MODEL
 from velatura.inverse.stacks import alternatives, model_of
 from velatura.inverse.target import Target, read
 from velatura.model import Model, named, variance_kind
 from velatura.model.variance import Isotropic
-from velatura.stack import Diffuse, Interface, Layer, Material, MaterialLike, Medium, Stack, as_described, load
+from velatura.stack import (
+    Diffuse,
+    Interface,
+    InterfaceValues,
+    Layer,
+    Material,
+    MaterialLike,
+    Medium,
+    Stack,
+    as_described,
+    load,
+)
 
 STARTS = 4
+BRUSHED, BRUSHING = (22.5, 67.5, 112.5, 157.5), 1.5  # degrees, and by which ratios, fits of brushed samples start
+DARKEST = -0.5  # share of a conductor's reflectance, with which its k is 0: a base may be darker than any metal
 TRIED = 3  # sets of interfaces from which simplification descends
 
 
@@ -45,8 +58,11 @@ def fit_target(
     """
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)
-    found = alternatives(wanted, starts, chosen, seed)
-    return fit(table, [_with_media(solution.stack) for solution in found], chosen, wanted.eta_max)
+    found = [_with_media(solution.stack) for solution in alternatives(wanted, starts, chosen, seed)]
+    if table.directions.brushed:
+        turned = [_brushed(stack, angle) for stack in found for angle in BRUSHED]
+        found = _closest(table, turned, chosen, wanted.eta_max, starts)
+    return fit(table, found, chosen, wanted.eta_max, _with_one_less)
 
 
 def simplify(
@@ -55,7 +71,8 @@ def simplify(
     """The stack of fewer interfaces whose reflectance comes closest to that of a stack, at all angles.
 
     It keeps some of the interfaces, the last one if nothing passes it, and a diffuse base; their values, and absorption
-    below each but the last, then descend. Only what is reflected is compared.
+    below each but the last, then descend. Only what is reflected is compared: first the energy in every colour at
+    every angle of incidence, then how it is spread.
 
     Args:
         stack: a material (a stack, a file, or a preset's name).
@@ -71,21 +88,23 @@ def simplify(
             f"interfaces: must be at least 1, and fewer than the {count} that there are, got {interfaces}"
         )
     turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
-    table = angles.table_of(stack, Directions.about_lobes(turned), chosen)
+    table = angles.table_of(stack, Directions.about_lobes(turned), chosen, with_energy=True)
 
     # Descend from the sets of interfaces that are closest before any change
     opaque = stack.interfaces[-1].opaque
     sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
     starts = [_of_some(stack, kept) for kept in sets]
-    errors = [_error(table, start, chosen) for start in starts]
-    best = [starts[n] for n in np.argsort(errors, kind="stable")[:TRIED]]
-    return fit(table, best, chosen, eta_max)
+    ends = descended(table, _closest(table, starts, chosen, eta_max, TRIED), chosen, eta_max, DARKEST)
+    best = ends[0]
+    found = angles.table_of(best.stack, table.directions, chosen, with_energy=True)
+    errors, by_angle = [end.error for end in ends], angles.report(table, found)
+    return Fit(best.stack, chosen, best.error, by_angle, errors, energies=angles.energies(table, found))
 
 
-def _error(table: ReflectanceTable, start: Stack, model: Model) -> float:
-    """The error of a stack, unchanged."""
-    value, cosine = angles.table_of(start, table.directions, model).value, table.directions.wo[2]
-    return float(np.mean((np.log1p(value * cosine) - np.log1p(table.value * cosine)) ** 2))
+def _closest(table: ReflectanceTable, starts: list[Stack], model: Model, eta_max: float, count: int) -> list[Stack]:
+    """The starts that are closest before any descent."""
+    costs = [Descent(table, start, model, eta_max).start_end.cost for start in starts]
+    return [starts[n] for n in np.argsort(costs, kind="stable")[:count]]
 
 
 def _of_some(stack: Stack, kept: Sequence[int]) -> Stack:
@@ -124,3 +143,20 @@ def _merged(media: Sequence[Medium]) -> Medium:
 def _with_media(stack: Stack) -> Stack:
     """The stack with a medium, clear if there was none, between all of its interfaces."""
     return _of_some(stack, range(len(stack.interfaces)))
+
+
+def _brushed(stack: Stack, angle: float) -> Stack:
+    """The stack with all of its rough interfaces brushed along a direction."""
+    changed: dict[str, float] = {}
+    for n, layer in enumerate(Material.of(stack).layers):
+        if isinstance(layer, InterfaceValues) and layer.alpha_u > 0:
+            u, v = layer.alpha_u / BRUSHING, min(layer.alpha_v * BRUSHING, 1.0)
+            changed |= {f"layer{n}_alpha_u": u, f"layer{n}_alpha_v": v, f"layer{n}_rotation": angle}
+    return stack.replace(**changed)
+
+
+def _with_one_less(stack: Stack) -> list[Stack]:
+    """The stacks that lack one of the interfaces, an opaque last one excepted."""
+    count = len(stack.interfaces)
+    left_out = range(count - stack.interfaces[-1].opaque) if count > 1 else ()
+    return [_of_some(stack, [n for n in range(count) if n != out]) for out in left_out]

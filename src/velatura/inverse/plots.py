@@ -1,4 +1,4 @@
-"""Pictures of equivalence classes."""
+"""Pictures of equivalence classes, and of fits."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import needs
+from velatura.inverse.angles import ReflectanceTable, grouped, table_of
+from velatura.inverse.descent import Fit
 from velatura.inverse.equivalence import EquivalenceClass
 from velatura.inverse.partial_stack import Layers
 
 RESOLUTION = 256
+PANELS, PAIRS = 6, 12  # angles of incidence, and correlations, that are drawn of a fit
 SIZE, DPI = (4.2, 4.2), 90  # of a picture: inches, and pixels in one
 FILLS = ("#d62728", "#2ca02c", "#1f77b4")  # of red, green and blue
 CHANNELS = ("red", "green", "blue")
@@ -105,3 +108,54 @@ def _conductor(members: EquivalenceClass, tint: float, channel: int) -> tuple[fl
     assert layers.kappa is not None
     eta, kappa = (float(np.broadcast_to(x, (3, 1))[channel, 0]) for x in (layers.eta, layers.kappa))
     return eta, kappa
+
+
+# Fits ----------------------------------------------------------------------------------------------------------------
+
+
+def draw_fit(figure: Any, table: ReflectanceTable, found: Fit, title: str) -> None:
+    """A table and its fit, a panel for each of up to six angles of incidence; below the intervals and correlations.
+
+    Over the tilt of the half-vector, f cos theta_o: of the table as points, of the stack as crosses.
+    """
+    figure.suptitle(f"{title}: the closest stack, by {found.model.name}, error of log(1 + f cos) {found.error:.2g}")
+    theta_i, cosine = grouped(table.directions.theta_i), table.directions.wo[2]
+    fitted = table_of(found.stack, table.directions, found.model).value * cosine
+    tilt = table.directions.tilt
+    different = np.unique(theta_i)
+    shown = different[np.unique(np.linspace(0, len(different) - 1, min(len(different), PANELS)).astype(int))]
+    above, below = figure.subfigures(2, 1, height_ratios=(3, 2))
+    for n, angle in enumerate(shown):
+        own = theta_i == angle
+        axes = above.add_subplot(-(-len(shown) // 3), min(len(shown), 3), n + 1, title=f"incidence at {angle:g}°")
+        for c, colour in enumerate(FILLS):
+            points = table.value[c, own] * cosine[own]
+            axes.plot(tilt[own], points, "o", color=colour, markersize=3, alpha=0.4, label=f"{CHANNELS[c]}, table")
+            axes.plot(tilt[own], fitted[c, own], "x", color=colour, markersize=4, label=f"{CHANNELS[c]}, fit")
+        least = np.quantile(np.abs(table.value[:, own] * cosine[own]), 0.05) + 1e-6
+        axes.set_yscale("symlog", linthresh=float(least))
+        axes.set(xlabel="tilt of the half-vector (degrees)", ylabel="f cos theta_o (1/sr)")
+        if n == 0:
+            axes.legend(fontsize="x-small", ncols=2)
+    _draw_estimates(below, found)
+
+
+def _draw_estimates(figure: Any, found: Fit) -> None:
+    """The interval of each parameter as a share of its value, and the pairs of them that are most correlated."""
+    left, right = figure.subplots(1, 2)
+    for y, one in enumerate(found.estimates):
+        size = max(abs(one.value), 1e-12)
+        low, high = max((one.low - one.value) / size, -1.0), min((one.high - one.value) / size, 1.0)
+        left.plot([low, high], [y, y], color="0.3", marker="|", markersize=8)
+        left.plot(0, y, "o", color="black", markersize=4)
+    left.set_yticks(
+        range(len(found.estimates)), [f"{one.name} = {one.value:.3g}" for one in found.estimates], fontsize="small"
+    )
+    left.axvline(0, color="0.8", linewidth=1, zorder=0)
+    left.set(xlim=(-1.05, 1.05), xlabel="interval (95 %), as a share of the value, cut off at 1", title="parameters")
+    left.invert_yaxis()
+    pairs = found.trades[:PAIRS]
+    right.barh(range(len(pairs)), [r for *_, r in pairs], color="0.5", height=0.5)
+    right.set_yticks(range(len(pairs)), [f"{a}, {b}" for a, b, _ in pairs], fontsize="small")
+    right.set(xlim=(-1, 1), ylim=(PAIRS, -1), xlabel="correlation")
+    right.set_title("parameters that trade places" if pairs else "no parameters trade places")
