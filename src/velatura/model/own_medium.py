@@ -71,27 +71,28 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     if not _is_outside(n):
         ring = ops.maximum(n * n - 1, 0.0)
         radius = ops.sqrt(ops.maximum(p[0] * p[0] + p[1] * p[1], ops.TINY))
-        cos_far = ops.sqrt(ring) * radius / n
+        cos_far = ops.sqrt(ring) * radius * radius / n
         stretch = ops.sqrt(1 - cos_far * cos_far) / radius
         far = stretch * p[0], stretch * p[1], cos_far
         h = ggx.normalize((i[0] + far[0], i[1] + far[1], i[2] + far[2]))
         ops.names(ring=ring, radius=radius, cos_far=cos_far, stretch=stretch, far=far, h_far=h)
-        pdf = pdf + seen * ggx.ndf(h, alpha_u, alpha_v) * (n * ops.sqrt(ring) / radius)
+        pdf = pdf + seen * ggx.ndf(h, alpha_u, alpha_v) * (2 * n * ops.sqrt(ring))
     return ops.select(above, value, 0.0), ops.select(above, pdf, 0.0)
 
 
 def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
     """A direction wo from uniform numbers, by a normal visible inside.
 
-    Momenta outside the cone, a ring of radii 1 to n, are spread over the disc inside: to the square root of
-    (n^2 - p^2) / (n^2 - 1). The direction may lie below the surface, where `eval_pdf` is 0.
+    Momenta outside the cone, a ring of radii 1 to n, are spread over the disc inside: to the fourth root of
+    (n^2 - p^2) / (n^2 - 1), which keeps the density finite. The direction may lie below the surface, where `eval_pdf`
+    is 0.
     """
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     o = ggx.reflect(i, ggx.sample_visible(i, alpha_u, alpha_v, u1, u2))
     x, y = n * o[0], n * o[1]
     p2 = x * x + y * y
     spread = ops.divide(n * n - p2, ops.maximum(n * n - 1, 0.0))
-    r2 = ops.select(p2 > 1, ops.clip(spread, 0.0, 1.0), p2)
+    r2 = ops.select(p2 > 1, ops.sqrt(ops.minimum(spread, 1.0)), p2)
     scale = ops.select(p2 > 1, ops.sqrt(r2 / ops.maximum(p2, 1.0)), 1.0)
     z = ops.sqrt(1 - r2)
     ops.names(o=o, x=x, y=y, p2=p2, r2=r2, scale=scale, z=z)
