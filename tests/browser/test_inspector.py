@@ -91,11 +91,12 @@ def test_the_energy_plot_tells_the_energies_of_the_model(visit: Look, model: str
     tab(visit, "Energy")
     for degrees in (0, 45, 80):
         lobes = vt.lobes(vt.preset(PRESET), math.cos(math.radians(degrees)), model=model)
-        expected = [energy[:, 0].tolist() for energy in (*lobes.energy, sum(lobes.energy))]
+        parts = [*lobes.energy, *([lobes.remainder] if model == "velatura" else [])]
+        expected = [energy[:, 0].tolist() for energy in (*parts, sum(parts))]
 
         def agrees(expected: list[list[float]] = expected) -> bool:
             found = [energy if len(energy) == 3 else 3 * energy for energy in told(visit).values()]
-            return len(found) == 3 and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
+            return len(found) == len(expected) and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
 
         aim(visit, "angle", degrees)
         until(visit, agrees)
@@ -105,7 +106,7 @@ def test_the_blur_plot_tells_the_roughnesses_of_the_model(visit: Look) -> None:
     tab(visit, "Blur")
     aim(visit, "angle", 60)
     found = list(told(visit).values())[1]
-    expected = vt.lobes(vt.preset(PRESET), 0.5).alpha[1][:, 0]
+    expected = vt.lobes(vt.preset(PRESET), 0.5).own_alpha[1][:, 0]
     assert sorted(found) == pytest.approx(sorted(expected.tolist()), abs=1e-3)
 
 
@@ -132,7 +133,7 @@ def test_the_polar_plot_follows_the_angle_and_the_material(visit: Look) -> None:
 def test_a_lobe_is_shown_alone_in_plots_and_picture(visit: Look) -> None:
     whole = visit.picture()
     lines = visit.page.locator("svg.polar .line")
-    assert lines.count() == 3
+    assert lines.count() == 4
     lobe = visit.page.locator(".legend button").first
     lobe.click()
     visit.page.wait_for_function("() => velatura.store.get().view.lobe === 0")
@@ -144,7 +145,7 @@ def test_a_lobe_is_shown_alone_in_plots_and_picture(visit: Look) -> None:
     lobe.click()
     painted(visit)
     assert visit.state("view.lobe") is None
-    assert lines.count() == 3
+    assert lines.count() == 4
 
 
 def test_names_and_numbers_change_together(visit: Look) -> None:
@@ -169,7 +170,7 @@ def test_names_and_numbers_change_together(visit: Look) -> None:
     names = [
         f"{n} {'Al' if n == 2 else 'polyurethane'}" for n, layer in enumerate(layers) if layer["kind"] == "interface"
     ]
-    until(visit, lambda: [name.split(",")[0] for name in list(told(visit))[:-1]] == names)
+    until(visit, lambda: [name.split(",")[0] for name in list(told(visit))[:-1]] == [*names, "remainder"])
     visit.page.evaluate("cancelAnimationFrame(looking)")
     after = visit.page.evaluate(legend)
     assert before != after
@@ -189,12 +190,13 @@ def test_plots_come_back_with_the_graphics_device(visit: Look) -> None:
     visit.page.wait_for_timeout(300)
     visit.page.evaluate("away.restoreContext()")
     stack = vt.preset(PRESET).replace(layer0_alpha=visit.state("layers.0.keys.alpha"))
-    energies = vt.lobes(stack, math.cos(math.radians(45))).energy
-    expected = [energy[:, 0].tolist() for energy in (*energies, sum(energies))]
+    lobes = vt.lobes(stack, math.cos(math.radians(45)))
+    parts = [*lobes.energy, lobes.remainder]
+    expected = [energy[:, 0].tolist() for energy in (*parts, sum(parts))]
 
     def agrees() -> bool:
         found = [energy if len(energy) == 3 else 3 * energy for energy in told(visit).values()]
-        return len(found) == 3 and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
+        return len(found) == len(expected) and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
 
     until(visit, agrees)
 

@@ -13,9 +13,11 @@ from chromium import Browser
 
 from velatura import tables
 from velatura.editor import messages
-from velatura.model import bsdf
-from velatura.model.context import at_a_point
+from velatura.model import Model, bsdf, solution
+from velatura.model.context import Context, at_a_point
 from velatura.shader import Recording, Shader, constant, record, shader, variance
+from velatura.shader.bake import Bake
+from velatura.shader.solved import Tabulated
 from velatura.stack import Kind, Material, Stack
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
@@ -92,11 +94,13 @@ def random_case(pattern: Pattern, count: int, rng: np.random.Generator) -> Case:
 
 
 def in_numpy(case: Case, recording: Recording) -> Results:
-    """What the model says."""
+    """What the model says; where it solves materials, of the first stack for all directions."""
     stack = case.stack
+    wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
+    if isinstance(recording.baked, Tabulated):
+        return _solved(stack, recording.model, wi, wo, u)
     material = Material.from_flat(stack.kinds, case.values, stack.thin)
     body = bsdf.body(material, recording.model, variance(stack), at_a_point())
-    wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]
     value, density = body.eval_pdf(wi, wo)
@@ -111,11 +115,31 @@ def in_numpy(case: Case, recording: Recording) -> Results:
     )
 
 
+def _solved(stack: Stack, model: Model, wi: Any, wo: Any, u: Any) -> Results:
+    body = solution.solve(Material.of(stack), model, variance(stack), Context())
+    seen, _ = body.seen(wi)
+    value, density = body.eval_pdf(wi, wo)
+    drawn, _ = body.sample(wi, *u)
+    count, columns, interfaces = len(density), seen.columns, range(len(stack.interfaces))
+    numbers = [shape.interface for shape in seen.shapes]
+    energies = [sum(e for e, number in zip(columns.energies, numbers) if number == k) for k in interfaces]
+    energies += [columns.rest, *([columns.passed] if columns.passes else [])]
+    return Results(
+        np.array([np.broadcast_to(energy, (3, count)) for energy in energies]),
+        np.array([[np.broadcast_to(a, count) for a in lobe.roughness[:2]] for lobe in seen.lobes]),
+        np.broadcast_to(value, (3, count)),
+        density,
+        np.array(np.broadcast_arrays(*drawn)),
+    )
+
+
 def in_browser(case: Case, recording: Recording, made: Shader, browser: Browser) -> tuple[Results, float, float]:
     """What the shader says, and milliseconds to compile and to draw; a row of pixels for each stack."""
-    lobes = [f"l.{name.removesuffix('.energy')}" for name in recording.lobes if name.endswith(".energy")]
-    answers = [f"vec4({lobe}.energy, {lobe}.alpha_u)" for lobe in lobes]
-    answers += [f"vec4({lobe}.alpha_v)" for lobe in lobes]
+    energies = [f"l.{name}" for name in recording.lobes if name.endswith(".energy")]
+    energies = energies or [f"vt_energies(m, wi)[{k}]" for k in range(len(recording.energies))]
+    lobes = [f"l.{name.removesuffix('.alpha_u')}" for name in recording.lobes if name.endswith(".alpha_u")]
+    answers = [f"vec4({energy}, 0.0)" for energy in energies]
+    answers += [f"vec4({lobe}.alpha_u, {lobe}.alpha_v, 0.0, 0.0)" for lobe in lobes]
     answers += ["vt_eval_pdf(m, l, wi, wo)", "vec4(vt_sample(m, l, wi, u), 0.0)"]
     inputs, text = _reading(case, made)
     cases = "\n".join(f"        case {j}: result = {answer}; break;" for j, answer in enumerate(answers))
@@ -138,13 +162,15 @@ void main() {{
 }}
 """
     textures = {"inputs": inputs, "vt_tables": made.tables}
+    if made.columns is not None:
+        textures["vt_baked"] = made.columns
     rows = inputs.shape[0]
     drawn = browser.draw(f"#version 300 es\n{made.text}{main}", textures, len(answers), rows)
     by_answer = np.moveaxis(drawn.pixels.astype(float), 0, -1)  # (answers, 4, N)
-    n = len(lobes)
+    n = len(energies)
     results = Results(
         by_answer[:n, :3],
-        np.stack([by_answer[:n, 3], by_answer[n : 2 * n, 0]], axis=1),
+        by_answer[n:-2, :2],
         by_answer[-2, :3],
         by_answer[-2, 3],
         by_answer[-1, :3],
@@ -230,7 +256,7 @@ def placed(stack: Stack, made: Shader) -> dict[str, list[float]]:
 
 def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Browser, quick: bool = False) -> np.ndarray:
     """The texture of lobes that the page works out, shape (height, width, 4), for values by place in the struct."""
-    assert made.baked is not None
+    assert isinstance(made.baked, Bake)
     baked, known = made.baked.to_dict(), dict(tables.load().items())
     job = {
         "baked": baked,

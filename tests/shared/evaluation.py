@@ -27,7 +27,8 @@ _ARITHMETIC: dict[str, Callable[..., Any]] = {
 
 
 def evaluate(outputs: Sequence[Value], values: Mapping[str, Any]) -> list[Any]:
-    """The outputs for values of the inputs: numbers (N,) and colours (3, N)."""
+    """The outputs for values of the inputs: numbers (N,) and colours (3, N); `vt_baked` is what reads a group of texels
+    at a place."""
     done: dict[Symbol, Any] = {}
 
     def of(x: Operand) -> Any:
@@ -61,9 +62,11 @@ def _evaluated(symbol: Symbol, args: list[Any], values: Mapping[str, Any]) -> An
     if symbol.op in ("component", "item"):
         return args[0][symbol.detail]
     if symbol.op == "colour":
-        return np.stack(np.broadcast_arrays(*args))
+        return np.stack(np.broadcast_arrays(*map(np.atleast_1d, args)))
     if symbol.op in ("texels", "value"):
         channels = ops.interpolate(getattr(tables.load(), symbol.detail), *args)
         return channels if symbol.op == "texels" else channels[0]
+    if symbol.op == "baked":
+        return values["vt_baked"](symbol.detail, args)
     function: Callable[..., Any] = _ARITHMETIC.get(symbol.op) or getattr(ops, symbol.op)
     return function(*args)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +15,7 @@ from velatura.shader.atlas import Layout
 from velatura.shader.bake import Bake, Group
 from velatura.shader.material import Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Output, Struct
+from velatura.shader.solved import Solution, Tabulated
 from velatura.shader.statements import statements
 from velatura.shader.symbol import Kind, Operand, Symbol
 
@@ -97,7 +98,7 @@ class PythonPrinter(Printer):
 
     # Programs
 
-    def header(self, name: str, model: str) -> str:
+    def header(self, name: str, model: str, fixed: bool) -> str:
         return f"# {name} as the model {model} has it\n"
 
     def structs(self, structs: Sequence[Struct]) -> str:
@@ -110,7 +111,7 @@ class PythonPrinter(Printer):
             for name, fields, _ in structs
         )
 
-    def parameters(self, shown: int) -> str:
+    def parameters(self, shown: int, remainder: int) -> str:
         return ""
 
     def material(self, filled: Filled) -> str:
@@ -136,7 +137,7 @@ class PythonPrinter(Printer):
             for x in layouts
         )
 
-    def lookup(self, bake: Bake) -> str:
+    def lookup(self, bake: Bake | Tabulated) -> str:
         return "".join(
             f"vt_baked_{x.name} = lambda *place: vt_read(vt_baked, {bake.nodes}, {bake.sides}, {tuple(x[1:])}, place)\n"
             for x in bake.groups
@@ -149,6 +150,9 @@ class PythonPrinter(Printer):
         lines, texts = statements(list(outputs.values()), self)
         assigned = [f"l.{name} = {text}" for name, text in zip(outputs, texts)]
         return _function("def vt_lobes(m, wi)", [*lines, "l = VtLobes()", *assigned, "return l"])
+
+    def energies(self, found: Sequence[Output]) -> str:
+        return self._returned("def vt_energies(m, wi)", found)
 
     def eval_pdf(self, value: Output, density: Output) -> str:
         return self._returned("def vt_eval_pdf(m, l, wi, wo)", [value, density])
@@ -175,6 +179,14 @@ def put(target: Any, place: str, value: Any) -> None:
     for part in path:
         target = getattr(target, part)
     setattr(target, last, value)
+
+
+def reader(baked: Tabulated, found: Solution | None = None) -> Callable[[Group, Sequence[Any]], Any]:
+    """What reads a group of texels of a solved material at a place."""
+    solved = found or baked.solved
+    assert solved is not None
+    texture = solved.texels.astype(float)
+    return lambda group, place: _read(texture, baked.nodes, baked.sides, (group.begin, group.texels), place)
 
 
 def _block(head: str, lines: Sequence[str]) -> list[str]:

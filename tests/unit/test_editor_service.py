@@ -138,7 +138,7 @@ def test_layers_models_and_textures_change_the_code(here: Path) -> None:
 
 
 def test_values_are_those_of_the_material() -> None:
-    made = shader(changed(eta=[1.4, 1.5, 1.6], alpha=0.25))
+    made = shader(changed(eta=[1.4, 1.5, 1.6], alpha=0.25), model="belcour2018")
     assert set(made["values"]) == set(made["uniforms"])
     assert made["values"]["layer0_eta"] == [1.4, 1.5, 1.6]
     assert made["values"]["layer0_alpha_u"] == 0.25
@@ -146,10 +146,29 @@ def test_values_are_those_of_the_material() -> None:
     assert (made["transmitted"], made["base"], made["thin"]) == (False, False, False)
 
 
+def test_what_is_solved_comes_with_the_code_and_by_itself() -> None:
+    """Coarse for what moves: nearly the same, for the same code."""
+    made = shader(COAT)
+    assert (made["baked"], made["tables"]) == (None, None)
+    assert made["shares"] == ["reflected[0].chance", "reflected[1].chance", "remainder_chance"]
+    assert made["shown"] == ["reflected[0]", "reflected[1]", "remainder"]
+    values = VERBS["values"]({"material": COAT})
+    assert values == {key: made[key] for key in ("values", "solution")}
+    coarse = VERBS["values"]({"material": COAT, "coarse": True})
+    fine, quick = (decoded(each["solution"]["texels"]) for each in (values, coarse))
+    assert fine.shape == quick.shape
+    assert 0 < np.abs(fine[4:] - quick[4:]).max() < 0.05  # energies
+    assert decoded(made["solution"]["remainder"]).shape == (8, 3)
+    assert VERBS["values"]({"material": COAT, "model": "belcour2018"})["solution"] is None
+    with pytest.raises(InvalidInput, match="coarse: must be true or false"):
+        VERBS["values"]({"material": COAT, "coarse": 1})
+
+
 def test_tables_are_those_that_are_read(here: Path) -> None:
     """A uniform material is worked out by a tape, which reads tables by name; a textured one by a shader."""
-    baked = shader(COAT)["baked"]
-    assert shader(COAT)["tables"] is None
+    made = shader(COAT, model="belcour2018")
+    baked = made["baked"]
+    assert (made["tables"], made["solution"]) == (None, None)
     for name in baked["tables"]:
         expected = dict(tables.load().items())[name].data
         np.testing.assert_array_equal(decoded(VERBS["table"]({"name": name})["table"]), expected)

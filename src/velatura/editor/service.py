@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from velatura import __version__
 from velatura.editor import appearance, bundle, class_maps, truth, validations
 from velatura.editor.messages import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
-from velatura.editor.shading import shading
+from velatura.editor.shading import contents, shading
 from velatura.editor.shading import tables as kept_tables
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, MODELS, SWITCHES, Model
@@ -138,9 +138,17 @@ def _names() -> Answer:
 
 def shader(body: Body) -> Answer:
     """The data to draw a material, of `shading.shading`, with the model and its switches."""
-    stack = material_of(body)
+    return shading(material_of(body), model_of(body), _stretched(body))
+
+
+def values(body: Body) -> Answer:
+    """The values of a material, of `shading.contents`, for code that is known; `coarse` ones while something moves."""
+    return contents(material_of(body), model_of(body), _stretched(body), field(body, "coarse", bool, False))
+
+
+def _stretched(body: Body) -> bool:
     written = (entry.get("interface") or {} for entry in body["material"]["layers"])
-    return shading(stack, model_of(body), stretched=any(isinstance(keys.get("alpha"), list) for keys in written))
+    return any(isinstance(keys.get("alpha"), list) for keys in written)
 
 
 def tables(body: Body) -> Answer:
@@ -197,6 +205,7 @@ def environment(body: Body) -> Answer:
 _VERBS: dict[str, Verb] = {
     "session": session,
     "shader": shader,
+    "values": values,
     "tables": tables,
     "table": table,
     "read": read,

@@ -8,15 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from velatura.editor.messages import array
 from velatura.errors import InvalidInput
 from velatura.model import Model
 from velatura.shader import Shader, atlas, constant, shader
+from velatura.shader.bake import Bake
 from velatura.stack import Address, Stack, Varying
 from velatura.stack.schema import unknown
 from velatura.tables import load
 
 #: Of an interface with a roughness for each axis, in the material that stands for all of its pattern.
 _STRETCHED = {"alpha_v": 0.2, "rotation": 30.0}
+
+COARSE = 12  # cosines
 
 
 def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
@@ -30,12 +34,11 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         InvalidInput: a stack without an interface, or a model, that there is no shader for.
     """
     made = _made(pattern(stack, stretched), model)
-    free = [(at, value) for at, value in stack.values() if at.name in made.uniforms and not isinstance(value, Varying)]
     return {
         "key": made.key,
         "text": made.text,
-        "baked": made.baked and made.baked.to_dict(),
-        "uniforms": {address.name: made.uniforms[address.name] for address, _ in free},
+        "baked": made.baked.to_dict() if isinstance(made.baked, Bake) else None,
+        "uniforms": {address.name: made.uniforms[address.name] for address, _ in _free(stack, made)},
         "tables": ",".join(made.looked_up) or None,
         "maps": [
             {"sampler": sampler, "texture": os.path.relpath(image.texture), "encoding": image.encoding}
@@ -46,11 +49,30 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
             for k, layers in enumerate(made.lobes)
         ],
         "shown": made.shown,
+        "shares": made.shares,
         "transmitted": stack.transmits,
         "base": stack.base is not None,
         "thin": stack.thin,
-        "values": {address.name: _plain(address, value) for address, value in free},
+        **_contents(stack, made),
     }
+
+
+def contents(stack: Stack, model: Model, stretched: bool, coarse: bool) -> dict[str, Any]:
+    """The values alone, for the code of `shading`, and where a material is solved its `solution`; a `coarse` one has
+    fewer directions, for what moves."""
+    return _contents(stack, _made(pattern(stack, stretched), model), COARSE if coarse else None)
+
+
+def _contents(stack: Stack, made: Shader, cosines: int | None = None) -> dict[str, Any]:
+    values = {address.name: _plain(address, value) for address, value in _free(stack, made)}
+    if made.baked is None or isinstance(made.baked, Bake):
+        return {"values": values, "solution": None}
+    found = made.baked.solve(stack, cosines)
+    return {"values": values, "solution": {"texels": array(found.texels), "remainder": array(found.remainder)}}
+
+
+def _free(stack: Stack, made: Shader) -> list[tuple[Address, Any]]:
+    return [(at, value) for at, value in stack.values() if at.name in made.uniforms and not isinstance(value, Varying)]
 
 
 def pattern(stack: Stack, stretched: bool) -> Stack:

@@ -1,4 +1,4 @@
-"""A material as shader code, and the texture of the tables that it looks up."""
+"""A material as shader code, and the texture that it reads."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ PRINTERS = {"glsl": GLSL}
 
 
 def write(request: Request) -> Export:
-    """The shader; beside it, if it looks up any tables, little-endian floats in rows of RGBA."""
+    """The shader; beside it the texture that it reads, if any, little-endian floats in rows of RGBA."""
     free = [name for name, value in request.stack.flat().items() if not isinstance(value, Varying)]
     constant = free if list(request.constant) == ["all"] else request.constant
     made = shader(request.stack, request.model, constant, printer=PRINTERS[request.to])
-    return Export(made.text, {".tables.bin": made.tables.astype("<f4").tobytes()} if made.looked_up else {})
+    read = made.tables if made.looked_up else made.columns
+    return Export(made.text, {} if read is None else {".tables.bin": read.astype("<f4").tobytes()})

@@ -57,7 +57,7 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     cos_o = ops.maximum(wo[2], 0.0)
     seen = 0.25 * _visibility(i, alpha_u, alpha_v) * cos_o / (n * n)
     # Reflect in the medium
-    o, reached = _out(p[0], p[1], n)
+    o, reached = ((p[0], p[1], ops.maximum(cos_o, COS_MIN)), True) if _is_outside(n) else _out(p[0], p[1], n)
     h = ggx.normalize((i[0] + o[0], i[1] + o[1], i[2] + o[2]))
     ops.names(i=i, o=o, h=h)
     density = ops.select(reached, seen * ggx.ndf(h, alpha_u, alpha_v), 0.0)
@@ -71,32 +71,40 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     if not _is_outside(n):
         ring = ops.maximum(n * n - 1, 0.0)
         radius = ops.sqrt(ops.maximum(p[0] * p[0] + p[1] * p[1], ops.TINY))
-        cos_far = ops.sqrt(ring) * radius / n
+        cos_far = ops.sqrt(ring) * radius * radius / n
         stretch = ops.sqrt(1 - cos_far * cos_far) / radius
         far = stretch * p[0], stretch * p[1], cos_far
         h = ggx.normalize((i[0] + far[0], i[1] + far[1], i[2] + far[2]))
         ops.names(ring=ring, radius=radius, cos_far=cos_far, stretch=stretch, far=far, h_far=h)
-        pdf = pdf + seen * ggx.ndf(h, alpha_u, alpha_v) * (n * ops.sqrt(ring) / radius)
+        pdf = pdf + seen * ggx.ndf(h, alpha_u, alpha_v) * (2 * n * ops.sqrt(ring))
     return ops.select(above, value, 0.0), ops.select(above, pdf, 0.0)
 
 
 def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
     """A direction wo from uniform numbers, by a normal visible inside.
 
-    Momenta outside the cone, a ring of radii 1 to n, are spread over the disc inside: to the square root of
-    (n^2 - p^2) / (n^2 - 1). The direction may lie below the surface, where `eval_pdf` is 0.
+    Momenta outside the cone, a ring of radii 1 to n, are spread over the disc inside: to the fourth root of
+    (n^2 - p^2) / (n^2 - 1), which keeps the density finite. The direction may lie below the surface, where `eval_pdf`
+    is 0.
     """
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     o = ggx.reflect(i, ggx.sample_visible(i, alpha_u, alpha_v, u1, u2))
+    if _is_outside(n):
+        return _out_of_frame(lobe, o)
     x, y = n * o[0], n * o[1]
     p2 = x * x + y * y
     spread = ops.divide(n * n - p2, ops.maximum(n * n - 1, 0.0))
-    r2 = ops.select(p2 > 1, ops.clip(spread, 0.0, 1.0), p2)
+    r2 = ops.select(p2 > 1, ops.sqrt(ops.minimum(spread, 1.0)), p2)
     scale = ops.select(p2 > 1, ops.sqrt(r2 / ops.maximum(p2, 1.0)), 1.0)
     z = ops.sqrt(1 - r2)
     ops.names(o=o, x=x, y=y, p2=p2, r2=r2, scale=scale, z=z)
-    w = scale * x, scale * y, ops.select(o[2] > 0, z, -z)
-    return w if _is_straight(lobe.roughness) else ggx.rotate(w, -lobe.roughness.rotation)
+    return _out_of_frame(lobe, (scale * x, scale * y, ops.select(o[2] > 0, z, -z)))
+
+
+def either(where: Value, a: OwnMediumLobe, b: OwnMediumLobe) -> OwnMediumLobe:
+    """A lobe to `sample`: that of a where a condition holds, else of b."""
+    roughness = Roughness(*(ops.select(where, x, y) for x, y in zip(a.roughness, b.roughness)))
+    return OwnMediumLobe(1.0, roughness, a.n if a.n is b.n else ops.select(where, a.n, b.n))
 
 
 def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Value:
@@ -178,6 +186,10 @@ def _visibility(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:
 
 def _in_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
     return w if _is_straight(lobe.roughness) else ggx.rotate(w, lobe.roughness.rotation)
+
+
+def _out_of_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
+    return w if _is_straight(lobe.roughness) else ggx.rotate(w, -lobe.roughness.rotation)
 
 
 def _is_straight(roughness: Roughness) -> bool:

@@ -30,11 +30,13 @@ class Recursion(ABC):
             facets that it is; so forward lobes are lossless, and the symmetric form is balanced.
         from_lowest: total internal reflection depends on the lowest index above, else on that of the medium above.
         closed_form: an interface that has a given lobe follows in closed form (Bati et al. 2021).
+        solved: uniform materials are solved for all directions (`velatura.model.solution`).
     """
 
     has_gain: ClassVar[bool]
     from_lowest: ClassVar[bool]
     closed_form: ClassVar[bool]
+    solved: ClassVar[bool]
 
     @abstractmethod
     def lobes(self, prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
@@ -84,6 +86,7 @@ class Adding(Recursion):
     has_gain = False
     from_lowest = False
     closed_form = True
+    solved = False
 
     def lobes(self, prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
         from velatura.model import adding
@@ -106,6 +109,7 @@ class Momentum(Recursion):
     has_gain = True
     from_lowest = True
     closed_form = False
+    solved = True
 
     def lobes(self, prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
         from velatura.model import momentum

@@ -146,6 +146,10 @@ class Seen:
     passage: Passage | None
     columns: Columns
 
+    def turned(self, w: Direction, by: Direction) -> Direction:
+        """A direction as this side sees it; all light comes from above where nothing passes."""
+        return upright(w, by) if self.passage else w
+
     @property
     def interfaces(self) -> int:
         return 1 + max(shape.interface for shape in self.shapes)
@@ -228,9 +232,9 @@ class Solved:
 
     def seen(self, wi: Direction) -> tuple[Seen, Value]:
         """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
-        turned = upright(wi, wi)
         if self.below is None:
-            return self.above.seen(turned), 1.0
+            return self.above.seen(wi), 1.0
+        turned = upright(wi, wi)
         where = wi[2] > 0
         columns = select(where, self.above.at(turned), self.below.at(turned))
         side = replace(
@@ -255,12 +259,13 @@ class Solved:
     def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ALL) -> tuple[Direction, Value]:
         """A direction wo, and the index on its side over that on the side of wi."""
         of, eta = self.seen(wi)
-        i, drawn = upright(wi, wi), of.only(asked)
-        wo = of.polynomial.sample(i, u1, u2)
+        i, drawn = of.turned(wi, wi), of.only(asked)
         begin = 1 - drawn.chances[-1]
-        for lobe, chance in zip(reversed(of.lobes), reversed(drawn.chances[:-1])):
-            wo = chosen_direction(u < begin, own_medium.sample(lobe, i, u1, u2), wo)
+        within, lobe = u < begin, of.lobes[-1]
+        for above, chance in zip(of.lobes[-2::-1], drawn.chances[-2:0:-1]):
             begin = begin - chance
+            lobe = own_medium.either(u < begin, above, lobe)
+        wo = chosen_direction(within, own_medium.sample(lobe, i, u1, u2), of.polynomial.sample(i, u1, u2))
         if of.passage is None or drawn.passes is None:
             return wo, 1.0
         again = ops.clip(ops.divide(u, drawn.share), 0.0, passed.BELOW_ONE)
@@ -291,8 +296,8 @@ def eval_pdf(
     of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Asked
 ) -> tuple[Value, Value]:
     """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
-    i, o, drawn = upright(wi, wi), upright(wo, wi), of.only(asked)
-    i_back, o_back = upright(wi, wo), upright(wo, wo)
+    i, o, drawn = of.turned(wi, wi), of.turned(wo, wi), of.only(asked)
+    i_back, o_back = of.turned(wi, wo), of.turned(wo, wo)
     cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
     value: Value = 0.0
     whole: Value = 0.0

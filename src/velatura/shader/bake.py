@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import prod
 from typing import Any, NamedTuple
 
 from velatura import ops
@@ -56,6 +57,11 @@ class Bake:
     def sides(self) -> int:
         """1 where light comes from above only."""
         return 1 if self.body.below is None else 2
+
+    @property
+    def height(self) -> int:
+        """Lines of the texture."""
+        return len(self.columns) // 4 * self.sides * prod(self.nodes[1:])
 
     @cached_property
     def tape(self) -> Tape:
@@ -112,7 +118,7 @@ def _apart(colour: Value) -> list[Operand]:
     return [component(operand(colour), channel) for channel in range(3)]
 
 
-def _together(r: Value, g: Value, b: Value) -> Value:
+def together(r: Value, g: Value, b: Value) -> Value:
     return Symbol("colour", (r, g, b), "colour")
 
 
@@ -120,7 +126,7 @@ def _together(r: Value, g: Value, b: Value) -> Value:
 
 
 @dataclass(frozen=True)
-class _Texture:
+class Texture:
     """The columns of a group, over direction, on one side."""
 
     shape: tuple[int, ...]
@@ -139,11 +145,11 @@ class _Texture:
 class _Base(Base):
     """A base whose light is read."""
 
-    texture: _Texture
+    texture: Texture
 
     def through(self, w: Direction) -> Value:
         r, g, b, _ = self.texture(w)
-        return _together(r, g, b)
+        return together(r, g, b)
 
 
 def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], facets: Sequence[bool]) -> bsdf.Lobed:
@@ -156,8 +162,8 @@ def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], fac
     def lobes(prepared: Prepared, side: Value) -> precomputed_lobes.Lobes:
         first = prepared.layers[0]
         own = [first if each and isinstance(first, PreparedInterface) else None for each in facets]
-        columns = _Texture(nodes, held, side, _OF_BASE if prepared.base else 0)
-        return precomputed_lobes.PrecomputedLobes(columns, _together, 3, prepared, own, transmits)
+        columns = Texture(nodes, held, side, _OF_BASE if prepared.base else 0)
+        return precomputed_lobes.PrecomputedLobes(columns, together, 3, prepared, own, transmits)
 
     if body.below is not None:
         return replace(body, lobes_above=lobes(body.above, sides[0]), lobes_below=lobes(body.below, sides[1]))
@@ -165,10 +171,10 @@ def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], fac
     read = replace(body, lobes_above=above, lobes_below=above)
     if body.above.base is None:
         return read
-    columns, through = _Texture(nodes, held, 0.0), _Texture(nodes, groups[0], 0.0)
+    columns, through = Texture(nodes, held, 0.0), Texture(nodes, groups[0], 0.0)
 
     def base(w: Direction) -> Base:
         channels = list(columns(w))[:_OF_BASE]
-        return _Base(body.above, _together(*channels[:3]), _together(*channels[3:]), through)
+        return _Base(body.above, together(*channels[:3]), together(*channels[3:]), through)
 
     return replace(read, base_above=base)

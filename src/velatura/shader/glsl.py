@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from velatura.shader.atlas import WIDTH, Layout, height
 from velatura.shader.bake import Bake, Group
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import CHOICE, Output, Printer, Struct
-from velatura.shader.recording import SHOWN
 from velatura.shader.statements import statements
-from velatura.shader.symbol import Kind, Operand, Symbol
+from velatura.shader.symbol import REMAINDER, SHOWN, Kind, Operand, Symbol
+
+if TYPE_CHECKING:  # it loads SciPy
+    from velatura.shader.solved import Tabulated
 
 _TYPES: dict[str, str] = {"number": "float", "colour": "vec3", "condition": "bool", "conditions": "bvec3"}
 _COMPARE = {"less": "lessThan", "greater": "greaterThan", "at_most": "lessThanEqual", "at_least": "greaterThanEqual"}
@@ -127,8 +130,9 @@ class Glsl(Printer):
 
     # Programs
 
-    def header(self, name: str, model: str) -> str:
-        return _HEADER.format(name=name, model=model)
+    def header(self, name: str, model: str, fixed: bool) -> str:
+        filled = "" if fixed else "        // or from uniforms, or your own textures"
+        return _HEADER.format(name=name, model=model, filled=filled)
 
     def structs(self, structs: Sequence[Struct]) -> str:
         def member(name: str, kind: str, count: int) -> str:
@@ -139,8 +143,9 @@ class Glsl(Printer):
             for struct in structs
         )
 
-    def parameters(self, shown: int) -> str:
-        return f"uniform VtMaterial {PARAMETERS};\n\nuniform float {SHOWN}[{shown}];\n"
+    def parameters(self, shown: int, remainder: int) -> str:
+        colours = f"uniform vec3 {REMAINDER}[{remainder}];\n" if remainder else ""
+        return f"uniform VtMaterial {PARAMETERS};\n\nuniform float {SHOWN}[{shown}];\n{colours}"
 
     def material(self, filled: Filled) -> str:
         samplers = [
@@ -166,8 +171,8 @@ class Glsl(Printer):
     def tables(self, layouts: Sequence[Layout]) -> str:
         return "\n".join([_TABLES.format(WIDTH, height(layouts)), _TEXELS + "".join(map(_table, layouts))])
 
-    def lookup(self, bake: Bake) -> str:
-        texel = _BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides)
+    def lookup(self, bake: Bake | Tabulated) -> str:
+        texel = _BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides, height=bake.height)
         return "".join([texel, *map(_group, bake.groups)])
 
     def helpers(self) -> str:
@@ -177,6 +182,13 @@ class Glsl(Printer):
         lines, texts = statements(list(outputs.values()), self)
         assigned = [f"l.{name} = {text};" for name, text in zip(outputs, texts)]
         return _function("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [*lines, "", "VtLobes l;", *assigned, "return l;"])
+
+    def energies(self, found: Sequence[Output]) -> str:
+        lines, texts = statements(found, self)
+        array = f"vec3[{len(found)}]"
+        return _function(
+            f"{array} vt_energies(VtMaterial m, vec3 wi)", [*lines, f"return {array}({', '.join(texts)});"]
+        )
 
     def eval_pdf(self, value: Output, density: Output) -> str:
         lines, texts = statements([value, density], self)
@@ -231,32 +243,26 @@ def _table(layout: Layout) -> str:
 _HEADER = """\
 // {name} as the model {model} has it; GLSL ES 3.00, written by Velatura.
 //
-//     VtMaterial m = vt_material(uv);        // or from uniforms, or your own textures
+//     VtMaterial m = vt_material(uv);{filled}
 //     VtLobes l = vt_lobes(m, wi);           // once for a direction of view
 //     vec4 f = vt_eval_pdf(m, l, wi, wo);    // f(wi, wo) |cos theta_o|, and the density of vt_sample
 //     vec3 wo = vt_sample(m, l, wi, u);      // from three uniform numbers; f may be 0 there
 //
 // Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
+// `velatura export -o` writes the texture that is read beside this text, row by row.
 
 precision highp float;
 precision highp int;
 """
 
 _WRAPPERS = """\
-// f(wi, wo) |cos theta_o|
-vec3 vt_eval(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
-    return vt_eval_pdf(m, l, wi, wo).rgb;
-}
-
-// Density of vt_sample, per solid angle
-float vt_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) {
-    return vt_eval_pdf(m, l, wi, wo).a;
-}
+// f(wi, wo) |cos theta_o|, and the density of vt_sample per solid angle
+vec3 vt_eval(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) { return vt_eval_pdf(m, l, wi, wo).rgb; }
+float vt_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) { return vt_eval_pdf(m, l, wi, wo).a; }
 """
 
 _TABLES = """\
 // Averages of Fresnel over rough interfaces: RGBA32F, {} x {} texels, never filtered.
-// `velatura export -o` writes them beside this text, row by row.
 uniform highp sampler2D vt_tables;
 """
 
@@ -317,7 +323,7 @@ float vt_volume(int start, ivec3 nodes, vec3 at) {{
 
 _BAKED = {
     1: """\
-// The lobes over direction: RGBA32F, never filtered
+// The lobes over direction: RGBA32F, {0} x {height} texels, never filtered
 uniform highp sampler2D vt_baked;
 
 vec4 vt_baked_texel(int texel, vec3 place) {{
@@ -328,17 +334,16 @@ vec4 vt_baked_texel(int texel, vec3 place) {{
 }}
 """,
     2: """\
-// The lobes over direction: RGBA32F, never filtered
+// The lobes over direction: RGBA32F, {0} x {height} texels, never filtered
 uniform highp sampler2D vt_baked;
 
 vec4 vt_baked_texel(int texel, vec3 place) {{
     vec2 position = clamp(place.xy, 0.0, 1.0) * vec2({0} - 1, {1} - 1);
     ivec2 node = min(ivec2(position), ivec2({0}, {1}) - 2);
+    ivec2 at = node + ivec2(0, ({sides} * texel + int(place.z)) * {1});
     vec2 upper = position - vec2(node);
-    int line = ({sides} * texel + int(place.z)) * {1} + node.y;
-    vec4 a = texelFetch(vt_baked, ivec2(node.x, line), 0), b = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
-    line++;
-    vec4 c = texelFetch(vt_baked, ivec2(node.x, line), 0), d = texelFetch(vt_baked, ivec2(node.x + 1, line), 0);
+    vec4 a = texelFetch(vt_baked, at, 0), b = texelFetch(vt_baked, at + ivec2(1, 0), 0);
+    vec4 c = texelFetch(vt_baked, at + ivec2(0, 1), 0), d = texelFetch(vt_baked, at + 1, 0);
     return mix(mix(a, b, upper.x), mix(c, d, upper.x), upper.y);
 }}
 """,
@@ -359,6 +364,5 @@ vec3 vt_sin(vec3 x) {
 float vt_sin(float x) { return vt_sin(vec3(x)).x; }
 vec3 vt_cos(vec3 x) { return vt_sin(x + 1.57079633); }
 float vt_cos(float x) { return vt_sin(x + 1.57079633); }
-
 bvec3 vt_both(bvec3 a, bvec3 b) { return bvec3(a.x && b.x, a.y && b.y, a.z && b.z); }
 """

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from velatura.shader.atlas import Layout
     from velatura.shader.bake import Bake, Group
     from velatura.shader.material import Filled
+    from velatura.shader.solved import Tabulated
 
 Output: TypeAlias = tuple[Operand, Kind]  # a value, and the kind as which it is returned
 
@@ -141,16 +142,17 @@ class Printer(ABC):
     # Programs
 
     @abstractmethod
-    def header(self, name: str, model: str) -> str:
-        """Comments that describe the material and how the code is called, and the required first lines."""
+    def header(self, name: str, model: str, fixed: bool) -> str:
+        """Comments that describe the material, whose values may be `fixed`, and how the code is called, and the
+        required first lines."""
 
     @abstractmethod
     def structs(self, structs: Sequence[Struct]) -> str:
         """Declarations of structs, each before those that contain it."""
 
     @abstractmethod
-    def parameters(self, shown: int) -> str:
-        """The uniforms that change: a material, and the weights of a number of lobes."""
+    def parameters(self, shown: int, remainder: int) -> str:
+        """The uniforms that change: a material, weights of a number of lobes, and a number of colours of remainders."""
 
     @abstractmethod
     def material(self, filled: Filled) -> str:
@@ -161,7 +163,7 @@ class Printer(ABC):
         """The texture of tables, and functions that look up each of them in it."""
 
     @abstractmethod
-    def lookup(self, bake: Bake) -> str:
+    def lookup(self, bake: Bake | Tabulated) -> str:
         """The texture of lobes over direction, and functions that look up each group of its texels."""
 
     @abstractmethod
@@ -171,6 +173,10 @@ class Printer(ABC):
     @abstractmethod
     def lobes(self, outputs: Mapping[str, Output]) -> str:
         """`vt_lobes(m, wi)`, which fills the struct; outputs by their place in it."""
+
+    @abstractmethod
+    def energies(self, found: Sequence[Output]) -> str:
+        """`vt_energies(m, wi)`, of the parts of a solved material."""
 
     @abstractmethod
     def eval_pdf(self, value: Output, density: Output) -> str:

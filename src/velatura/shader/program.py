@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from velatura.shader.printer import Field, Printer, Struct
 from velatura.shader.recording import Recording, part, record
 from velatura.stack import MaterialLike, Texture, load
 
+if TYPE_CHECKING:  # it loads SciPy
+    from velatura.shader.solved import Tabulated
+
 
 @dataclass(frozen=True)
 class Shader:
@@ -28,8 +31,10 @@ class Shader:
     and where they lie in the struct (`layer0.eta`). `maps` are the textures of the material by sampler.
 
     Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baked` is what works out
-    the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point.
-    `lobes` are the layers whose light each reflected lobe is, seen from above.
+    the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point. A solved material
+    always has one; `columns` is the texture of a single one.
+    `lobes` are the layers whose light each reflected lobe is, seen from above; `shares` names the energies or chances,
+    fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
     """
 
     text: str
@@ -38,17 +43,25 @@ class Shader:
     maps: Mapping[str, Texture]
     lobes: Sequence[Sequence[int]]
     shown: Sequence[str]
-    baked: Bake | None
+    shares: Sequence[str]
+    baked: Bake | Tabulated | None
 
     @property
     def tables(self) -> np.ndarray:
         """The texture of the tables that are looked up, float32 of shape (height, width, 4)."""
         return atlas.texture(self.looked_up)
 
+    @property
+    def columns(self) -> np.ndarray | None:
+        """The texture `vt_baked` of a material that is solved, float32 of shape (height, width, 4)."""
+        if self.baked is None or isinstance(self.baked, Bake) or self.baked.solved is None:
+            return None
+        return self.baked.solved.texels
+
     @cached_property
     def key(self) -> str:
         """Equal for equal code."""
-        tape = self.baked.tape if self.baked else None
+        tape = self.baked.tape if isinstance(self.baked, Bake) else None
         return hashlib.sha256(f"{self.text}{tape}".encode()).hexdigest()[:16]
 
 
@@ -65,7 +78,8 @@ def shader(
     Args:
         stack: a material (a stack, a file, or a preset's name). Its kinds of layers make the code; its values go into
             `vt_material`, which gives them.
-        constant: flat names of values that never change, which are worked out now and are not in the struct.
+        constant: flat names of values that never change, which are worked out now and are not in the struct. Of a
+            material that is solved, all are.
         values: plain values as `literals`, or as `uniforms` that a user changes; then the code is the same for all
             of them, be roughnesses equal or not, and lobes are drawn once for a change, and read.
         printer: the language; GLSL ES 3.00 by default.
@@ -80,15 +94,16 @@ def shader(
     layouts, filled = atlas.layouts(looked_up), material.filled(stack, read, bool(shown))
     name = "A material" if shown else " ".join(stack.name.split()) or "A material"
     parts = [
-        printer.header(name, _described(recording.model)),
+        printer.header(name, _described(recording.model), bool(recording.energies)),
         printer.structs(material.structs(stack, read)),
-        *([printer.parameters(len(shown))] if shown else []),
+        *([printer.parameters(len(shown), _colours(baked))] if shown else []),
         printer.material(filled),
         printer.structs(_structs(recording)),
         *([printer.tables(layouts)] if layouts else []),
         *([printer.lookup(baked)] if baked else []),
         printer.helpers(),
         printer.lobes({name: (value, recording.kinds[name]) for name, value in recording.lobes.items()}),
+        *([printer.energies([(value, "colour") for value in recording.energies])] if recording.energies else []),
         printer.eval_pdf((recording.value, "colour"), (recording.density, "number")),
         printer.sample([(w, "number") for w in recording.drawn]),
     ]
@@ -99,14 +114,30 @@ def shader(
         maps=filled.samplers,
         lobes=_interfaces(recording),
         shown=shown,
+        shares=_shares(recording),
         baked=baked,
     )
 
 
+def _colours(baked: Bake | Tabulated | None) -> int:
+    """How many of the remainder change with values."""
+    return 0 if baked is None or isinstance(baked, Bake) else baked.colours
+
+
 def _interfaces(recording: Recording) -> list[list[int]]:
-    """By reflected lobe, seen from above: the layers whose light it is."""
+    """By reflected lobe that is shown, seen from above: the layers whose light it is."""
     places = recording.stack.surfaces[: len(recording.stack.interfaces)]
+    if recording.energies:
+        return [[place] for place in places]
     return [[places[k] for k in group] for group in merging(recording.model, len(places))]
+
+
+def _shares(recording: Recording) -> list[str]:
+    baked = recording.baked
+    if baked and not isinstance(baked, Bake):
+        return baked.shares if recording.shown else []
+    energies = [name for name in recording.kinds if name.endswith("energy")]
+    return [*(name for name in energies if name.startswith("t")), *(name for name in energies if name[0] != "t")]
 
 
 def _described(model: Model) -> str:
@@ -119,11 +150,12 @@ def _described(model: Model) -> str:
 def _structs(recording: Recording) -> list[Struct]:
     """A lobe, and all that is known once wi is."""
     kinds = recording.kinds
-    count = sum(name.startswith("reflected") and name.endswith("energy") for name in kinds)
+    places = dict.fromkeys(name.rpartition(".")[0] for name in kinds if "." in name)
+    count = sum(place.startswith("reflected") for place in places)
     parts = {part(name): kind for name, kind in kinds.items() if "." in name}
     members = [Field("reflected", "VtLobe", count)] if count else []
-    members += [Field("transmitted", "VtLobe")] if "transmitted.energy" in kinds else []
-    members += [Field(name, "colour") for name in kinds if "." not in name]
+    members += [Field("transmitted", "VtLobe")] if "transmitted" in places else []
+    members += [Field(name, kind) for name, kind in kinds.items() if "." not in name]
     return [
         Struct("VtLobe", [Field(name, kind) for name, kind in parts.items()], "rotation in radians"),
         Struct("VtLobes", members, "of light from one direction"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
 from velatura import ops
 from velatura.errors import InvalidInput
@@ -25,7 +25,8 @@ from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
 from velatura.stack import Address, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
 
-SHOWN = "vt_shown"  # in the code: the weights of lobes
+if TYPE_CHECKING:  # it loads SciPy
+    from velatura.shader.solved import Tabulated
 
 
 @dataclass(frozen=True)
@@ -33,15 +34,17 @@ class Recording:
     """The model's computation for a stack: `lobes` from material and wi, the rest from these, wo, and random numbers u.
 
     Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ... `baked` is the texture that
-    lobes are read from, if they are not added up; `shown` names the weights of lobes, where they have any.
+    lobes are read from, if they are not added up; `shown` names the weights of lobes, where they have any. `energies`
+    are those of all parts of a solved material, whose lobes do not hold them.
     """
 
     stack: Stack
     model: Model
-    baked: Bake | None
+    baked: Bake | Tabulated | None
     shown: Sequence[str]
     kinds: Mapping[str, Kind]
     lobes: Mapping[str, Operand]
+    energies: Sequence[Operand]
     value: Operand
     density: Operand
     drawn: Sequence[Operand]
@@ -49,7 +52,7 @@ class Recording:
     @cached_property
     def symbols(self) -> list[Symbol]:
         """All computed values, and all inputs."""
-        return in_order([*self.lobes.values(), self.value, self.density, *self.drawn])
+        return in_order([*self.lobes.values(), *self.energies, self.value, self.density, *self.drawn])
 
     @cached_property
     def read(self) -> dict[str, str]:
@@ -59,7 +62,7 @@ class Recording:
     @property
     def parameters(self) -> dict[str, str]:
         """Those that anything reads: a tape, which stands for the code that works out the lobes, reads others."""
-        return {**self._places(set(self.baked.tape.inputs)), **self.read} if self.baked else self.read
+        return {**self._places(set(self.baked.tape.inputs)), **self.read} if isinstance(self.baked, Bake) else self.read
 
     def _places(self, inputs: Collection[str]) -> dict[str, str]:
         places = {address.name: material.place(address) for address, _ in self.stack.values()}
@@ -94,28 +97,49 @@ def record(
     wi, wo, u = _direction("wi"), _direction("wo"), _direction("u")
 
     # Run the model
-    kind = structure(stack) if parameters else variance(stack)
-    recorded = Material.of(stack, lambda at, value: material.constant(at, value) if at.name in constant else _input(at))
-    prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     uniform = not any(isinstance(value, Varying) for value in flat.values())
-    baked = bake(recorded, prepared()) if parameters and uniform else None
+    constants = flat if chosen.recursion.solved and uniform and not parameters else constant
+    recorded = Material.of(
+        stack, lambda at, value: material.constant(at, value) if at.name in constants else _input(at)
+    )
+    kind = structure(stack) if parameters else variance(stack)
+    prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
+    baked: Bake | Tabulated | None = None
+    if uniform and chosen.recursion.solved:
+        from velatura.shader.solved import tabulated
+
+        baked = tabulated(stack, recorded, chosen, kind, general=parameters)
+    elif uniform and parameters:
+        baked = bake(recorded, prepared())
     shown: list[str] = []
     with ops.readable():
-        body = baked.body if baked else prepared()
-        if parameters:
-            body, shown = _weighed(body)
-        base = body.above.base if baked is None else None  # the values read of a base hold all of it
-        fields, kinds = _fields(bsdf.scattered(body, wi), base.worth if base else ())
+        energies: list[Value] = []
+        if baked is None or isinstance(baked, Bake):
+            body: bsdf.Body
+            body, fields, shown = _lobed(baked.body if baked else prepared(), wi, baked is None, parameters)
+        else:
+            body, fields, energies = baked.body, baked.fields(wi, parameters), baked.energies(wi)
+            shown = baked.shown if parameters else []
         value, density = body.eval_pdf(wi, wo)
         drawn, _ = body.sample(wi, *u)
 
     # Read the values that the lobes hold
-    graph = Graph()
-    lobes = dict(zip(fields, graph.unique(list(fields.values()))))
+    graph, kinds = Graph(), _kinds(fields)
+    every = iter(graph.unique([*fields.values(), value, density, *drawn]))
+    lobes = {name: next(every) for name in fields}
     held = {x: _held(name, kinds[name], x) for name, x in reversed(lobes.items()) if _worth(x)}
-    rest = Graph(held)
-    evaluated, sampled = rest.unique(graph.unique([value, density])), rest.unique(graph.unique(drawn))
-    return Recording(stack, chosen, baked, shown, kinds, lobes, evaluated[0], evaluated[1], sampled)
+    of_value, of_density, *sampled = Graph(held).unique(list(every))
+    found = Graph().unique(energies)
+    return Recording(stack, chosen, baked, shown, kinds, lobes, found, of_value, of_density, sampled)
+
+
+def _lobed(
+    body: bsdf.Lobed, wi: Direction, added: bool, parameters: bool
+) -> tuple[bsdf.Lobed, dict[str, Value], list[str]]:
+    """A body, all that is known of it once wi is, and the names of its weights; `added` where lobes are added up."""
+    weighed, shown = _weighed(body) if parameters else (body, [])
+    base = body.above.base if added else None  # the values read of a base hold all of it
+    return weighed, _fields(bsdf.scattered(weighed, wi), base.worth if base else ()), shown
 
 
 def _worth(x: Operand) -> TypeGuard[Symbol]:
@@ -156,7 +180,7 @@ def _weighed(body: bsdf.Lobed) -> tuple[bsdf.Lobed, list[str]]:
     """A body with a weight for each reflected lobe, its base and its transmitted lobe; and their names."""
     count = len(merging(body.above.model, sum(isinstance(layer, PreparedInterface) for layer in body.above.layers)))
     names = [f"reflected[{k}]" for k in range(count)]
-    last = symbol.number(f"{SHOWN}[{count}]")
+    last = symbol.number(f"{symbol.SHOWN}[{count}]")
 
     def lobe(seen: Lobe, weight: Value) -> Lobe:
         gain = seen.gain * weight if seen.facets else seen.gain
@@ -165,7 +189,7 @@ def _weighed(body: bsdf.Lobed) -> tuple[bsdf.Lobed, list[str]]:
     def weighed(lobes: precomputed_lobes.Lobes) -> precomputed_lobes.Lobes:
         def shown(w: Direction) -> tuple[list[Lobe], Lobe | None]:
             reflected, passed = lobes(w)
-            weights = [symbol.number(f"{SHOWN}[{k}]") for k in range(count)]
+            weights = [symbol.number(f"{symbol.SHOWN}[{k}]") for k in range(count)]
             return [lobe(*pair) for pair in zip(reflected, weights)], lobe(passed, last) if passed else None
 
         return shown
@@ -181,7 +205,7 @@ def _weighed(body: bsdf.Lobed) -> tuple[bsdf.Lobed, list[str]]:
     return (replace(shown, base_above=base), [*names, "base"]) if body.above.base else (shown, names)
 
 
-def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> tuple[dict[str, Value], dict[str, Kind]]:
+def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> dict[str, Value]:
     """All that is known once wi is, by its place in the struct; `worth` is that of the light over a diffuse base."""
     lobes = {f"reflected[{k}]": lobe for k, lobe in enumerate(seen.reflected)}
     if seen.transmitted is not None:
@@ -192,12 +216,17 @@ def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> tuple[dict[str, Val
     fields = {f"{place}.{part}": value for place, all_parts in parts.items() for part, value in all_parts.items()}
     if seen.base:
         fields |= {"base_scale": seen.base.scale, "base_energy": seen.base.energy}
-    worths = {f"base_worth{k}": value for k, value in enumerate(worth)}
-    fields |= worths
-    # A part is a colour in all lobes, where it is in one
-    wide = {"energy", "base_scale", "base_energy", *worths}
-    wide |= {part(name) for name, value in fields.items() if symbol.is_colour(operand(value))}
-    return fields, {name: "colour" if part(name) in wide else "number" for name in fields}
+    return fields | {f"base_worth{k}": value for k, value in enumerate(worth)}
+
+
+def _kinds(fields: Mapping[str, Value]) -> dict[str, Kind]:
+    """By place: a part is a colour in all lobes, where it is in one, or may be."""
+    wide = {part(name) for name, value in fields.items() if symbol.is_colour(operand(value)) or _is_energy(name)}
+    return {name: "colour" if part(name) in wide else "number" for name in fields}
+
+
+def _is_energy(name: str) -> bool:
+    return part(name) == "energy" or name.startswith("base_")
 
 
 def part(name: str) -> str:

@@ -11,7 +11,7 @@ from velatura.shader.printer import ATOM, CONDITION, NEGATIVE, Output, Printer
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
 
 ARGUMENTS = frozenset({"m", "l", "wi", "wo", "u"})  # of the functions
-_LONG = 72  # characters of an expression that gets a name of its own
+_LONG = 104  # characters of an expression that gets a name of its own
 _COMPARE = ("less", "greater", "at_most", "at_least")
 
 

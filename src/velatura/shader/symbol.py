@@ -20,6 +20,9 @@ from velatura.ops import Unrolled, Value
 Kind: TypeAlias = Literal["number", "colour", "condition", "conditions", "texels", "loop"]
 Operand: TypeAlias = "Symbol | float | bool | tuple[float, ...]"
 
+SHOWN = "vt_shown"  # in the code: the weights of lobes
+REMAINDER = "vt_remainder"  # the colours of the remainders of both sides, where they change
+
 _serials = count()
 _depth: ContextVar[int] = ContextVar("depth", default=0)  # of loops that are being recorded
 _CONDITIONS = {"less", "greater", "at_most", "at_least", "both"}
@@ -187,6 +190,12 @@ class Recorder(Unrolled):
         if op.startswith("_"):
             raise AttributeError(op)
         return lambda *args: record(op, *args)
+
+    def cos(self, x: Symbol) -> Value:
+        return record("cos", x.args[0] if x.op == "negative" else x)
+
+    def sin(self, x: Symbol) -> Value:
+        return -record("sin", x.args[0]) if x.op == "negative" else record("sin", x)
 
     def select(self, condition: Value, a: Value, b: Value) -> Value:
         asked, chosen, other = operand(condition), operand(a), operand(b)

@@ -78,7 +78,7 @@ def energies(
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(INCIDENCES))])
     nodes = Nodes.of(indices(everything), NODES)
     basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES)
-    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, SAMPLES, often)
+    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, SAMPLES, often, made)
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)

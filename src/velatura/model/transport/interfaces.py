@@ -8,7 +8,7 @@ tables of multiple scattering say.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -172,7 +172,8 @@ def _smith(w: tuple[Array, Array, Array], alpha: tuple[float, float]) -> Array:
 @dataclass(frozen=True)
 class Setting:
     """How light is described: its basis, beams of momenta of length p at azimuths phi (M,), and how finely facets are
-    sampled. With the tables of multiple scattering facets are met often, else once.
+    sampled. With the tables of multiple scattering facets are met often, else once. What is `made` of interfaces is
+    kept for others.
     """
 
     basis: Basis
@@ -180,6 +181,7 @@ class Setting:
     phi: Array
     samples: int
     often: Tables | None = None
+    made: dict[Hashable, Any] = field(default_factory=dict)
 
     @property
     def ways(self) -> list[bool]:
@@ -263,6 +265,14 @@ class _Met:
 
     @classmethod
     def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
+        """Once for interfaces that are alike but for their rotation."""
+        key = facets.key, p.tobytes(), psi.tobytes(), setting.basis, setting.samples, *setting.ways
+        if key not in setting.made:
+            setting.made[key] = cls._of(facets, p, psi, setting)
+        return setting.made[key]
+
+    @classmethod
+    def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
         """In blocks of sources that a processor's cache holds."""
         size = max(BLOCK // setting.samples, 1)
 
@@ -273,7 +283,7 @@ class _Met:
             blocked = found.blocked_reflected, found.blocked_refracted, found.whole
             return cls(basis.deposited(found.reflected), refracted, found.kept, *blocked)
 
-        every = [vars(met(first)).values() for first in range(0, len(p), size)]
+        every = [vars(met(first)).values() for first in range(0, max(len(p), 1), size)]
         whole: list[Any] = [None if each[0] is None else np.concatenate(each, axis=-1) for each in zip(*every)]
         return cls(*whole)
 
@@ -291,26 +301,27 @@ class _Side:
     @classmethod
     def of(cls, facets: Facets, setting: Setting) -> _Side:
         basis, turn = setting.basis, facets.rotation
-        p = np.concatenate([np.tile(basis.nodes.p, len(basis.azimuths)), setting.p])
-        psi = np.concatenate([np.repeat(basis.azimuths, basis.nodes.count), basis.relative(setting.phi, turn)])
-        met = _Met.of(facets, p, psi, setting)
-        count = len(p) - len(setting.p)
+        along_axes = replace(facets, rotation=0.0)
+        p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
+        at_nodes = _Met.of(along_axes, p, psi, setting)
+        of_beams = _Met.of(along_axes, setting.p, basis.relative(setting.phi, turn), setting)
 
-        def operators(light: Array | None) -> tuple[Operator, Operator]:
-            if light is None:
+        def operators(nodes: Array | None, beams: Array | None) -> tuple[Operator, Operator]:
+            if nodes is None or beams is None:
                 nothing = Operator.nothing(basis.size, len(setting.p))
                 return nothing, nothing
-            both = basis.operators(light[..., :count], turn), basis.columns(light[..., count:], turn)
+            both = basis.operators(nodes, turn), basis.columns(beams, turn)
             found = [Operator.of(*each) for each in zip(*(np.split(x, len(setting.ways)) for x in both))]
             return found[0], found[-1]
 
-        r, t = operators(met.reflected), operators(met.refracted)
+        r, t = operators(at_nodes.reflected, of_beams.reflected), operators(at_nodes.refracted, of_beams.refracted)
         if setting.often is None:
             return cls(r, t, None)
         weights = basis.nodes.weights(float(ops.mean(facets.above)))
         blocked = []
-        for share in _again_shares(facets, setting.often, p, met):
-            rows, beams = basis.rows(share[:, :count], turn), share[:, count:]
+        shares = [_again_shares(facets, setting.often, q, met) for q, met in ((p, at_nodes), (setting.p, of_beams))]
+        for nodes, beams in zip(*shares):
+            rows = basis.rows(nodes, turn)
             emitted = rows * weights
             blocked.append(_Blocked(rows, beams, emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)))
         return cls(r, t, (blocked[0], blocked[1]))

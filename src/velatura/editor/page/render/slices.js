@@ -9,13 +9,16 @@ export const radians = (angle) => (angle * Math.PI) / 180;
 export const degrees = (angle) => (angle * 180) / Math.PI;
 
 /**
- * Parts of the light, in the order of all answers: reflected lobes seen from above, then what is transmitted,
- * or the diffuse base; each `{kind, place, layers}`.
+ * Parts of the light, in the order of all answers: reflected lobes seen from above, then the remainder of a solved
+ * material, what is transmitted, or the diffuse base; each `{kind, place, layers}`, and in the code its `energy`, and
+ * the `lobe` that has its roughness, if any.
  */
-export function partsOf({ shown, lobes }) {
+export function partsOf({ shown, lobes, solution }) {
   return shown.map((place, k) => {
     const kind = place.startsWith('reflected') ? 'reflected' : place;
-    return { kind, place, layers: lobes[k]?.layers ?? [] };
+    const isLobe = kind === 'reflected' || (kind === 'transmitted' && !solution);
+    const energy = solution ? `energies[${k}]` : `l.${kind === 'base' ? 'base_energy' : `${place}.energy`}`;
+    return { kind, place, layers: lobes[k]?.layers ?? [], energy, lobe: isLobe ? `l.${place}` : null };
   });
 }
 
@@ -50,7 +53,7 @@ export class Slices {
     this.below = below && slot.shader.transmitted;
     this.parts = partsOf(slot.shader);
     this.#device = slot.device;
-    this.#values = slot.values;
+    this.#values = slot.contents.values;
     const incidence = { vt_angle: angle, vt_azimuth: radians(azimuth), vt_side: this.below ? -1 : 1 };
     this.#uniforms = { ...slot.uniforms(), ...incidence, vt_shown: this.only(null) };
   }
@@ -97,9 +100,9 @@ export class Slices {
     const pixels = await this.drawn(this.#lobesProgram, width, 2 * this.parts.length, [{}]);
     const at = (x, y, channel) => pixels[4 * (y * width + x) + channel];
     const row = (value) => Array.from({ length: width }, (_, x) => value(x));
-    return this.parts.map(({ kind }, k) => ({
+    return this.parts.map(({ lobe }, k) => ({
       energy: row((x) => [0, 1, 2].map((channel) => at(x, 2 * k, channel))),
-      ...(kind !== 'base' && {
+      ...(lobe && {
         alpha: [0, 1].map((axis) => row((x) => at(x, 2 * k + 1, axis))),
         rotation: row((x) => at(x, 2 * k + 1, 2)),
       }),
@@ -204,7 +207,7 @@ const colours = (pixels) =>
 // Code ------------------------------------------------------------------------------------------------
 
 /** Two rows for each part, energies and roughnesses; a column for each angle of incidence. */
-const lobesProgram = ({ text }, parts) => `#version 300 es
+const lobesProgram = ({ text, shown, solution }, parts) => `#version 300 es
 ${text}
 uniform float vt_angle, vt_azimuth, vt_side;
 out vec4 vt_result;
@@ -213,18 +216,19 @@ void main() {
     int column = int(gl_FragCoord.x);
     float angle = radians(column < ${DEGREES} ? float(column) : vt_angle);
     vec3 wi = vec3(sin(angle) * vec2(cos(vt_azimuth), sin(vt_azimuth)), vt_side * cos(angle));
-    VtLobes l = vt_lobes(vt_material(vec2(0.5)), wi);
+    VtMaterial m = vt_material(vec2(0.5));
+    VtLobes l = vt_lobes(m, wi);
+    ${solution ? `vec3 energies[${shown.length}] = vt_energies(m, wi);` : ''}
     switch (int(gl_FragCoord.y)) {
 ${parts.map(cases).join('\n')}
     }
 }
 `;
 
-function cases({ kind, place }, k) {
-  const energy = kind === 'base' ? 'base_energy' : `${place}.energy`;
-  const rest = kind === 'base' ? '0.0' : `l.${place}.alpha_u, l.${place}.alpha_v, l.${place}.rotation, 0.0`;
+function cases({ energy, lobe }, k) {
+  const rest = lobe ? `${lobe}.alpha_u, ${lobe}.alpha_v, ${lobe}.rotation, 0.0` : '0.0';
   return `\
-        case ${2 * k}: vt_result = vec4(l.${energy}, 0.0); break;
+        case ${2 * k}: vt_result = vec4(${energy}, 0.0); break;
         case ${2 * k + 1}: vt_result = vec4(${rest}); break;`;
 }
 

@@ -1,17 +1,16 @@
 // A material on the stage: its programs, its parameters, its lobes, and the light that was added up.
 
+import { decode } from '../arrays.js';
 import { Bake } from './bake.js';
 import { adding, learning } from './glsl/display.glsl.js';
 import { lighting } from './glsl/preview.glsl.js';
 import { tracer } from './glsl/tracer.glsl.js';
 import { sobol } from './sobol.js';
 
-const SHOWN = 8; // lobes that may be shown alone
-
 export class Slot {
   device;
   shader = null; // the answer of call("shader")
-  values = null; // by flat name
+  contents = null; // {values by flat name, solution}, as call("values") has them
   lobe = null; // the one that is shown alone, by its number
   samples = 0;
   preview = null; // the target that it is drawn to
@@ -25,6 +24,7 @@ export class Slot {
   #learning = null;
   #textures = {}; // by the names of their samplers
   #bake = null;
+  #solved = null; // texels, and colours of the remainder, that Python has worked out
   #placed = {}; // values by their places in the shader's struct
   #outdated = true; // whether the bake is of other values
   #coarse = false; // whether it is a coarse one
@@ -44,7 +44,7 @@ export class Slot {
   }
 
   /** Takes a material; compiles where its code is new. The one before stays until all is ready. */
-  async setMaterial(shader, values) {
+  async setMaterial(shader, contents) {
     const { device } = this;
     if (this.shader?.key !== shader.key) {
       this.#asked = shader;
@@ -66,21 +66,23 @@ export class Slot {
       shader.maps?.forEach(({ sampler }, i) => (this.#textures[sampler] = maps[i]));
       this.#setBake(Object.fromEntries(baked.map((name, k) => [name, looked[k]])));
     }
-    this.setValues(values);
+    this.setContents(contents);
   }
 
   #setBake(tables) {
-    const { device, shader } = this;
+    const { device, shader } = this, solved = shader.solution?.texels.shape;
     this.#bake = shader.baked && new Bake(shader.baked, tables);
-    if (this.#bake) this.#textures.vt_baked = device.texture('RGBA32F', this.#bake.width, this.#bake.height);
+    const [height, width] = solved ?? [this.#bake?.height, this.#bake?.width];
+    if (height) this.#textures.vt_baked = device.texture('RGBA32F', width, height);
   }
 
-  setValues(values) {
-    this.values = values;
+  setContents(contents) {
+    const { values, solution } = (this.contents = contents);
     this.#placed = {};
     for (const [name, place] of Object.entries(this.shader.uniforms)) {
       if (name in values) this.#placed[place] = values[name];
     }
+    this.#solved = solution && { texels: decode(solution.texels).array, remainder: decode(solution.remainder).array };
     this.#outdated = true;
   }
 
@@ -94,10 +96,12 @@ export class Slot {
       this.device.fill(this.#textures.vt_baked, this.#bake.draw(this.#placed, coarse));
       this.#coarse = coarse;
     }
+    if (this.#solved && this.#outdated) this.device.fill(this.#textures.vt_baked, this.#solved.texels);
     this.#outdated = false;
-    const shown = Array.from({ length: SHOWN }, (_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
+    const shown = this.shader.shown.map((_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
     const parameters = Object.entries(this.#placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
-    return { ...Object.fromEntries(parameters), ...this.#textures, vt_shown: shown };
+    const remainder = this.#solved && { vt_remainder: this.#solved.remainder };
+    return { ...Object.fromEntries(parameters), ...this.#textures, ...remainder, vt_shown: shown };
   }
 
   // The picture

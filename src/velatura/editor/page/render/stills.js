@@ -27,11 +27,11 @@ export class Thumbnails {
   }
 
   /** An ImageData of a material; `uniforms` are the stage's for that size. */
-  async draw(shader, values, { size, samples, exposure, uniforms }) {
+  async draw(shader, contents, { size, samples, exposure, uniforms }) {
     const device = this.#device;
     const slot = (this.#slot ??= new Slot(device, this.#loader));
     if (slot.pass?.width !== size) slot.setSize(size, size);
-    await slot.setMaterial(shader, values);
+    await slot.setMaterial(shader, contents);
     slot.samples = 0;
     while (slot.samples < samples) {
       slot.trace(uniforms);

@@ -82,10 +82,10 @@ export class Viewport {
     if (this.sources.parts) this.#placeObject();
   }
 
-  /** A material in slot "a" or "b": the answer of call("shader"), and values by flat name. */
-  async setMaterial(slot, shader, values = shader.values) {
+  /** A material in slot "a" or "b": the answer of call("shader"), and maybe another one of call("values"). */
+  async setMaterial(slot, shader, contents = shader) {
     const known = this.slots[slot].shader?.key === shader.key;
-    await this.slots[slot].setMaterial(shader, values);
+    await this.slots[slot].setMaterial(shader, contents);
     if (!known) this.forget(slot);
     this.#changed();
   }
@@ -93,7 +93,7 @@ export class Viewport {
   /** Makes ready for a material that may come: compiles its programs, and draws a pixel, which some devices wait for. */
   async prepare(shader) {
     const slot = (this.coming ??= new Slot(this.device, this.loader));
-    await slot.setMaterial(shader, shader.values);
+    await slot.setMaterial(shader, shader);
     slot.warm(this.gbuffer, this.uniforms());
   }
 
@@ -103,8 +103,8 @@ export class Viewport {
   }
 
   /** Other values of the same material: nothing is compiled. */
-  setValues(slot, values) {
-    this.slots[slot].setValues(values);
+  setContents(slot, contents) {
+    this.slots[slot].setContents(contents);
     this.#changed();
   }
 
@@ -204,9 +204,9 @@ export class Viewport {
   }
 
   /** A small square picture of another material on the same object, from here; an ImageData. */
-  thumbnail(shader, values, size, samples) {
+  thumbnail(shader, contents, size, samples) {
     const uniforms = this.uniforms({ width: size, height: size });
-    return this.thumbnails.draw(shader, values, { size, samples, exposure: this.settings.exposure, uniforms });
+    return this.thumbnails.draw(shader, contents, { size, samples, exposure: this.settings.exposure, uniforms });
   }
 
   /** The uniforms of object, light and camera, for a picture of a size. */
@@ -243,9 +243,9 @@ export class Viewport {
     this.#fit();
     if (truth) this.setTruth(truth);
     await this.ready;
-    for (const [name, { shader, values, lobe }] of Object.entries(slots)) {
+    for (const [name, { shader, contents, lobe }] of Object.entries(slots)) {
       this.slots[name].setLobe(lobe);
-      if (shader) await this.slots[name].setMaterial(shader, values);
+      if (shader) await this.slots[name].setMaterial(shader, contents);
     }
     if (sources.environment) this.#placeLight();
     if (sources.parts) this.#placeObject();

@@ -19,6 +19,9 @@ class Slot {
   #failed = false; // whether it refused that
   #busy = false;
   #timer = null;
+  #moved = null; // the state whose values Python is to work out next, with the question
+  #moving = false; // whether it is at work on some
+  #settled = false; // whether the state is drawn, and not a coarse answer
 
   constructor(name, services) {
     this.#name = name;
@@ -26,7 +29,7 @@ class Slot {
   }
 
   get quiet() {
-    return !this.#wanted && !this.#busy;
+    return !this.#wanted && !this.#busy && !this.#moving;
   }
 
   stop() {
@@ -43,13 +46,21 @@ class Slot {
     const known = shape === this.drawn;
     this.#asked = text;
     this.#failed = false;
+    this.#settled = false;
     this.#state = state;
     this.#shape = shape;
-    if (known) this.#setValues();
     this.#wanted = { material, model, switches, shape };
     clearTimeout(this.#timer);
-    if (known) this.#timer = setTimeout(() => this.#ask(), PAUSE);
-    else this.#ask();
+    this.#timer = null;
+    const { viewport, session } = this.#services, isSolved = Boolean(this.shader?.solution);
+    if (!known || (isSolved && !viewport.held)) return this.#ask();
+    this.#timer = setTimeout(() => {
+      this.#timer = null;
+      this.#ask();
+    }, PAUSE);
+    if (!isSolved) return this.#setContents(contentsOf(this.shader, state, session), state);
+    this.#moved = { state, shape, question: { material, model, switches, coarse: true } };
+    return this.#move();
   }
 
   /** Takes a state of the same material, opened anew maybe, for the one that was asked for. */
@@ -58,12 +69,29 @@ class Slot {
     this.#state = state;
   }
 
-  #setValues() {
-    const { viewport, session, onBaked } = this.#services, name = this.#name, state = this.#state;
+  #setContents(contents, state) {
+    const { viewport, onBaked } = this.#services, name = this.#name;
     if (state.document !== this.given?.document) viewport.forget(name);
-    viewport.setValues(name, valuesOf(this.shader, state, session));
+    viewport.setContents(name, contents);
     this.given = state;
     onBaked(name);
+  }
+
+  /** Has Python work out what is drawn of values that move, one request at a time and only the latest. */
+  async #move() {
+    if (this.#moving) return;
+    this.#moving = true;
+    while (this.#moved) {
+      const { state, shape, question } = this.#moved;
+      this.#moved = null;
+      try {
+        const contents = await this.#services.call('values', question);
+        if (shape === this.drawn && !this.#settled) this.#setContents(contents, state);
+      } catch {
+        // The reason is shown when the shader is asked for, after a pause
+      }
+    }
+    this.#moving = false;
   }
 
   /** Requests the shader of the wanted state, one request at a time and only the latest. */
@@ -71,7 +99,7 @@ class Slot {
     if (this.#busy) return;
     const { call, onProblem } = this.#services;
     this.#busy = true;
-    while (this.#wanted) {
+    while (this.#wanted && this.#timer === null) {
       const { shape, ...question } = this.#wanted;
       this.#wanted = null;
       try {
@@ -87,28 +115,29 @@ class Slot {
   }
 
   async #accept(shader, shape) {
-    const { viewport, session, onShader, onProblem } = this.#services;
+    const { viewport, session, onShader, onProblem } = this.#services, state = this.#state;
+    const contentsNow = () => (shader.solution ? shader : contentsOf(shader, this.#state, session));
     if (shader.key !== this.shader?.key) {
-      const state = this.#state;
-      await viewport.setMaterial(this.#name, shader, valuesOf(shader, state, session));
+      await viewport.setMaterial(this.#name, shader, contentsNow());
       this.shader = shader;
       this.given = state;
     }
     this.drawn = shape;
-    if (shape === this.#shape) this.#setValues();
+    this.#settled = !this.#wanted;
+    if (shape === this.#shape) this.#setContents(contentsNow(), shader.solution ? state : this.#state);
     onProblem(this.#name, null);
     onShader(this.#name, shader);
   }
 }
 
-/** A state's values in the form that a shader takes them: three for what may be a colour. */
-export function valuesOf(shader, state, session) {
+/** What a shader whose material is not solved takes of a state: values, three for what may be a colour. */
+export function contentsOf(shader, state, session) {
   const values = flat(state, session);
   const shaped = ([key, old]) => {
     const value = values[key] ?? old;
     return [key, Array.isArray(old) && !Array.isArray(value) ? old.map(() => value) : value];
   };
-  return Object.fromEntries(Object.entries(shader.values).map(shaped));
+  return { values: Object.fromEntries(Object.entries(shader.values).map(shaped)), solution: null };
 }
 
 const isSame = (a, b) => ['origin', 'target', 'fov'].every((key) => String(a[key]) === String(b[key]));

@@ -271,7 +271,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
       const at = ({ angles, parts }) =>
         parts.map(({ alpha }) => alpha?.map((axis) => valueAt({ x: angles, y: axis }, cursor)) ?? null);
       return {
-        plot: overAngle('Equivalent roughness of each lobe along both axes', 'equivalent alpha', lines, cursor),
+        plot: overAngle('Roughness of each lobe along both axes', 'alpha', lines, cursor),
         read: { title: `Alpha along u, v at ${shown(cursor)}°`, parts: at(a), all: null, other: b && { parts: at(b), all: null } },
       };
     },
@@ -311,10 +311,11 @@ export function mountInspector(element, { store, session, viewport, call, pictur
     const azimuth = radians(made.azimuth);
     const angle = reflected ? made.angle : made.refracted;
     if (angle === null) return [];
+    const isOutside = (k) => k === 0 || !made.shader.solution; // other solved lobes have the roughness in their medium
     return made
       .chosen()
       .map((part, k) => ({ ...part, k, kind: made.parts[k].kind }))
-      .filter(({ k, kind, alpha }) => alpha && seen(k) && (kind === 'reflected') === reflected)
+      .filter(({ k, kind, alpha }) => alpha && seen(k) && isOutside(k) && (kind === 'reflected') === reflected)
       .map((part) => ({ k: part.k, dashed, points: outline(part, Math.sin(radians(angle)), azimuth) }));
   }
 
@@ -329,7 +330,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
 
   const tagOf = (k) => {
     const { kind, layers } = slices.a.parts[k];
-    if (kind !== 'reflected') return kind === 'base' ? 'base' : 'T';
+    if (kind !== 'reflected') return { base: 'base', remainder: 'rest', transmitted: 'T' }[kind];
     return seenLayers(layers).join('+');
   };
 
@@ -343,6 +344,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
   function nameOf(k) {
     const { kind, layers } = slices.a.parts[k];
     if (kind === 'base') return 'diffuse base';
+    if (kind === 'remainder') return 'remainder';
     if (kind === 'transmitted') return 'T transmitted';
     const all = enabled(slices.a.state);
     return seenLayers(layers).map((layer) => `${layer} ${described(all[layer], session.layers)}`).join(', ');

@@ -18,16 +18,13 @@ ${blurredEnvironment}
 ${parts(shader)}
 ${OBJECT}`;
 
-/** The lobes, and the base, in the order in which vt_sample divides its first number among them. */
-function parts({ lobes, transmitted, base }) {
-  const energies = [
-    ...(transmitted ? ['transmitted.energy'] : []),
-    ...lobes.map(({ place }) => `${place}.energy`),
-    ...(base ? ['base_energy'] : []),
-  ];
-  const assigned = energies.map((energy, k) => `shares[${k}] = dot(l.${energy}, vec3(1.0)) + 3e-9;`);
+/** The parts in the order in which vt_sample divides its first number among them, by energies, or by chances. */
+function parts({ shares }) {
+  const assigned = shares.map((place, k) => `shares[${k}] = whole(l.${place}) + 3e-9;`);
   return `
-const int PARTS = ${energies.length};
+const int PARTS = ${shares.length};
+float whole(vec3 energy) { return dot(energy, vec3(1.0)); }
+float whole(float chance) { return chance; }
 float[PARTS] part_shares(VtLobes l) {
   float shares[PARTS];
   ${assigned.join('\n  ')}

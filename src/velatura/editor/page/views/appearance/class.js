@@ -5,7 +5,7 @@ import { ref } from 'lit-html/directives/ref.js';
 import { decode } from '../../arrays.js';
 import { setMember } from '../../state/commands.js';
 import { layersOf, pattern } from '../../state/material.js';
-import { valuesOf } from '../../state/picture.js';
+import { contentsOf } from '../../state/picture.js';
 import { shown } from '../plots/scale.js';
 import { pathOf } from './path.js';
 import { deepest, plane } from './plane.js';
@@ -186,7 +186,8 @@ async function small({ store, session, call, viewport, picture, isQuiet }, mater
   const state = { ...store.get(), layers: layersOf(material) };
   const { model, switches } = state;
   const known = picture.shader('a');
-  const shader =
-    known && pattern(state) === pattern(store.get()) ? known : await call('shader', { material, model, switches });
-  return viewport.thumbnail(shader, valuesOf(shader, state, session), SMALL, samples);
+  const question = { material, model, switches };
+  const shader = known && pattern(state) === pattern(store.get()) ? known : await call('shader', question);
+  const solved = shader === known && shader.solution && (await call('values', question));
+  return viewport.thumbnail(shader, solved || contentsOf(shader, state, session), SMALL, samples);
 }

@@ -1,0 +1,276 @@
+"""A uniform material of a solved model in a shader: a texture of its columns over direction, and numbers for the rest.
+
+The columns are those of `velatura.model.solution`, four to a texel: first what light is drawn with, then energies,
+which few programs read. Where a user changes values, they all have a place; else columns that are the same are one, and
+constant ones are numbers in the code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model import Model, solution, straight_through
+from velatura.model.context import Context, at_a_point
+from velatura.model.passed import Parts
+from velatura.model.remainder import Remainder
+from velatura.model.solution import Layout, SolvedSide, Solver
+from velatura.model.solved import Columns, Side, Solved
+from velatura.model.solved_grid import Grid
+from velatura.model.variance import Variance
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+from velatura.shader.bake import Group, Texture, together
+from velatura.shader.symbol import REMAINDER, SHOWN, colour, number
+from velatura.stack import InterfaceValues, Material, MediumValues, Stack
+
+OF_POLYNOMIAL = 8  # colours
+FAINTLY = 1e-3  # chance that is added to that of every reflected part, where some are shown alone
+NORMAL = (0.0, 0.0, 1.0)
+SCATTERING = 1.0, 0.9  # optical depth and asymmetry of media below which veils are seen
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a shader reads of a material: texels (height, width, 4), and colours (8 sides, 3) of the remainders."""
+
+    texels: Array
+    remainder: Array
+
+
+@dataclass(frozen=True)
+class Places:
+    """Groups of texels that are read together, and of each column its place in them, or its value if it is constant."""
+
+    groups: Sequence[Group]
+    places: Sequence[int | float]
+
+    @property
+    def texels(self) -> int:
+        return sum(group.texels for group in self.groups)
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """A material, or all of its kind, whose columns are read from a texture by the recorded `body`.
+
+    A line of texels holds one of them for all cosines; lines go over azimuths, sides and texels. `nodes` are those over
+    the cosine and maybe the azimuth.
+    """
+
+    body: Solved
+    solver: Solver
+    layouts: Sequence[Layout]
+    columns: Places
+    solved: Solution | None = None  # of one material
+
+    @property
+    def groups(self) -> Sequence[Group]:
+        return self.columns.groups
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        return self.solver.shape
+
+    @property
+    def sides(self) -> int:
+        """1 where light comes from above only."""
+        return 1 if self.body.below is None else 2
+
+    @property
+    def colours(self) -> int:
+        """Of the remainders of both sides."""
+        return OF_POLYNOMIAL * self.sides
+
+    @property
+    def turns(self) -> int:
+        """Nodes over the azimuth."""
+        return self.nodes[1] if len(self.nodes) > 1 else 1
+
+    @property
+    def height(self) -> int:
+        """Lines of the texture."""
+        return self.columns.texels * self.sides * self.turns
+
+    @property
+    def interfaces(self) -> list[int]:
+        """By lobe: the number of its interface from the top."""
+        return [each.interface for each in self.layouts[0].lobes]
+
+    @property
+    def shown(self) -> list[str]:
+        """What has a weight: interfaces, by the first lobe of each, the remainder, and what passes."""
+        first = [f"reflected[{self.interfaces.index(k)}]" for k in dict.fromkeys(self.interfaces)]
+        return [*first, "remainder", *(["transmitted"] if self.sides > 1 else [])]
+
+    def fields(self, wi: Direction, general: bool) -> dict[str, Value]:
+        """All that values and samples take from wi, by its place in the struct; in `general`, the two parts of samples
+        of light that goes straight through as well."""
+        seen, _ = self.body.seen(wi)
+        columns, found = seen.columns, dict[str, Value]()
+        for k, (lobe, chance) in enumerate(zip(seen.lobes, columns.chances)):
+            parts = {"weight": lobe.weight, **lobe.roughness._asdict(), "chance": chance}
+            found |= {f"reflected[{k}].{part}": value for part, value in parts.items()}
+        found |= {"remainder": columns.scale, "remainder_chance": columns.chance}
+        if columns.passes:
+            found |= {f"passed_{name}": value for name, value in vars(columns.passes).items()}
+        if general and columns.passes and seen.passage:
+            passes = ops.mean(straight_through.entered(seen.passage, seen.turned(wi, wi)).passes[0])
+            straight = columns.passes.of_straight
+            found |= {"passed_refracted": straight * passes, "passed_mirrored": straight * (1 - passes)}
+        return found
+
+    @property
+    def shares(self) -> list[str]:
+        """The fields by which samples are shared in `general`, in the order in which they follow one another."""
+        through = ["refracted", "mirrored", "of_bounced", "of_rest"] if self.sides > 1 else []
+        chances = [f"reflected[{k}].chance" for k in range(len(self.interfaces))]
+        return [*(f"passed_{name}" for name in through), *chances, "remainder_chance"]
+
+    def energies(self, wi: Direction) -> list[Value]:
+        """Of what `shown` names, colours."""
+        columns = self.body.seen(wi)[0].columns
+        lobes = list(zip(columns.energies, self.interfaces))
+        found = [sum(energy for energy, each in lobes if each == k) for k in dict.fromkeys(self.interfaces)]
+        return [*found, columns.rest, *([] if columns.passed is None else [columns.passed])]
+
+    def solve(self, stack: Stack, cosines: int | None = None) -> Solution:
+        """A stack of this kind, maybe at fewer cosines than usual."""
+        grid = Grid(self.solver.isotropic, cosines) if cosines else self.solver.grid
+        solver = replace(self.solver, grid=grid, made={})
+        found = solver.solve(_numbers(stack), self.layouts)
+        return Solution(self.texels(_rows(solver, found)), np.concatenate(list(map(_colours, found))))
+
+    def texels(self, rows: Array) -> Array:
+        """The texture of columns, (rows, sides, nodes)."""
+        columns = np.zeros((4 * self.columns.texels, self.sides, self.nodes[0], self.turns), np.float32)
+        for row, place in zip(rows, self.columns.places, strict=True):
+            if isinstance(place, int):
+                columns[place] = row.reshape(columns.shape[1:])
+        return columns.reshape(-1, 4, *columns.shape[1:]).transpose(0, 2, 4, 3, 1).reshape(self.height, -1, 4)
+
+
+def tabulated(stack: Stack, material: Material, model: Model, variance: type[Variance], general: bool) -> Tabulated:
+    """The recorded body of a stack; a `general` one is that of all values, and has weights of its parts."""
+    solver, plain = Solver.of(model, variance, Context()), _numbers(stack)
+    layouts = solver.layouts([_eventful(plain) if general else plain])
+    found = None if general else solver.solve(plain, layouts)
+    rows = None if found is None else _rows(solver, found)
+    sides = []
+    for k, (seen, layout) in enumerate(zip(solution.sides(material.solid()), layouts)):
+        colours = [colour(f"{REMAINDER}[{OF_POLYNOMIAL * k + j}]") for j in range(OF_POLYNOMIAL)]
+        polynomial = Remainder(*(_colours(found[k]) if found else colours))
+        context = replace(at_a_point(), colour=together)
+        sides.append(solver.side(seen, layout, None, polynomial, context))
+    columns = _placed(sides[0], rows)
+    for k, beam in enumerate(_beams(len(sides), model)):
+        curves = _Curves(columns, tuple(Texture(solver.shape, group, beam) for group in columns.groups))
+        sides[k] = replace(_Weighed(**vars(sides[k])) if general else sides[k], curves=curves)
+    made = Tabulated(solver.bsdf(material.solid(), sides), solver, layouts, columns)
+    if found is None or rows is None:
+        return made
+    return replace(made, solved=Solution(made.texels(rows), np.concatenate(list(map(_colours, found)))))
+
+
+def _beams(sides: int, model: Model) -> list[Value]:
+    """The side of the texture that each side reads: where light is, but for the symmetric form, which looks at both."""
+    if sides == 1:
+        return [0.0]
+    return [0.0, 1.0] if model.form == "symmetric" else [ops.select(number("wi.z") > 0, 0.0, 1.0)] * 2
+
+
+def _placed(side: Side, rows: Array | None) -> Places:
+    """Where columns lie; those that are the same, if they are known, lie in one place."""
+    counted = count()
+    numbered = replace(side, curves=lambda w: counted, colour=lambda *channels: channels).at(NORMAL)
+    total = next(counted)
+    energies = {k for each in (*numbered.energies, numbered.rest, numbered.passed or ()) for k in each}
+    constants: list[float | None] = [None] * total
+    first = list(range(total))
+    if rows is not None:
+        rows = rows.astype(np.float32)
+        constants = [float(row.flat[0]) if np.ptp(row) == 0 else None for row in rows]
+        first = [next(k for k, other in enumerate(rows) if np.array_equal(row, other)) for row in rows]
+    groups, places, begin = [], dict[int, int](), 0
+    for name, wanted in (("columns", False), ("energies", True)):
+        own = [k for k in range(total) if first[k] == k and constants[k] is None and (k in energies) == wanted]
+        places |= {k: 4 * begin + j for j, k in enumerate(own)}
+        texels = -(-len(own) // 4)
+        groups += [Group(name, begin, texels)] if texels else []
+        begin += texels
+    return Places(groups, [x if x is not None else places[k] for k, x in zip(first, constants)])
+
+
+@dataclass(frozen=True)
+class _Curves:
+    """The columns for a direction, as the code reads them."""
+
+    columns: Places
+    textures: tuple[Texture, ...]
+
+    def __call__(self, w: Direction) -> list[Value]:
+        read = [x for texture in self.textures for x in texture(w)]
+        return [read[place] if isinstance(place, int) else place for place in self.columns.places]
+
+
+@dataclass(frozen=True)
+class _Weighed(Side):
+    """A side with a weight, 0 or 1, for each interface, the remainder, and what passes."""
+
+    def at(self, w: Direction) -> Columns:
+        columns, numbers = super().at(w), [shape.interface for shape in self.shapes]
+        shown = [number(f"{SHOWN}[{k}]") for k in (*numbers, max(numbers) + 1, max(numbers) + 2)]
+        *lobes, rest, through = shown
+        kept = [x * (chance + FAINTLY) for x, chance in zip(shown, [*columns.chances, columns.chance])]
+        passes = columns.passes
+        total = sum(kept) + (through * passes.share if passes else 0.0)
+        chances = [ops.divide(x, total) for x in kept]
+        if passes:
+            weights = [through * x for x in (passes.straight, passes.bounced, passes.rest)]
+            parts = (passes.of_straight, passes.of_bounced, passes.of_rest)
+            passes = Parts(*weights, *(ops.divide(through * x, total) for x in parts))
+        return Columns(
+            [x * weight for x, weight in zip(lobes, columns.weights)],
+            columns.roughness,
+            chances[:-1],
+            [x * energy for x, energy in zip(lobes, columns.energies)],
+            rest * columns.scale,
+            chances[-1],
+            rest * columns.rest,
+            passes,
+            None if columns.passed is None else through * columns.passed,
+        )
+
+
+def _numbers(stack: Stack) -> Material:
+    return solution.plain(Material.of(stack).solid())
+
+
+def _rows(solver: Solver, found: Sequence[SolvedSide]) -> Array:
+    """Columns on the grid that is read, (rows, sides, nodes)."""
+    return np.stack([solver.grid.spread(side.rows, solver.shape) for side in found], axis=1)
+
+
+def _colours(side: SolvedSide) -> Array:
+    return side.numbers.reshape(OF_POLYNOMIAL, -1)
+
+
+def _eventful(material: Material) -> Material:
+    """Of which all is drawn that layers like these may have: media scatter, and all indices differ."""
+    depth, g = SCATTERING
+
+    def eventful(k: int, layer: Any) -> Any:
+        if isinstance(layer, MediumValues):
+            return replace(layer, depth=depth, sigma_s=np.ones((3, 1)), g=g)
+        dielectric = isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
+        return replace(layer, eta=material.exterior * (1.5 + 0.1 * k)) if dielectric else layer
+
+    return replace(material, layers=tuple(eventful(k, layer) for k, layer in enumerate(material.layers)))
