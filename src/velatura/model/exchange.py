@@ -103,7 +103,7 @@ def _leaving(kernel: Array, factor: Array) -> Array:
 
 
 def _ratio(energy: Array, light: Array) -> Array:
-    return np.where(light > DARK, energy / np.maximum(light, DARK), 1.0)
+    return np.where(light > DARK, np.maximum(energy, 0) / np.maximum(light, DARK), 1.0)
 
 
 def _bounded(factor: Array, most: float) -> Array:

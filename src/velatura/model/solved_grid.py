@@ -75,7 +75,7 @@ class Grid:
 
     def spread(self, rows: Array, shape: tuple[int, ...]) -> Array:
         """Values at the nodes, (..., M), interpolated, (..., prod(shape)): by splines over the cosine, by waves over
-        the azimuth."""
+        the azimuth, which do not fall below 0 where no value does."""
         values = rows.reshape(*rows.shape[:-1], self.cosines, self.turns)
         if not self.isotropic:
             x, y, _ = directional_grid.directions(shape, None)
@@ -83,7 +83,8 @@ class Grid:
             order = np.arange(self.turns // 2 + 1)
             both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
             waves = np.fft.rfft(values, axis=-1) / self.turns * both
-            values = (waves @ np.exp(2j * order[:, None] * phi)).real
+            least = values.min(axis=-1, keepdims=True)
+            values = np.maximum((waves @ np.exp(2j * order[:, None] * phi)).real, np.minimum(least, 0))
         fine = PchipInterpolator(self.nodes, values, axis=-2)(np.linspace(0, 1, shape[0]))
         return np.asarray(fine.reshape(*rows.shape[:-1], -1))
 

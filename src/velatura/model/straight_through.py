@@ -45,6 +45,7 @@ from velatura.stack import InterfaceValues, Material, MediumValues
 
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
 WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
+NARROW_MIN = 2e-5  # of it, across the brushing
 COS_MIN = 0.02  # in slabs that light crosses, and in those that it cannot enter
 GRAZING = 1e-4  # cosine outside
 NODES = (16, 24)  # of the quadrature
@@ -151,7 +152,8 @@ def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Varia
     eta = layer.eta / above
     ratio = ops.mean(layer.eta) / ops.mean(above)  # and so its inverse from the other side
     sign = ops.select(ratio > 1, -1.0, ops.select(ratio < 1, 1.0, 0.0))
-    least = WIDTH_MIN * n_1 * ops.sqrt(ratio / (u * v))
+    widths = ops.maximum(WIDTH_MIN / ops.sqrt(u * v), NARROW_MIN / ops.minimum(u, v))
+    least = n_1 * ops.sqrt(ratio) * widths
     return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least)
 
 
