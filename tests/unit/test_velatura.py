@@ -94,11 +94,13 @@ def test_smooth_stacks_reflect_by_fresnel_and_absorption(reflectance: str) -> No
 
 def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
     """What is evaluated is F D G / 4 cos, with Fresnel at the half-vector."""
-    from velatura.model import bsdf
+    from velatura.model import variance_kind
+    from velatura.model.context import Context
     from velatura.optics import fresnel, ggx
 
     stack = Stack([Interface(alpha=(0.1, 0.3), rotation=20, **GOLD)])
-    body = bsdf.body(Material.of(stack), named("velatura", reflectance="fgd"))
+    material, model = Material.of(stack), named("velatura", reflectance="fgd")
+    body = model.recursion.body(material, model, variance_kind(material), Context())
     rng = np.random.default_rng(0)
     wi, wo = (w / np.linalg.norm(w, axis=0) for w in abs(rng.normal(size=(2, 3, 200))))
     value, _ = body.eval_pdf(tuple(wi), tuple(wo))

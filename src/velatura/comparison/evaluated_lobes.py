@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
-from velatura.model import Model, adding, bsdf, mixture
+from velatura.model import Model, adding, bsdf, mixture, variance_kind
+from velatura.model.context import Context
 from velatura.model.diffuse import Base
+from velatura.model.lobe_statistics import StackLobes
+from velatura.model.stack_lobes import stack_lobes
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import WalkedLobe
 from velatura.reference.distribution import BINS
-from velatura.sampling.low_discrepancy import square
+from velatura.sampling.low_discrepancy import at_nodes, square
 from velatura.stack import Material, Stack
 
 Array = NDArray[np.floating]
@@ -42,22 +45,29 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     """
     if model.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since the truth has one roughness a lobe")
-    body = bsdf.body(Material.of(stack), model)
-    columns = [_column(body, wi) for wi in directions(cos_theta, 0.0)]
+    material = Material.of(stack).solid()
+    body = model.recursion.body(material, model, variance_kind(material), Context())
+    remainder: Array | float = 0.0
+    if isinstance(body, bsdf.Lobed):
+        columns = [_column(body, wi) for wi in directions(cos_theta, 0.0)]
+    else:
+        statistics = stack_lobes(stack, cos_theta, 0.0, model)
+        remainder = 0.0 if stack.base else statistics.remainder
+        columns = [_drawn(body, stack, statistics, j, wi) for j, wi in enumerate(directions(cos_theta, 0.0))]
 
     names = [field.name for field in dataclasses.fields(WalkedLobe)]
     rows = zip(*(lobes for lobes, _ in columns))
     lobes = tuple(WalkedLobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in rows)
     reflected, transmitted = (lobes[:-1], lobes[-1]) if stack.transmits else (lobes, None)
     grids = np.stack([grid for _, grid in columns], axis=1)
-    return Account(reflected, transmitted, grids.sum(axis=(2, 3)), grids)
+    return Account(reflected, transmitted, grids.sum(axis=(2, 3)), grids, remainder)
 
 
 def _column(body: bsdf.Lobed, incident: Array) -> tuple[list[WalkedLobe], Array]:
     """The lobes of one direction, and the distribution (3, bins, bins) of reflected light."""
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
-    each, _ = body.above.model.recursion.lobes(body.above, wi)
+    each, _ = adding.lobes(body.above, wi)
     seen = bsdf.scattered(body, wi)
     lights = [_sampled(body, lobe, wi, k) for k, lobe in enumerate(seen.reflected)]
     # A model that merges lobes still has one for each interface
@@ -69,6 +79,35 @@ def _column(body: bsdf.Lobed, incident: Array) -> tuple[list[WalkedLobe], Array]
     if seen.transmitted:
         lobes.append(_described(seen.transmitted, _sampled_below(body, seen.transmitted, wi)))
     return lobes, np.sum([distribution(light) for light in lights], axis=0)
+
+
+def _drawn(
+    body: bsdf.Body, stack: Stack, statistics: StackLobes, j: int, incident: Array
+) -> tuple[list[WalkedLobe], Array]:
+    """As `_column`, of a body that is solved, by its components. The remainder is the light of a diffuse base, if there
+    is one, and else in no lobe."""
+    x, y, z = incident[:, None]
+    wi: Direction = (x, y, z)
+    u = at_nodes(1, LIT_SAMPLES, None)
+
+    def light(part: int | None) -> Light:
+        each = [k == part for k in range(count + 1)]
+        asked = bsdf.Asked(each if part is not None else False, part is None, radiance=False)
+        wo, _ = body.sample(wi, *u, asked)
+        return _light(wo, *body.eval_pdf(wi, wo, asked))
+
+    count = len(statistics.energy)
+    lights = [light(k) for k in range(count + 1)]
+    lobes = [
+        _lobe(energy[:, j, None], (alpha[0, j], alpha[1, j]), rotation[j], seen)
+        for energy, alpha, rotation, seen in zip(statistics.energy, statistics.alpha, statistics.rotation, lights)
+    ]
+    if stack.base:
+        lobes.append(_lobe(statistics.remainder[:, j, None], (np.nan, np.nan), np.nan, lights[-1]))
+    if passed := statistics.transmitted:
+        alpha = passed.alpha[0, j], passed.alpha[1, j]
+        lobes.append(_lobe(passed.energy[:, j, None], alpha, passed.rotation[j], light(None)))
+    return lobes, np.sum([distribution(each) for each in lights], axis=0)
 
 
 def _sampled(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> Light:

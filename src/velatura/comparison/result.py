@@ -30,18 +30,20 @@ class Account:
     lobes); transmitted: the light that leaves below, or None. Their mean and covariance are those of the outgoing
     directions on the projected disc, and a model's alpha is that along the axes of the true lobe, wherever its own
     `rotation` has turned them. evaluated (3, N): the integral of `eval`, which is the rendered albedo. distribution
-    (3, N, bins, bins): energies of reflected light over x and y of the projected disc.
+    (3, N, bins, bins): energies of reflected light over x and y of the projected disc. remainder (3, N): the energy of
+    reflected light in no lobe.
     """
 
     reflected: tuple[WalkedLobe, ...]
     transmitted: WalkedLobe | None
     evaluated: Array
     distribution: Array
+    remainder: Array | float = 0.0
 
     @property
     def albedo(self) -> Array:
-        """The sum of the energies of the reflected lobes, (3, N)."""
-        return np.sum([lobe.energy for lobe in self.reflected], axis=0)
+        """The energy of all reflected light, (3, N)."""
+        return np.sum([lobe.energy for lobe in self.reflected], axis=0) + self.remainder
 
     @property
     def lobes(self) -> tuple[WalkedLobe, ...]:

@@ -14,15 +14,14 @@ from functools import partial
 from typing import Protocol
 
 from velatura import ops
-from velatura.model import energy_balance, mixture, precomputed_lobes
-from velatura.model.adding import Lobe
+from velatura.model import mixture, precomputed_lobes
+from velatura.model.adding import Lobe, lobes
 from velatura.model.context import Context
 from velatura.model.diffuse import Base, under, with_means
-from velatura.model.energy_balance import Scaling
 from velatura.model.lobe_merging import merged
 from velatura.model.models import Model
-from velatura.model.prepare import Prepared, lobes, prepare, variance_kind
-from velatura.model.variance import Isotropic, Roughness, Variance
+from velatura.model.prepare import Prepared, prepare, variance_kind
+from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
@@ -84,18 +83,18 @@ class Lobed:
 
     `eta` is the index below over the index above, one for all colours; 1 where nothing is transmitted. `lobes_above`
     and `lobes_below` give the lobes on either side, for a direction turned up, and `base_above` the diffuse base; None
-    where it is worked out from the layers. `scaling` keeps the energy of the symmetric form; None where it is as
-    published. `even` is the share of samples that goes to all lobes alike, and to the cosine: the symmetric form has
-    light where the lobes by which it is sampled have no energy, and samples would miss it. While a stack is balanced it
-    is 0: of the few samples there, all go where most of the light is.
+    where it is worked out from the layers. `even` is the share of samples that goes to all lobes alike, and to the
+    cosine: the symmetric form has light where the lobes by which it is sampled have no energy, and samples would miss
+    it. `balanced` is whether the symmetric form conserves energy.
     """
+
+    balanced = False
 
     above: Prepared
     below: Prepared | None
     eta: Value
     lobes_above: precomputed_lobes.Lobes
     lobes_below: precomputed_lobes.Lobes
-    scaling: Scaling | None = None
     base_above: Callable[[Direction], Base | None] | None = None
     even: float = 0.0
 
@@ -107,11 +106,6 @@ class Lobed:
     def diffuse(self) -> bool:
         """Whether a diffuse base is the last reflected part."""
         return self.above.base is not None
-
-    @property
-    def balanced(self) -> bool:
-        """Whether the symmetric form conserves energy."""
-        return self.scaling is not None
 
     def albedo(self, wi: Direction) -> Value:
         """Energy of all parts, a colour."""
@@ -239,7 +233,7 @@ def body(
     context = context or Context()
     material, variance = material.solid(), variance or variance_kind(material)
 
-    def lobes(prepared: Prepared) -> precomputed_lobes.Lobes:
+    def sampled(prepared: Prepared) -> precomputed_lobes.Lobes:
         added = partial(_lobes, prepared)
         if context.number is None or context.colour is None or not material.interfaces:
             return added
@@ -248,12 +242,11 @@ def body(
     even = EVEN if model.form == "symmetric" else 0.0
     above = with_means(prepare(material, model, variance, context), context.settle)
     if not material.transmits:
-        from_above = lobes(above)
-        opaque = Lobed(above, None, 1.0, from_above, from_above)
-        return replace(balanced(opaque, context) if material.interfaces else opaque, even=even)
+        from_above = sampled(above)
+        return Lobed(above, None, 1.0, from_above, from_above, even=even)
     below = prepare(material.reversed(), model, variance, context)
     eta = ops.mean(material.below) / ops.mean(material.exterior)
-    return replace(balanced(Lobed(above, below, eta, lobes(above), lobes(below)), context), even=even)
+    return Lobed(above, below, eta, sampled(above), sampled(below), even=even)
 
 
 def scattered(stack: Lobed, wi: Direction) -> Scattered:
@@ -303,50 +296,13 @@ def exchangeable(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Sequence[L
     i, o = upright(wi, wi), upright(wo, wi)
     half = _difference(i, o)
     if stack.below is None:
-        return _scaled(stack, wi, wo, stack.lobes_above(half)[0]), None
+        return stack.lobes_above(half)[0], None
     half_below = _difference(*_pair_below(stack, wi, wo))
     seen = chosen_direction(o[2] > 0, half, refracted(half_below, 1 / stack.eta))
     reflected, passed = stack.lobes_above(seen)
     reflected_below, _ = stack.lobes_below(half)
     assert passed is not None
-    *reflected, passed = _scaled(
-        stack, wi, wo, [*(_chosen(wi[2] > 0, a, b) for a, b in zip(reflected, reflected_below)), passed]
-    )
-    return reflected, passed
-
-
-def _scaled(stack: Lobed, wi: Direction, wo: Direction, lobes: Sequence[Lobe]) -> list[Lobe]:
-    if stack.scaling is None:
-        return list(lobes)
-    factor = stack.scaling(wi) * stack.scaling(wo)
-    return [replace(lobe, gain=lobe.gain * factor) for lobe in lobes]
-
-
-def balanced(stack: Lobed, context: Context) -> Lobed:
-    """A uniform stack with a symmetric form that conserves energy, if its model has one.
-
-    Published models are unchanged, and so is a stack that may not be sampled over direction.
-    """
-    colour, model = context.colour, stack.above.model
-    if colour is None or not context.constant or model.form == "forward" or not model.recursion.has_gain:
-        return stack
-    bare, asked = replace(stack, above=replace(stack.above, base=None)), Asked(radiance=False)
-
-    def sampled(wi: Direction, u: Value, u1: Value, u2: Value) -> tuple[Direction, Value]:
-        wo, _ = bare.sample(wi, u, u1, u2, asked)
-        value, density = bare.eval_pdf(wi, wo, asked)
-        return wo, full(ops.select(density > 0, value / ops.maximum(density, ops.TINY), 0.0), wi)
-
-    def energy(wi: Direction) -> Value:
-        seen = scattered(bare, wi)
-        return full(sum(lobe.energy for lobe in (*seen.reflected, *filter(None, [seen.transmitted]))), wi)
-
-    def full(value: Value, wi: Direction) -> Value:
-        return colour(value + 0 * wi[2])
-
-    isotropic = stack.above.variance is Isotropic
-    number, transmits = context.number, stack.below is not None
-    return replace(stack, scaling=energy_balance.balanced(sampled, energy, colour, number, isotropic, transmits))
+    return [_chosen(wi[2] > 0, a, b) for a, b in zip(reflected, reflected_below)], passed
 
 
 def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:

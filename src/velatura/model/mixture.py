@@ -104,14 +104,6 @@ def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence
     return chosen
 
 
-def drawn(lobe: Lobe, wi: Direction, u1: Value, u2: Value) -> Value:
-    """Weight of a sample of a lobe by itself, for a gain of 1: of all light, or of its energy without facets."""
-    alpha_u, alpha_v, i = _in_frame(lobe.roughness, wi)
-    h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
-    fresnel = lobe.facets.reflect(ops.clip(ggx.dot(i, h), 0.0, 1.0)) if lobe.facets else 1.0
-    return fresnel * ggx.masking(ggx.reflect(i, h), alpha_u, alpha_v)
-
-
 def _colour(lobe: Lobe, wi: Direction, h: Direction) -> Value:
     """The factor that makes a GGX reflection the lobe."""
     if lobe.facets is None:

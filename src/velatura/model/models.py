@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from velatura.errors import InvalidInput
-from velatura.model.calibration import CALIBRATIONS
-from velatura.model.recursion import ADDING, Momentum, Recursion
+from velatura.model.recursion import ADDING, InOwnMedia, Recursion
 from velatura.stack.schema import unknown
 
 #: Every switch with its values; `Model` describes each one.
 SWITCHES: dict[str, tuple[str, ...]] = {
     "reflectance": ("fresnel", "fg", "fgd", "fgd-multi", "split-sum"),
     "tir": ("off", "published", "clean"),
-    "map": ("belcour", "belcour-release", "weier", "weier-2d", "power"),
+    "map": ("belcour", "belcour-release", "weier", "weier-2d"),
     "scale": ("shipped", "angles"),
     "channels": ("mean", "separate"),
     "medium": ("shipped", "weighted", "doubled"),
@@ -157,10 +156,7 @@ MODELS: tuple[Model, ...] = (
         "velatura",
         reflectance="fgd-multi",
         tir="published",
-        map="power",
-        scale="angles",
-        medium="doubled",
-        recursion=Momentum(CALIBRATIONS),
+        recursion=InOwnMedia(),
     ),
 )
 

@@ -7,23 +7,19 @@ half a turn.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
-from velatura import ops
-from velatura.model import mixture
 from velatura.model.adding import Lobe
 from velatura.model.prepare import Prepared, PreparedInterface
 from velatura.model.roughness_maps import AS_IT_IS
-from velatura.model.variance import Isotropic, Variance
+from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid, low_discrepancy
+from velatura.sampling import directional_grid
 
 # Reflected, and transmitted if anything is, for a direction above the surface
 Lobes = Callable[[Direction], tuple[list[Lobe], Lobe | None]]
-
-NORMALS = 256  # over which the albedo of a lobe is averaged
 
 
 class Sampled(Protocol):
@@ -59,12 +55,9 @@ class PrecomputedLobes:
         energy = self._colour(channels)
         if facets is not None:
             return Lobe(energy, facets.s_r, facets.roughness, self._colour(channels), facets)
-        kind = _kind(self.prepared)
+        kind = self.prepared.variance
         roughness = kind(*(next(channels) for _ in kind.__dataclass_fields__)).roughness(AS_IT_IS)
-        if kind is not Isotropic and self.prepared.variance is Isotropic:
-            roughness = roughness._replace(rotation=ops.arctan2(w[1], w[0]))
-        gain = next(channels) if self.prepared.model.recursion.has_gain else 1.0
-        return Lobe(energy, kind.of(roughness, self.prepared.f), roughness, gain)
+        return Lobe(energy, kind.of(roughness, self.prepared.f), roughness)
 
     def _colour(self, channels: Iterator[Value]) -> Value:
         return self.colour(*(next(channels) for _ in range(self.width)))
@@ -79,36 +72,13 @@ def sample(
     seen = [*reflected, passed] if transmits and passed is not None else reflected
     facets = [lobe.facets for lobe in seen]
 
-    def kept(seen: Sequence[Lobe]) -> PrecomputedLobes:
-        held = [column for lobe in seen for column in columns(lobe, prepared, colour)]
-        curves = directional_grid.curves(held, shape, number)
-        return PrecomputedLobes(curves, colour, len(colour()), prepared, facets, transmits)
-
-    precomputed = kept(seen)
-    if prepared.variance is Isotropic or not prepared.model.recursion.has_gain:
-        return precomputed
-    return kept([replace(lobe, gain=gain) for lobe, gain in zip(seen, _gains(precomputed, seen, number))])
-
-
-def _kind(prepared: Prepared) -> type[Variance]:
-    """The kind of variance that holds the roughness of lobes."""
-    return prepared.model.recursion.lobe_kind(prepared.variance)
+    held = [column for lobe in seen for column in columns(lobe, prepared, colour)]
+    curves = directional_grid.curves(held, shape, number)
+    return PrecomputedLobes(curves, colour, len(colour()), prepared, facets, transmits)
 
 
 def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Value]]) -> list[Value]:
     """The numbers of a lobe in a `PrecomputedLobes`, in order; `apart` gives the channels of a colour."""
     if lobe.facets is not None:
         return [*apart(lobe.energy), *apart(lobe.gain)]
-    roughness = vars(_kind(prepared).of(lobe.roughness, AS_IT_IS)).values()
-    return [*apart(lobe.energy), *roughness, *([lobe.gain] if prepared.model.recursion.has_gain else [])]
-
-
-def _gains(precomputed: PrecomputedLobes, seen: Sequence[Lobe], number: type) -> list[Value]:
-    """Gains with which lobes have their energy when they are evaluated, at any rotation."""
-    x, y, z = directional_grid.directions(precomputed.curves.shape, number)
-    _, u_1, u_2 = low_discrepancy.at_nodes(len(z), NORMALS, number)
-    w = low_discrepancy.repeated(x, NORMALS), low_discrepancy.repeated(y, NORMALS), low_discrepancy.repeated(z, NORMALS)
-    reflected, passed = precomputed(w)
-    drawn = [mixture.drawn(lobe, w, u_1, u_2) for lobe in [*reflected, *([passed] if passed else [])]]
-    albedos = [low_discrepancy.averaged(each, NORMALS) for each in drawn]
-    return [ops.divide(lobe.energy if lobe.facets else 1.0, albedo) for lobe, albedo in zip(seen, albedos)]
+    return [*apart(lobe.energy), *vars(prepared.variance.of(lobe.roughness, AS_IT_IS)).values()]

@@ -5,10 +5,9 @@ Values arrive as a `Material`, in any dialect; a renderer hands in constants onc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import TYPE_CHECKING
 
 from velatura import ops, tables
 from velatura.model.context import Context
@@ -17,13 +16,8 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.optics.ggx import Direction
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.tables import Average, Row, Tables
-
-if TYPE_CHECKING:  # a lobe may hold the interface that it is drawn with
-    from velatura.model.adding import Lobe
-
 
 COS_MIN = 1e-4  # keeps ways through media, and Snell's factors, finite at grazing
 
@@ -94,11 +88,7 @@ class PreparedBase:
 
 @dataclass(frozen=True)
 class Prepared:
-    """The layers from the top, with a diffuse base apart, and the parts of the model for which they are prepared.
-
-    For the recursion in momentum, `once` is the albedo of the first interface where light meets its facets once; None
-    where a medium lies above the first interface, or below the last one.
-    """
+    """The layers from the top, with a diffuse base apart, and the parts of the model for which they are prepared."""
 
     model: Model
     layers: tuple[PreparedInterface | PreparedMedium, ...]
@@ -106,15 +96,6 @@ class Prepared:
     f: RoughnessMap
     tables: Tables
     base: PreparedBase | None = None
-    once: Average | None = None
-
-
-def lobes(prepared: Prepared, wi: Direction) -> tuple[list[Lobe], Lobe]:
-    """The reflected lobes of a stack, one per interface from the top, and the transmitted one, by its model.
-
-    `wi` points away from the surface. Where nothing passes, the transmitted lobe has energy 0.
-    """
-    return prepared.model.recursion.lobes(prepared, wi)
 
 
 def variance_kind(material: Material) -> type[Variance]:
@@ -140,27 +121,20 @@ def prepare(
     averages = _Averages(model, context)
     layers: list[PreparedInterface | PreparedMedium] = []
     eta_1, n_leaving, base = material.exterior, None, None
-    n: Value = 1.0  # index so far, and the lowest of those above, over that outside
-    lowest: Value = 1.0
+    n: Value = 1.0  # index so far, over that outside
     for layer in material.layers:
         if isinstance(layer, InterfaceValues):
             layers.append(_interface(layer, eta_1, n_leaving, averages, variance))
             if layer.kind == "dielectric":
-                lowest, n = ops.minimum(lowest, n), n * ops.mean(layer.eta / eta_1)
-                n_leaving = lowest / n if model.recursion.from_lowest else ops.mean(eta_1 / layer.eta)
+                n = n * ops.mean(layer.eta / eta_1)
+                n_leaving = ops.mean(eta_1 / layer.eta)
                 ops.names(n_leaving=n_leaving)
                 eta_1 = layer.eta
         elif isinstance(layer, DiffuseValues):
             base = PreparedBase(layer.albedo, n)
         else:
             layers.append(_medium(layer))
-    prepared = Prepared(model, tuple(layers), variance, MAPS[model.map], context.tables, base)
-    if not model.recursion.has_gain:
-        return prepared
-    # A pane under a medium is drawn alike from both sides, or a lobe could not be chosen by the side that light is on
-    first = layers[0] if layers and len(material.layers) - 1 in material.surfaces else None
-    once = averages.once(first.eta, first.kappa) if isinstance(first, PreparedInterface) else None
-    return replace(prepared, once=once)
+    return Prepared(model, tuple(layers), variance, MAPS[model.map], context.tables, base)
 
 
 def _medium(layer: MediumValues) -> PreparedMedium:
@@ -204,12 +178,6 @@ class _Averages:
         else:
             row = tables.conductor_row(self.context.tables, eta, kappa, self.context.constant, multiple)
         return self._of(row)
-
-    def once(self, eta: Value | None, kappa: Value | None) -> Average:
-        """Albedo of an interface with facets that light meets once."""
-        average = replace(self, model=replace(self.model, reflectance="fgd")).reflectance(eta, kappa)
-        assert average is not None
-        return average
 
     def _of(self, row: Row) -> Average:
         if self.context.number:

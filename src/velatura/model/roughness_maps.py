@@ -101,8 +101,6 @@ AS_IT_IS = RoughnessMap(lambda along, across: along, lambda along, across: along
 MAPS: dict[str, RoughnessMap] = {
     "belcour": _odds_of_power(1.1),  # Belcour 2018, Eq. 6
     "belcour-release": _each(lambda a: a / (1 - a), lambda s: s / (1 + s)),  # as in its released plugin
-    # Of `velatura.model.momentum`; unlike the others it has no bound of its own
-    "power": _each(lambda a: ops.power(a, 1.5), lambda s: ops.minimum(ops.power(s, 2 / 3), 1.0)),
     "weier": _weier(),  # Weier & Belcour 2020, Listing 2
     "weier-2d": weier_2d(*WEIER_2D),
 }

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from velatura.model.adding import Lobe
+from velatura.model.adding import Lobe, lobes
 from velatura.model.diffuse import under, with_means
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_axis, with_axes_named
 from velatura.model.models import DEFAULT, Model, named
-from velatura.model.prepare import lobes, prepare
-from velatura.model.variance import Isotropic
+from velatura.model.prepare import prepare
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.stack import Material, Stack
@@ -36,8 +35,7 @@ def added(material: Material, model: Model, wi: Direction) -> StackLobes:
     """The lobes of a material with values in NumPy by a recursion that draws them outside, for directions (N,)."""
     prepared = prepare(material, model)
     reflected, transmitted = lobes(prepared, wi)
-    in_plane = model.recursion.lobe_kind(Isotropic) is not Isotropic
-    axis = nearer_axis(material, np.arctan2(wi[1], wi[0]) if in_plane else np.zeros_like(wi[2]))
+    axis = nearer_axis(material, np.zeros_like(wi[2]))
     base = under(with_means(prepared), wi)
     return StackLobes.of(
         [_collect(lobe, model, axis) for lobe in reflected],

@@ -27,9 +27,10 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from functools import reduce
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -259,6 +260,11 @@ def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Val
 
     wi lies above. Radiance is not scaled by the index. The value is 0 for wo above.
     """
+    return _eval_pdf(passage, wi, wo)
+
+
+def _eval_pdf(passage: Passage, wi: Direction, wo: Direction, passes: bool = False) -> tuple[Value, Value]:
+    """As `eval_pdf`; `passes` if all wo lie below."""
     n = passage.indices
     below, cos_o = wo[2] < 0, ops.absolute(wo[2])
     n_out = ops.select(below, n[-1], n[0])
@@ -283,7 +289,9 @@ def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Val
             goes_on = o.p2 < _lowest2(n[j + 1 :])
             through = ops.select(goes_on, ops.mean(facet.passes) * visible, 0.0)
         with ops.block("Or be reflected by it"):
-            density = density + share * ops.select(below, through, _reflected(passage, i, o, j, sampled.roughness))
+            if not passes:
+                through = ops.select(below, through, _reflected(passage, i, o, j, sampled.roughness))
+            density = density + share * through
     # From momentum to solid angle
     lit, scale = wi[2] > 0, n_out * n_out * cos_o
     return ops.select(lit & below, value * scale, 0.0), ops.select(lit, density * scale, 0.0)
@@ -446,9 +454,24 @@ def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[in
     x, y = (p[0] + r * ray[0]) / n_out, (p[1] + r * ray[1]) / n_out
     z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-12))
     area = area / (n_out * n_out * z)
-    shape = x.shape
-    spread = [np.broadcast_to(w[:, None, None], shape).ravel() for w in wi]
-    i_x, i_y, i_z, o_x, o_y, o_z = (w.astype(np.float32) for w in (*spread, x.ravel(), y.ravel(), -z.ravel()))
-    value, density = eval_pdf(passage, (i_x, i_y, i_z), (o_x, o_y, o_z))
-    energy = np.sum(value.reshape(-1, *shape) * area, axis=(-2, -1))
-    return energy, np.sum(density.reshape(shape) * area, axis=(-2, -1))
+    # What depends on wi alone is worked out once for all of its rays
+    flat = len(x), -1
+    i_x, i_y, i_z = (w.astype(np.float32)[:, None] for w in wi)
+    o_x, o_y, o_z = (w.reshape(flat).astype(np.float32) for w in (x, y, -z))
+    value, density = _eval_pdf(_wider(passage), (i_x, i_y, i_z), (o_x, o_y, o_z), True)
+    area = area.reshape(flat)
+    value = value if np.ndim(value) > 2 else value[None]
+    return np.sum(value * area, axis=-1), np.sum(density * area, axis=-1)
+
+
+def _wider(values: Any) -> Any:
+    """Records of arrays, with one axis more."""
+    if isinstance(values, np.ndarray):
+        return values[..., None]
+    if isinstance(values, Roughness):
+        return Roughness(*map(_wider, values))
+    if isinstance(values, tuple):
+        return tuple(map(_wider, values))
+    if is_dataclass(values) and not isinstance(values, type):
+        return type(values)(*(_wider(x) for x in vars(values).values()))
+    return values

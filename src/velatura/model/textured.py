@@ -1,9 +1,9 @@
 """Materials whose values come from textures: solved for some of those values, and interpolated between.
 
 Each texture is an axis. Columns over direction are solved at all nodes of two axes together, splines refine them, and a
-renderer interpolates linearly; so do gradients. A third texture, or a second one where interfaces are brushed, adds
-what it changes by itself, at the middle of the others. A texture of the rotation that all brushed interfaces share
-turns directions, and is no axis.
+renderer interpolates linearly; so do gradients. A third texture, or a second one where interfaces are brushed, changes
+columns as it does at the middle of the others: it scales those that are nowhere negative, and adds to others. A texture
+of the rotation that all brushed interfaces share turns directions, and is no axis.
 
 Of a texture of colours, each channel has its own coordinate, and solves are of grey values.
 """
@@ -43,6 +43,8 @@ Array = NDArray[np.floating]
 
 COSINES = {True: 24, False: 16}  # at which isotropic materials are solved, and others
 SHAPES = {True: (96,), False: (48, 33)}  # places over direction
+FAINTEST = 1e-4  # columns that are scaled from less than that are scaled by less
+MOST = 8.0  # times
 TOGETHER = {True: 2, False: 1}  # axes of one table
 
 
@@ -88,7 +90,8 @@ class Turning:
 
 @dataclass(frozen=True)
 class Term:
-    """What some axes change: tables over direction and them, for either side, and of the remainder over them."""
+    """What some axes change: tables over direction and them, for either side, and of the remainder over them. The first
+    term has the columns themselves, a further one by what it scales those of the first, or `adds` to them."""
 
     axes: tuple[Axis, ...]
     columns: tuple[Curves, ...]
@@ -100,9 +103,11 @@ class Term:
 
 @dataclass(frozen=True)
 class Tables:
-    """A material by the sum of some terms; `fixed` are the values that it was solved for, beside those of textures."""
+    """A material by some terms, of which further ones scale or add; `fixed` are the values that it was solved for,
+    beside those of textures."""
 
     terms: tuple[Term, ...]
+    adds: tuple[Array, ...]
     layouts: list[Layout]
     solver: Solver
     context: Context
@@ -116,8 +121,9 @@ class Tables:
         material = material.solid()
         places, made = [term.places(material) for term in self.terms], []
         for k, (seen, layout) in enumerate(zip(solution.sides(material), self.layouts)):
-            curves = partial(_summed, [term.columns[k] for term in self.terms], places)
-            numbers = _sums([ops.interpolate(term.polynomials[k], *at) for term, at in zip(self.terms, places)])
+            curves = partial(_together, [term.columns[k] for term in self.terms], places, self.adds[k])
+            found = [ops.interpolate(term.polynomials[k], *at) for term, at in zip(self.terms, places)]
+            numbers = [sum(each[1:], each[0]) for each in zip(*found)]
             polynomial = solution.remainder_of(numbers, self.solver, self.context)
             side = self.solver.side(seen, layout, curves, polynomial, self.context)
             made.append(_Interpolated(**vars(side), summed=len(self.terms) > 1))
@@ -169,13 +175,12 @@ def _bounded(found: Columns, summed: bool) -> Columns:
     )
 
 
-def _summed(curves: Sequence[Curves], places: Sequence[Sequence[Value]], w: Direction) -> list[Value]:
+def _together(curves: Sequence[Curves], places: Sequence[Sequence[Value]], adds: Array, w: Direction) -> list[Value]:
     """The columns of all terms, for a direction."""
-    return _sums([each(w, *at) for each, at in zip(curves, places)])
-
-
-def _sums(found: Sequence[Sequence[Value]]) -> list[Value]:
-    return [sum(each[1:], each[0]) for each in zip(*found)]
+    first, *others = (each(w, *at) for each, at in zip(curves, places))
+    for found in others:
+        first = [a + b if add else a * b for a, b, add in zip(first, found, adds)]
+    return first
 
 
 def textured(
@@ -234,13 +239,21 @@ def _tabulated(
         by_side = zip(*(solver.solve(node, layouts) for node in nodes))
         return [(np.array([x.rows for x in side]), np.array([x.numbers for x in side])) for side in by_side]
 
+    adds: list[Array] = []
+
     def tables(numbers: list[float]) -> list[Array]:
         made, found = given.replaced(start, numbers), []
-        at_middle = solved(made, ()) if len(groups) > 1 else None
-        for k, group in enumerate(groups):
-            for s, (columns, polynomials) in enumerate(solved(made, group)):
-                if k and at_middle:
-                    columns, polynomials = columns - at_middle[s][0], polynomials - at_middle[s][1]
+        by_group = [solved(made, group) for group in groups]
+        at_middle = solved(made, ()) if len(groups) > 1 else by_group[0]
+        if not adds:
+            every = zip(*by_group)
+            adds.extend(np.min([x.min(axis=(0, 2)) for x, _ in of_side], axis=0) < 0 for of_side in every)
+        for k, (group, of_group) in enumerate(zip(groups, by_group)):
+            for (columns, polynomials), (middle, polynomial), add in zip(of_group, at_middle, adds):
+                if k:
+                    scaled = np.clip((columns + FAINTEST) / (middle + FAINTEST), 0, MOST)
+                    columns = np.where(add[:, None], columns - middle, scaled)
+                    polynomials = polynomials - polynomial
                 found += [_flat(solver.grid.spread(columns, shape), group), _flat(polynomials, group)]
         return found
 
@@ -255,7 +268,7 @@ def _tabulated(
         ]
         terms.append(Term(group, tuple(made[::2]), tuple(made[1::2])))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)
-    return Tables(tuple(terms), layouts, solver, point, fixed)
+    return Tables(tuple(terms), tuple(adds), layouts, solver, point, fixed)
 
 
 def _flat(values: Array, group: Sequence[Axis]) -> Array:

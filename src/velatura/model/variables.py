@@ -11,7 +11,8 @@ import numpy as np
 from velatura.sampling import differences
 from velatura.stack import Address, Material
 
-RELATIVE = 0.02  # step over a value
+RELATIVES = {"alpha_u": 0.04, "alpha_v": 0.04, "rotation": 0.0}  # steps over a value
+RELATIVE = 0.02
 STEPS = {"alpha_u": 0.004, "alpha_v": 0.004, "rotation": 1.0}  # least steps; rotations are in degrees
 STEP = 0.005
 
@@ -33,8 +34,7 @@ class Variables:
         """Numbers a step below and above that of the k-th variable, x, within the range."""
         address = self.addresses[self.given[k].places[0][0]]
         low, high = address.declared.within
-        relative = 0.0 if address.key == "rotation" else RELATIVE * abs(x)
-        step = max(relative, STEPS.get(address.key, STEP))
+        step = max(RELATIVES.get(address.key, RELATIVE) * abs(x), STEPS.get(address.key, STEP))
         return max(x - step, low), min(x + step, high)
 
     def replaced(self, material: Material, numbers: Sequence[float]) -> Material:

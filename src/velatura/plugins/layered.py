@@ -64,7 +64,7 @@ def make(mi: Any) -> type:
         def exceptions(self) -> frozenset[str]:
             """Laws of `velatura.checks` that it is known not to keep."""
             shape, form = "pane" if self.transmits else "opaque", self.model.form
-            if form == "forward" and self.model.recursion.has_gain:
+            if form == "forward" and not self.model.recursion.closed_form:
                 form = "scaled"
             elif self.bodies.balanced:
                 form = "balanced" if shape == "opaque" and self.variance is Isotropic else "exchanged"

@@ -56,15 +56,6 @@ def repeated(values: Value, samples: int) -> Value:
     return dr.repeat(values, samples)
 
 
-def averaged(values: Value, samples: int) -> Value:
-    """Means over the samples of each node."""
-    if isinstance(values, np.ndarray):
-        return values.reshape(*values.shape[:-1], -1, samples).mean(axis=-1)
-    import drjit as dr
-
-    return dr.block_sum(values, samples) / samples
-
-
 def integers(count: int, number: type | None) -> tuple[Value, Callable[[Value], Value]]:
     """Integers from 0, and what makes real numbers of them; for Dr.Jit's type of numbers, or None for NumPy."""
     if number is None:

@@ -32,6 +32,7 @@ STAND_IN = 144  # normals of interfaces that stand in for brushed ones
 GRAZING = 1e-4  # least cosine of light that meets an interface
 ALPHA_MIN = 1e-3
 BLOCK = 1 << 15  # samples at a time
+DIGITS = 9  # of lengths of momentum that are alike
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
 
@@ -265,8 +266,14 @@ class _Met:
 
     @classmethod
     def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
-        """Once for interfaces that are alike but for their rotation."""
-        key = facets.key, p.tobytes(), psi.tobytes(), setting.basis, setting.samples, *setting.ways
+        """Once for interfaces that are alike but for their rotation and the unit of momentum."""
+        basis, nodes = setting.basis, setting.basis.nodes
+        lengths = facets.above, facets.below, facets.k, p, nodes.ends
+        key = (
+            *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in lengths),
+            *(facets.alpha_u, facets.alpha_v, psi.tobytes(), setting.samples, *setting.ways),
+            *(type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), nodes.cells),
+        )
         if key not in setting.made:
             setting.made[key] = cls._of(facets, p, psi, setting)
         return setting.made[key]
