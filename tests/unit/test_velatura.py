@@ -67,11 +67,10 @@ def test_trapped_light_is_absorbed_and_reflected_as_in_walks(
 
 @pytest.mark.parametrize("reflectance", REFLECTANCES)
 def test_smooth_steps_of_the_index_below_a_rough_coat_change_no_blur(reflectance: str) -> None:
-    """Where they reflect little: within 2.5 %, of which 1 % is what they reflect back; 5 % at grazing directions."""
-    one = lobes(over_mirror([(1.5, 0.1)], 0.0), COSINES, reflectance)
-    many = lobes(over_mirror([(1.5, 0.1), (1.6, 0.0), (1.7, 0.0), (1.8, 0.0)], 0.0), COSINES, reflectance)
-    np.testing.assert_allclose(many.alpha[-1][:, :2], one.alpha[-1][:, :2], rtol=0.025)
-    np.testing.assert_allclose(many.alpha[-1], one.alpha[-1], rtol=0.05)
+    """Where they reflect little: within 3 % at cosines of .75 and 1, of which 1 % is what they reflect back."""
+    one = lobes(over_mirror([(1.5, 0.1)], 0.0), COSINES[:2], reflectance)
+    many = lobes(over_mirror([(1.5, 0.1), (1.6, 0.0), (1.7, 0.0), (1.8, 0.0)], 0.0), COSINES[:2], reflectance)
+    np.testing.assert_allclose(many.alpha[-1], one.alpha[-1], rtol=0.03)
 
 
 @pytest.mark.parametrize("reflectance", REFLECTANCES)
