@@ -3,7 +3,8 @@
     python benchmarks/preparation.py [--rounds 15]
 
 One roughness of a preset is changed, the BSDF is made and evaluated once. Medians over changes of the processor's and
-the clock's seconds, without the first two, which compile.
+the clock's seconds, without the first two, which compile. Below, the same for three interfaces of every kind, by
+`velatura`, where facets are met once, and often.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 import velatura as vt
 from velatura.checks.probe import Probe
+from velatura.stack import Interface, Medium, Stack
 
 PRESETS = ("frosted-metal", "coated-gold", "pearl-lacquer")
 MODELS: dict[str, dict[str, Any]] = {
@@ -24,13 +26,44 @@ MODELS: dict[str, dict[str, Any]] = {
     "velatura": {"model": "velatura"},
     "velatura, symmetric": {"model": "velatura", "form": "symmetric"},
 }
+COPPER: dict[str, Any] = {"eta": (0.2, 0.9, 1.1), "k": (3.9, 2.4, 2.2)}
+PAINT = Medium(depth=1.0, sigma_s=(0.9, 0.8, 0.6), sigma_a=(0.1, 0.2, 0.4), g=0.6)
+
+
+def three(*alphas: Any, turns: tuple[float, float] = (0.0, 0.0), **base: Any) -> Stack:
+    """Three interfaces, of which the last two are turned."""
+    first, second, third = alphas
+    return Stack([
+        Interface(eta=1.5, alpha=first),
+        Interface(eta=1.8, alpha=second, rotation=turns[0]),
+        Interface(alpha=third, rotation=turns[1], **base),
+    ])  # fmt: skip
+
+
+def painted(stack: Stack) -> Stack:
+    """With a medium that scatters below the first interface."""
+    return Stack([stack.layers[0], PAINT, *stack.layers[1:]])
+
+
+ISOTROPIC = three(0.1, 0.2, 0.3, **COPPER)
+BRUSHED = three(0.1, (0.05, 0.2), (0.1, 0.4), **COPPER)
+TURNED = three((0.05, 0.1), (0.05, 0.2), (0.1, 0.4), turns=(30.0, 75.0), **COPPER)
+KINDS = {
+    "isotropic": ISOTROPIC,
+    "brushed": BRUSHED,
+    "turned": TURNED,
+    "isotropic glass": three(0.1, 0.2, 0.3, eta=1.3),
+    "turned glass": three((0.05, 0.1), (0.05, 0.2), (0.1, 0.4), turns=(30.0, 75.0), eta=1.3),
+    "isotropic, scattering": painted(ISOTROPIC),
+    "brushed, scattering": painted(BRUSHED),
+    "turned, scattering": painted(TURNED),
+}
 WI = np.array([[0.6, 0.0, 0.8]])
 WO = np.array([[-0.6, 0.0, 0.8]])
 
 
-def seconds(preset: str, choices: dict[str, Any], rounds: int) -> tuple[float, float]:
+def seconds(stack: Stack, choices: dict[str, Any], rounds: int) -> tuple[float, float]:
     """Seconds of the processor and of the clock."""
-    stack = vt.load(preset)
     name = next(name for name in stack.flat() if "_alpha" in name)
     spent = []
     for i in range(rounds + 2):
@@ -47,8 +80,12 @@ def main() -> None:
     rounds = parser.parse_args().rounds
     print(f"{'processor, clock (s)':24s}" + "".join(f"{preset:>20s}" for preset in PRESETS))
     for name, choices in MODELS.items():
-        cells = (seconds(preset, choices, rounds) for preset in PRESETS)
+        cells = (seconds(vt.load(preset), choices, rounds) for preset in PRESETS)
         print(f"{name:24s}" + "".join(f"{p:13.2f}, {c:5.2f}" for p, c in cells))
+    print(f"\n{'processor, clock (s)':24s}{'once':>20s}{'often':>20s}")
+    for kind, stack in KINDS.items():
+        cells = (seconds(stack, {"model": "velatura", "reflectance": x}, rounds) for x in ("fgd", "fgd-multi"))
+        print(f"{kind:24s}" + "".join(f"{p:13.2f}, {c:5.2f}" for p, c in cells))
 
 
 if __name__ == "__main__":

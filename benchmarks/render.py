@@ -3,7 +3,11 @@
 The material ball fills over 60 % of a 512x512 picture under an environment map, 64 spp, path with max_depth 4; model
 defaults with tables and total internal reflection on. Beside it: `eval_pdf` alone, and textured parameters.
 
-    python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb] [--model NAME]
+With `--solids`: solids of rough glass (index 1.5) instead, beside `roughdielectric`: the light of a sphere in a white
+furnace, path depth 40, and the noise of a block in the studio at equal samples, as a ratio; so of spheres of opaque
+presets, beside `belcour2018`.
+
+    python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb] [--model NAME] [--solids]
 """
 
 from __future__ import annotations
@@ -21,6 +25,8 @@ from velatura.model import DEFAULT
 from velatura.scenes import scene_dict
 
 ZOOM = 1.25
+ROUGH = (0.05, 0.2, 0.4)
+OPAQUE = ("coated-gold", "varnished-paint", "scattering-medium-over-gold", "furnace-rough", "crossed-brushing")
 
 
 def stacks() -> dict[str, vt.Stack]:
@@ -85,6 +91,51 @@ def interleaved(jobs: dict, rounds: int) -> dict[str, float]:
     return {name: median(t / f for t, f in zip(values, first)) for name, values in times.items()}
 
 
+def furnace(mi, bsdf, spp: int = 1024) -> tuple[float, float]:
+    """Light of a sphere under white light from everywhere, and its standard error."""
+    to_world = mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0])
+    film = {"type": "hdrfilm", "width": 24, "height": 24, "rfilter": {"type": "box"}}
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "path", "max_depth": 40, "rr_depth": 40},
+            "light": {"type": "constant", "radiance": 1.0},
+            "sphere": {"type": "sphere", "bsdf": bsdf},
+            "sensor": {"type": "perspective", "fov": 14, "to_world": to_world, "film": film},
+        }
+    )
+    means = [float(np.mean(np.array(mi.render(scene, spp=spp // 8, seed=seed)))) for seed in range(8)]
+    return float(np.mean(means)), float(np.std(means) / np.sqrt(8))
+
+
+def noise(mi, bsdf, shape: str, spp: int = 16, rounds: int = 16) -> float:
+    """Standard deviation of pixels over rounds, root mean square, of a shape in the studio."""
+    description = scene_dict("sphere", "studio", bsdf, (96, 96), ZOOM)
+    if shape == "cube":
+        turn = mi.ScalarTransform4f().translate([0, 0.9, 0]).rotate([0, 1, 0], 30).scale(0.7)
+        description["object"] = {"type": "cube", "to_world": turn, "bsdf": bsdf}
+    scene = mi.load_dict({**description, "integrator": {"type": "path", "max_depth": 16, "rr_depth": 16}})
+    pictures = [np.minimum(np.array(mi.render(scene, spp=spp, seed=seed)), 20) for seed in range(rounds)]
+    return float(np.sqrt(np.mean(np.var(pictures, axis=0, ddof=1))))
+
+
+def solids(mi, model: str) -> None:
+    for alpha in ROUGH:
+        glass = mi.load_dict({"type": "roughdielectric", "distribution": "ggx", "int_ior": 1.5, "alpha": alpha})
+        stack = vt.Stack([vt.Interface(eta=1.5, alpha=alpha)])
+        once, often = (vt.bsdf(stack, model=model, reflectance=name) for name in ("fgd", "fgd-multi"))
+        whites = [furnace(mi, each) for each in (often, once, glass)]
+        ratio = noise(mi, once, "cube") / noise(mi, glass, "cube")
+        lights = ", ".join(f"{name} {x:.4f}" for name, (x, _) in zip(("fgd-multi", "fgd", "roughdielectric"), whites))
+        error = max(e for _, e in whites)
+        print(f"glass, alpha {alpha}: furnace {lights} (+- {error:.4f}); noise of a block {ratio:.2f}", flush=True)
+    for name in OPAQUE:
+        ratio = noise(mi, vt.bsdf(name, model=model), "sphere") / noise(
+            mi, vt.bsdf(name, model="belcour2018"), "sphere"
+        )
+        print(f"{name}: noise {ratio:.2f}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=9)
@@ -92,11 +143,15 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=512)
     parser.add_argument("--variant", default="llvm_ad_rgb")
     parser.add_argument("--model", default=DEFAULT)
+    parser.add_argument("--solids", action="store_true", help="solids of rough glass, and noise")
     arguments = parser.parse_args()
     mi = kernel.mitsuba(arguments.variant)
     import drjit as dr
 
     vt.register()
+    if arguments.solids:
+        solids(mi, arguments.model)
+        return
     materials = bsdfs(mi, arguments.model)
 
     def evaluation(bsdf, count: int = 1 << 22):

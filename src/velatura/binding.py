@@ -287,8 +287,9 @@ class Binding:
         """
         given: dict[int, list[Address]] = {}
         for name, image in self.images.items():
-            given.setdefault(id(image), []).append(self.addresses[name])
-        values, found = self._colours(), []
+            if name not in self.steering:
+                given.setdefault(id(image), []).append(self.addresses[name])
+        values, found = {**self._colours(), **self.steering}, []
         for addresses in given.values():
             texels = self._texels(addresses[0], unknown)
             if (texels != texels[:, :1]).any():
@@ -306,6 +307,8 @@ class Binding:
         if isinstance(image, Field):
             return np.array([[-180.0, 180.0]])
         channels = len(mi.UnpolarizedSpectrum()) if image.colour else 1
+        if mi.is_spectral and image.colour:
+            return np.tile([unknown.get(address.key, address.declared.within)], (channels, 1))
         read = mi.traverse(image.texture)
         found = []
         for value in [value for name, value in read if name.split(".")[-1] in _TEXELS]:
@@ -321,8 +324,9 @@ class Binding:
         texels = np.concatenate(found, axis=1)
         return np.clip(texels * image.scale + image.offset, image.low, image.high)
 
-    def at_wavelengths(self, nm: Sequence[float]) -> Material:
-        """The same, with spectra in channels at these wavelengths, as many as a multiple of those of a ray."""
+    def at_wavelengths(self, nm: Sequence[float], material: Material | None = None) -> Material:
+        """The material of values that are the same everywhere, or another one, with spectra in channels at these
+        wavelengths, as many as a multiple of those of a ray."""
         import drjit as dr
 
         carried = len(self.mi.UnpolarizedSpectrum())
@@ -333,7 +337,8 @@ class Binding:
             dr.make_opaque(si)
             for name, channels in spectra.items():
                 channels.extend(self.images[name].at(si, True))
-        return self.material({**self.constants, **{name: self.mi.ArrayXf(x) for name, x in spectra.items()}})
+        flat = material.flat() if material else {}
+        return self.material({**flat, **self.constants, **{name: self.mi.ArrayXf(x) for name, x in spectra.items()}})
 
     def looked_at(self) -> Material:
         """The material with its numeric constants as plain numbers, and its images unchanged."""

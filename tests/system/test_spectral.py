@@ -114,6 +114,21 @@ def test_shapes_do_not_depend_on_the_wavelengths_of_a_ray(name: str) -> None:
     assert not np.allclose(one[1], other[1], rtol=1e-3)
 
 
+def test_a_texture_of_one_value_is_that_value() -> None:
+    """Of a roughness among others, below water: albedos of gold within .005 of those of a number."""
+    rng, n = np.random.default_rng(3), 500
+    texels = mi.Bitmap(np.float32([[[0.1], [0.25], [0.4]]]))
+    texture = mi.load_dict({"type": "bitmap", "bitmap": texels, "raw": True, "filter_type": "nearest"})
+    textured = kernel.load_dict({"type": "layered", "material": "gold-under-water", "layer1_alpha": texture})
+    z = rng.uniform(0.15, 1, n)
+    si = seen((np.sqrt(1 - z**2), 0.0, z), rng.uniform(390, 750, (4, n)), n)
+    si.uv = mi.Point2f(0.5, 0.5)
+    uniform = vt.bsdf(vt.preset("gold-under-water").replace(layer1_alpha=0.25))
+    found, expected = (np.array(bsdf.eval_diffuse_reflectance(si)) for bsdf in (textured, uniform))
+    np.testing.assert_allclose(found, expected, atol=5e-3)
+    assert np.abs(found - expected).mean() < 1.5e-3
+
+
 def test_a_textured_stack_is_steered_too() -> None:
     """Colours of the image, and measured spectra beside it: the density stays, and the wider the lobe, the rarer."""
     texels = mi.Bitmap(np.float32([[[0.1], [0.4]]]))

@@ -9,8 +9,10 @@ import pytest
 from scipy import stats
 
 import velatura as vt
-from velatura import kernel
+from velatura import kernel, tables
 from velatura.model import bsdf, named
+from velatura.model.transport.energies import energies
+from velatura.model.widths import nearly_straight
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -83,24 +85,24 @@ def albedo(stack: vt.Stack, cos_theta: float, form: str, side: int = 1, n: int =
 
 
 @pytest.mark.parametrize("name", ["furnace-rough", "turned-brushing", "frosted-glass"])
-def test_what_is_drawn_is_the_energy_of_the_lobes(name: str) -> None:
+def test_what_is_drawn_is_the_energy_of_the_layers(name: str) -> None:
     """Both forms of `velatura`, isotropic, with turned axes, and transmitting: the albedo of the forward form within
-    0.5 %, of the symmetric one within 1 % (0.5 % in the furnace), which is off by 2 to 15 % without its factors.
-    Standard errors are 0.1 % or so."""
+    0.5 % of that of its layers, of the symmetric one within 1.2 %. Standard errors are 0.1 % or
+    so."""
     stack = vt.preset(name)
     for cos_theta in (1.0, 0.7, 0.3):
-        lobes = vt.lobes(stack, cos_theta, model="velatura")
-        leaving = [*lobes.energy, *([lobes.transmitted.energy] if lobes.transmitted else [])]
-        expected = np.sum(leaving, axis=0)[:, 0]
+        incidence = np.array([cos_theta]), np.zeros(1)
+        solved = energies(Material.of(stack).solid(), *incidence, tables.load(), nearly_straight)
+        leaving = [*solved.lobes, *solved.veils, solved.rest, *([solved.passed] if stack.transmits else [])]
+        expected = np.sum([np.broadcast_to(energy, (3, 1)) for energy in leaving], axis=0)[:, 0]
         for form in ("forward", "symmetric"):
-            bound = 0.005 if form == "forward" or name == "furnace-rough" else 0.01
+            bound = 0.005 if form == "forward" else 0.012
             np.testing.assert_allclose(
                 albedo(stack, cos_theta, form), expected, rtol=bound, err_msg=f"{form} {cos_theta}"
             )
 
 
 def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change() -> None:
-    """Those that sample lobes, which take longest to compile."""
     import drjit as dr
 
     def kernels(alpha: float) -> list[Any]:
@@ -108,11 +110,11 @@ def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change() -> 
         stack = vt.Stack([vt.Interface(eta=1.5, alpha=(alpha, 0.2)), vt.Interface(conductor="Au", alpha=0.3)])
         vt.bsdf(stack, form="symmetric")
         dr.sync_thread()
-        return [kernel for kernel in dr.kernel_history([dr.KernelType.JIT]) if kernel["size"] > 2**14]
+        return dr.kernel_history([dr.KernelType.JIT])
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         first, again = kernels(0.1), kernels(0.15)
-    assert {kernel["hash"] for kernel in again} == {kernel["hash"] for kernel in first} != set()
+    assert {kernel["hash"] for kernel in again} == {kernel["hash"] for kernel in first}
 
 
 def test_the_laws() -> None:

@@ -91,11 +91,12 @@ class Extremes:
 
 @dataclass(frozen=True)
 class Turned:
-    """Light (n, channels) from directions wi (n, 3), times solid angle, and that of the BSDF whose layers are turned,
-    for directions that are turned with them."""
+    """Light (n, channels) from directions wi (n, 3), times solid angle, the same asked `again`, which differs by noise,
+    and that of the BSDF whose layers are turned, for directions that are turned with them."""
 
     wi: Array
     light: Array
+    again: Array
     turned: Array
 
 
@@ -273,9 +274,13 @@ def _turn(probe: Probe, other: Probe, degrees: float, rng: np.random.Generator) 
     wo = np.where((rng.random(len(wi)) < 0.5)[:, None], samples.wo, evenly)
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     matrix = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    here, there = probe.eval_pdf(wi, wo), other.eval_pdf(wi @ matrix.T, wo @ matrix.T)
+    here, again, there = (
+        probe.eval_pdf(wi, wo),
+        probe.eval_pdf(wi, wo, 0.125),
+        other.eval_pdf(wi @ matrix.T, wo @ matrix.T),
+    )
     density = (0.5 * here.pdf + 0.25 / np.pi)[:, None] * each
-    return Turned(wi, here.value / density, there.value / density)
+    return Turned(wi, here.value / density, again.value / density, there.value / density)
 
 
 def _direction(cos_theta: float, phi: float) -> Array:

@@ -295,8 +295,8 @@ def turning(evidence: Evidence, alarm: float) -> Finding | None:
         return None
     found = evidence.turned
     cosines, place = np.unique(found.wi[:, 2], return_inverse=True)
-    change = np.abs(found.light - found.turned).mean(axis=1)
-    elsewhere = np.bincount(place, change)
+    change, noise = (np.abs(found.light - other).mean(axis=1) for other in (found.turned, found.again))
+    elsewhere = np.maximum(np.bincount(place, change - noise), 0)
     light = np.bincount(place, found.light.mean(axis=1))
     share = elsewhere / np.maximum(light, DARK)
     at = _worst(share)

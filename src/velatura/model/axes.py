@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from velatura import ops
 from velatura.ops import Value
@@ -62,8 +62,13 @@ class Axis:
         begin = max(begin, least)
         return cls(tuple(addresses), float(begin), float(end), max(2, round((end - begin) / step) + 1))
 
-    def covers(self, other: Axis) -> bool:
-        return self.addresses == other.addresses and self.low <= other.low and other.high <= self.high
+    def covers(self, other: Axis | Wavelengths) -> bool:
+        return (
+            isinstance(other, Axis)
+            and self.addresses == other.addresses
+            and self.low <= other.low
+            and other.high <= self.high
+        )
 
     @property
     def values(self) -> list[float]:
@@ -84,17 +89,50 @@ class Axis:
             x = ops.arctan2(ops.sin(double), ops.cos(double)) * (QUARTER / pi)
         return (x - self.low) / (self.high - self.low)
 
+    def changed(self, x: float) -> dict[str, float]:
+        """Values by flat name, at one of the axis."""
+        return {address.name: x for address in self.addresses}
+
     def refined(self, values: Array, axis: int) -> Array:
         """Values at the nodes, at all places."""
         nodes = np.linspace(0, 1, self.count)
         return np.asarray(CubicSpline(nodes, values, axis=axis)(np.linspace(0, 1, self.places)))
 
 
+@dataclass(frozen=True)
+class Wavelengths:
+    """Values at some places on the spectrum from 0 to 1, of all that depends on wavelength alone, by flat name."""
+
+    nodes: tuple[float, ...]
+    spectra: tuple[tuple[str, tuple[float, ...]], ...]
+
+    addresses: ClassVar[tuple[Address, ...]] = ()
+    places: ClassVar[int] = 64
+
+    @property
+    def count(self) -> int:
+        return len(self.nodes)
+
+    @property
+    def values(self) -> list[float]:
+        """Numbers of the nodes."""
+        return [*map(float, range(self.count))]
+
+    def covers(self, other: Axis | Wavelengths) -> bool:
+        return self == other
+
+    def refined(self, values: Array, axis: int) -> Array:
+        return np.asarray(PchipInterpolator(self.nodes, values, axis=axis)(np.linspace(0, 1, self.places)))
+
+    def changed(self, x: float) -> dict[str, float]:
+        return {name: values[int(x)] for name, values in self.spectra}
+
+
 def _coordinate(address: Address, value: Value) -> Value:
     return ops.sqrt(value) if address.key in ROOTS else value
 
 
-def refined(values: Array, axes: Sequence[Axis]) -> Array:
+def refined(values: Array, axes: Sequence[Axis | Wavelengths]) -> Array:
     """Values at the nodes of all axes, (nodes, ...), at all places: the axes are the leading ones."""
     found = values.reshape(*(axis.count for axis in axes), *values.shape[1:])
     for k, axis in enumerate(axes):
@@ -102,11 +140,11 @@ def refined(values: Array, axes: Sequence[Axis]) -> Array:
     return found
 
 
-def placed(material: Material, axes: Sequence[Axis], values: Iterable[float]) -> Material:
+def placed(material: Material, axes: Sequence[Axis | Wavelengths], values: Iterable[float]) -> Material:
     """A material of NumPy's values with others on some axes."""
     changed: dict[str, float] = {}
     for axis, x in zip(axes, values):
-        changed.update({address.name: x for address in axis.addresses})
+        changed.update(axis.changed(x))
 
     def value(address: Address, old: Any) -> Any:
         new = changed.get(address.name)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
+from velatura.model.axes import Wavelengths
 from velatura.model.context import Context
 from velatura.model.models import Model
 from velatura.model.remainder import Remainder
@@ -115,6 +116,14 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
         curves = (directional_grid.interleaved(next(flat), shape, context.number) for shape in shapes)
         made.append(_Side(order, *curves))
     return Spectra(solver, layouts, made)
+
+
+def axis(material: Material, places: Array) -> Wavelengths:
+    """As an axis of tables, for a material with channels at places on the spectrum as `solve` takes it."""
+    start = plain(material.solid())
+    chosen = sorted(_chosen(start, places), key=lambda k: places[k])
+    spectra = {address.name: np.ravel(x)[chosen].tolist() for address, x in start.values() if np.size(x) == len(places)}
+    return Wavelengths(tuple(places[chosen].tolist()), tuple((name, tuple(x)) for name, x in spectra.items()))
 
 
 def _flat(side: SolvedSide, solver: Solver, places: Array) -> list[Array]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import axes, solution
-from velatura.model.axes import Axis, Range
+from velatura.model.axes import Axis, Range, Wavelengths
 from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
@@ -54,8 +54,8 @@ class Textured(Protocol):
     @property
     def balanced(self) -> bool: ...
 
-    def at(self, material: Material) -> Body:
-        """With the values of a point."""
+    def at(self, material: Material, place: Value = None) -> Body:
+        """With the values of a point; `place` is that on the spectrum."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Same:
     def balanced(self) -> bool:
         return self.body.balanced
 
-    def at(self, material: Material) -> Body:
+    def at(self, material: Material, place: Value = None) -> Body:
         return self.body
 
 
@@ -83,9 +83,9 @@ class Turning:
     def balanced(self) -> bool:
         return self.straight.balanced
 
-    def at(self, material: Material) -> Body:
+    def at(self, material: Material, place: Value = None) -> Body:
         angle = material.flat()[f"layer{self.layer}_rotation"]
-        return Turned(self.straight.at(_straight(material)), angle * (pi / 180))
+        return Turned(self.straight.at(_straight(material), place), angle * (pi / 180))
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,12 @@ class Term:
     """What some axes change: tables over direction and them, for either side, and of the remainder over them. The first
     term has the columns themselves, a further one by what it scales those of the first, or `adds` to them."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[Axis | Wavelengths, ...]
     columns: tuple[Curves, ...]
     polynomials: tuple[Curves, ...]
 
-    def places(self, material: Material) -> list[Value]:
-        return [axis.at(material) for axis in self.axes]
+    def places(self, material: Material, place: Value) -> list[Value]:
+        return [axis.at(material) if isinstance(axis, Axis) else place for axis in self.axes]
 
 
 @dataclass(frozen=True)
@@ -117,9 +117,9 @@ class Tables:
     def balanced(self) -> bool:
         return self.solver.model.form == "symmetric"
 
-    def at(self, material: Material) -> Solved:
+    def at(self, material: Material, place: Value = None) -> Solved:
         material = material.solid()
-        places, made = [term.places(material) for term in self.terms], []
+        places, made = [term.places(material, place) for term in self.terms], []
         for k, (seen, layout) in enumerate(zip(solution.sides(material), self.layouts)):
             curves = partial(_together, [term.columns[k] for term in self.terms], places, self.adds[k])
             found = [ops.interpolate(term.polynomials[k], *at) for term, at in zip(self.terms, places)]
@@ -129,7 +129,7 @@ class Tables:
             made.append(_Interpolated(**vars(side), summed=len(self.terms) > 1))
         return self.solver.bsdf(material, made)
 
-    def holds(self, solver: Solver, wanted: Sequence[Axis], fixed: bytes) -> bool:
+    def holds(self, solver: Solver, wanted: Sequence[Axis | Wavelengths], fixed: bytes) -> bool:
         """Whether it is what would be solved, for values of textures in these ranges."""
         known = [axis for term in self.terms for axis in term.axes]
         covered = len(known) == len(wanted) and all(a.covers(b) for a, b in zip(known, wanted))
@@ -185,7 +185,7 @@ def _together(curves: Sequence[Curves], places: Sequence[Sequence[Value]], adds:
 
 def textured(
     material: Material,
-    ranges: Sequence[Range],
+    ranges: Sequence[Range | Wavelengths],
     symbolic: Material,
     model: Model,
     variance: type[Variance],
@@ -201,14 +201,14 @@ def textured(
     if layer is None:
         return _tabulated(material, ranges, model, variance, context, before)
     inner = before.straight if isinstance(before, Turning) and before.layer == layer else None
-    others = [given for given in ranges if given[0][0].key != "rotation"]
+    others = [given for given in ranges if isinstance(given, Wavelengths) or given[0][0].key != "rotation"]
     straight = _tabulated(_straight(material), others, model, variance, context, inner)
     return before if straight is inner and before else Turning(straight, layer)
 
 
 def _tabulated(
     material: Material,
-    ranges: Sequence[Range],
+    ranges: Sequence[Range | Wavelengths],
     model: Model,
     variance: type[Variance],
     context: Context,
@@ -217,13 +217,13 @@ def _tabulated(
     if not ranges:
         return Same(solution.solve(material, model, variance, context))
     isotropic = variance is Isotropic
-    spanned = [Axis.of(each, alone=len(ranges) == 1) for each in ranges]
+    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, alone=len(ranges) == 1) for x in ranges]
     material = material.solid()
     middle = [axis.values[axis.count // 2] for axis in spanned]
     start = axes.placed(solution.plain(material), spanned, middle)
     solver = Solver.of(model, variance, context)
     solver = replace(solver, grid=replace(solver.grid, cosines=COSINES[isotropic]))
-    textures = {address.name for axis in spanned for address in axis.addresses}
+    textures = {name for axis in spanned for name in axis.changed(0.0)}
     fixed = b"".join(np.asarray(x).tobytes() for address, x in start.values() if address.name not in textures)
     given = Variables.of(material)
     if isinstance(before, Tables) and not given.given and before.holds(solver, spanned, fixed):
@@ -233,7 +233,7 @@ def _tabulated(
     ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
     layouts = solver.layouts([start, *(axes.placed(start, spanned, values) for values in ends)])
 
-    def solved(made: Material, group: Sequence[Axis]) -> list[tuple[Array, Array]]:
+    def solved(made: Material, group: Sequence[Axis | Wavelengths]) -> list[tuple[Array, Array]]:
         """Columns and numbers of each side, (nodes, ...)."""
         nodes = [axes.placed(made, group, values) for values in product(*(axis.values for axis in group))]
         by_side = zip(*(solver.solve(node, layouts) for node in nodes))
@@ -271,7 +271,7 @@ def _tabulated(
     return Tables(tuple(terms), tuple(adds), layouts, solver, point, fixed)
 
 
-def _flat(values: Array, group: Sequence[Axis]) -> Array:
+def _flat(values: Array, group: Sequence[Axis | Wavelengths]) -> Array:
     """Values (nodes, channels, directions) or (nodes, channels), at all places, and interleaved: flat, with the nodes
     of directions first and channels last."""
     fine = axes.refined(values, group)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -79,6 +80,7 @@ class Prepared:
 class Tabulated:
     """Bodies by tables over what textures change."""
 
+    mi: Any
     binding: Binding
     textured: Textured
 
@@ -91,7 +93,8 @@ class Tabulated:
         return self.textured.balanced
 
     def at(self, si: Any, active: Any) -> Body:
-        return self.textured.at(self.binding.at(si, active))
+        material = self.binding.steered(si, active)
+        return self.textured.at(material, _places(self.mi, si) if self.mi.is_spectral else None)
 
 
 @dataclass(frozen=True)
@@ -109,8 +112,17 @@ class OverWavelengths:
         return self.spectra.symmetric
 
     def at(self, si: Any, active: Any) -> Body:
-        places = self.mi.ArrayXf([*spectral.places(STEERING_NM), *spectral.places(si.wavelengths)])
-        return self.spectra.at(self.binding.steered(si, active), places)
+        return self.spectra.at(self.binding.steered(si, active), _places(self.mi, si))
+
+
+def _places(mi: Any, si: Any) -> Any:
+    """Of fixed wavelengths on the spectrum, and of those of a ray."""
+    return mi.ArrayXf([*spectral.places(STEERING_NM), *spectral.places(si.wavelengths)])
+
+
+def _spectrum(mi: Any, *channels: Any) -> Any:
+    """A colour at fixed wavelengths, and at those of a ray."""
+    return mi.ArrayXf(list(channels) or [0.0] * (2 * len(mi.UnpolarizedSpectrum())))
 
 
 def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before: Bodies | None) -> Bodies:
@@ -128,22 +140,25 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         body = model.recursion.body(binding.uniform_material(), model, variance, context)
         dr.eval(body)
         return Uniform(body)
+    nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, solved_spectra.NODES).tolist()]
+    places = np.array(spectral.places(nm))
     if not binding.varies and model.recursion.solves(binding.uniform_material()):
-        nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, solved_spectra.NODES).tolist()]
-        material, places = binding.at_wavelengths(nm), np.array(spectral.places(nm))
-        solved = solved_spectra.solve(material, places, model, variance, context)
+        solved = solved_spectra.solve(binding.at_wavelengths(nm), places, model, variance, context)
         dr.eval(solved.sides)
         return OverWavelengths(mi, binding, solved)
     if not binding.varies:
         model = model.recursion.unsolved(model)
     prepared = Prepared(binding, model, variance)
-    if binding.varies and not mi.is_spectral:
+    if binding.varies:
+        if mi.is_spectral:
+            context = replace(context, colour=partial(_spectrum, mi))
         material, ranges = binding.tabulated(axes.UNKNOWN)
+        spectra = [solved_spectra.axis(binding.at_wavelengths(nm, material), places)] if binding.steering else []
         known = before.textured if isinstance(before, Tabulated) else None
         symbolic = binding.symbolic(binding.looked_at())
-        textured = model.recursion.textured(material, ranges, symbolic, model, variance, context, known)
+        textured = model.recursion.textured(material, [*spectra, *ranges], symbolic, model, variance, context, known)
         if textured:
-            return Tabulated(binding, textured)
+            return Tabulated(mi, binding, textured)
     if binding.varies or number is None or not binding.stack.interfaces:
         return prepared
 
@@ -154,6 +169,6 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
 
     fixed = bsdf.body(binding.uniform_material(), model, variance, context)
     dr.eval(fixed)
-    spectra = spectral.sample(mi, fixed, at_wavelengths)
-    dr.eval(spectra.above, spectra.below, spectra.means)
-    return Prepared(binding, model, variance, spectra)
+    sampled = spectral.sample(mi, fixed, at_wavelengths)
+    dr.eval(sampled.above, sampled.below, sampled.means)
+    return Prepared(binding, model, variance, sampled)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
+import numpy as np
 from pydantic import model_validator
 
 from velatura.stack.schema import Parameter, Record, parameters
@@ -84,7 +85,7 @@ LayerValues: TypeAlias = InterfaceValues | MediumValues | DiffuseValues
 
 def is_zero(value: object) -> bool:
     """Whether a value is 0 and may be looked at."""
-    return isinstance(value, float) and value == 0.0
+    return isinstance(value, float | np.ndarray) and not np.any(value)
 
 
 # As they are written -------------------------------------------------------------------------------------------------
