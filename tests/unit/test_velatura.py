@@ -92,7 +92,7 @@ def test_smooth_stacks_reflect_by_fresnel_and_absorption(reflectance: str) -> No
 
 
 def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
-    """What is evaluated is F D G / 4 cos, with Fresnel at the half-vector."""
+    """What is evaluated is F D G / 4 cos, with Fresnel at the half-vector, within 3 %: its weights are interpolated."""
     from velatura.model import variance_kind
     from velatura.model.context import Context
     from velatura.optics import fresnel, ggx
@@ -107,7 +107,8 @@ def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
     i, o, m = (ggx.rotate(tuple(w), np.radians(20)) for w in (wi, wo, h))
     f = fresnel.conductor(ggx.dot(tuple(wi), h), *(np.array(GOLD[part])[:, None] for part in ("eta", "k")))
     truth = f * ggx.ndf(m, 0.1, 0.3) * ggx.masking(i, 0.1, 0.3) * ggx.masking(o, 0.1, 0.3) / (4 * wi[2])
-    np.testing.assert_allclose(value, truth, rtol=1e-6)
+    np.testing.assert_allclose(value, truth, rtol=0.03)
+    assert np.median(np.abs(value / truth - 1)) < 0.005
 
 
 @settings(max_examples=20)
