@@ -104,9 +104,15 @@ def kept_by_cone(c: Coated, cosine: Array) -> Array:
     return np.asarray(f * (1 - thrown) + (1 - 1 / c.n**2) * thrown)
 
 
+def below(c: Coated, cosine: Array) -> Array:
+    """All that the model reflects below the coat, in a lobe or not."""
+    found = vt.lobes(c.stack(), cosine, model="velatura")
+    return np.asarray(found.energy[-1] + found.remainder)
+
+
 ENERGIES: dict[str, Callable[[Coated, Array], Array]] = {
     "ours": lambda c, cosine: darkened(c, cosine, kept_by_cone(c, cosine)),
-    "model velatura": lambda c, cosine: vt.lobes(c.stack(), cosine, model="velatura").energy[-1],
+    "model velatura": lambda c, cosine: below(c, cosine),
     "Fresnel both ways": lambda c, cosine: darkened(c, cosine, fresnel.dielectric(cosine, c.n)),
     "one pass, 1 - F": lambda c, cosine: darkened(c, cosine, 0 * cosine),
 }

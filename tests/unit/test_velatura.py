@@ -108,7 +108,7 @@ def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
     f = fresnel.conductor(ggx.dot(tuple(wi), h), *(np.array(GOLD[part])[:, None] for part in ("eta", "k")))
     truth = f * ggx.ndf(m, 0.1, 0.3) * ggx.masking(i, 0.1, 0.3) * ggx.masking(o, 0.1, 0.3) / (4 * wi[2])
     np.testing.assert_allclose(value, truth, rtol=0.03)
-    assert np.median(np.abs(value / truth - 1)) < 0.005
+    assert np.median(np.abs(value / truth - 1)) < 0.01
 
 
 @settings(max_examples=20)

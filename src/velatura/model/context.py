@@ -16,6 +16,10 @@ def as_it_is(value: Value) -> Value:
     return value
 
 
+def in_silence(done: int, total: int) -> None:
+    """No progress is shown."""
+
+
 def channels(*values: Value) -> np.ndarray:
     """A colour in NumPy, from its channels, or from one value for all."""
     return np.stack(values) if len(values) > 1 else np.broadcast_to(values[0], (3, np.shape(values[0])[-1]))
@@ -32,6 +36,7 @@ class Context:
         colour: makes a colour of its channels, in sampled values; None if none are sampled.
         settle: applied to intermediate values; a renderer evaluates them, so that one kernel serves all.
         tables: the averages over rough interfaces.
+        progress: called with steps done and their total while textures are tabulated.
     """
 
     constant: bool = True
@@ -39,6 +44,7 @@ class Context:
     colour: Callable[..., Value] | None = channels
     settle: Callable[[Value], Value] = as_it_is
     tables: Tables = field(default_factory=tables.load)
+    progress: Callable[[int, int], None] = in_silence
 
 
 def at_a_point() -> Context:

@@ -30,13 +30,13 @@ MOST_REST = 4.0  # for the remainder
 DARK = 1e-6
 
 
-def factors(solved: Solved, wi: Direction, shares: Shares, count: int) -> list[list[Array]]:
+def factors(solved: Solved, wi: Direction, shares: Shares, count: int, samples: int | None) -> list[list[Array]]:
     """Squares of the factors, (C, M) at nodes wi, of each reflected part of a side and then of what passes.
 
     `solved` is that of NumPy in the symmetric form, with the weights of the forward form; `shares` interpolates between
-    the nodes.
+    the nodes; `samples` are those at each node, None for as many as a single material may take.
     """
-    samples = SAMPLES[count > MANY]
+    samples = samples or SAMPLES[count > MANY]
     i = tuple(low_discrepancy.repeated(x, samples) for x in wi)
     u = low_discrepancy.at_nodes(count, samples, None)
     nodes = np.repeat(np.arange(count), samples)

@@ -88,7 +88,7 @@ class SolvedSide:
 class Solver:
     """How materials of NumPy's values are solved for the directions of a grid, in a number of colours.
 
-    Operators that materials share are `made` once.
+    `samples` are those of `velatura.model.exchange`. Operators that materials share are `made` once.
     """
 
     model: Model
@@ -96,6 +96,7 @@ class Solver:
     grid: Grid
     colours: int
     tables: Tables
+    samples: int | None = None
     made: Made = field(default_factory=dict)
 
     @classmethod
@@ -132,7 +133,7 @@ class Solver:
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
         numbers = self._numbers(material, found, layouts)
-        factors = exchange.factors(numbers, self.grid.directions, self.grid.shares, self.grid.count)
+        factors = exchange.factors(numbers, self.grid.directions, self.grid.shares, self.grid.count, self.samples)
         return [side.weighed(each) for side, each in zip(found, factors)]
 
     def _numbers(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:

@@ -42,6 +42,7 @@ from velatura.stack import InterfaceValues, Material
 Array = NDArray[np.floating]
 
 COSINES = {True: 24, False: 16}  # at which isotropic materials are solved, and others
+SAMPLES = 377  # for the factors of the symmetric form, at each direction
 SHAPES = {True: (96,), False: (48, 33)}  # places over direction
 FAINTEST = 1e-4  # columns that are scaled from less than that are scaled by less
 MOST = 8.0  # times
@@ -222,7 +223,7 @@ def _tabulated(
     middle = [axis.values[axis.count // 2] for axis in spanned]
     start = axes.placed(solution.plain(material), spanned, middle)
     solver = Solver.of(model, variance, context)
-    solver = replace(solver, grid=replace(solver.grid, cosines=COSINES[isotropic]))
+    solver = replace(solver, grid=replace(solver.grid, cosines=COSINES[isotropic]), samples=SAMPLES)
     textures = {name for axis in spanned for name in axis.changed(0.0)}
     fixed = b"".join(np.asarray(x).tobytes() for address, x in start.values() if address.name not in textures)
     given = Variables.of(material)
@@ -236,7 +237,12 @@ def _tabulated(
     def solved(made: Material, group: Sequence[Axis | Wavelengths]) -> list[tuple[Array, Array]]:
         """Columns and numbers of each side, (nodes, ...)."""
         nodes = [axes.placed(made, group, values) for values in product(*(axis.values for axis in group))]
-        by_side = zip(*(solver.solve(node, layouts) for node in nodes))
+        solves = []
+        for done, node in enumerate(nodes):
+            context.progress(done, len(nodes))
+            solves.append(solver.solve(node, layouts))
+        context.progress(len(nodes), len(nodes))
+        by_side = zip(*solves)
         return [(np.array([x.rows for x in side]), np.array([x.numbers for x in side])) for side in by_side]
 
     adds: list[Array] = []

@@ -15,7 +15,7 @@ from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
 from velatura.model.textured import Textured
 from velatura.model.variance import Variance
-from velatura.plugins import spectral
+from velatura.plugins import progress, spectral
 from velatura.plugins.spectral import Spectra
 
 
@@ -135,7 +135,8 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
 
     # Scalar variants compute every direction anew
     number = mi.Float if dr.is_jit_v(mi.Float) else None
-    context = Context(number=number, colour=mi.UnpolarizedSpectrum, settle=settled)
+    shown = progress.line("velatura: solving textured materials")
+    context = Context(number=number, colour=mi.UnpolarizedSpectrum, settle=settled, progress=shown)
     if binding.uniform:
         body = model.recursion.body(binding.uniform_material(), model, variance, context)
         dr.eval(body)

@@ -63,18 +63,21 @@ def make(mi: Any) -> type:
         @property
         def exceptions(self) -> frozenset[str]:
             """Laws of `velatura.checks` that it is known not to keep."""
+            solved = self.model.recursion.solved
+            if solved and self.delta:
+                return frozenset()
             shape, form = "pane" if self.transmits else "opaque", self.model.form
             if form == "forward" and not self.model.recursion.closed_form:
                 form = "scaled"
             elif self.bodies.balanced:
                 form = "balanced" if shape == "opaque" and self.variance is Isotropic else "exchanged"
             declared = EXCEPTIONS[form, shape]
-            # The albedo of a base is a sum over cosines, which hardly resolves a critical angle outside, and errs by up
-            # to 2.5 % below several interfaces
+            # The albedo of a base hardly resolves a critical angle outside; where it is a sum over cosines, it errs by
+            # up to 2.5 % below several interfaces
             seen = self.binding.looked_at()
             known = [layer.eta for layer in seen.interfaces if not (layer.eta is None or isinstance(layer.eta, Image))]
             below_outside = any(np.mean(np.array(eta)) < np.max(np.array(seen.exterior)) for eta in known)
-            inexact = self.binding.stack.base and (below_outside or len(seen.interfaces) > 1)
+            inexact = self.binding.stack.base and (below_outside or (len(seen.interfaces) > 1 and not solved))
             return declared | GAIN if inexact else declared
 
         # The material, and what follows from it
