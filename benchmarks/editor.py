@@ -69,11 +69,12 @@ async (kind) => {
 """
 DRAG = """
 async (key) => {
-  const { values } = viewport.slots.a;
+  const { shader, contents } = viewport.slots.a;
   viewport.moving(true);
   viewport.schedule.frames = [];
   for (let k = 0, end = performance.now() + 3000; performance.now() < end; k++) {
-    viewport.setValues('a', { ...values, [key]: 0.05 + 0.3 * ((k % 50) / 50) });
+    const changed = { ...shader.values, [key]: 0.05 + 0.3 * ((k % 50) / 50) };
+    viewport.setContents('a', { ...contents, values: changed });
     await new Promise((resolve) => requestAnimationFrame(resolve));
   }
   viewport.moving(false);
@@ -133,9 +134,9 @@ async (material) => {
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     return performance.now() - start;
   };
-  const slot = viewport.slots.a, { values } = slot, uniforms = viewport.uniforms();
+  const slot = viewport.slots.a, { contents } = slot, uniforms = viewport.uniforms();
   const ours = (quick, alpha) => () => {
-    slot.setValues({ ...values, layer0_alpha_u: alpha, layer0_alpha_v: alpha });
+    slot.setContents({ ...contents, values: { ...contents.values, layer0_alpha_u: alpha, layer0_alpha_v: alpha } });
     slot.drawPreview(viewport.gbuffer, uniforms, quick);
     viewport.paint();
   };

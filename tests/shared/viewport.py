@@ -42,7 +42,7 @@ async ([material, model, object, environment]) => {
   if (object) await viewport.setObject(object);
   if (environment) await viewport.setEnvironment(environment);
   const shader = await answer('shader', { material, model });
-  await viewport.setMaterial('a', shader, shader.values);
+  await viewport.setMaterial('a', shader);
 }
 """
 _RADIANCE = """

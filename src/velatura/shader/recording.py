@@ -98,14 +98,15 @@ def record(
 
     # Run the model
     uniform = not any(isinstance(value, Varying) for value in flat.values())
-    constants = flat if chosen.recursion.solved and uniform and not parameters else constant
+    chosen = chosen if uniform else chosen.adder  # which is worked out at every point
+    constants = flat if chosen.recursion.solved and not parameters else constant
     recorded = Material.of(
         stack, lambda at, value: material.constant(at, value) if at.name in constants else _input(at)
     )
     kind = structure(stack) if parameters else variance(stack)
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     baked: Bake | Tabulated | None = None
-    if uniform and chosen.recursion.solved:
+    if chosen.recursion.solved:
         from velatura.shader.solved import tabulated
 
         baked = tabulated(stack, recorded, chosen, kind, general=parameters)
