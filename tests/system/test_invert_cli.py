@@ -81,7 +81,8 @@ def test_what_cannot_be_exits_with_3(run: Run, folder: Path) -> None:
     """Expected: one line that says why and what is possible, the same as JSON, and nothing written."""
     status, out, err = run("invert", "bright.yaml", "-o", "stack.yaml", "--plot")
     assert (status, out) == (3, "")
-    assert err == "velatura: no stack: lobe 1: no index up to 4 reflects as much (possible: lobe 1 energy 0.36)\n"
+    ways = "lobe 1 energy 0.36; lobe 1 base conductor"
+    assert err == f"velatura: no stack: lobe 1: no index up to 4 reflects as much (possible: {ways})\n"
     status, out, _ = run("invert", "bright.yaml", "--json")
     report = json.loads(out)
     assert (status, report["feasible"]) == (3, False)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,6 @@ from velatura.inverse.drag import Bound, DraggedStack, plain, seen
 from velatura.inverse.explain import REASONS
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.interface import conductor_tint
-from velatura.inverse.target import BLUR
 from velatura.model import Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
@@ -30,7 +28,6 @@ from velatura.stack import Diffuse, Interface, Stack, Varying
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
 EFFORT = stacks.EFFORTS[:1]  # to find a stack that is not near
 HALVES = 7  # of the way to a wish that cannot be met
-STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
 SAVED = tuple(str(n) for n in range(15, 23))  # figures of Bati et al. 2021
 SAVED_MODEL = "bati2021"
 
@@ -257,38 +254,29 @@ def _further(wish: Target, found: DraggedStack) -> DraggedStack:
 
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
-    for start in _starts(wish):
-        found = stacks.search(start, model.in_closed_form, EFFORT)
-        fresh = DraggedStack.of(found.stack, start, model) if found else None
-        if fresh is not None:
-            moved, bound = fresh.towards(fresh.achromatic(wish))
-            if bound is None or start is not wish:
-                return answered(moved, bound.why(wish) if bound else None)
-    return _pinned(wish, model)
+    found = stacks.search(wish, model.in_closed_form, EFFORT)
+    fresh = DraggedStack.of(found.stack, wish, model) if found else None
+    if fresh is not None:
+        moved, bound = fresh.towards(wish)
+        if bound is None:
+            return answered(moved, None)
+    return _searched(wish, model)
 
 
-def _starts(wish: Target) -> Iterator[Target]:
-    """Targets from which a wish is approached: itself, then ones with more blur below, then darker ones."""
-    yield wish
-    for scale in STARTS:
-        start, s = wish, 0.0
-        for k, lobe in enumerate(wish.lobes):
-            s = max(float(BLUR.variance(lobe.roughness)), WIDER * s)
-            grey = k == 0 and lobe.interfaces == 1 and lobe.base == "dielectric"
-            energy = (float(np.mean(lobe.colour)),) * 3 if grey else lobe.colour
-            start = start.with_lobe(k, energy=tuple(scale * e for e in energy), alpha=None, variance=s)
-        yield start
-
-
-def _pinned(wish: Target, model: Model) -> Answer:
-    """A stack for a target that fixes more than a drag keeps, by the whole search."""
+def _searched(wish: Target, model: Model) -> Answer:
+    """A stack for a target by the whole search, or for the nearest target of its form that has one."""
     try:
         found, says = invert_stack(wish, model), None
     except Infeasible as error:
-        if error.nearest is None:
+        possible = [way.target for way in error.directions if _form(way.target) == _form(wish)]
+        if not possible:
             return {"feasible": False, "why": error.why}
-        found, says = invert_stack(error.nearest, model), error.why
+        found, says = invert_stack(possible[0], model), error.why
     return _answer(found.stack, found.target, model, says)
+
+
+def _form(target: Target) -> list[tuple[int, str]]:
+    return [(lobe.interfaces, lobe.base) for lobe in target.lobes]
 
 
 # Coats, and the figures ----------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,7 +72,8 @@ class Problem:
             if outside & blocked:
                 return space.bound_at(min(outside & blocked), full)
             blocked = outside
-        return space.broken(x, bound) or bound or space.bounds[0]
+        # No bound is in the way where the steps do not end
+        return space.broken(x, bound) or bound or replace(space.bounds[0], reason="model")
 
     @cached_property
     def way(self) -> Array:
