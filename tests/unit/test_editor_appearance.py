@@ -315,7 +315,12 @@ def test_a_coat_keeps_the_appearance_or_says_why_not() -> None:
     (row,) = answer["lobes"]
     assert row["energy_after"] == pytest.approx(row["energy_before"], abs=1e-6)
     sharp = {"layers": [{"interface": {"conductor": "Au", "alpha": 0.001}}]}
-    refused = appearance.coated({"material": sharp, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})
+    near = appearance.coated({"material": sharp, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})
+    (loss,) = near["losses"]
+    assert loss.startswith("layer 0 (interface): cannot keep all of its appearance") and answer["losses"] == []
+    assert near["lobes"][0]["alpha_after"][0] > near["lobes"][0]["alpha_before"][0]
+    cloudy = {"layers": [{"medium": {"sigma_s": 1.0}}, {"interface": {"conductor": "Au"}}]}
+    refused = appearance.coated({"material": cloudy, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})
     assert set(refused) == {"error"}
     assert "\n" not in refused["error"]
 

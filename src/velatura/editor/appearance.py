@@ -291,7 +291,7 @@ def coated(body: Body) -> Answer:
         found = coat(stack, eta, alpha, keep_appearance=body.get("keep", False), model=model_of(body))
     except NoSolution as error:
         return {"error": str(error)}
-    return {"material": document(found.stack), "lobes": found.change()}
+    return {"material": document(found.stack), "lobes": found.change(), "losses": list(found.losses)}
 
 
 def targets(body: Body) -> Answer:
