@@ -29,7 +29,7 @@ SLACK = 1e-9  # by which a constraint may be broken: rounding of solutions
 NEGLIGIBLE = 1e-7  # the same for numerical solutions
 ENERGY_MIN = 1e-9  # of a lobe in a channel; less is taken for nothing
 CONDUCTOR_MIN = 3 - 2 * np.sqrt(2)  # a conductor (k >= eta) reflects more
-CONDUCTOR_MAX = 1 - 1e-6  # beyond which indices of a metal have no bound
+CONDUCTOR_MAX = 1 - 2.1e-3  # up to which indices of a metal lie within what a material may hold, with any tint
 ROUNDS, ENOUGH = 40, 1e-7  # of corrections where a model's own reading differs from the closed form
 MISSED = 1e-6  # what remains after them is no solution
 

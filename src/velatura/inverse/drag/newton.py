@@ -47,6 +47,7 @@ class Problem:
         space, bound = self.start.space, compromise.bound if compromise else None
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, set[int]()
+        missing = self._missing(self.start.reading, part)
         for n in range(ROUNDS):
             # See what is missing, and how that changes
             known = n == 0 and bound is None
@@ -72,8 +73,14 @@ class Problem:
             if outside & blocked:
                 return space.bound_at(min(outside & blocked), full)
             blocked = outside
-        # No bound is in the way where the steps do not end
-        return space.broken(x, bound) or bound or replace(space.bounds[0], reason="model")
+        return space.broken(x, bound) or bound or self._in_the_way(x, missing)
+
+    def _in_the_way(self, x: Array, missing: Array) -> Bound:
+        """The bound that stops a search that does not end: that of the coordinate whose reading misses most."""
+        space = self.start.space
+        worst = int(space.free[int(np.argmax(np.abs(missing[: len(space.free)])))])
+        on = [bound for bound in space.bounds if bound.coordinate == worst and abs(x[worst] - bound.at) <= SLACK]
+        return on[0] if on else replace(space.bounds[0], reason="model")
 
     @cached_property
     def way(self) -> Array:
