@@ -67,7 +67,7 @@ def wrong(target: Target, refusal: Infeasible, model: str = MODEL) -> str | None
         possible = {
             "energy": lobe.base == "dielectric" and lobe.fixed.of("eta", last) is None,
             "bright": lobe.base == "conductor",
-            "upper": lobe.interfaces == 2 and fixed["eta"],
+            "upper": lobe.interfaces == 2 and (fixed["eta"] or fixed["alpha"]),  # either settles the upper index
             "absorption": lobe.fixed.of("eta", last) is not None,
             "colour": (first and lobe.interfaces == 1) or fixed["tau"],
             "metal": lobe.base == "conductor",
