@@ -81,7 +81,8 @@ def test_what_cannot_be_exits_with_3(run: Run, folder: Path) -> None:
     """Expected: one line that says why and what is possible, the same as JSON, and nothing written."""
     status, out, err = run("invert", "bright.yaml", "-o", "stack.yaml", "--plot")
     assert (status, out) == (3, "")
-    assert err == "velatura: no stack: lobe 1: no index up to 4 reflects as much (possible: lobe 1 energy 0.36)\n"
+    ways = "lobe 1 energy 0.36; lobe 1 base conductor"
+    assert err == f"velatura: no stack: lobe 1: no index up to 4 reflects as much (possible: {ways})\n"
     status, out, _ = run("invert", "bright.yaml", "--json")
     report = json.loads(out)
     assert (status, report["feasible"]) == (3, False)
@@ -146,10 +147,21 @@ def test_a_coat_that_keeps_the_appearance(run: Run, folder: Path) -> None:
     assert brushed.rotation == pytest.approx(30) and brushed.alpha[0] < brushed.alpha[1]
     report = json.loads(run("coat", "coated-gold", "--json")[1])
     assert any(lobe["energy_after"] != pytest.approx(lobe["energy_before"], abs=1e-3) for lobe in report["lobes"])
-    status, _, err = run("coat", "coated-gold", "--alpha", "0.5", "--keep-appearance", "-o", "rough.yaml")
-    assert status == 3
-    assert err.startswith("velatura: layer 0 (interface): cannot keep its appearance under the coat: ")
     assert files(folder) == {"kept.yaml"}
+
+
+def test_a_coat_too_rough_to_keep_says_what_is_lost(run: Run, folder: Path) -> None:
+    """Expected: the nearest material, with a line for each layer; the coat's own lobe has a row, as in JSON."""
+    arguments = ("coat", "coated-gold", "--alpha", "0.5", "--keep-appearance")
+    status, out, err = run(*arguments, "-o", "rough.yaml")
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    start = "cannot keep all of its appearance under the coat: what lies above it blurs light more than that"
+    assert sum(start in line for line in lines) == 2 and lines[-1] == "rough.yaml"
+    assert any("coat" in line and "0.5000" in line for line in lines)
+    report = json.loads(run(*arguments, "--json")[1])
+    assert len(report["losses"]) == 2 and report["coat"]["alpha"] == pytest.approx([0.5, 0.5], abs=1e-6)
+    assert files(folder) == {"rough.yaml"}
 
 
 def test_the_model_is_named_where_it_is_not_the_one_that_renders(run: Run, folder: Path) -> None:

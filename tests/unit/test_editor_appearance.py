@@ -338,7 +338,12 @@ def test_a_coat_keeps_the_appearance_or_says_why_not() -> None:
     (row,) = answer["lobes"]
     assert row["energy_after"] == pytest.approx(row["energy_before"], abs=1e-6)
     sharp = {"layers": [{"interface": {"conductor": "Au", "alpha": 0.001}}]}
-    refused = appearance.coated({"material": sharp, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})
+    near = appearance.coated({"material": sharp, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})
+    (loss,) = near["losses"]
+    assert loss.startswith("layer 0 (interface): cannot keep all of its appearance") and answer["losses"] == []
+    assert near["lobes"][0]["alpha_after"][0] > near["lobes"][0]["alpha_before"][0]
+    cloudy = {"layers": [{"medium": {"sigma_s": 1.0}}, {"interface": {"conductor": "Au"}}]}
+    refused = appearance.coated({"material": cloudy, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})
     assert set(refused) == {"error"}
     assert "\n" not in refused["error"]
 
@@ -389,3 +394,21 @@ def test_a_part_of_the_way_ends_on_the_bound_that_is_named(
     found, bound = stack.towards(stack.target.with_lobe(0, energy=(energy,) * 3))
     assert bound is not None and bound.reason == reason
     assert np.min(np.abs(np.array(found.target.lobes[0].colour) - reached)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("lobe", "energy", "says"),
+    [
+        ({"energy": [0.08, 0.04, 0.05]}, [0.0567] * 3, "lobe 1: what lies above it absorbs nothing"),
+        ({"energy": [0.95, 0.75, 0.35], "alpha": 0.4, "base": "conductor"}, [0.7849, 0.75, 0.35], "lobe 1: not even"),
+        ({"energy": [0.5, 0.1, 0.1], "base": "conductor"}, [0.5, 0.1716, 0.1716], "lobe 1: a conductor"),
+        ({"energy": 0.6, "interfaces": 2}, [0.529] * 3, "lobe 1: no index up to 4"),
+    ],
+)
+def test_a_wish_that_cannot_be_is_answered_by_the_nearest_with_the_reason(
+    lobe: dict[str, Any], energy: list[float], says: str
+) -> None:
+    """The nearest of the same form, as `velatura invert` names it; the reason is one that such a lobe can have."""
+    answer = appearance.invert({"target": {"lobes": [lobe]}, "model": "bati2021"})
+    assert answer["target"]["lobes"][0]["energy"] == pytest.approx(energy, abs=1e-3)
+    assert answer["snapped"].startswith(says)

@@ -47,12 +47,15 @@ def coat(
         save(coated.stack, output)
     if as_json:
         answer = {"stack": coated.stack.to_dict(), "coat": _own(coated), "lobes": coated.change(), **_diffuse(coated)}
+        answer |= {"losses": list(coated.losses)} if keep_appearance else {}
         print(json.dumps({"model": coated.model.name, **answer}, allow_nan=False))
         return
     from rich.console import Console
 
     Console().print(_table(coated))
-    if keep_appearance:
+    for loss in coated.losses:
+        print(f"{loss}; this is the nearest")
+    if keep_appearance and not coated.losses:
         _say_how_kept(stack, coated)
     else:
         invert.say_for_which(coated.model)

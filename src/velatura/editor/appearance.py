@@ -20,7 +20,6 @@ from velatura.inverse.drag import Bound, DraggedStack, plain, seen
 from velatura.inverse.explain import REASONS
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.interface import conductor_tint
-from velatura.inverse.refined import starts
 from velatura.model import Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
@@ -268,25 +267,29 @@ def _further(wish: Target, found: DraggedStack) -> DraggedStack:
 
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
-    for start in starts(wish):
-        found = stacks.search(start, model.in_closed_form, EFFORT)
-        fresh = DraggedStack.of(found.stack, start, model) if found else None
-        if fresh is not None:
-            moved, bound = fresh.towards(fresh.achromatic(wish))
-            if bound is None or start is not wish:
-                return answered(moved, bound.why(wish) if bound else None)
-    return _pinned(wish, model)
+    found = stacks.search(wish, model.in_closed_form, EFFORT)
+    fresh = DraggedStack.of(found.stack, wish, model) if found else None
+    if fresh is not None:
+        moved, bound = fresh.towards(wish)
+        if bound is None:
+            return answered(moved, None)
+    return _searched(wish, model)
 
 
-def _pinned(wish: Target, model: Model) -> Answer:
-    """A stack for a target that fixes more than a drag keeps, by the whole search."""
+def _searched(wish: Target, model: Model) -> Answer:
+    """A stack for a target by the whole search, or for the nearest target of its form that has one."""
     try:
         found, says = invert_stack(wish, model), None
     except Infeasible as error:
-        if error.nearest is None:
+        possible = [way.target for way in error.directions if _form(way.target) == _form(wish)]
+        if not possible:
             return {"feasible": False, "why": error.why}
-        found, says = invert_stack(error.nearest, model), error.why
+        found, says = invert_stack(possible[0], model), error.why
     return _answer(found.stack, seen(found.stack, found.target, model), model, says)
+
+
+def _form(target: Target) -> list[tuple[int, str]]:
+    return [(lobe.interfaces, lobe.base) for lobe in target.lobes]
 
 
 # Coats, and the figures ----------------------------------------------------------------------------------------------
@@ -301,7 +304,7 @@ def coated(body: Body) -> Answer:
         found = coat(stack, eta, alpha, keep_appearance=body.get("keep", False), model=model_of(body))
     except NoSolution as error:
         return {"error": str(error)}
-    return {"material": document(found.stack), "lobes": found.change()}
+    return {"material": document(found.stack), "lobes": found.change(), "losses": list(found.losses)}
 
 
 def targets(body: Body) -> Answer:

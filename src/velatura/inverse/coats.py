@@ -33,6 +33,8 @@ from velatura.stack import (
 
 KEEP = 64  # partial stacks that are followed
 SMALL = 0.01  # energy or variance that is added to those of the goal, for units in which they are missed
+FOLLOWED, GRID, REFINED = 2, 16, 3  # those that the nearest lobe is sought for, steps on either side, and rounds
+LEAST, FARTHEST = 1e-3, 3.0  # by which its energy, as a logarithm, and its variance may differ
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Coated:
     """A coated stack, and the lobes at normal incidence without and with the coat: those of the stack come last.
 
     model: by which these are the lobes. diffuse: energy (3,) that a diffuse base scatters back up, without and with the
-    coat; None without one.
+    coat; None without one. losses: of lobes that were to be kept, and could not be: the layer, and the reason.
     """
 
     stack: Stack
@@ -48,6 +50,7 @@ class Coated:
     after: StackLobes
     model: Model
     diffuse: tuple[Array, Array] | None
+    losses: tuple[str, ...] = ()
 
     def change(self) -> list[dict[str, list[float]]]:
         """For every interface of the bare material energy (rgb) and roughness (two axes), before and after."""
@@ -79,18 +82,20 @@ def coat(
         stack: a material (a stack, a file, or a preset's name).
         eta, alpha: absolute index and roughness of the coat.
         keep_appearance: change the material below, so that its lobes at normal incidence keep energy and variance, and
-            a diffuse base its energy, unless it would have to be brighter than white.
+            a diffuse base its energy, unless it would have to be brighter than white. A lobe that cannot be kept comes
+            as near as it can, and is named in `losses`.
         eta_max: largest index that a dielectric may be given.
 
     Raises:
         InvalidInput: not a valid material, a texture, an index or a roughness outside its range, an unknown model or
             switch.
-        NoSolution: no material keeps the appearance; the message names the layer and the constraint.
+        NoSolution: no material keeps any of the appearance; the message names the layer and the constraint.
     """
     chosen, stack = named(model, **switches), load(stack)
     top = Interface(eta=eta, alpha=alpha)
+    losses: list[str] = []
     if keep_appearance:
-        below: tuple[Layer, ...] = _kept(
+        below, losses = _kept(
             stack, Layers("dielectric", eta, None, Roughness(alpha, alpha, 0.0), 0.0), eta_max, chosen
         )
     else:
@@ -105,11 +110,11 @@ def coat(
         if keep_appearance:
             coated = with_albedo(coated, wanted, chosen)
         diffuse = wanted, scattered(coated, chosen)
-    return Coated(coated, before, after, chosen, diffuse)
+    return Coated(coated, before, after, chosen, diffuse, tuple(losses))
 
 
-def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Layer, ...]:
-    """Layers whose lobes below a coat equal those of the bare stack."""
+def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[tuple[Layer, ...], list[str]]:
+    """Layers whose lobes below a coat equal those of the bare stack, or come near them, and which do not equal them."""
     material = Material.of(stack)
     kind = variance_kind(material)
     above, _ = Above.nothing(model, stack.exterior, kind).below(top)
@@ -119,13 +124,14 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[Laye
         return _solved(stack, above, eta_max, wanted)
 
     # Ask for other lobes, until the model itself reads those of the bare stack
-    def ask(request: Array) -> tuple[Layer, ...] | None:
+    def ask(request: Array) -> tuple[tuple[Layer, ...], list[str]] | None:
         try:
             return _solved(stack, above, eta_max, [_lobe(numbers, kind) for numbers in request.reshape(-1, 6)])
         except NoSolution:
             return None
 
-    def read(layers: tuple[Layer, ...]) -> Array:
+    def read(found: tuple[tuple[Layer, ...], list[str]]) -> Array:
+        layers, _ = found
         coat = top.written(0)
         return _numbers(stack_lobes(stack.with_layers([*coat, *layers]), 1.0, model=model))[6 * len(coat) :]
 
@@ -150,11 +156,13 @@ def _lobe(numbers: Array, kind: type[Variance]) -> tuple[Array, Variance]:
     return numbers[:3, None], kind(*entries)
 
 
-def _solved(stack: Stack, above: Above, eta_max: float, wanted: Sequence[tuple[Array, Variance]]) -> tuple[Layer, ...]:
-    """Layers with lobes of these energies and variances below a coat."""
+def _solved(
+    stack: Stack, above: Above, eta_max: float, wanted: Sequence[tuple[Array, Variance]]
+) -> tuple[tuple[Layer, ...], list[str]]:
+    """Layers with lobes of these energies and variances below a coat, or near them, and which are not these."""
     material = Material.of(stack)
     # Solve for its interfaces, from the top
-    paths, remaining = Partial(above, (), np.zeros(1)), iter(wanted)
+    paths, remaining, losses = Partial(above, (), np.zeros(1)), iter(wanted), list[str]()
     for n, (layer, values) in enumerate(zip(stack.layers, material.layers)):
         where = f"layer {n} ({type(layer).__name__.lower()})"
         if isinstance(values, MediumValues):
@@ -162,21 +170,66 @@ def _solved(stack: Stack, above: Above, eta_max: float, wanted: Sequence[tuple[A
                 raise NoSolution(f"{where}: scatters light; an appearance is kept of media that only absorb")
         elif isinstance(layer, Interface):
             (energy, variance), own = next(remaining), _choices(material, n, eta_max)
-            found = []
-            for rank, choice in enumerate(own):
-                part = interface.solve(paths.above, energy, variance, choice)
-                cost = paths.cost + rank + dislike(paths.above.eta, part.layers)
-                found.append(Partial(part.below, (*paths.layers, part.layers), cost))
-            tried = join(found, [len(part.cost) for part in found])
-            paths = pruned(tried, 1, KEEP)
-            if not len(paths.cost):
-                raise NoSolution(f"{where}: cannot keep its appearance under the coat: {_reason(tried, eta_max)}")
+            tried = _extended(paths, energy, variance, own)
+            kept = pruned(tried, 1, KEEP)
+            if not len(kept.cost):
+                reason = _reason(tried, eta_max)
+                near = _nearest(paths, energy, variance, own)
+                if near is None:
+                    raise NoSolution(f"{where}: cannot keep its appearance under the coat: {reason}")
+                kept = near
+                losses.append(f"{where}: cannot keep all of its appearance under the coat: {reason}")
+            paths = kept
     best = paths.take(np.array([np.argmin(paths.cost)]))
     # The axes keep their names: brushing that is turned by 30 degrees stays so
     axes = [np.radians(values.rotation) for values in material.interfaces]
-    kept = [replace(x, roughness=with_axes_named(x.roughness, axis)) for x, axis in zip(best.layers, axes)]
-    solved = [layer for layers in kept for layer in layers.written(0)]
-    return (*solved, *([stack.base] if stack.base else []))
+    named_alike = [replace(x, roughness=with_axes_named(x.roughness, axis)) for x, axis in zip(best.layers, axes)]
+    solved = [layer for layers in named_alike for layer in layers.written(0)]
+    return (*solved, *([stack.base] if stack.base else [])), losses
+
+
+def _extended(paths: Partial, energy: Array, variance: Variance, choices: Sequence[Choice]) -> Partial:
+    """The partial stacks with an interface that gives a lobe, by all choices, feasible or not."""
+    found = []
+    for rank, choice in enumerate(choices):
+        part = interface.solve(paths.above, energy, variance, choice)
+        cost = paths.cost + rank + dislike(paths.above.eta, part.layers)
+        found.append(Partial(part.below, (*paths.layers, part.layers), cost))
+    return join(found, [len(part.cost) for part in found])
+
+
+def _nearest(paths: Partial, energy: Array, variance: Variance, choices: Sequence[Choice]) -> Partial | None:
+    """The partial stack with the nearest lobe that any can have, of other energy or wider; None if none has any.
+
+    Bright channels get darker, or dark ones brighter, and all axes equally wider, each by as little as possible.
+    """
+    if choices[0].kind == "mirror":  # it may lose energy; nothing absorbs above it
+        choices = [*choices, Choice("conductor")]
+    some = paths.take(np.argsort(paths.cost, kind="stable")[:FOLLOWED])
+    own, s = np.maximum(energy, interface.ENERGY_MIN), float(np.mean(variance.matrix()[0])) + LEAST
+    steps = np.geomspace(LEAST, FARTHEST, GRID)
+    exponents, widths = np.r_[-steps[::-1], 0.0, steps], np.r_[0.0, steps]
+    best, near = np.inf, None
+    for _ in range(REFINED):
+        x, y, path = (each.ravel() for each in np.meshgrid(exponents, widths, np.arange(len(some.cost))))
+        darker, brighter = own.max() * np.exp(np.minimum(x, 0)), own.min() * np.exp(np.maximum(x, 0))
+        wished = np.where(x < 0, np.minimum(own, darker), np.maximum(own, brighter))
+        tried = _extended(some.take(path), wished, variance + type(variance).uniform(y), choices)
+        change = np.sum(np.abs(np.log(wished / own)), axis=0) + np.log1p(y / s)
+        cost = np.where(tried.layers[-1].feasible, np.tile(change, len(choices)), np.inf)
+        n = int(np.argmin(cost))
+        if not cost[n] < best:
+            break
+        best, near = cost[n], tried.take(np.array([n]))
+        # Look again between the neighbours of the best point
+        exponents, widths = (_about(axis, v[n % len(v)]) for axis, v in ((exponents, x), (widths, y)))
+    return near
+
+
+def _about(axis: Array, value: float) -> Array:
+    """Points between the neighbours of a point of an axis."""
+    n = int(np.argmin(np.abs(axis - value)))
+    return np.unique(np.r_[value, np.linspace(axis[max(n - 1, 0)], axis[min(n + 1, len(axis) - 1)], GRID)])
 
 
 def scattered(stack: Stack, model: Model) -> Array:
@@ -231,6 +284,8 @@ def _index_above(material: Material, n: int) -> Array:
 def _reason(tried: Partial, eta_max: float) -> str:
     """The constraint that the best attempt breaks most."""
     margins = tried.layers[-1].margins
+    if tried.layers[-1].kind == "mirror" and np.all(margins["blur"] >= 0):
+        return REASONS["bright"]
     names, values = list(margins), np.array(np.broadcast_arrays(*margins.values()))
     best = values[:, np.argmax(np.minimum(values, 0).sum(axis=0))]
     return REASONS[names[int(np.argmin(best))]].format(eta_max=eta_max)

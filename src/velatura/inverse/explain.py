@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from velatura.errors import NoSolution
 from velatura.inverse import stacks
 from velatura.inverse.interface import CONDUCTOR_MIN
-from velatura.inverse.target import BLUR, Target
+from velatura.inverse.target import BLUR, Fixed, Target, TargetLobe
 from velatura.model import Model
 
 EFFORT = ((12, 32), (24, 128))
-STEPS, HALVINGS = 12, 14  # by which a target that can be reached is looked for, and then approached
+STEPS, HALVINGS = 8, 12  # by which a target that can be reached is looked for, and then approached
+FAR, LEAST = 4.0, 1e-4  # the logarithm by which quantities change at most; less energy or variance than that has none
+FURTHER = (0.01, 0.03, 0.1, 0.3)  # beyond what a closed form can reach, as shares of the way there
+PAIRED, OTHER, FREED, REMADE = 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
+SURE = (0.02, 0.002, 2e-4)  # energies of lobes that are almost always possible
+ROUNDING = 1e-9  # by which lobes stay below what there is
+SHOWN = 3  # ways out, the nearest ones
 TOO_MUCH = "energies sum to {total:.4g}, above 1"
 REASONS = {
     "energy": "no index up to {eta_max:g} reflects as much",
+    "bright": "not even the brightest metal reflects as much, of what its facets lose and what lies above lets through",
     "upper": "its upper interface alone reflects more",
     "absorption": "the fixed index reflects too little",
     "colour": "what lies above it absorbs nothing, or what is fixed, and one index does not give that colour",
@@ -27,6 +36,8 @@ REASONS = {
     "fixed": "a fixed roughness is not the one that gives that blur",
     "model": "the model's own reading cannot be met",
 }
+#: What reflects too little: of a dielectric, of a conductor, of either where its index is fixed.
+TOO_LITTLE = ("energy", "bright", "absorption")
 
 
 @dataclass(frozen=True)
@@ -43,7 +54,7 @@ class Infeasible(NoSolution):
     """No stack gives the target.
 
     lobe: the first one from the top, counted from 1, that cannot be given; 0 where it is all of them. constraint: what
-    forbids it, a key of `REASONS`, or "sum". directions: the nearest targets that can be reached.
+    forbids it, a key of `REASONS`, or "sum". directions: the targets that can be reached, the nearest first.
     """
 
     def __init__(self, why: str, lobe: int, constraint: str, directions: list[Direction]) -> None:
@@ -54,7 +65,7 @@ class Infeasible(NoSolution):
     @property
     def nearest(self) -> Target | None:
         """The target with the smallest change, of all directions."""
-        return min(self.directions, key=lambda d: d.change).target if self.directions else None
+        return self.directions[0].target if self.directions else None
 
 
 def infeasible(target: Target, model: Model) -> Infeasible:
@@ -63,12 +74,29 @@ def infeasible(target: Target, model: Model) -> Infeasible:
         from velatura.inverse import refined  # which drags, for reasons that stand here
 
         return refined.refused(target, model)
+    search, found = Search(model), list[Direction]()
     total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
     if total > 1:
-        directions = [d for d in [_scaled(target, model)] if d]
-        return Infeasible(TOO_MUCH.format(total=total), 0, "sum", directions)
-    lobe, constraint = why_not(target, model)
-    return Infeasible(because(lobe, constraint, target), lobe + 1, constraint, _directions(target, model, lobe))
+        why, n, constraint = TOO_MUCH.format(total=total), -1, "sum"
+        ways = [*_dimmed(target), *_capped(target)]
+        found = search.nearest(ways)
+        for way in () if found else ways:
+            if (direction := search.completed(way.direction(0.0), way.along(0.0), 0)) is not None:
+                found.append(direction)
+    else:
+        n, constraint = why_not(target, model)
+        why = because(n, constraint, target)
+        first = search.of_lobe(target, n)
+        found = [whole for direction in first if (whole := search.with_rest(direction, target)) is not None]
+        for direction in () if found else first[:1]:
+            if (whole := search.completed(direction, target, n + 1)) is not None:
+                found.append(whole)
+    if not found:
+        found = next((ends for way in _to_sure(target) if (ends := search.nearest([way]))), [])
+    return Infeasible(why, n + 1, constraint, sorted(found, key=lambda direction: direction.change))
+
+
+# Why -----------------------------------------------------------------------------------------------------------------
 
 
 def because(lobe: int, constraint: str, target: Target) -> str:
@@ -89,75 +117,304 @@ def why_not(target: Target, model: Model) -> tuple[int, str]:
             layers = tried.layers[-lobe.interfaces :]
             names = [key for part in layers for key in part.margins]
             margins = np.array(np.broadcast_arrays(*(m for part in layers for m in part.margins.values())))
-            best = margins[:, np.argmax(np.minimum(margins, 0).sum(axis=0))]
-            return n, names[int(np.argmin(best))]
+            best = margins[:, np.argmax(np.maximum(np.minimum(margins, 0), -1e9).sum(axis=0))]
+            return n, _named(names[int(np.argmin(best))], lobe)
     return len(target.lobes) - 1, "model"
 
 
-def _directions(target: Target, model: Model, n: int) -> list[Direction]:
-    """The nearest targets: all of a lobe's energy changed, one channel's, its blur."""
-    lobe = target.lobes[n]
-    found = []
+def _named(constraint: str, lobe: TargetLobe) -> str:
+    """The reason for a violated constraint: too little reflectance has another one where an index is fixed."""
+    if constraint not in TOO_LITTLE:
+        return constraint
+    if lobe.fixed.of("eta", lobe.interfaces - 1) is not None:
+        return "absorption"
+    return "bright" if lobe.base == "conductor" else "energy"
 
-    def energies(scale: np.ndarray) -> Target:
-        colour = tuple(float(e) for e in np.array(lobe.colour) * scale)
-        return target.with_lobe(n, energy=colour[0] if len(set(colour)) == 1 else colour)
 
-    channels = [(f"lobe {n + 1} energy", np.ones(3))]
-    if len(set(lobe.colour)) > 1:
-        channels += [(f"lobe {n + 1} energy {name}", np.eye(3)[c]) for c, name in enumerate("rgb")]
-    for what, which in channels:
+# Ways out ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Targets `along(x)` that lie further from a target the larger x is, from 0 to `far`.
+
+    words: of a target on the way. cost: of the way itself, beside how far the quantities change. inclusive: whether the
+    first one is another target already.
+    """
+
+    what: str
+    start: Target
+    along: Callable[[float], Target]
+    words: Callable[[Target], str]
+    far: float = FAR
+    cost: float = 0.0
+    inclusive: bool = False
+
+    def direction(self, x: float) -> Direction:
+        """The target at x as a direction."""
+        found = self.along(x)
+        return Direction(self.what, self.words(found), self.cost + _change(self.start, found), found)
+
+
+@dataclass(frozen=True)
+class Search:
+    """Targets that a model has a stack for, found by bisection: in closed form first, which is quicker."""
+
+    model: Model
+
+    @cached_property
+    def quick(self) -> Model:
+        """The model in closed form."""
+        return self.model if self.model.recursion.closed_form else self.model.in_closed_form
+
+    def possible(self, target: Target, model: Model) -> bool:
+        """Whether a target has a stack."""
+        return stacks.search(target, model, EFFORT[:1]) is not None
+
+    def nearest(self, ways: Iterable[Way]) -> list[Direction]:
+        """The first targets along ways that have a stack, of each description one; the nearest of them."""
+        ends = {way: end for way in ways if (end := self._end(way)) is not None}
+        found: dict[str, Direction] = {}
+        for way in sorted(ends, key=lambda way: way.direction(ends[way]).change):
+            direction = self._met(way, ends[way]) if len(found) < SHOWN else None
+            if direction is not None:
+                found.setdefault(direction.words, direction)
+        return sorted(found.values(), key=lambda direction: direction.change)
+
+    def of_lobe(self, target: Target, n: int) -> list[Direction]:
+        """The nearest ways out of a lobe that cannot be given below those above it, without the lobes below."""
+        above = target.model_copy(update={"lobes": target.lobes[: n + 1]})
+        last = n == len(target.lobes) - 1
+        own = [*_of_energy(above, n), *_of_blur(above, n), *_of_form(above, n, last)]
+        return self.nearest(own) or self.nearest(_of_others(above, n))
+
+    def with_rest(self, direction: Direction, target: Target) -> Direction | None:
+        """A direction of the first lobes together with those below, as a target has them; None if it has no stack."""
+        rest = target.lobes[len(direction.target.lobes) :]
+        whole = target.model_copy(update={"lobes": (*direction.target.lobes, *rest)})
+        return replace(direction, target=whole) if not rest or self.possible(whole, self.model) else None
+
+    def completed(self, direction: Direction, target: Target, n: int) -> Direction | None:
+        """A direction of the first n lobes together with those below, these changed, too, where they must be."""
+        lobes = direction.target.lobes[:n]
+        for k in range(n, len(target.lobes)):
+            now = target.model_copy(update={"lobes": (*lobes, target.lobes[k])})
+            if not self.possible(now, self.model):
+                nearest = self.nearest([*_of_blur(now, k), *_as_dark_as_must_be(now, k)])
+                if not nearest:
+                    return None
+                words, change = f"{direction.words} and {nearest[0].words}", direction.change + nearest[0].change
+                direction, now = Direction(direction.what, words, change, now), nearest[0].target
+            lobes = now.lobes
+        return replace(direction, target=target.model_copy(update={"lobes": lobes}))
+
+    def _end(self, way: Way) -> float | None:
+        """Where a way first has a stack in closed form."""
+        ends = self._bracketed(way)
+        return None if ends is None else self._approached(way, *ends, self.quick, HALVINGS)
+
+    def _met(self, way: Way, end: float) -> Direction | None:
+        """The direction there, or just beyond where the model itself has none there."""
+        if self.quick is not self.model and not self.possible(way.along(end), self.model):
+            further = [end + share * max(end, 0.1) for share in FURTHER]
+            n = next((n for n, x in enumerate(further) if self.possible(way.along(x), self.model)), None)
+            if n is None:
+                return None
+            end = self._approached(way, [end, *further][n], further[n], self.model, HALVINGS // 3)
+        return way.direction(end)
+
+    def _bracketed(self, way: Way) -> tuple[float, float] | None:
+        """Two neighbouring points of a way, of which only the further one has a stack in closed form."""
+        if way.inclusive and self.possible(way.along(0.0), self.quick):
+            return 0.0, 0.0
+        steps = [way.far * (n / STEPS) ** 2 for n in range(STEPS + 1)] if way.far else []
+        return next((ends for ends in pairwise(steps) if self.possible(way.along(ends[1]), self.quick)), None)
+
+    def _approached(self, way: Way, start: float, end: float, model: Model, halvings: int) -> float:
+        """The first point that has a stack, between one that has none and one that has."""
+        for _ in range(halvings if start < end else 0):
+            middle = (start + end) / 2
+            start, end = (start, middle) if self.possible(way.along(middle), model) else (middle, end)
+        return end
+
+
+def _of_energy(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
+    """A lobe of other energy: all of it, one channel, the dark ones or the bright ones, or grey."""
+    lobe, what = target.lobes[n], f"lobe {n + 1} energy"
+    own = np.maximum(lobe.colour, LEAST)
+
+    def way(name: str, along: Callable[[float], np.ndarray], far: float = FAR, inclusive: bool = False) -> Way:
+        def words(t: Target) -> str:
+            return f"{name} {digits(t.lobes[n].energy)}"
+
+        return Way(name, target, lambda x: _with_energy(target, n, along(x)), words, far, cost, inclusive)
+
+    for sign in (-1, 1):
+        yield way(what, lambda x, sign=sign: own * np.exp(sign * x))  # type: ignore[misc]
+    if np.ptp(own) == 0:
+        return
+    for channel, name in zip(np.eye(3), "rgb"):
         for sign in (-1, 1):
-            t = _first(target, model, lambda x: energies(np.exp(sign * x * which)), 4.0)  # noqa: B023
-            if t is not None:
-                change = abs(float(np.sum(np.log(np.array(t.lobes[n].colour) / np.array(lobe.colour)))))
-                found.append(Direction(what, f"{what} {digits(t.lobes[n].energy)}", change, t))
-
-    def blurred(x: float) -> Target:
-        return target.with_lobe(n, alpha=None, variance=float(max(s * np.exp(x), 0.0)))
-
-    s = float(BLUR.variance(lobe.roughness))
-    for sign in (-1, 1) if s > 0 else ():
-        t = _first(target, model, lambda x: blurred(sign * x), 4.0)  # noqa: B023
-        if t is not None:
-            now = t.lobes[n]
-            words = f"lobe {n + 1} variance {digits(now.variance or 0.0)}"
-            found.append(Direction(f"lobe {n + 1} variance", words, abs(float(np.log((now.variance or 0) / s))), t))
-    return found
+            yield way(f"{what} {name}", lambda x, by=sign * channel: own * np.exp(by * x))  # type: ignore[misc]
+    apart = float(np.log(own.max() / own.min()))
+    yield way(f"{what}, its dark channels", lambda x: np.maximum(own, own.min() * np.exp(x)), apart)
+    yield way(f"{what}, its bright channels", lambda x: np.minimum(own, own.max() * np.exp(-x)), apart)
+    grey = np.full(3, own.mean())
+    for sign in (-1, 1):
+        yield way(f"{what}, grey", lambda x, sign=sign: grey * np.exp(sign * x), inclusive=True)  # type: ignore[misc]
 
 
-def _scaled(target: Target, model: Model) -> Direction | None:
-    """All lobes darker by the same factor."""
+def _as_dark_as_must_be(target: Target, n: int) -> Iterator[Way]:
+    """A lobe of less energy."""
+    own = np.maximum(target.lobes[n].colour, LEAST)
+
+    def words(t: Target) -> str:
+        return f"lobe {n + 1} energy {digits(t.lobes[n].energy)}"
+
+    yield Way(f"lobe {n + 1} energy", target, lambda x: _with_energy(target, n, own * np.exp(-x)), words)
+
+
+def _of_blur(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
+    """A lobe of other variance."""
+    what, s = f"lobe {n + 1} variance", float(BLUR.variance(target.lobes[n].roughness))
+
+    def words(t: Target) -> str:
+        return f"{what} {digits(t.lobes[n].variance or 0.0)}"
+
+    def sharper(x: float) -> Target:
+        return target.with_lobe(n, alpha=None, variance=float(s * np.exp(-x)))
+
+    def wider(x: float) -> Target:
+        return target.with_lobe(n, alpha=None, variance=float(max(s, LEAST) * np.exp(x)))
+
+    if s > 0:
+        yield Way(what, target, sharper, words, FAR, cost)
+    if s < (widest := float(BLUR.variance(1.0))):
+        yield Way(what, target, wider, words, float(np.log(widest / max(s, LEAST))), cost)
+
+
+def _of_form(target: Target, n: int, last: bool) -> Iterator[Way]:
+    """A lobe of as many interfaces as it has not, with another base, or with nothing fixed."""
+    lobe, what = target.lobes[n], f"lobe {n + 1}"
+    forms: list[tuple[str, dict[str, object], float]] = [
+        (f"{what} interfaces {3 - lobe.interfaces}", {"interfaces": 3 - lobe.interfaces, "fixed": Fixed()}, PAIRED)
+    ]
+    if last:
+        base = "dielectric" if lobe.base == "conductor" else "conductor"
+        forms.append((f"{what} base {base}", {"base": base, "fixed": Fixed()}, REMADE))
+    if lobe.fixed != Fixed():
+        forms.append((f"{what} nothing fixed", {"fixed": Fixed()}, FREED))
+    for name, changes, cost in forms:
+        yield _at(target, target.with_lobe(n, **changes), name, cost)
+
+
+def _of_others(target: Target, n: int) -> Iterator[Way]:
+    """Lobes above, less bright or less blurred."""
+    for k in range(n):
+        own, s = np.maximum(target.lobes[k].colour, LEAST), float(BLUR.variance(target.lobes[k].roughness))
+
+        def dimmer(x: float, k: int = k, own: np.ndarray = own) -> Target:
+            return _with_energy(target, k, own * np.exp(-x))
+
+        def sharper(x: float, k: int = k, s: float = s) -> Target:
+            return target.with_lobe(k, alpha=None, variance=float(s * np.exp(-x)))
+
+        def energy(t: Target, k: int = k) -> str:
+            return f"lobe {k + 1} energy {digits(t.lobes[k].energy)}"
+
+        def variance(t: Target, k: int = k) -> str:
+            return f"lobe {k + 1} variance {digits(t.lobes[k].variance or 0.0)}"
+
+        yield Way(f"lobe {k + 1} energy", target, dimmer, energy, FAR, OTHER)
+        if s > 0:
+            yield Way(f"lobe {k + 1} variance", target, sharper, variance, FAR, OTHER)
+
+
+def _dimmed(target: Target) -> Iterator[Way]:
+    """All lobes darker by the same factor, so that they sum to 1, and then less."""
+    total = np.sum([lobe.colour for lobe in target.lobes], axis=0).max() * (1 + ROUNDING)
 
     def darker(x: float) -> Target:
         changed = target
         for n, lobe in enumerate(target.lobes):
-            changed = changed.with_lobe(n, energy=tuple(float(e * np.exp(-x)) for e in lobe.colour))
+            changed = _with_energy(changed, n, np.array(lobe.colour) * np.exp(-x) / total)
         return changed
 
-    t = _first(target, model, darker, 4.0)
-    if t is None:
-        return None
-    scale = t.lobes[0].colour[0] / max(target.lobes[0].colour[0], 1e-12)
-    return Direction("energy", f"all energies times {scale:.3g}", abs(float(np.log(max(scale, 1e-12)))), t)
+    def words(t: Target) -> str:
+        return f"all energies times {max(t.lobes[0].colour) / max(*target.lobes[0].colour, LEAST):.3g}"
+
+    yield Way("energy", target, darker, words, inclusive=True)
 
 
-def _first(target: Target, model: Model, along: Callable[[float], Target], far: float) -> Target | None:
-    """The first target along a way that has a stack; None if there is none up to a distance."""
+def _capped(target: Target) -> Iterator[Way]:
+    """One lobe of at most what the others leave, and then less."""
+    total = np.sum([lobe.colour for lobe in target.lobes], axis=0)
+    for n, lobe in enumerate(target.lobes):
+        left = (1 - (total - np.array(lobe.colour))) * (1 - ROUNDING)
+        if left.min() <= LEAST:
+            continue
 
-    def possible(x: float) -> bool:
-        t = along(x)
-        return stacks.search(t, model, EFFORT[:1]) is not None
+        def lower(x: float, n: int = n, left: np.ndarray = left) -> Target:
+            return _with_energy(target, n, np.minimum(target.lobes[n].colour, left * np.exp(-x)))
 
-    steps = far * (np.arange(1, STEPS + 1) / STEPS) ** 2
-    end = next((x for x in steps if possible(x)), None)
-    if end is None:
-        return None
-    start = 0.0 if end == steps[0] else float(steps[np.searchsorted(steps, end) - 1])
-    for _ in range(HALVINGS):
-        middle = (start + end) / 2
-        start, end = (start, middle) if possible(middle) else (middle, end)
-    return along(float(end))
+        def words(t: Target, n: int = n) -> str:
+            return f"lobe {n + 1} energy {digits(t.lobes[n].energy)}"
+
+        yield Way(f"lobe {n + 1} energy", target, lower, words, inclusive=True)
+
+
+def _to_sure(target: Target) -> Iterator[Way]:
+    """Towards lobes that are almost always possible, dark and blurred more the deeper they lie; then nothing fixed."""
+    for kept in (target, _freed(target)):
+        for dark in SURE:
+            sure, s = kept, 0.0
+            for n, lobe in enumerate(target.lobes):
+                s = max(2.5 * s, float(BLUR.variance(lobe.roughness)), LEAST)
+                energy = 0.4 if lobe.base == "conductor" else dark
+                sure = _with_energy(sure, n, np.full(3, energy)).with_lobe(n, alpha=None, variance=s)
+
+            def along(x: float, kept: Target = kept, sure: Target = sure) -> Target:
+                changed = kept
+                for n, (lobe, to) in enumerate(zip(kept.lobes, sure.lobes)):
+                    one, two = (np.log(np.maximum(each.colour, LEAST)) for each in (lobe, to))
+                    a, b = (max(float(BLUR.variance(each.roughness)), LEAST) for each in (lobe, to))
+                    changed = _with_energy(changed, n, np.exp(one + x * (two - one)))
+                    changed = changed.with_lobe(n, alpha=None, variance=float(a * (b / a) ** x))
+                return changed
+
+            yield Way("lobes", target, along, _described, 1.0, OTHER)
+
+
+def _freed(target: Target) -> Target:
+    for n in range(len(target.lobes)):
+        target = target.with_lobe(n, fixed=Fixed())
+    return target
+
+
+def _described(target: Target) -> str:
+    lobes = (f"energy {digits(lobe.energy)} variance {digits(lobe.variance or 0.0)}" for lobe in target.lobes)
+    return "lobes of " + ", ".join(lobes)
+
+
+def _at(target: Target, changed: Target, name: str, cost: float) -> Way:
+    """A way of one target."""
+    return Way(name, target, lambda x: changed, lambda t: name, 0.0, cost, inclusive=True)
+
+
+def _with_energy(target: Target, n: int, colour: np.ndarray) -> Target:
+    """The target with another energy of a lobe, a number where it is grey."""
+    r, g, b = (float(e) for e in colour)
+    return target.with_lobe(n, energy=r if r == g == b else (r, g, b))
+
+
+def _change(one: Target, other: Target) -> float:
+    """By which logarithms the energies and variances of two targets differ."""
+    total = 0.0
+    for a, b in zip(one.lobes, other.lobes):
+        total += float(np.sum(np.abs(np.log(np.maximum(a.colour, LEAST) / np.maximum(b.colour, LEAST)))))
+        s_a, s_b = (max(float(BLUR.variance(lobe.roughness)), LEAST) for lobe in (a, b))
+        total += abs(float(np.log(s_a / s_b)))
+    return total
 
 
 def digits(value: float | tuple[float, ...]) -> str:

@@ -21,6 +21,7 @@ from velatura.model import Model, named
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW
 
 MODEL = "bati2021"
 DENSER, RARER = 1, -1
@@ -28,7 +29,7 @@ SLACK = 1e-9  # by which a constraint may be broken: rounding of solutions
 NEGLIGIBLE = 1e-7  # the same for numerical solutions
 ENERGY_MIN = 1e-9  # of a lobe in a channel; less is taken for nothing
 CONDUCTOR_MIN = 3 - 2 * np.sqrt(2)  # a conductor (k >= eta) reflects more
-CONDUCTOR_MAX = 1 - 1e-6  # beyond which indices of a metal have no bound
+CONDUCTOR_MAX = 1 - 2.1e-3  # up to which indices of a metal lie within what a material may hold, with any tint
 ROUNDS, ENOUGH = 40, 1e-7  # of corrections where a model's own reading differs from the closed form
 MISSED = 1e-6  # what remains after them is no solution
 
@@ -307,10 +308,17 @@ def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
         low = fresnel.normal_incidence(n, n)
     least, most = excess(low), excess(high)
     u = false_position(excess, low, high, least, most)
-    margins = {"energy": margin(np.min(most, axis=0), NEGLIGIBLE)}
+    found = layers(*indices(u))
+    margins = {"bright": np.minimum(margin(np.min(most, axis=0), NEGLIGIBLE), _writable(found.eta, found.kappa))}
     if not choice.absorbs or choice.tau is not None:
         margins["metal"] = margin(np.min(-least, axis=0), NEGLIGIBLE)
-    return layers(*indices(u)).with_margins(**margins)
+    return found.with_margins(**margins)
+
+
+def _writable(eta: Array, kappa: Array) -> Array:
+    """The margin, (N,), of a metal's indices within what a material may hold."""
+    inside = (np.log(eta / INDEX_LOW), np.log(INDEX_HIGH / eta), np.log(INDEX_HIGH / np.maximum(kappa, INDEX_LOW)))
+    return margin(np.min([np.min(np.atleast_2d(x), axis=0) for x in inside], axis=0))
 
 
 def conductor_index(reflectance: Value, tint: Value) -> Value:

@@ -368,7 +368,7 @@ class Reader:
         self.x.append(value)
         self.bounds.append(Bound(lobe, reason, 1, low, n))
         if high is not None:
-            self.bounds.append(Bound(lobe, "energy" if reason != "index" else reason, -1, high, n))
+            self.bounds.append(Bound(lobe, ABOVE.get(reason, "energy"), -1, high, n))
         return n
 
     def _colour(self, lobe: int, values: Sequence[float], reason: str, low: float, high: float | None = None) -> slice:
@@ -376,6 +376,10 @@ class Reader:
         for value in values:
             self._coordinate(lobe, float(value), reason, low, high)
         return slice(first, len(self.x))
+
+
+#: Reasons for an upper bound, where the lower one has another: of indices, and of the reflectance of conductors.
+ABOVE = {"index": "index", "metal": "bright", "upper": "bright"}
 
 
 def retinted(tint: Array, now: float, then: float) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -50,7 +50,7 @@ class Problem:
         enough = ENOUGH if bound and closed else ALMOST
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, dict[int, int]()
-        before = None
+        before, missing = None, self._missing(self.start.reading, part)
         for n in range(ROUNDS if closed else SLOW_ROUNDS):
             # See what is missing, and how that changes
             known = n == 0 and bound is None
@@ -77,7 +77,14 @@ class Problem:
             blocked = {c: blocked.get(c, 0) + 1 for c in outside}
             if held := [c for c, times in blocked.items() if times > (1 if closed else PATIENCE)]:
                 return space.bound_at(min(held), full)
-        return space.broken(x, bound) or bound or space.bounds[0]
+        return space.broken(x, bound) or bound or self._in_the_way(x, missing)
+
+    def _in_the_way(self, x: Array, missing: Array) -> Bound:
+        """The bound that stops a search that does not end: that of the coordinate whose reading misses most."""
+        space = self.start.space
+        worst = int(space.free[int(np.argmax(np.abs(missing[: len(space.free)])))])
+        on = [bound for bound in space.bounds if bound.coordinate == worst and abs(x[worst] - bound.at) <= SLACK]
+        return on[0] if on else replace(space.bounds[0], reason="model")
 
     @cached_property
     def way(self) -> Array:

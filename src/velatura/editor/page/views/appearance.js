@@ -328,7 +328,8 @@ export function mountAppearance(element, services) {
       const answer = await call('coat', { ...question(), ...coat });
       if (before !== now()) return;
       if (answer.material) store.run(addCoat, answer.material);
-      coatSays = answer.error ? `${capital(answer.error)}.` : '';
+      const says = answer.error ? [answer.error] : answer.losses;
+      coatSays = says.map((why) => `${capital(why)}.`).join(' ');
       paint();
     });
   }
