@@ -162,7 +162,7 @@ def main() -> None:
             si.wi = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
             si.uv = mi.Point2f(rng.next_float32(), rng.next_float32())
             wo = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
-            dr.eval(bsdf.eval_pdf(mi.BSDFContext(), si, wo))
+            dr.eval(bsdf.eval_pdf(mi.BSDFContext(), si, wo), rng)  # the latter, so that every round has the same kernel
             dr.sync_thread()
 
         return job
