@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from velatura import ops
 from velatura.model import operators
-from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
+from velatura.model.prepare import Prepared, PreparedMedium
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -19,17 +19,11 @@ from velatura.optics.ggx import Direction
 
 @dataclass(frozen=True)
 class Lobe(ops.Named):
-    """Energy (a colour), variance in the space of the roughness map, and the GGX lobe that has it.
-
-    The lobe is drawn as `gain` times its energy times a GGX reflection, or, where it is that of `facets`, times their
-    Fresnel reflectance.
-    """
+    """Energy (a colour), variance in the space of the roughness map, and the GGX lobe that has it."""
 
     energy: Value
     variance: Variance
     roughness: Roughness
-    gain: Value = 1.0
-    facets: PreparedInterface | None = None
 
 
 @dataclass(frozen=True)

@@ -353,14 +353,10 @@ def chosen_direction(where: Value, a: Direction, b: Direction) -> Direction:
 
 
 def _chosen(where: Value, a: Lobe, b: Lobe) -> Lobe:
-    """The lobe a where a condition holds, else b; of one kind, both drawn with facets or neither."""
-    assert type(a.variance) is type(b.variance) and (a.facets is None) == (b.facets is None)
+    """The lobe a where a condition holds, else b; of one kind."""
+    assert type(a.variance) is type(b.variance)
     variance = type(a.variance)(
         *(ops.select(where, p, q) for p, q in zip(vars(a.variance).values(), vars(b.variance).values()))
     )
     roughness = Roughness(*(ops.select(where, p, q) for p, q in zip(a.roughness, b.roughness)))
-    facets = None
-    if a.facets is not None and b.facets is not None:
-        facets = replace(a.facets, eta=ops.select(where, a.facets.eta, b.facets.eta))
-    gain = ops.select(where, a.gain, b.gain)
-    return Lobe(ops.select(where, a.energy, b.energy), variance, roughness, gain, facets)
+    return Lobe(ops.select(where, a.energy, b.energy), variance, roughness)

@@ -61,7 +61,7 @@ def eval_pdf(
         density = density + probability * (visible * jacobian)
     for lobe in lobes if lit is None else lit:
         visible, masking = _visible(lobe.roughness, wi, wo, h)
-        value = value + _colour(lobe, wi, h) * (visible * jacobian * masking)
+        value = value + lobe.energy * (visible * jacobian * masking)
     return ops.select(above, value, 0.0), ops.select(above, density, 0.0)
 
 
@@ -102,13 +102,6 @@ def picked(lobes: Sequence[Lobe], base: Base | None, u: Value, numbers: Sequence
         begin = begin + before
         chosen = ops.select(u > begin, number, chosen)
     return chosen
-
-
-def _colour(lobe: Lobe, wi: Direction, h: Direction) -> Value:
-    """The factor that makes a GGX reflection the lobe."""
-    if lobe.facets is None:
-        return lobe.energy * lobe.gain
-    return lobe.facets.reflect(ops.clip(ggx.dot(wi, h), 0.0, 1.0)) * lobe.gain
 
 
 def _bounded(roughness: Roughness) -> Roughness:

@@ -26,14 +26,13 @@ SWITCHES: dict[str, tuple[str, ...]] = {
 GAIN = frozenset({"energy", "white furnace"})  # laws that a gain breaks
 
 #: By form and shape of the stack, the laws that BSDFs do not keep. Light that a lobe sends below the surface is lost.
-#: The forward form is not reciprocal; `scaled` is that whose lobes are drawn with their full energy, which gains where
-#: light meets rough glass from inside. The symmetric form gains at grazing angles, and its samples have any
-#: weight; `balanced` is that of isotropic opaque stacks of uniform values by `velatura`, `exchanged` that of others.
+#: The forward form is not reciprocal, the symmetric one gains at grazing angles, and its samples have any weight. Of
+#: materials that are solved, the forms are `solved` and `exchanged`, or `balanced` where opaque, isotropic and uniform.
 EXCEPTIONS: dict[tuple[str, str], frozenset[str]] = {
     ("forward", "opaque"): frozenset({"lossless", "reciprocity"}),
     ("forward", "pane"): frozenset({"lossless", "reciprocity"}),
-    ("scaled", "opaque"): frozenset({"lossless", "reciprocity"}),
-    ("scaled", "pane"): frozenset({"lossless", "reciprocity"}) | GAIN,
+    ("solved", "opaque"): frozenset({"lossless", "reciprocity"}),
+    ("solved", "pane"): frozenset({"lossless", "reciprocity"}) | GAIN,
     ("symmetric", "opaque"): frozenset({"lossless", "spread"}) | GAIN,
     ("symmetric", "pane"): frozenset({"lossless", "spread"}) | GAIN,
     ("exchanged", "opaque"): frozenset({"lossless"}) | GAIN,

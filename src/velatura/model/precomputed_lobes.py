@@ -6,12 +6,12 @@ half a turn.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 from velatura.model.adding import Lobe
-from velatura.model.prepare import Prepared, PreparedInterface
+from velatura.model.prepare import Prepared
 from velatura.model.roughness_maps import AS_IT_IS
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
@@ -34,27 +34,22 @@ class Sampled(Protocol):
 @dataclass(frozen=True)
 class PrecomputedLobes:
     """Energies and roughnesses of all lobes, the transmitted one last if there is one; `colour` makes an energy of
-    `width` channels.
-
-    Lobes that have axes of their own have a gain too; `facets` are those of lobes that are drawn with them.
-    """
+    `width` channels. There are `count` lobes."""
 
     curves: Sampled
     colour: Callable[..., Value]
     width: int
     prepared: Prepared
-    facets: Sequence[PreparedInterface | None]
+    count: int
     transmits: bool
 
     def __call__(self, w: Direction) -> tuple[list[Lobe], Lobe | None]:
         channels = iter(self.curves(w))
-        lobes = [self._lobe(w, facets, channels) for facets in self.facets]
+        lobes = [self._lobe(channels) for _ in range(self.count)]
         return (lobes[:-1], lobes[-1]) if self.transmits else (lobes, None)
 
-    def _lobe(self, w: Direction, facets: PreparedInterface | None, channels: Iterator[Value]) -> Lobe:
+    def _lobe(self, channels: Iterator[Value]) -> Lobe:
         energy = self._colour(channels)
-        if facets is not None:
-            return Lobe(energy, facets.s_r, facets.roughness, self._colour(channels), facets)
         kind = self.prepared.variance
         roughness = kind(*(next(channels) for _ in kind.__dataclass_fields__)).roughness(AS_IT_IS)
         return Lobe(energy, kind.of(roughness, self.prepared.f), roughness)
@@ -70,15 +65,12 @@ def sample(
     shape = directional_grid.LINE if prepared.variance is Isotropic else directional_grid.PLANE
     reflected, passed = lobes(directional_grid.directions(shape, number))
     seen = [*reflected, passed] if transmits and passed is not None else reflected
-    facets = [lobe.facets for lobe in seen]
 
     held = [column for lobe in seen for column in columns(lobe, prepared, colour)]
     curves = directional_grid.curves(held, shape, number)
-    return PrecomputedLobes(curves, colour, len(colour()), prepared, facets, transmits)
+    return PrecomputedLobes(curves, colour, len(colour()), prepared, len(seen), transmits)
 
 
 def columns(lobe: Lobe, prepared: Prepared, apart: Callable[[Value], Iterable[Value]]) -> list[Value]:
     """The numbers of a lobe in a `PrecomputedLobes`, in order; `apart` gives the channels of a colour."""
-    if lobe.facets is not None:
-        return [*apart(lobe.energy), *apart(lobe.gain)]
     return [*apart(lobe.energy), *vars(prepared.variance.of(lobe.roughness, AS_IT_IS)).values()]

@@ -67,8 +67,8 @@ def make(mi: Any) -> type:
             if solved and self.delta:
                 return frozenset()
             shape, form = "pane" if self.transmits else "opaque", self.model.form
-            if form == "forward" and not self.model.recursion.closed_form:
-                form = "scaled"
+            if form == "forward" and solved:
+                form = "solved"
             elif self.bodies.balanced:
                 form = "balanced" if shape == "opaque" and self.variance is Isotropic else "exchanged"
             declared = EXCEPTIONS[form, shape]

@@ -23,25 +23,20 @@ NODES = 48  # over these, a multiple of those of a ray
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """The lobes on one side: those of fixed wavelengths, and the energies of all (gains too, of lobes with facets)."""
+    """The lobes on one side: those of fixed wavelengths, and the energies of all."""
 
     fixed: precomputed_lobes.PrecomputedLobes
     energies: directional_grid.Curves
 
-    def at(self, prepared: Prepared, mi: Any, place: Any) -> precomputed_lobes.Lobes:
-        """The lobes at the wavelengths of a ray, by their place among all; `prepared` holds the facets there."""
+    def at(self, mi: Any, place: Any) -> precomputed_lobes.Lobes:
+        """The lobes at the wavelengths of a ray, by their place among all."""
 
         def lobes(w: Direction) -> tuple[list[Lobe], Lobe | None]:
             reflected, passed = self.fixed(w)
             channels = iter(self.energies(w, place))
 
             def with_spectra(lobe: Lobe) -> Lobe:
-                lobe = replace(lobe, energy=mi.ArrayXf([*lobe.energy, *next(channels)]))
-                if lobe.facets is None:
-                    return lobe
-                gain = mi.ArrayXf([*lobe.gain, *next(channels)])
-                facets: Any = prepared.layers[0]  # only the first interface is drawn with its own
-                return replace(lobe, gain=gain, facets=facets)
+                return replace(lobe, energy=mi.ArrayXf([*lobe.energy, *next(channels)]))
 
             reflected = [with_spectra(lobe) for lobe in reflected]
             return reflected, with_spectra(passed) if passed else None
@@ -62,10 +57,10 @@ class Spectra:
     def at(self, body: bsdf.Lobed, wavelengths_nm: Any) -> bsdf.Lobed:
         """The body for a ray, with the sampled values."""
         (place,) = places([wavelengths_nm])
-        above = self.above.at(body.above, self.mi, place)
+        above = self.above.at(self.mi, place)
         if self.below is None or body.below is None:
             return replace(body, above=self._with_means(body.above, place), lobes_above=above, lobes_below=above)
-        return replace(body, lobes_above=above, lobes_below=self.below.at(body.below, self.mi, place))
+        return replace(body, lobes_above=above, lobes_below=self.below.at(self.mi, place))
 
     def _with_means(self, prepared: Prepared, place: Any) -> Prepared:
         base = self.fixed.above.base
@@ -103,8 +98,7 @@ def _side(mi: Any, fixed: precomputed_lobes.Lobes, lobes_at: Callable[[Any], pre
 
     # Keep what depends on them
     seen = [*reflected, *([passed] if fixed.transmits and passed else [])]
-    columns = [c for lobe in seen for c in ([lobe.energy, lobe.gain] if lobe.facets else [lobe.energy])]
-    flat = [_over_wavelengths(mi, column, count) for column in columns]
+    flat = [_over_wavelengths(mi, lobe.energy, count) for lobe in seen]
     return Side(fixed, directional_grid.curves(flat, (*shape, NODES), mi.Float))
 
 

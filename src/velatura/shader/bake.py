@@ -1,7 +1,7 @@
 """The lobes of a uniform material, computed once over direction for a texture, and read back from it.
 
 A tape computes them, so that another stack of layers needs no compilation. The values, and the lobes made of them, are
-those of `velatura.model.precomputed_lobes`: energies, gains, and roughness as a matrix, over the
+those of `velatura.model.precomputed_lobes`: energies, and roughness as a matrix, over the
 cosine, and over the azimuth where an interface is anisotropic.
 """
 
@@ -17,7 +17,7 @@ from velatura import ops
 from velatura.model import bsdf, precomputed_lobes
 from velatura.model.context import at_a_point
 from velatura.model.diffuse import Base
-from velatura.model.prepare import Prepared, PreparedInterface
+from velatura.model.prepare import Prepared
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -79,7 +79,7 @@ def bake(material: Material, body: bsdf.Lobed) -> Bake:
     w = directional_grid.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
 
     # Compute the lobes seen in a direction
-    columns, facets = _seen(material, body, w)
+    columns, lobes = _seen(material, body, w)
     base, groups = body.base(w), []
     if base:
         groups, through = [Group("through", 0, 1)], _apart(base.through(w))
@@ -88,11 +88,11 @@ def bake(material: Material, body: bsdf.Lobed) -> Bake:
     groups.append(Group("lobes", len(groups), len(columns) // 4 - len(groups)))
 
     # And read it
-    return Bake([operand(x) for x in columns], _read(body, nodes, groups, facets), nodes, groups)
+    return Bake([operand(x) for x in columns], _read(body, nodes, groups, lobes), nodes, groups)
 
 
-def _seen(material: Material, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], list[bool]]:
-    """The columns of all lobes at an upright direction, and whether each is drawn with facets."""
+def _seen(material: Material, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], int]:
+    """The columns of all lobes at an upright direction, and how many lobes there are."""
     above = number(f"{PLACE}.z") < 0.5
     if body.below is not None and material.kinds == material.kinds[::-1]:
         # Layers that are of the same kinds from both sides are added up once, for either
@@ -101,17 +101,17 @@ def _seen(material: Material, body: bsdf.Lobed, w: Direction) -> tuple[list[Valu
         model, variance = body.above.model, body.above.variance
         body = bsdf.body(chosen, model, variance, at_a_point())
         return _columns(body.lobes_above, body, w)
-    columns, facets = _columns(body.lobes_above, body, w)
+    columns, count = _columns(body.lobes_above, body, w)
     if body.below is None:
-        return columns, facets
-    return [ops.select(above, a, b) for a, b in zip(columns, _columns(body.lobes_below, body, w)[0])], facets
+        return columns, count
+    return [ops.select(above, a, b) for a, b in zip(columns, _columns(body.lobes_below, body, w)[0])], count
 
 
-def _columns(lobes: precomputed_lobes.Lobes, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], list[bool]]:
+def _columns(lobes: precomputed_lobes.Lobes, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], int]:
     reflected, passed = lobes(w)
     seen = [*reflected, *([passed] if body.below is not None and passed is not None else [])]
     columns = [column for lobe in seen for column in precomputed_lobes.columns(lobe, body.above, _apart)]
-    return columns, [lobe.facets is not None for lobe in seen]
+    return columns, len(seen)
 
 
 def _apart(colour: Value) -> list[Operand]:
@@ -152,7 +152,7 @@ class _Base(Base):
         return together(r, g, b)
 
 
-def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], facets: Sequence[bool]) -> bsdf.Lobed:
+def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], count: int) -> bsdf.Lobed:
     """A body whose lobes are read from the texture."""
     transmits, held = body.below is not None, groups[-1]
     # Light is on the side that wi is on, but for the symmetric form, which looks at others
@@ -160,10 +160,8 @@ def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], fac
     sides = (0.0, 1.0) if body.above.model.form == "symmetric" else (side, side)
 
     def lobes(prepared: Prepared, side: Value) -> precomputed_lobes.Lobes:
-        first = prepared.layers[0]
-        own = [first if each and isinstance(first, PreparedInterface) else None for each in facets]
         columns = Texture(nodes, held, side, _OF_BASE if prepared.base else 0)
-        return precomputed_lobes.PrecomputedLobes(columns, together, 3, prepared, own, transmits)
+        return precomputed_lobes.PrecomputedLobes(columns, together, 3, prepared, count, transmits)
 
     if body.below is not None:
         return replace(body, lobes_above=lobes(body.above, sides[0]), lobes_below=lobes(body.below, sides[1]))

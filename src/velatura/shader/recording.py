@@ -184,8 +184,7 @@ def _weighed(body: bsdf.Lobed) -> tuple[bsdf.Lobed, list[str]]:
     last = symbol.number(f"{symbol.SHOWN}[{count}]")
 
     def lobe(seen: Lobe, weight: Value) -> Lobe:
-        gain = seen.gain * weight if seen.facets else seen.gain
-        return replace(seen, energy=seen.energy * weight, gain=gain)
+        return replace(seen, energy=seen.energy * weight)
 
     def weighed(lobes: precomputed_lobes.Lobes) -> precomputed_lobes.Lobes:
         def shown(w: Direction) -> tuple[list[Lobe], Lobe | None]:
@@ -212,8 +211,6 @@ def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> dict[str, Value]:
     if seen.transmitted is not None:
         lobes["transmitted"] = seen.transmitted
     parts = {place: {"energy": lobe.energy, **lobe.roughness._asdict()} for place, lobe in lobes.items()}
-    if any(isinstance(lobe.gain, Symbol) for lobe in lobes.values()):
-        parts = {place: {**parts[place], "gain": lobe.gain} for place, lobe in lobes.items()}
     fields = {f"{place}.{part}": value for place, all_parts in parts.items() for part, value in all_parts.items()}
     if seen.base:
         fields |= {"base_scale": seen.base.scale, "base_energy": seen.base.energy}
