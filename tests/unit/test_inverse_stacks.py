@@ -489,6 +489,7 @@ def test_what_a_coat_cannot_keep_comes_near(
     assert min(row["energy_after"]) > energy
     other = "energy" if kept == "alpha" else "alpha"
     assert row[f"{other}_after"] != pytest.approx(row[f"{other}_before"], abs=1e-4)
-    assert row["energy_after"] == pytest.approx(row["energy_before"], abs=0.05)
+    bounced = found.after.remainder[..., 0]  # which `velatura` counts in no lobe
+    assert row["energy_after"] + bounced == pytest.approx(np.array(row["energy_before"]), abs=0.05)
     assert row["alpha_after"] == pytest.approx(row["alpha_before"], abs=0.08)
     assert loads(dumps(found.stack)) == found.stack

@@ -33,8 +33,11 @@ from velatura.stack import (
 
 KEEP = 64  # partial stacks that are followed
 SMALL = 0.01  # energy or variance that is added to those of the goal, for units in which they are missed
+MISSED, HARDLY = 1e-5, 1e6  # what may be missing; the unit of what cannot be kept, so that it hardly counts
 FOLLOWED, GRID, REFINED = 2, 16, 3  # those that the nearest lobe is sought for, steps on either side, and rounds
 LEAST, FARTHEST = 1e-3, 3.0  # by which its energy, as a logarithm, and its variance may differ
+
+Kept = tuple[tuple[Layer, ...], list[str]]  # layers below a coat, and what these cannot keep
 
 
 @dataclass(frozen=True)
@@ -113,31 +116,53 @@ def coat(
     return Coated(coated, before, after, chosen, diffuse, tuple(losses))
 
 
-def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> tuple[tuple[Layer, ...], list[str]]:
+def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> Kept:
     """Layers whose lobes below a coat equal those of the bare stack, or come near them, and which do not equal them."""
     material = Material.of(stack)
     kind = variance_kind(material)
     above, _ = Above.nothing(model, stack.exterior, kind).below(top)
-    bare, _ = lobes(prepare(material, above.model, kind), NORMAL)
-    wanted = [(np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)) for lobe in bare]
+
+    def solver_reads(whole: Material) -> list[tuple[Array, Variance]]:
+        found, _ = lobes(prepare(whole, above.model, kind), NORMAL)
+        return [(np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)) for lobe in found]
+
+    wanted = solver_reads(material)
     if model.recursion.closed_form or not wanted:
         return _solved(stack, above, eta_max, wanted)
 
     # Ask for other lobes, until the model itself reads those of the bare stack
-    def ask(request: Array) -> tuple[tuple[Layer, ...], list[str]] | None:
+    coating, refused = top.written(0), list[tuple[Array, Kept]]()
+
+    def near(request: Array) -> Kept | None:
         try:
             return _solved(stack, above, eta_max, [_lobe(numbers, kind) for numbers in request.reshape(-1, 6)])
         except NoSolution:
             return None
 
-    def read(found: tuple[tuple[Layer, ...], list[str]]) -> Array:
-        layers, _ = found
-        coat = top.written(0)
-        return _numbers(stack_lobes(stack.with_layers([*coat, *layers]), 1.0, model=model))[6 * len(coat) :]
+    def ask(request: Array) -> Kept | None:
+        found = near(request)
+        if found is None or not found[1]:
+            return found
+        refused.append((request, found))
+        return None
+
+    def read(found: Kept) -> Array:
+        return _numbers(stack_lobes(stack.with_layers([*coating, *found[0]]), 1.0, model=model))[6 * len(coating) :]
 
     goal, first = _numbers(stack_lobes(stack, 1.0, model=model)), np.array([_entries(*lobe) for lobe in wanted]).ravel()
-    kept = requests.met(ask, read, first, goal, np.abs(goal) + SMALL)
-    return kept if kept is not None else _solved(stack, above, eta_max, wanted)
+    scale = np.abs(goal) + SMALL
+    kept = requests.met(ask, read, first, goal, scale)
+    if kept is not None and (not refused or np.abs(read(kept) - goal).max() < MISSED):
+        return kept
+    if not refused:
+        return _solved(stack, above, eta_max, wanted)  # fails, with the reason
+
+    # Where it can only come near a request, that loss stays, and the rest is met
+    request, nearest = refused[-1]
+    solved = solver_reads(Material.of(stack.with_layers([*coating, *nearest[0]])))[len(coating) :]
+    lost = np.abs(np.ravel([_entries(*lobe) for lobe in solved]) - request) > LEAST * scale
+    found = requests.met(near, read, request, goal, np.where(lost, HARDLY, scale)) or nearest
+    return found[0], found[1] or nearest[1]
 
 
 def _numbers(found: StackLobes) -> Array:
@@ -150,15 +175,13 @@ def _entries(energy: Array, variance: Variance) -> Array:
 
 
 def _lobe(numbers: Array, kind: type[Variance]) -> tuple[Array, Variance]:
-    """Energy (3, 1) and variance of a lobe from its numbers."""
-    xx, xy, yy = (np.atleast_1d(x) for x in numbers[3:])
+    """Energy (3, 1) and variance of a lobe from its numbers; none is negative."""
+    xx, xy, yy = (np.atleast_1d(x) for x in (max(numbers[3], 0.0), numbers[4], max(numbers[5], 0.0)))
     entries = {Isotropic: (0.5 * (xx + yy),), PerAxis: (xx, yy)}.get(kind, (xx, xy, yy))
     return numbers[:3, None], kind(*entries)
 
 
-def _solved(
-    stack: Stack, above: Above, eta_max: float, wanted: Sequence[tuple[Array, Variance]]
-) -> tuple[tuple[Layer, ...], list[str]]:
+def _solved(stack: Stack, above: Above, eta_max: float, wanted: Sequence[tuple[Array, Variance]]) -> Kept:
     """Layers with lobes of these energies and variances below a coat, or near them, and which are not these."""
     material = Material.of(stack)
     # Solve for its interfaces, from the top

@@ -10,7 +10,7 @@ import numpy as np
 from velatura import ops
 from velatura.inverse.partial_stack import Array
 
-ROUNDS, ENOUGH = 12, 1e-6  # of requests, and what may be missing, in units of the goal
+ROUNDS, ENOUGH = 24, 1e-6  # of requests, and what may be missing, in units of the goal
 SMALL = 0.01  # reading, in these units, of which no ratio is taken
 RATIO = 0.1, 10.0  # bounds of that
 
