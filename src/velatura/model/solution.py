@@ -25,6 +25,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.model.widths import Tensor
 from velatura.ops import Value
 from velatura.sampling import differences, directional_grid, low_discrepancy
+from velatura.sampling.directional_grid import Packing
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.tables import Tables
 
@@ -68,6 +69,12 @@ class SolvedSide:
     def rows(self) -> Array:
         """All columns, (rows, M), in the order in which `Columns.read` takes them."""
         return np.concatenate([np.atleast_2d(each) for each in self.columns.all])
+
+    @property
+    def groups(self) -> list[int]:
+        """Which rows are read together: 1 for those that are read seldom."""
+        columns = self.columns
+        return [int(seldom) for x, seldom in zip(columns.all, columns.seldom) for _ in np.atleast_2d(x)]
 
     @property
     def numbers(self) -> Array:
@@ -254,15 +261,22 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     start = plain(material)
     layouts = solver.layouts([start])
 
+    packings: list[Packing] = []
+
     def arrays(numbers: list[float]) -> list[Array]:
         found = solver.solve(given.replaced(start, numbers), layouts)
-        spread = [solver.grid.spread(side.rows, solver.shape).T.ravel() for side in found]
-        return [each for pair in zip(spread, (side.numbers for side in found)) for each in pair]
+        if not packings:
+            packings.extend(Packing.of(side.rows, side.groups, shared=not given.given) for side in found)
+        flat = []
+        for side, packing in zip(found, packings):
+            flat += [x.T.ravel() for x in packing.split(solver.grid.spread(side.rows, solver.shape))]
+            flat.append(side.numbers)
+        return flat
 
     flat, made = iter(differences.differentiable(arrays, given.given, given.around, context.number)), []
-    for seen, layout in zip(sides(material), layouts):
-        curves = directional_grid.interleaved(next(flat), solver.shape, context.number)
-        column = next(flat)
+    for seen, layout, packing in zip(sides(material), layouts, packings):
+        tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
+        curves, column = packing.curves(tables), next(flat)
         numbers = column[:, None] if context.colour is channels else differences.numbers(column, context.number)
         made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context))
     return solver.bsdf(material, made)
