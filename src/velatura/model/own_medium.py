@@ -55,9 +55,10 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     p = _in_frame(lobe, wo)
     cos_o = ops.maximum(wo[2], 0.0)
-    seen = 0.25 * _visibility(i, alpha_u, alpha_v) * cos_o / (n * n)
+    inverse = 1 / n
+    seen = 0.25 * _visibility(i, alpha_u, alpha_v) * cos_o * (inverse * inverse)
     # Reflect in the medium
-    o, reached = ((p[0], p[1], ops.maximum(cos_o, COS_MIN)), True) if _is_outside(n) else _out(p[0], p[1], n)
+    o, reached = ((p[0], p[1], ops.maximum(cos_o, COS_MIN)), True) if _is_outside(n) else _out(p[0], p[1], inverse)
     m = i[0] + o[0], i[1] + o[1], i[2] + o[2]
     ops.names(i=i, o=o, m=m)
     density = ops.select(reached, seen * ggx.ndf_along(m, alpha_u, alpha_v), 0.0)
@@ -72,8 +73,8 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     if not _is_outside(n):
         ring = ops.sqrt(ops.maximum(n * n - 1, 0.0))
         p2 = ops.maximum(p[0] * p[0] + p[1] * p[1], ops.TINY)
-        cos_far = ring * p2 / n
-        stretch = ops.sqrt((1 - cos_far * cos_far) / p2)
+        cos_far = ring * p2 * inverse
+        stretch = ops.sqrt((1 - cos_far * cos_far) * (1 / p2))
         m = i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + cos_far
         ops.names(ring=ring, p2=p2, cos_far=cos_far, stretch=stretch, m_far=m)
         pdf = pdf + seen * ggx.ndf_along(m, alpha_u, alpha_v) * (2 * n * ring)
@@ -165,15 +166,16 @@ def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Value, Di
     if _is_outside(n):
         return alpha_u, alpha_v, n, (x, y, ops.maximum(z, COS_MIN))
     radius = ops.sqrt(ops.maximum(x * x + y * y, ops.TINY))
-    scale = ops.minimum(1 / n, (1 - 0.5 * COS_MIN * COS_MIN) / radius)
-    cosine = ops.sqrt(ops.maximum((n * n - 1 + z * z) / (n * n), COS_MIN * COS_MIN))
-    ops.names(radius=radius, scale=scale, cosine=cosine)
+    inverse = 1 / n
+    scale = ops.minimum(inverse, (1 - 0.5 * COS_MIN * COS_MIN) / radius)
+    cosine = ops.sqrt(ops.maximum((n * n - 1 + z * z) * (inverse * inverse), COS_MIN * COS_MIN))
+    ops.names(radius=radius, inverse=inverse, scale=scale, cosine=cosine)
     return alpha_u, alpha_v, n, (scale * x, scale * y, cosine)
 
 
-def _out(x: Value, y: Value, n: Value) -> tuple[Direction, Value]:
-    """The direction inside with a momentum, and whether it exists."""
-    x, y = x / n, y / n
+def _out(x: Value, y: Value, inverse: Value) -> tuple[Direction, Value]:
+    """The direction inside with a momentum, and whether it exists; `inverse` is that of the index."""
+    x, y = inverse * x, inverse * y
     cos2 = 1 - x * x - y * y
     return (x, y, ops.sqrt(ops.maximum(cos2, COS_MIN * COS_MIN))), cos2 > 0
 
