@@ -51,11 +51,13 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Layout:
-    """The lobes of a side, the interfaces that make a step of the index, and the last one whose facets turn light."""
+    """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, and the
+    slabs that scatter, by the number of interfaces above."""
 
     lobes: list[Drawn]
     stepped: list[int]
     rough: int | None
+    cloudy: list[int]
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ class Solver:
         assert context.colour is not None
         shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
         passage = (
-            straight_through.passage(material, self.variance, layout.stepped, layout.rough)
+            straight_through.passage(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
             if material.transmits
             else None
         )
@@ -222,7 +224,9 @@ class Solver:
         shares = [passed.light(share, sum(shares), each) for share, each in zip(shares, heaviest)]
         total, left, passes = sum(shares), np.ones(count), None
         if material.transmits:
-            passage = straight_through.passage(_slim(material), self.variance, layout.stepped, layout.rough)
+            passage = straight_through.passage(
+                _slim(material), self.variance, layout.stepped, layout.rough, layout.cloudy
+            )
             passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
             passes = _evenly(passes, least)
             left = 1 - passes.share
@@ -302,7 +306,18 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     both = [(k, veil) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
     rough = widths.stepped(turns, widths.LEAST_TURN)
     lobes = [Drawn(k, widths.first_step(steps[:k]), veil) for k, veil in both]
-    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None)
+    cloudy = sorted(set().union(*map(_cloudy, materials)))
+    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy)
+
+
+def _cloudy(material: Material) -> set[int]:
+    """Slabs that scatter light, by the number of interfaces above them."""
+    found, above = set(), 0
+    for layer in material.layers:
+        above += isinstance(layer, InterfaceValues)
+        if isinstance(layer, MediumValues) and np.any(layer.sigma_s * layer.depth > 0):
+            found.add(above)
+    return found
 
 
 def sides(material: Material) -> list[Material]:
