@@ -202,7 +202,8 @@ class End:
     def of(self, model: Model) -> End:
         """The end for a model without a closed form, near that for the one which stands in for it.
 
-        What the two differ by at one end is added to the residuals of the next descent (Bandler et al. 1994).
+        What the two differ by at one end is added to the residuals of the next descent: space mapping
+        (Bandler et al. 1994), of residuals in place of parameters.
         """
         end = self
         for n in range(0 if model.recursion.closed_form else MAPPED):

@@ -55,28 +55,29 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     p = _in_frame(lobe, wo)
     cos_o = ops.maximum(wo[2], 0.0)
-    seen = 0.25 * _visibility(i, alpha_u, alpha_v) * cos_o / (n * n)
+    inverse = 1 / n
+    seen = 0.25 * _visibility(i, alpha_u, alpha_v) * cos_o * (inverse * inverse)
     # Reflect in the medium
-    o, reached = ((p[0], p[1], ops.maximum(cos_o, COS_MIN)), True) if _is_outside(n) else _out(p[0], p[1], n)
-    h = ggx.normalize((i[0] + o[0], i[1] + o[1], i[2] + o[2]))
-    ops.names(i=i, o=o, h=h)
-    density = ops.select(reached, seen * ggx.ndf(h, alpha_u, alpha_v), 0.0)
+    o, reached = ((p[0], p[1], ops.maximum(cos_o, COS_MIN)), True) if _is_outside(n) else _out(p[0], p[1], inverse)
+    m = i[0] + o[0], i[1] + o[1], i[2] + o[2]
+    ops.names(i=i, o=o, m=m)
+    density = ops.select(reached, seen * ggx.ndf_along(m, alpha_u, alpha_v), 0.0)
     value = lobe.weight * density * _visibility(o, alpha_u, alpha_v)
     if lobe.facets:
-        value = value * lobe.facets(ops.clip(ggx.dot(i, h), 0.0, 1.0))
+        # The cosine of half the angle between i and o
+        value = value * lobe.facets(ops.minimum(0.5 * ops.sqrt(ggx.dot(m, m)), 1.0))
     if lobe.leaving:
         value = value * lobe.leaving(cos_o)
     pdf = density / o[2]
     # Add what falls outside the cone, and is spread over it
     if not _is_outside(n):
-        ring = ops.maximum(n * n - 1, 0.0)
-        radius = ops.sqrt(ops.maximum(p[0] * p[0] + p[1] * p[1], ops.TINY))
-        cos_far = ops.sqrt(ring) * radius * radius / n
-        stretch = ops.sqrt(1 - cos_far * cos_far) / radius
-        far = stretch * p[0], stretch * p[1], cos_far
-        h = ggx.normalize((i[0] + far[0], i[1] + far[1], i[2] + far[2]))
-        ops.names(ring=ring, radius=radius, cos_far=cos_far, stretch=stretch, far=far, h_far=h)
-        pdf = pdf + seen * ggx.ndf(h, alpha_u, alpha_v) * (2 * n * ops.sqrt(ring))
+        ring = ops.sqrt(ops.maximum(n * n - 1, 0.0))
+        p2 = ops.maximum(p[0] * p[0] + p[1] * p[1], ops.TINY)
+        cos_far = ring * p2 * inverse
+        stretch = ops.sqrt((1 - cos_far * cos_far) * (1 / p2))
+        m = i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + cos_far
+        ops.names(ring=ring, p2=p2, cos_far=cos_far, stretch=stretch, m_far=m)
+        pdf = pdf + seen * ggx.ndf_along(m, alpha_u, alpha_v) * (2 * n * ring)
     return ops.select(above, value, 0.0), ops.select(above, pdf, 0.0)
 
 
@@ -165,15 +166,16 @@ def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Value, Di
     if _is_outside(n):
         return alpha_u, alpha_v, n, (x, y, ops.maximum(z, COS_MIN))
     radius = ops.sqrt(ops.maximum(x * x + y * y, ops.TINY))
-    scale = ops.minimum(1 / n, (1 - 0.5 * COS_MIN * COS_MIN) / radius)
-    cosine = ops.sqrt(ops.maximum((n * n - 1 + z * z) / (n * n), COS_MIN * COS_MIN))
-    ops.names(radius=radius, scale=scale, cosine=cosine)
+    inverse = 1 / n
+    scale = ops.minimum(inverse, (1 - 0.5 * COS_MIN * COS_MIN) / radius)
+    cosine = ops.sqrt(ops.maximum((n * n - 1 + z * z) * (inverse * inverse), COS_MIN * COS_MIN))
+    ops.names(radius=radius, inverse=inverse, scale=scale, cosine=cosine)
     return alpha_u, alpha_v, n, (scale * x, scale * y, cosine)
 
 
-def _out(x: Value, y: Value, n: Value) -> tuple[Direction, Value]:
-    """The direction inside with a momentum, and whether it exists."""
-    x, y = x / n, y / n
+def _out(x: Value, y: Value, inverse: Value) -> tuple[Direction, Value]:
+    """The direction inside with a momentum, and whether it exists; `inverse` is that of the index."""
+    x, y = inverse * x, inverse * y
     cos2 = 1 - x * x - y * y
     return (x, y, ops.sqrt(ops.maximum(cos2, COS_MIN * COS_MIN))), cos2 > 0
 

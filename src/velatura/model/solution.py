@@ -25,6 +25,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.model.widths import Tensor
 from velatura.ops import Value
 from velatura.sampling import differences, directional_grid, low_discrepancy
+from velatura.sampling.directional_grid import Packing
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.tables import Tables
 
@@ -50,11 +51,13 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Layout:
-    """The lobes of a side, the interfaces that make a step of the index, and the last one whose facets turn light."""
+    """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, and the
+    slabs that scatter, by the number of interfaces above."""
 
     lobes: list[Drawn]
     stepped: list[int]
     rough: int | None
+    cloudy: list[int]
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,12 @@ class SolvedSide:
     def rows(self) -> Array:
         """All columns, (rows, M), in the order in which `Columns.read` takes them."""
         return np.concatenate([np.atleast_2d(each) for each in self.columns.all])
+
+    @property
+    def groups(self) -> list[int]:
+        """Which rows are read together: 1 for those that are read seldom."""
+        columns = self.columns
+        return [int(seldom) for x, seldom in zip(columns.all, columns.seldom) for _ in np.atleast_2d(x)]
 
     @property
     def numbers(self) -> Array:
@@ -150,7 +159,7 @@ class Solver:
         assert context.colour is not None
         shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
         passage = (
-            straight_through.passage(material, self.variance, layout.stepped, layout.rough)
+            straight_through.passage(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
             if material.transmits
             else None
         )
@@ -215,7 +224,9 @@ class Solver:
         shares = [passed.light(share, sum(shares), each) for share, each in zip(shares, heaviest)]
         total, left, passes = sum(shares), np.ones(count), None
         if material.transmits:
-            passage = straight_through.passage(_slim(material), self.variance, layout.stepped, layout.rough)
+            passage = straight_through.passage(
+                _slim(material), self.variance, layout.stepped, layout.rough, layout.cloudy
+            )
             passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
             passes = _evenly(passes, least)
             left = 1 - passes.share
@@ -254,15 +265,22 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     start = plain(material)
     layouts = solver.layouts([start])
 
+    packings: list[Packing] = []
+
     def arrays(numbers: list[float]) -> list[Array]:
         found = solver.solve(given.replaced(start, numbers), layouts)
-        spread = [solver.grid.spread(side.rows, solver.shape).T.ravel() for side in found]
-        return [each for pair in zip(spread, (side.numbers for side in found)) for each in pair]
+        if not packings:
+            packings.extend(Packing.of(side.rows, side.groups, shared=not given.given) for side in found)
+        flat = []
+        for side, packing in zip(found, packings):
+            flat += [x.T.ravel() for x in packing.split(solver.grid.spread(side.rows, solver.shape))]
+            flat.append(side.numbers)
+        return flat
 
     flat, made = iter(differences.differentiable(arrays, given.given, given.around, context.number)), []
-    for seen, layout in zip(sides(material), layouts):
-        curves = directional_grid.interleaved(next(flat), solver.shape, context.number)
-        column = next(flat)
+    for seen, layout, packing in zip(sides(material), layouts, packings):
+        tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
+        curves, column = packing.curves(tables), next(flat)
         numbers = column[:, None] if context.colour is channels else differences.numbers(column, context.number)
         made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context))
     return solver.bsdf(material, made)
@@ -288,7 +306,18 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     both = [(k, veil) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
     rough = widths.stepped(turns, widths.LEAST_TURN)
     lobes = [Drawn(k, widths.first_step(steps[:k]), veil) for k, veil in both]
-    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None)
+    cloudy = sorted(set().union(*map(_cloudy, materials)))
+    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy)
+
+
+def _cloudy(material: Material) -> set[int]:
+    """Slabs that scatter light, by the number of interfaces above them."""
+    found, above = set(), 0
+    for layer in material.layers:
+        above += isinstance(layer, InterfaceValues)
+        if isinstance(layer, MediumValues) and np.any(layer.sigma_s * layer.depth > 0):
+            found.add(above)
+    return found
 
 
 def sides(material: Material) -> list[Material]:

@@ -87,6 +87,12 @@ class Columns:
             found += [*vars(self.passes).values(), self.passed]
         return found
 
+    @property
+    def seldom(self) -> list[bool]:
+        """Which of them are energies: only albedos, and samples of some parts alone, need them."""
+        energies = {id(x) for x in (*self.energies, self.rest, self.passed)}
+        return [id(x) in energies for x in self.all]
+
 
 @dataclass(frozen=True)
 class Side:

@@ -138,7 +138,7 @@ def _passed(
         return Roughness(0 * phi, 0 * phi, phi)
     if kind is Isotropic:
         wi = np.hypot(wi[0], wi[1]), 0 * wi[1], wi[2]  # alike in all planes
-    passage = straight_through.passage(material, kind, layout.stepped, layout.rough)
+    passage = straight_through.passage(material, kind, layout.stepped, layout.rough, layout.cloudy)
     straight, bounced, all_ = (np.maximum(energy, DARK) for energy in (solved.straight, solved.bounced, solved.passed))
     shares = passed.parts(passage, wi, straight, bounced, all_, np.zeros((1, len(phi))))
     samples = outside.of_passed(passage, shares, wi)

@@ -116,18 +116,24 @@ class Passage:
 
 
 def passage(
-    material: Material, kind: type[Variance], stepped: Sequence[int] | None = None, rough: int | None = None
+    material: Material,
+    kind: type[Variance],
+    stepped: Sequence[int] | None = None,
+    rough: int | None = None,
+    cloudy: Sequence[int] | None = None,
 ) -> Passage:
     """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`. `stepped` are the
-    interfaces that make a step of the index, `rough` is the last one whose facets turn light; None for all, and for the
-    last one."""
+    interfaces that make a step of the index, `rough` is the last one whose facets turn light, `cloudy` are the
+    slabs that scatter; None for all, for the last one, and for those of media whose scattering is not known to be 0.
+    """
     above, n = material.exterior, 1.0
     crossings: list[Crossing] = []
     slabs = [Slab()]
     for layer in material.solid().layers:
         if isinstance(layer, MediumValues):
             tau_s = layer.sigma_s * layer.depth
-            slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, tau_s, ops.mean(layer.g))
+            clear = is_none(tau_s) if cloudy is None else len(crossings) not in cloudy
+            slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
         crossings.append(_crossing(layer, above, n, kind))
@@ -137,10 +143,10 @@ def passage(
     lower, *others = reversed(range(count) if stepped is None else stepped or [count - 1])
     faces = tuple(float(k in (lower, *others[:1])) for k in range(count))
     under = tuple(float(k >= lower) for k in range(count))
-    cloudy = [l for l, slab in enumerate(slabs) if not is_none(slab.scattering)]
-    last = min(cloudy[-1], count - 1) if cloudy else 1 + (count - 1 if rough is None else rough)
+    scattering = [l for l, slab in enumerate(slabs) if not is_none(slab.scattering)]
+    last = min(scattering[-1], count - 1) if scattering else 1 + (count - 1 if rough is None else rough)
     scattered = tuple(float(k >= last) for k in range(count))
-    return Passage(tuple(crossings), tuple(slabs), faces, under, scattered, bool(others), bool(cloudy))
+    return Passage(tuple(crossings), tuple(slabs), faces, under, scattered, bool(others), bool(scattering))
 
 
 def is_none(x: Value) -> bool:

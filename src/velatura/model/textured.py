@@ -36,7 +36,7 @@ from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import differences, directional_grid
-from velatura.sampling.directional_grid import Curves
+from velatura.sampling.directional_grid import Packed, Packing
 from velatura.stack import InterfaceValues, Material
 
 Array = NDArray[np.floating]
@@ -95,8 +95,8 @@ class Term:
     term has the columns themselves, a further one by what it scales those of the first, or `adds` to them."""
 
     axes: tuple[Axis | Wavelengths, ...]
-    columns: tuple[Curves, ...]
-    polynomials: tuple[Curves, ...]
+    columns: tuple[Packed, ...]
+    polynomials: tuple[Packed, ...]
 
     def places(self, material: Material, place: Value) -> list[Value]:
         return [axis.at(material) if isinstance(axis, Axis) else place for axis in self.axes]
@@ -123,7 +123,7 @@ class Tables:
         places, made = [term.places(material, place) for term in self.terms], []
         for k, (seen, layout) in enumerate(zip(solution.sides(material), self.layouts)):
             curves = partial(_together, [term.columns[k] for term in self.terms], places, self.adds[k])
-            found = [ops.interpolate(term.polynomials[k], *at) for term, at in zip(self.terms, places)]
+            found = [term.polynomials[k].at(*at) for term, at in zip(self.terms, places)]
             numbers = [sum(each[1:], each[0]) for each in zip(*found)]
             polynomial = solution.remainder_of(numbers, self.solver, self.context)
             side = self.solver.side(seen, layout, curves, polynomial, self.context)
@@ -176,7 +176,7 @@ def _bounded(found: Columns, summed: bool) -> Columns:
     )
 
 
-def _together(curves: Sequence[Curves], places: Sequence[Sequence[Value]], adds: Array, w: Direction) -> list[Value]:
+def _together(curves: Sequence[Packed], places: Sequence[Sequence[Value]], adds: Array, w: Direction) -> list[Value]:
     """The columns of all terms, for a direction."""
     first, *others = (each(w, *at) for each, at in zip(curves, places))
     for found in others:
@@ -234,6 +234,8 @@ def _tabulated(
     ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
     layouts = solver.layouts([start, *(axes.placed(start, spanned, values) for values in ends)])
 
+    reads: list[list[int]] = []
+
     def solved(made: Material, group: Sequence[Axis | Wavelengths]) -> list[tuple[Array, Array]]:
         """Columns and numbers of each side, (nodes, ...)."""
         nodes = [axes.placed(made, group, values) for values in product(*(axis.values for axis in group))]
@@ -242,10 +244,12 @@ def _tabulated(
             context.progress(done, len(nodes))
             solves.append(solver.solve(node, layouts))
         context.progress(len(nodes), len(nodes))
+        reads[:] = [side.groups for side in solves[0]]
         by_side = zip(*solves)
         return [(np.array([x.rows for x in side]), np.array([x.numbers for x in side])) for side in by_side]
 
     adds: list[Array] = []
+    packings: dict[tuple[int, int], tuple[Packing, ...]] = {}  # of columns and polynomials, by group and side
 
     def tables(numbers: list[float]) -> list[Array]:
         made, found = given.replaced(start, numbers), []
@@ -255,22 +259,32 @@ def _tabulated(
             every = zip(*by_group)
             adds.extend(np.min([x.min(axis=(0, 2)) for x, _ in of_side], axis=0) < 0 for of_side in every)
         for k, (group, of_group) in enumerate(zip(groups, by_group)):
-            for (columns, polynomials), (middle, polynomial), add in zip(of_group, at_middle, adds):
+            both = zip(of_group, at_middle, adds)
+            for side, ((columns, polynomials), (middle, polynomial), add) in enumerate(both):
                 if k:
                     scaled = np.clip((columns + FAINTEST) / (middle + FAINTEST), 0, MOST)
                     columns = np.where(add[:, None], columns - middle, scaled)
                     polynomials = polynomials - polynomial
-                found += [_flat(solver.grid.spread(columns, shape), group), _flat(polynomials, group)]
+                if (k, side) not in packings:
+                    packings[k, side] = tuple(
+                        Packing.of(values.swapaxes(0, 1), each, shared=not given.given)
+                        for values, each in ((columns, reads[side]), (polynomials, [0] * polynomials.shape[1]))
+                    )
+                packing, of_polynomial = packings[k, side]
+                found += [_flat(solver.grid.spread(x, shape), group) for x in packing.split(columns, 1)]
+                found += [_flat(x, group) for x in of_polynomial.split(polynomials, 1)]
         return found
 
     flat = iter(differences.differentiable(tables, given.given, given.around, context.number))
     terms = []
-    for group in groups:
+    for k, group in enumerate(groups):
         places = tuple(axis.places for axis in group)
         made = [
-            directional_grid.interleaved(next(flat), (*directions, *places), context.number)
-            for _ in layouts
-            for directions in (shape, ())
+            packing.curves(
+                directional_grid.interleaved(next(flat), (*directions, *places), context.number) for _ in packing.tables
+            )
+            for side in range(len(layouts))
+            for packing, directions in zip(packings[k, side], (shape, ()))
         ]
         terms.append(Term(group, tuple(made[::2]), tuple(made[1::2])))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)

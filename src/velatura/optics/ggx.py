@@ -46,6 +46,15 @@ def ndf(h: Direction, alpha_u: Value, alpha_v: Value) -> Value:
     return 1 / (pi * alpha_u * alpha_v * q * q)
 
 
+def ndf_along(m: Direction, alpha_u: Value, alpha_v: Value) -> Value:
+    """`ndf` of the direction of a vector, of any length, by one division."""
+    area = alpha_u * alpha_v
+    x, y, z = alpha_v * m[0], alpha_u * m[1], area * m[2]
+    q = dot(m, m) * area / (x * x + y * y + z * z)
+    ops.names(area=area, q=q)
+    return q * q * area * (1 / pi)
+
+
 def masking(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:
     """Smith's G1(w), the visible share of the normals that face `w` (Heitz 2014, Eq. 43); 0 below the horizon."""
     x, y = alpha_u * w[0], alpha_v * w[1]

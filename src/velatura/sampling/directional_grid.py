@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi, prod
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.ops import Value
@@ -33,6 +34,56 @@ class Curves:
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
         """For a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
         return ops.interpolate(self, *places(w, len(self.shape) - len(others)), *others)
+
+
+@dataclass(frozen=True)
+class Packing:
+    """Functions in several tables: `tables` are the numbers of those that each one has, and `places` those of all
+    functions among what is read. Those that are the same are one."""
+
+    tables: tuple[tuple[int, ...], ...]
+    places: tuple[int, ...]
+
+    @classmethod
+    def of(cls, rows: NDArray[np.floating], groups: Sequence[int], shared: bool = True) -> Packing:
+        """Of values (rows, ...), those of each group in a table of its own; `shared` where the same ones are one."""
+        keys = [
+            (group, row.astype(np.float32).tobytes() if shared else k)
+            for k, (group, row) in enumerate(zip(groups, rows))
+        ]
+        first: dict[Any, int] = {}
+        for k, key in enumerate(keys):
+            first.setdefault(key, k)
+        tables = [tuple(k for (each, _), k in first.items() if each == group) for group in sorted({*groups})]
+        order = [k for table in tables for k in table]
+        return cls(tuple(tables), tuple(order.index(first[key]) for key in keys))
+
+    def split(self, values: NDArray[np.floating], axis: int = 0) -> list[NDArray[np.floating]]:
+        """The values of each table, with functions along an axis."""
+        return [np.take(values, table, axis) for table in self.tables]
+
+    def curves(self, tables: Iterable[Curves]) -> Packed:
+        return Packed(tuple(tables), self.places)
+
+
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """Functions in several tables. A renderer fetches those that it uses one of."""
+
+    tables: tuple[Curves, ...]
+    places: tuple[int, ...]
+
+    def __call__(self, w: Direction, *others: Value) -> list[Value]:
+        """As `Curves`."""
+        return self._placed(table(w, *others) for table in self.tables)
+
+    def at(self, *coordinates: Value) -> list[Value]:
+        """For coordinates from 0 to 1 on all axes, those of directions included."""
+        return self._placed(ops.interpolate(table, *coordinates) for table in self.tables)
+
+    def _placed(self, tables: Iterable[list[Value]]) -> list[Value]:
+        read = [x for table in tables for x in table]
+        return [read[k] for k in self.places]
 
 
 def directions(shape: tuple[int, ...], number: type | None) -> Direction:

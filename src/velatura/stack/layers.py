@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
-import numpy as np
 from pydantic import model_validator
 
 from velatura.stack.schema import Parameter, Record, parameters
@@ -85,7 +84,11 @@ LayerValues: TypeAlias = InterfaceValues | MediumValues | DiffuseValues
 
 def is_zero(value: object) -> bool:
     """Whether a value is 0 and may be looked at."""
-    return isinstance(value, float | np.ndarray) and not np.any(value)
+    if isinstance(value, float):
+        return value == 0
+    import numpy as np  # slow to import, and most stacks have numbers alone
+
+    return isinstance(value, np.ndarray) and not value.any()
 
 
 # As they are written -------------------------------------------------------------------------------------------------
