@@ -360,8 +360,9 @@ class Binding:
         return looked_at.each(lambda address, value: apart.get(address.name, value))
 
     def _at(self, si: Any, active: Any) -> dict[str, Any]:
-        found = {name: image.at(si, active) for name, image in self.images.items()}
-        return {**self._colours(), **found}
+        # One image for several values, such as both axes of an interface, is looked up once
+        found = {id(image): image.at(si, active) for image in {id(x): x for x in self.images.values()}.values()}
+        return {**self._colours(), **{name: found[id(image)] for name, image in self.images.items()}}
 
     def _at_fixed_wavelengths(self, si: Any) -> Any:
         fixed = self.mi.SurfaceInteraction3f(si)

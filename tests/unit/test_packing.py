@@ -1,0 +1,26 @@
+"""Functions of direction in several tables, of which the same ones are kept once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from velatura.sampling import directional_grid
+from velatura.sampling.directional_grid import Packing
+
+RNG = np.random.default_rng(0)
+SHAPE = (7,)
+GROUPS = [0, 1, 0, 0, 1, 0, 1]
+SAME = [0, 1, 2, 0, 1, 2, 0]  # by row, the first of its values; the last one lies in another table
+
+
+@pytest.mark.parametrize(("shared", "sizes"), [(True, [2, 2]), (False, [4, 3])])
+def test_packed_functions_are_those_that_were_given(shared: bool, sizes: list[int]) -> None:
+    rows = RNG.uniform(size=(3, *SHAPE))[SAME]
+    packing = Packing.of(rows, GROUPS, shared)
+    assert [len(table) for table in packing.tables] == sizes
+    packed = packing.curves(directional_grid.curves(list(x), SHAPE, None) for x in packing.split(rows))
+    w = directional_grid.direction(RNG.uniform(size=50), np.zeros(50))
+    expected = directional_grid.curves(list(rows), SHAPE, None)(w)
+    np.testing.assert_allclose(packed(w), expected, rtol=1e-12)
+    np.testing.assert_allclose(packed.at(np.sqrt(w[2])), expected, rtol=1e-12)
