@@ -100,7 +100,7 @@ def energies(
 
     # Sort what leaves
     total = _sum(full.reflected)
-    reflected = full.energy(total)
+    reflected = np.maximum(full.energy(total), 0)
 
     def of_lobes(system: Leaving) -> list[Operator]:
         found = [system.reflected[i] + each for i, each in zip(shares, more)]
@@ -124,7 +124,7 @@ def energies(
         rest=rest[:, :count],
         straight=straight[:, :count],
         bounced=np.maximum(sharp.energy(sharp.passed) - straight, 0)[:, :count],
-        passed=full.energy(full.passed)[:, :count],
+        passed=np.maximum(full.energy(full.passed), 0)[:, :count],
         remainder=remainder,
         nodes=nodes,
     )

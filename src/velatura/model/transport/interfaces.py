@@ -28,7 +28,6 @@ Array = NDArray[np.floating]
 # Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
 # often, and where such light is lost
 STRAIGHT = {True: 0.09, False: 0.01}
-STAND_IN = 144  # normals of interfaces that stand in for brushed ones
 GRAZING = 1e-4  # least cosine of light that meets an interface
 ALPHA_MIN = 1e-3
 BLOCK = 1 << 15  # samples at a time
@@ -326,7 +325,7 @@ class _Side:
             return cls(r, t, None)
         weights = basis.nodes.weights(float(ops.mean(facets.above)))
         blocked = []
-        shares = [_again_shares(facets, setting.often, q, met) for q, met in ((p, at_nodes), (setting.p, of_beams))]
+        shares = [_again_shares(facets, setting, q, met) for q, met in ((p, at_nodes), (setting.p, of_beams))]
         for nodes, beams in zip(*shares):
             rows = basis.rows(nodes, turn)
             emitted = rows * weights
@@ -340,12 +339,14 @@ def _again(taken: _Blocked, there: _Blocked, setting: Setting) -> Operator:
     return Operator.of(outer(there.emitted, taken.nodes), outer(there.emitted, taken.beams))
 
 
-def _again_shares(facets: Facets, known: Tables, p: Array, events: _Met) -> tuple[Array, Array]:
+def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> tuple[Array, Array]:
     """Shares (C, sources) of light of lengths p that first events block and that in the end is reflected, or passes.
 
     Of blocked light, it is reflected in the share that an isotropic interface of the mean roughness reflects: by the
     tables over any number of events, less what first events reflect.
     """
+    known = setting.often
+    assert known is not None
     if facets.below is None:
         return events.whole, np.zeros_like(events.whole)
     mean = float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
@@ -359,7 +360,7 @@ def _again_shares(facets: Facets, known: Tables, p: Array, events: _Met) -> tupl
     often = found.reshape(len(events.blocked_reflected), -1)
     stand_in: _Met | _Events = events
     if facets.alpha_u != facets.alpha_v:
-        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, STAND_IN, [True])
+        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, setting.samples, [True])
     once = stand_in.kept
     blocked: Array
     little: Array
