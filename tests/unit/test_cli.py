@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import signal
 import sys
@@ -307,6 +308,7 @@ def test_an_interrupt_leaves_no_picture(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(signal, "getsignal", lambda _: signal.default_int_handler)
+    monkeypatch.setattr(os, "_exit", sys.exit)
     calls["meanwhile"] = meanwhile
     status, out, err = run("render", material)
     assert (status, out) == (130, "")

@@ -103,6 +103,9 @@ def main() -> None:
     if status == INTERRUPTED:
         _complain("interrupted")
     _drop_output()
+    if status == INTERRUPTED:
+        # Python's own end may wait or fail for threads of Dr.Jit, and is by signal after an interrupt within `exec`
+        os._exit(status)
     sys.exit(status)
 
 
