@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -17,13 +18,14 @@ from velatura.model.passed import Parts
 from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
 from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
-from velatura.model.solved_grid import Folded, Grid
+from velatura.model.solved_grid import COS_MIN, Folded, Grid
 from velatura.model.transport.adding import Made, interfaces, parts
 from velatura.model.transport.energies import INCIDENCES, energies
 from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.model.widths import Tensor
 from velatura.ops import Value
+from velatura.optics.ggx import Direction
 from velatura.sampling import differences, directional_grid, low_discrepancy
 from velatura.sampling.directional_grid import Packing
 from velatura.stack import InterfaceValues, Material, MediumValues
@@ -77,6 +79,13 @@ class SolvedSide:
         """Which rows are read together: 1 for those that are read seldom."""
         columns = self.columns
         return [int(seldom) for x, seldom in zip(columns.all, columns.seldom) for _ in np.atleast_2d(x)]
+
+    @property
+    def places(self) -> list[int]:
+        """The first rows of the remainder's scale, and of its energy."""
+        of = [id(x) for x in self.columns.all]
+        rows = [len(np.atleast_2d(x)) for x in self.columns.all]
+        return [sum(rows[: of.index(id(x))]) for x in (self.columns.scale, self.columns.rest)]
 
     @property
     def numbers(self) -> Array:
@@ -149,7 +158,7 @@ class Solver:
         """The BSDF in NumPy."""
         context, made = Context(colour=_stacked, tables=self.tables), []
         for seen, side, layout in zip(sides(material), found, layouts):
-            curves = directional_grid.curves(list(self.grid.spread(side.rows, self.shape)), self.shape, None)
+            curves = directional_grid.curves(list(self.spread(side)), self.shape, None)
             polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(side.polynomial).values()))
             made.append(self.side(seen, layout, curves, polynomial, context))
         return self.bsdf(material, made)
@@ -209,7 +218,7 @@ class Solver:
             z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi)
             weights.append(np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0))
             heaviest.append(weights[-1] * largest)
-        z, largest = _integrals(polynomial, folded)
+        z, largest = (np.repeat(each, len(folded.kept), axis=-1) for each in _integrals(polynomial, folded.at_cosines))
         scale = np.clip(rest / np.maximum(z, DIM), 0, BRIGHTEST)
         heaviest.append(scale * largest)
 
@@ -246,6 +255,18 @@ class Solver:
         columns = folded.unfolded(columns)
         return SolvedSide(columns, Remainder(*(np.broadcast_to(x, self.colours) for x in vars(polynomial).values())))
 
+    def spread(self, side: SolvedSide) -> Array:
+        """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
+        energy there, too."""
+        rows = self.grid.spread(side.rows, self.shape)
+        if self.model.form == "forward":
+            cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
+            z, _ = _integrals(side.polynomial, (np.sqrt(1 - cosine * cosine), 0 * cosine, cosine))
+            whole = np.repeat(z, math.prod(self.shape[1:]), axis=-1)
+            scale, rest = (slice(k, k + self.colours) for k in side.places)
+            rows[scale] = np.clip(rows[rest] / np.maximum(whole, DIM), 0, BRIGHTEST)
+        return rows
+
     def _colours(self, values: Array) -> Array:
         return np.broadcast_to(values, (self.colours, np.shape(values)[-1]))
 
@@ -273,7 +294,7 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
             packings.extend(Packing.of(side.rows, side.groups, shared=not given.given) for side in found)
         flat = []
         for side, packing in zip(found, packings):
-            flat += [x.T.ravel() for x in packing.split(solver.grid.spread(side.rows, solver.shape))]
+            flat += [x.T.ravel() for x in packing.split(solver.spread(side))]
             flat.append(side.numbers)
         return flat
 
@@ -350,13 +371,13 @@ def _slim(material: Material) -> Material:
     return material.each(lambda _, value: slim(value) if np.ndim(value) else value)
 
 
-def _integrals(polynomial: Remainder, folded: Folded) -> list[Array]:
-    """Mean and largest weight of samples of the remainder as it is clipped, (C, M); they depend on the cosine alone."""
+def _integrals(polynomial: Remainder, wi: Direction) -> list[Array]:
+    """Mean and largest weight of samples of the remainder as it is clipped, (C, M)."""
     numbers = Remainder(*(np.reshape(x, (-1, 1, 1)) for x in vars(polynomial).values()))
-    x, y, z = (each.reshape(-1, len(folded.kept))[:, :1] for each in folded.directions)
+    x, y, z = (each[:, None] for each in wi)
     wo = numbers.sample((x, y, z), *low_discrepancy.square(EVENLY))
     weights = numbers.value((x, y, z), wo) / numbers.density((x, y, z), wo)
-    return [np.repeat(each, len(folded.kept), axis=-1) for each in (weights.mean(axis=-1), weights.max(axis=-1))]
+    return [weights.mean(axis=-1), weights.max(axis=-1)]
 
 
 def _veiled(material: Material) -> set[int]:

@@ -130,6 +130,12 @@ class Folded:
         x, y, z = map(self._of, self.grid.directions)
         return x, y, z
 
+    @property
+    def at_cosines(self) -> tuple[Array, Array, Array]:
+        """One direction for each cosine."""
+        x, y, z = (each.reshape(-1, len(self.kept))[:, 0] for each in self.directions)
+        return x, y, z
+
     def _of(self, values: Array) -> Array:
         return values.reshape(-1, self.grid.turns)[:, self.kept].ravel()
 

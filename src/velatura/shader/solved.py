@@ -256,7 +256,7 @@ def _numbers(stack: Stack) -> Material:
 
 def _rows(solver: Solver, found: Sequence[SolvedSide]) -> Array:
     """Columns on the grid that is read, (rows, sides, nodes)."""
-    return np.stack([solver.grid.spread(side.rows, solver.shape) for side in found], axis=1)
+    return np.stack([solver.spread(side) for side in found], axis=1)
 
 
 def _colours(side: SolvedSide) -> Array:
