@@ -47,7 +47,7 @@ def of_lobe(lobe: OwnMediumLobe, wi: Direction) -> Samples:
     """Of a lobe with numbers (N,), and a weight (C, N), for directions wi."""
     each = replace(lobe, weight=_each(lobe.weight), roughness=Roughness(*map(_each, lobe.roughness)))
     i = _direction(wi)
-    u1, u2 = (u.ravel() for u in _lattice(ggx.rotate(wi, lobe.roughness.rotation)))
+    u1, u2 = (u.ravel() for u in _lattice(_azimuth(wi) - lobe.roughness.rotation))
     wo = own_medium.sample(each, i, u1, u2)
     return _weighted(wi, wo, *own_medium.eval_pdf(each, i, wo))
 
@@ -74,19 +74,20 @@ def roughness(samples: Samples, axis: Array | None = None) -> Roughness:
     # Light of no energy has the shape of its samples
     total = samples.energy.sum(axis=-1, keepdims=True)
     weight = np.where(total > FAINT, samples.energy / np.maximum(total, FAINT), 1 / z.shape[-1])
-    rotation = _axis((x, y, z), weight, np.arctan2(samples.wi[1], samples.wi[0])) if axis is None else axis
+    azimuth = _azimuth(samples.wi)
+    rotation = _axis((x, y, z), weight, azimuth) if axis is None else axis
     x, y, z = ggx.rotate((x, y, z), rotation[:, None])
     target = np.array([_median(w / z, weight) for w in (x, y)])
-    u, v = _matching(ggx.rotate(samples.wi, rotation), target)
+    u, v = _matching(ggx.rotate(samples.wi, rotation), azimuth - rotation, target)
     return Roughness(u, v, rotation)
 
 
-def _matching(wi: Direction, target: Array) -> Array:
+def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
     """Roughnesses (2, N) of GGX reflections of wi, (N,) each, in their frame, whose medians are `target`.
 
     Medians grow almost in proportion to the roughness, so Newton's step is that of the median.
     """
-    u1, u2 = _lattice(wi)
+    u1, u2 = _lattice(azimuth)
     wi = wi[0][:, None], wi[1][:, None], wi[2][:, None]
     alpha = np.clip(target, *ALPHA_LIMITS)
     for _ in range(STEPS):
@@ -100,13 +101,17 @@ def _matching(wi: Direction, target: Array) -> Array:
     return alpha
 
 
-def _lattice(wi: Direction) -> tuple[Array, Array]:
-    """Uniform numbers (N, M) for visible normals of wi, in any frame alike on both sides of the plane of incidence, and
-    along and across it."""
+def _lattice(azimuth: Array) -> tuple[Array, Array]:
+    """Uniform numbers (N, M) for visible normals, in any frame alike on both sides of the plane of incidence, and
+    along and across it; its azimuth in the frame, (N,), is given, as the normal itself has one in no frame."""
     u1, u2 = low_discrepancy.fibonacci(SAMPLES // 4)
-    azimuth = np.arctan2(wi[1], wi[0])[:, None] / (2 * np.pi)
+    turn = azimuth[:, None] / (2 * np.pi)
     turned = np.concatenate([u1, 1 - u1, u1 + 0.25, 1.25 - u1])
-    return (turned + azimuth) % 1, np.tile(u2, 4) + 0 * azimuth
+    return (turned + turn) % 1, np.tile(u2, 4) + 0 * turn
+
+
+def _azimuth(wi: Direction) -> Array:
+    return np.asarray(np.arctan2(wi[1], wi[0]))
 
 
 def _median(x: Array, weight: Array) -> Array:
