@@ -88,7 +88,7 @@ class Visit:
     def __init__(self, page: Any, address: str) -> None:
         self.open.append(self)
         self.page = page
-        page.set_default_timeout(60_000)
+        page.set_default_timeout(300_000)  # clicks, too, wait for shaders that the processor compiles
         self.complaints: list[str] = []
         page.on("console", self._listen)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))

@@ -78,7 +78,7 @@ class Stage:
         """Change the picture's size in pixels."""
         self.page.evaluate("([width, height]) => viewport.setSize(width, height)", [width, height])
 
-    def trace(self, samples: int, seconds: float = 300.0) -> np.ndarray:
+    def trace(self, samples: int, seconds: float = 1200.0) -> np.ndarray:
         """The linear picture (height, width, 3) after so many samples."""
         self.page.evaluate("(samples) => viewport.setBudget({ samples })", samples)
         end = time.monotonic() + seconds
