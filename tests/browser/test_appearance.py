@@ -213,7 +213,7 @@ def test_a_visit_from_blur_to_class_to_coat(visit: Open, served: Server) -> None
     assert page.state("layers.0.keys.eta") == pytest.approx(1.33)
     covered = lobes(page)
     assert len(covered.energy) == interfaces + 1
-    assert covered.alpha[-1][0, 0] == pytest.approx(0.35, abs=1e-4)
+    assert covered.alpha[-1][0, 0] == pytest.approx(0.35, abs=1e-3)  # the roughness of solved lobes has small steps
     kept = page.picture()
 
     # Save and reopen
