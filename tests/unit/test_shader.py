@@ -114,7 +114,7 @@ def test_what_is_given_is_read() -> None:
         ((number("x") + 1) * -number("y"), "(x + 1.0) * -y"),
         (ops.clip(number("x"), 0.0, 1.0), "clamp(x, 0.0, 1.0)"),
         (ops.maximum(number("x"), 1e-15), "max(x, 1e-15)"),
-        (ops.select(number("x") < 0, 1.0, number("x")), "x < 0.0 ? 1.0 : x"),
+        (ops.select(number("x") < 0, 1.0, number("x")), "vt_choice(x < 0.0, 1.0, x)"),
         (ops.select(colour("c") < 0.5, 1.0, colour("c")), "mix(c, vec3(1.0), lessThan(c, vec3(0.5)))"),
         (ops.power(colour("c"), 1.5), "pow(c, vec3(1.5))"),
         (colour("c") * np.array([0.5, 1.0, 2.0]), "c * vec3(0.5, 1.0, 2.0)"),

@@ -333,7 +333,7 @@ def eval_pdf(
     scale = ops.select(wi[2] * wo[2] < 0, eta * eta, 1.0)
     # No sample is too heavy, there and, in the symmetric form, back
     most = ops.minimum(densities[1], densities[2] * cosines * scale) if back else densities[1]
-    value = value * ops.minimum(ops.divide(HEAVY * most, whole), 1.0)
+    value = ops.maximum(value * ops.minimum(ops.divide(HEAVY * most, whole), 1.0), 0.0)
     if of.passage is None:
         lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, densities[0], 0.0)

@@ -11,7 +11,7 @@ import numpy as np
 from velatura.shader.atlas import WIDTH, Layout, height
 from velatura.shader.bake import Bake, Group
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
-from velatura.shader.printer import CHOICE, Output, Printer, Struct
+from velatura.shader.printer import ATOM, Output, Printer, Struct
 from velatura.shader.statements import statements
 from velatura.shader.symbol import REMAINDER, SHOWN, Kind, Operand, Symbol
 
@@ -86,7 +86,7 @@ class Glsl(Printer):
         return f"vt_both(bvec3({a}), bvec3({b}))" if op == "both" else f"{_COMPARE[op]}({a}, {b})"
 
     def select(self, condition: str, a: str, b: str) -> tuple[str, int]:
-        return f"{condition} ? {a} : {b}", CHOICE
+        return f"vt_choice({condition}, {a}, {b})", ATOM
 
     def select_channels(self, conditions: str, a: str, b: str) -> str:
         return f"mix({b}, {a}, {conditions})"
@@ -365,4 +365,9 @@ float vt_sin(float x) { return vt_sin(vec3(x)).x; }
 vec3 vt_cos(vec3 x) { return vt_sin(x + 1.57079633); }
 float vt_cos(float x) { return vt_sin(x + 1.57079633); }
 bvec3 vt_both(bvec3 a, bvec3 b) { return bvec3(a.x && b.x, a.y && b.y, a.z && b.z); }
+
+// Without branches, of which compilers for processors make much
+float vt_choice(bool where, float a, float b) { return mix(b, a, where); }
+vec3 vt_choice(bool where, vec3 a, vec3 b) { return mix(b, a, bvec3(where)); }
+bool vt_choice(bool where, bool a, bool b) { return (where && a) || (!where && b); }
 """

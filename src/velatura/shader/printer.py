@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Output: TypeAlias = tuple[Operand, Kind]  # a value, and the kind as which it is returned
 
-ATOM, NEGATIVE, CHOICE = 9, 7, 1  # how strongly a text binds: nothing needs parentheses, a sign, a choice
+ATOM, NEGATIVE = 9, 7  # how strongly a text binds: nothing needs parentheses, a sign
 CONDITION = 2  # how strongly the condition of a choice has to bind
 
 
