@@ -24,10 +24,9 @@ def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
 
     This lets all colour channels share one refracted direction; the reflectance is the same from either side.
     """
-    s, p = cos_theta + eta * cos_t, eta * cos_theta + cos_t
-    both = ops.divide(2 * cos_t, s * p)
-    r_s, r_p = 1 - eta * p * both, 1 - s * both
-    ops.names(cos_t=cos_t, s=s, p=p, both=both, r_s=r_s, r_p=r_p)
+    r_s = 1 - 2 * ops.divide(eta * cos_t, cos_theta + eta * cos_t)
+    r_p = 1 - 2 * ops.divide(cos_t, eta * cos_theta + cos_t)
+    ops.names(cos_t=cos_t, r_s=r_s, r_p=r_p)
     return 0.5 * (r_s * r_s + r_p * r_p)
 
 
