@@ -42,8 +42,8 @@ def visit(look: Look) -> Iterator[Look]:
     """The first preset, lit from 45 degrees; afterwards all is undone, and nothing was complained about."""
     tab(look, "Polar")
     aim(look, "angle", 45)
-    look.begun = look.begun or told(look)
-    until(look, lambda: told(look) == look.begun)  # the plots of what was undone may still be there
+    look.begun = look.begun or read_out(look)
+    until(look, lambda: read_out(look) == look.begun)  # the plots of what was undone may still be there
     yield look
     look.page.evaluate("() => { while (velatura.store.canUndo) velatura.store.undo(); }")
     assert look.complaints == []
@@ -69,7 +69,7 @@ def until(visit: Look, holds: Callable[[], bool]) -> None:
     assert holds()
 
 
-def told(visit: Look) -> dict[str, list[float]]:
+def read_out(visit: Look) -> dict[str, list[float]]:
     """The read-out: numbers by what they are of."""
     rows = visit.page.locator(".inspector .legend tbody tr").all()
     pairs = [(row.locator("th").inner_text().strip(), row.locator("td").first.inner_text().split()) for row in rows]
@@ -95,7 +95,7 @@ def test_the_energy_plot_tells_the_energies_of_the_model(visit: Look, model: str
         expected = [energy[:, 0].tolist() for energy in (*parts, sum(parts))]
 
         def agrees(expected: list[list[float]] = expected) -> bool:
-            found = [energy if len(energy) == 3 else 3 * energy for energy in told(visit).values()]
+            found = [energy if len(energy) == 3 else 3 * energy for energy in read_out(visit).values()]
             return len(found) == len(expected) and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
 
         aim(visit, "angle", degrees)
@@ -105,7 +105,7 @@ def test_the_energy_plot_tells_the_energies_of_the_model(visit: Look, model: str
 def test_the_blur_plot_tells_the_roughnesses_of_the_model(visit: Look) -> None:
     tab(visit, "Blur")
     aim(visit, "angle", 60)
-    found = list(told(visit).values())[1]
+    found = list(read_out(visit).values())[1]
     expected = vt.lobes(vt.preset(PRESET), 0.5).own_alpha[1][:, 0]
     assert sorted(found) == pytest.approx(sorted(expected.tolist()), abs=1e-3)
 
@@ -113,13 +113,13 @@ def test_the_blur_plot_tells_the_roughnesses_of_the_model(visit: Look) -> None:
 def test_the_polar_plot_follows_the_angle_and_the_material(visit: Look) -> None:
     """The highest value lies near the mirror direction, and drops where the coat is rougher."""
     outline = visit.page.locator("svg.polar .line").first
-    before, peak = outline.get_attribute("d"), told(visit)
+    before, peak = outline.get_attribute("d"), read_out(visit)
     aim(visit, "angle", 20)
     until(visit, lambda: outline.get_attribute("d") != before)
     assert "20°" in visit.page.locator(".legend thead").inner_text()
 
     aim(visit, "angle", 45)
-    until(visit, lambda: told(visit) == peak)
+    until(visit, lambda: read_out(visit) == peak)
     coat = visit.state("layers.0.id")
     visit.page.evaluate(
         """(id) => velatura.store.run((state) => ({ ...state, layers: state.layers.map((layer) =>
@@ -127,7 +127,7 @@ def test_the_polar_plot_follows_the_angle_and_the_material(visit: Look) -> None:
         coat,
     )
     first = next(iter(peak))
-    until(visit, lambda: told(visit)[first][0] < 0.2 * peak[first][0])
+    until(visit, lambda: read_out(visit)[first][0] < 0.2 * peak[first][0])
 
 
 def test_a_lobe_is_shown_alone_in_plots_and_picture(visit: Look) -> None:
@@ -170,7 +170,7 @@ def test_names_and_numbers_change_together(visit: Look) -> None:
     names = [
         f"{n} {'Al' if n == 2 else 'polyurethane'}" for n, layer in enumerate(layers) if layer["kind"] == "interface"
     ]
-    until(visit, lambda: [name.split(",")[0] for name in list(told(visit))[:-1]] == [*names, "remainder"])
+    until(visit, lambda: [name.split(",")[0] for name in list(read_out(visit))[:-1]] == [*names, "remainder"])
     visit.page.evaluate("cancelAnimationFrame(looking)")
     after = visit.page.evaluate(legend)
     assert before != after
@@ -195,7 +195,7 @@ def test_plots_come_back_with_the_graphics_device(visit: Look) -> None:
     expected = [energy[:, 0].tolist() for energy in (*parts, sum(parts))]
 
     def agrees() -> bool:
-        found = [energy if len(energy) == 3 else 3 * energy for energy in told(visit).values()]
+        found = [energy if len(energy) == 3 else 3 * energy for energy in read_out(visit).values()]
         return len(found) == len(expected) and all(a == pytest.approx(b, abs=1e-3) for a, b in zip(found, expected))
 
     until(visit, agrees)
@@ -203,7 +203,7 @@ def test_plots_come_back_with_the_graphics_device(visit: Look) -> None:
 
 def test_the_disc_tells_f_cos_where_the_pointer_is(visit: Look) -> None:
     """In the mirror direction it tells what the polar plot tells there, but for the size of a pixel."""
-    peak = list(told(visit).values())
+    peak = list(read_out(visit).values())
     tab(visit, "Disc")
     disc = visit.page.locator(".disc svg")
     disc.scroll_into_view_if_needed()
@@ -212,12 +212,12 @@ def test_the_disc_tells_f_cos_where_the_pointer_is(visit: Look) -> None:
     x = box["x"] + box["width"] * (1.05 - math.sin(math.radians(45))) / 2.1
     visit.page.mouse.move(x, box["y"] + box["height"] / 2)
     painted(visit)
-    found = list(told(visit).values())
+    found = list(read_out(visit).values())
     assert found[1] == pytest.approx(peak[1], rel=0.03)
     assert found[-1] == pytest.approx(peak[-1], rel=0.1)
 
 
-def test_two_models_are_drawn_and_told_side_by_side(visit: Look) -> None:
+def test_two_models_are_drawn_and_listed_side_by_side(visit: Look) -> None:
     visit.page.evaluate(
         """() => velatura.store.run((state) =>
              ({ ...state, view: { ...state.view, mode: 'split', other: { model: 'belcour2018' } } }))"""

@@ -55,7 +55,7 @@ def explore(
     apart = [float(np.abs(energy - seen[0]).mean()) for energy in seen]
     order = np.argsort(apart, kind="stable")
     for n in order:
-        print(f"{apart[n]:.4f}  {_told(found[n])}")
+        print(f"{apart[n]:.4f}  {_listed(found[n])}")
     invert.say_for_which(found[0].model)
     if path:
         title = (
@@ -74,7 +74,7 @@ def _sheet(path: Path) -> Path:
     return path
 
 
-def _told(solution: Any) -> str:
+def _listed(solution: Any) -> str:
     """A stack in a line, from the top: absorption, index and roughness of every interface."""
     import numpy as np
 

@@ -58,7 +58,7 @@ def held(material: Answer, target: Target, model: Model) -> DraggedStack | None:
 
 
 def dragged(body: Body, target: Target) -> DraggedStack | None:
-    """The material as it is dragged, by a model in closed form where it is told which lobes it has."""
+    """The material as it is dragged, by a model in closed form where its lobes are given."""
     model, material, read = reader_of(body, target), body.get("material") or {}, body.get("read")
     if read is None or model.recursion.closed_form:
         return held(material, target, model)

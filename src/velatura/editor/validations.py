@@ -103,7 +103,7 @@ def reflection(alpha_1: float, alpha_2: float, angle: float) -> dict[str, Any]:
         f = MAPS[name]
         alphas[name] = float(f.roughness(np.float64(f.variance(alpha_1) + f.variance(alpha_2))))
         curves.append(_shape(f"one of {name}'s map", _lobe(sine, alphas[name]), "model"))
-    return _answer(curves, _ACROSS, f"Equivalent alpha: {_told(alphas)}.")
+    return _answer(curves, _ACROSS, f"Equivalent alpha: {_listed(alphas)}.")
 
 
 def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
@@ -123,7 +123,7 @@ def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
         assert lobe is not None
         alphas[label] = float(lobe.alpha[0, 0])
         curves.append(_shape(label, _lobe(refracted, alphas[label]), "model"))
-    return _answer(curves, _ACROSS, f"Equivalent alpha of the transmitted lobe: {_told(alphas)}.")
+    return _answer(curves, _ACROSS, f"Equivalent alpha of the transmitted lobe: {_listed(alphas)}.")
 
 
 def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
@@ -143,7 +143,7 @@ def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
         energies[model], alphas[model] = float(found.energy[0][0, 0]), float(found.alpha[0][0, 0])
         lobe = _lobe(sine, alphas[model])
         curves.append(_density(model, lobe, _total(lobe) / energies[model], "model"))
-    says = f"Energy: {_told(energies)}. Equivalent alpha: {_told(alphas)}."
+    says = f"Energy: {_listed(energies)}. Equivalent alpha: {_listed(alphas)}."
     return _answer(curves, {**_ACROSS, "y": _axis("energy across the disc")}, says)
 
 
@@ -165,7 +165,7 @@ def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
         energies[label] = float(lobe.energy[0, 0])
         curves.append(_within(label, sine, _lobe(sine, float(lobe.alpha[0, 0])), "model"))
     axes = {"x": _axis("turned by less than (\N{DEGREE SIGN})", 0, 90), "y": _axis("share of what comes through", 0, 1)}
-    return _answer(curves, axes, f"Energy that comes through: {_told(energies)}.")
+    return _answer(curves, axes, f"Energy that comes through: {_listed(energies)}.")
 
 
 def decoupling(eta: float, alpha: float) -> dict[str, Any]:
@@ -190,9 +190,9 @@ def decoupling(eta: float, alpha: float) -> dict[str, Any]:
         share[form] = np.asarray(tables.tir(tables.load(), form, np.float64(1 / eta), inside, np.float64(alpha)))
     curves = [_curve("integral", "truth", angles, leaves)]
     curves += [_curve(f"tir={form}", "model", angles, straight * kept) for form, kept in share.items()]
-    told = {curve["label"]: curve["y"][0] for curve in curves}
+    energies = {curve["label"]: curve["y"][0] for curve in curves}
     axes = {"x": _axis("angle of incidence (\N{DEGREE SIGN})", 0, 90), "y": _axis("share that leaves", 0, 1)}
-    return _answer(curves, axes, f"At normal incidence: {_told(told)}.")
+    return _answer(curves, axes, f"At normal incidence: {_listed(energies)}.")
 
 
 def _compared(**switches: Any) -> dict[str, tuple[str, dict[str, Any]]]:
@@ -285,7 +285,7 @@ def _answer(curves: list[dict[str, Any]], axes: dict[str, Any], says: str) -> di
     return {"curves": curves, "axes": axes, "says": says}
 
 
-def _told(numbers: Mapping[str, float]) -> str:
+def _listed(numbers: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {number:.3f}" for name, number in numbers.items())
 
 

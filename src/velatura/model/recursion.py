@@ -21,12 +21,11 @@ class Recursion:
     """A recursion over the layers.
 
     Attributes:
-        closed_form: an interface that has a given lobe follows in closed form (Bati et al. 2021).
-        solved: uniform materials are solved for all directions (`velatura.model.solution`).
+        closed_form: an interface that has a given lobe follows in closed form (Bati et al. 2021). Else materials are
+            solved for all directions (`velatura.model.solution`).
     """
 
     closed_form: ClassVar[bool]
-    solved: ClassVar[bool]
 
     def reflectances(self) -> tuple[str, ...] | None:
         """Its reflectances, if all other switches but the form have one value; None if all may have any."""
@@ -63,7 +62,6 @@ class Adding(Recursion):
     """The recursion of the papers (Belcour 2018, section 5; Weier & Belcour 2020; Yamaguchi et al. 2019)."""
 
     closed_form = True
-    solved = False
 
 
 ADDING = Adding()
@@ -74,7 +72,6 @@ class InOwnMedia(Recursion):
     """Adding on nodes of tangential momentum, for lobes in their own media (`velatura.model.solution`)."""
 
     closed_form = False
-    solved = True
 
     def reflectances(self) -> tuple[str, ...]:
         return "fgd", "fgd-multi"

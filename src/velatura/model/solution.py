@@ -219,7 +219,7 @@ class Solver:
             weights.append(np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0))
             heaviest.append(weights[-1] * largest)
         z, largest = (np.repeat(each, len(folded.kept), axis=-1) for each in _integrals(polynomial, folded.at_cosines))
-        scale = np.clip(rest / np.maximum(z, DIM), 0, BRIGHTEST)
+        scale = _scale(rest, z)
         heaviest.append(scale * largest)
 
         # Share samples by energies
@@ -264,7 +264,7 @@ class Solver:
             z, _ = _integrals(side.polynomial, (np.sqrt(1 - cosine * cosine), 0 * cosine, cosine))
             whole = np.repeat(z, math.prod(self.shape[1:]), axis=-1)
             scale, rest = (slice(k, k + self.colours) for k in side.places)
-            rows[scale] = np.clip(rows[rest] / np.maximum(whole, DIM), 0, BRIGHTEST)
+            rows[scale] = _scale(rows[rest], whole)
         return rows
 
     def _colours(self, values: Array) -> Array:
@@ -378,6 +378,11 @@ def _integrals(polynomial: Remainder, wi: Direction) -> list[Array]:
     wo = numbers.sample((x, y, z), *low_discrepancy.square(EVENLY))
     weights = numbers.value((x, y, z), wo) / numbers.density((x, y, z), wo)
     return [weights.mean(axis=-1), weights.max(axis=-1)]
+
+
+def _scale(energy: Array, albedo: Array) -> Array:
+    """Of a remainder of an albedo, so that it has an energy."""
+    return np.clip(energy / np.maximum(albedo, DIM), 0, BRIGHTEST)
 
 
 def _veiled(material: Material) -> set[int]:

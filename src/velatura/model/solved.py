@@ -227,10 +227,7 @@ class Solved:
     eta: Value
     symmetric: bool
 
-    @property
-    def diffuse(self) -> bool:
-        """The remainder comes after the lobes."""
-        return True
+    diffuse = True  # the remainder comes after the lobes
 
     @property
     def balanced(self) -> bool:

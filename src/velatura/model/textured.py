@@ -46,6 +46,7 @@ SAMPLES = 377  # for the factors of the symmetric form, at each direction
 SHAPES = {True: (96,), False: (48, 33)}  # places over direction
 FAINTEST = 1e-4  # columns that are scaled from less than that are scaled by less
 MOST = 8.0  # times
+OF_PASSED = 0.05  # share of what passes by which each part of it is sampled at least, where terms are summed
 TOGETHER = {True: 2, False: 1}  # axes of one table
 
 
@@ -145,9 +146,6 @@ class _Interpolated(Side):
 
     def at(self, w: Direction) -> Columns:
         return _bounded(super().at(w), self.summed)
-
-
-OF_PASSED = 0.05  # share of what passes by which each part of it is sampled at least, where terms are summed
 
 
 def _bounded(found: Columns, summed: bool) -> Columns:

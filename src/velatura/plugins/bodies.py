@@ -60,13 +60,11 @@ class Prepared:
     variance: type[Variance]
     spectra: Spectra | None = None
 
+    balanced = False
+
     @property
     def diffuse(self) -> bool:
         return self.binding.stack.base is not None
-
-    @property
-    def balanced(self) -> bool:
-        return False
 
     def at(self, si: Any, active: Any) -> Body:
         lobed = self.lobed(si, active)
@@ -84,9 +82,7 @@ class Tabulated:
     binding: Binding
     textured: Textured
 
-    @property
-    def diffuse(self) -> bool:
-        return True
+    diffuse = True  # the remainder comes after the lobes
 
     @property
     def balanced(self) -> bool:

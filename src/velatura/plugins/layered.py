@@ -63,7 +63,7 @@ def make(mi: Any) -> type:
         @property
         def exceptions(self) -> frozenset[str]:
             """Laws of `velatura.checks` that it is known not to keep."""
-            solved = self.model.recursion.solved
+            solved = not self.model.recursion.closed_form
             if solved and self.delta:
                 return frozenset()
             shape, form = "pane" if self.transmits else "opaque", self.model.form

@@ -151,14 +151,3 @@ def _to_azimuth(t: Value) -> Value:
     p = ops.select(back, 4 * t - 3, 1 - 4 * t)
     s = 1 - ops.absolute(p)
     return 0.5 * ops.arctan2(ops.select(back, -s, s), p) + ops.select(back, pi, 0.0)
-
-
-def as_constants(*values: Any) -> tuple[Any, ...]:
-    """Values, and tuples of them, detached from their gradients."""
-    if all(isinstance(x, (float, np.ndarray, tuple)) for x in values):
-        return values
-    import drjit as dr
-
-    values = dr.detach(values)
-    dr.eval(values)
-    return values

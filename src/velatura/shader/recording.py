@@ -99,14 +99,15 @@ def record(
     # Run the model
     uniform = not any(isinstance(value, Varying) for value in flat.values())
     chosen = chosen if uniform else chosen.adder  # which is worked out at every point
-    constants = flat if chosen.recursion.solved and not parameters else constant
+    solved = not chosen.recursion.closed_form
+    constants = flat if solved and not parameters else constant
     recorded = Material.of(
         stack, lambda at, value: material.constant(at, value) if at.name in constants else _input(at)
     )
     kind = structure(stack) if parameters else variance(stack)
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     baked: Bake | Tabulated | None = None
-    if chosen.recursion.solved:
+    if solved:
         from velatura.shader.solved import tabulated
 
         baked = tabulated(stack, recorded, chosen, kind, general=parameters)

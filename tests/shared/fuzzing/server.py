@@ -199,15 +199,15 @@ def requests(port: int, token: str, count: int, seed: int) -> Outcome:
     rng, outcome = random.Random(seed), Outcome()
     for n in range(count):
         method, path, body, headers = request(rng)
-        told = f"request {n}: {method} {path} {body[:300]!r} {headers}"
+        shown = f"request {n}: {method} {path} {body[:300]!r} {headers}"
         try:
             status, text = Client(port, token).ask(method, path, body, headers)
         except (OSError, http.client.HTTPException) as error:
-            outcome.failures.append(f"{told}: {error!r}")
+            outcome.failures.append(f"{shown}: {error!r}")
             continue
         outcome.answers[f"{status}"] += 1
         if status == 500 or (path.startswith("/api/") and status == 422 and "\n" in json.loads(text)["error"]):
-            outcome.failures.append(f"{told}: {status} {text[:300]!r}")
+            outcome.failures.append(f"{shown}: {status} {text[:300]!r}")
     return outcome
 
 
@@ -220,16 +220,16 @@ def messages(port: int, token: str, count: int, seed: int) -> Outcome:
             sent = message(rng)
             while len(sent) > 2**20:
                 sent = message(rng)
-            told = f"message {n}: {sent[:300]!r}"
+            shown = f"message {n}: {sent[:300]!r}"
             try:
                 socket.send(sent)
                 answer = json.loads(socket.recv(SLOW))
             except Exception as error:
-                outcome.failures.append(f"{told}: {error!r}")
+                outcome.failures.append(f"{shown}: {error!r}")
                 break
             outcome.answers["error" if "error" in answer else "answer"] += 1
             if "mistake in it" in answer.get("error", ""):
-                outcome.failures.append(f"{told}: {answer}")
+                outcome.failures.append(f"{shown}: {answer}")
     return outcome
 
 
