@@ -25,6 +25,7 @@ from velatura.stack import InterfaceValues, Material
 
 Array = NDArray[np.floating]
 
+NONE = np.zeros(0)  # directions at which the remainder, which has no lobe, is known
 DARK = 1e-9  # energy of lobes that have a shape all the same
 
 
@@ -41,7 +42,7 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
         others = replace(material, layers=tuple(x for place, x in enumerate(material.layers) if place not in nothing))
         return _with_dark(solved_lobes(others, model, wi), material, model, nothing, phi)
     often = tables.load() if model.reflectance == "fgd-multi" else None
-    solved, found = energies(material, cos_theta, phi, often, widths.nearly_straight), parts(material)
+    solved, found = energies(material, cos_theta, phi, often, widths.nearly_straight, incidences=NONE), parts(material)
     kind = variance_kind(material)
     # Symmetry has the axes of isotropic stacks in the plane of incidence
     in_plane = phi if kind is Isotropic else None

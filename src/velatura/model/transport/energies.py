@@ -12,12 +12,22 @@ import functools
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.transport.adding import Leaving, Made, Part, indices, interfaces, layers, leaving, parts, settings
+from velatura.model.transport.adding import (
+    Lambert,
+    Leaving,
+    Made,
+    Part,
+    indices,
+    interfaces,
+    layers,
+    leaving,
+    parts,
+    settings,
+)
 from velatura.model.transport.interfaces import Facets, Setting
 from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.modes import TINY, Basis, Even, Relative
@@ -48,8 +58,8 @@ class Energies:
         rest: (C, M), reflected in no lobe.
         straight, bounced, passed: (C, M), of what passes: straight through, and after reflections, where facets are met
             once and media do not scatter; and all of it.
-        remainder: what is reflected in no lobe for beams of cosines `INCIDENCES`, by mode of azimuth at the `nodes`,
-            (C, MODES, N, 8).
+        remainder: what is reflected in no lobe for beams of the cosines at which it is asked for, by mode of azimuth at
+            the `nodes`, (C, MODES, N, I).
     """
 
     lobes: Array
@@ -63,21 +73,28 @@ class Energies:
 
 
 def energies(
-    material: Material, cos_theta: Array, phi: Array, often: Tables | None, forward: Straight, made: Made | None = None
+    material: Material,
+    cos_theta: Array,
+    phi: Array,
+    often: Tables | None,
+    forward: Straight,
+    made: Made | None = None,
+    incidences: Array = INCIDENCES,
 ) -> Energies:
     """Energies for beams at cosines and azimuths (M,).
 
     `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
-    into veils. `made` keeps what materials may share.
+    into veils. `made` keeps what materials may share. The remainder is known at the cosines `incidences`, (I,); without
+    any, lobes are all that is worked out, which is quicker.
     """
     made = {} if made is None else made
-    everything = parts(material)
+    everything = _ended(parts(material))
     brushed = any(facets.alpha_u != facets.alpha_v for facets in interfaces(everything))
     azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
-    cosines = np.concatenate([cos_theta, np.tile(INCIDENCES, len(azimuths))])
-    around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(INCIDENCES))])
+    cosines = np.concatenate([cos_theta, np.tile(incidences, len(azimuths))])
+    around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
     nodes = Nodes.of(indices(everything), NODES)
-    basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES)
+    basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES if len(incidences) else 1)
     setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, SAMPLES, often, made)
 
     # Sum up the systems
@@ -90,9 +107,9 @@ def energies(
         kept = [medium(part, x) if isinstance(part, Slab) else of_it[as_set] for part, x, of_it in zip(found, of, each)]
         return leaving(kept, setting)
 
-    clear = parts(material, lambda g: 0.0)
+    clear = _ended(parts(material, lambda g: 0.0))
     sharp = system(clear) if scatters or often else full
-    kept = system(parts(material, forward)) if scatters else sharp
+    kept = system(_ended(parts(material, forward))) if scatters else sharp
     # A lobe has all that media do not scatter where nothing above it refracts, and else a share of it
     whole = system(clear, True) if scatters and often else full
     shares = _undisturbed(everything)
@@ -115,8 +132,10 @@ def energies(
     lobes, veils = unscattered * share, np.maximum(veiled - unscattered, 0) * share
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
     count = np.size(cos_theta)
-    in_lobes = _sum(of_lobes(kept))
-    remainder = _remainder(total, in_lobes, rest[:, count:], basis, material, often, forward, made)
+    if brushed and len(incidences):
+        remainder = _of_isotropic(material, rest[:, count:], often, forward, made, incidences)
+    else:
+        remainder = (total.columns - _sum(of_lobes(kept)).columns)[..., count:]
     straight = sharp.energy(sharp.straight)
     return Energies(
         lobes=lobes[..., :count],
@@ -128,6 +147,14 @@ def energies(
         remainder=remainder,
         nodes=nodes,
     )
+
+
+def _ended(found: list[Part]) -> list[Part]:
+    """The layers, without a black base directly below an interface, which is then the last one that light meets."""
+    *others, last = found
+    if others and isinstance(others[-1], Facets) and isinstance(last, Lambert) and not last.albedo.any():
+        return [*others[:-1], replace(others[-1], final=True)]
+    return found
 
 
 def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
@@ -145,15 +172,14 @@ def _sum(lights: Sequence[Operator]) -> Operator:
     return functools.reduce(operator.add, lights)
 
 
-def _remainder(total: Operator, in_lobes: Operator, energy: Array, basis: Basis, *solved: Any) -> Array:
-    """What is reflected in no lobe, by mode and node. That of brushed interfaces is that of isotropic ones of the mean
-    roughness, with the energy that it has on average over azimuths.
+def _of_isotropic(
+    material: Material, energy: Array, often: Tables | None, forward: Straight, made: Made, incidences: Array
+) -> Array:
+    """The remainder of brushed interfaces, by mode and node: that of isotropic ones of the mean roughness, with the
+    energy that it has on average over azimuths.
     """
-    if isinstance(basis, Relative):
-        return np.asarray((total.columns - in_lobes.columns)[..., -len(INCIDENCES) :])
-    material, *others = solved
     stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
-    found = energies(stand_in, INCIDENCES, np.zeros(len(INCIDENCES)), *others)
+    found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
     return found.remainder * (mean / np.maximum(found.rest, TINY))[:, None, None]
 

@@ -38,7 +38,7 @@ BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which
 @dataclass(frozen=True)
 class Facets:
     """An interface between indices `above` and `below`, by colour (C,); `k` is None for a dielectric, and `below` too
-    for a mirror. Roughnesses, and a rotation in radians.
+    for a mirror. Roughnesses, and a rotation in radians. `final` says that nothing sends back what it lets through.
     """
 
     above: Array
@@ -47,6 +47,7 @@ class Facets:
     alpha_u: float
     alpha_v: float
     rotation: float = 0.0
+    final: bool = False
 
     @property
     def key(self) -> Hashable:
@@ -201,12 +202,12 @@ class Setting:
 
 
 def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
-    """An interface as a layer, with facets met once, and as the setting says; what is opaque lets nothing through, and
-    has no other side."""
+    """An interface as a layer, with facets met once, and as the setting says; what is opaque or final lets nothing
+    through, and has no other side."""
     nothing = Operator.nothing(setting.basis.size, len(setting.p))
     if facets.is_smooth:
         r, t = (scaled(partial(facets.smooth, transmitted=side), setting) for side in (False, True))
-        if facets.opaque:
+        if facets.opaque or facets.final:
             t = r_below = t_below = nothing
         else:
             back = facets.reversed()
@@ -214,7 +215,7 @@ def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
         smooth = Layer(r, t, r_below, t_below)
         return smooth, smooth
     above = _Side.of(facets, setting)
-    if facets.opaque:
+    if facets.opaque or facets.final:
         once, first = (Layer(r, nothing, nothing, nothing) for r in above.r)
         if not above.blocked:
             return once, once
@@ -270,7 +271,7 @@ class _Met:
         lengths = facets.above, facets.below, facets.k, p, nodes.ends
         key = (
             *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in lengths),
-            *(facets.alpha_u, facets.alpha_v, psi.tobytes(), setting.samples, *setting.ways),
+            *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes(), setting.samples, *setting.ways),
             *(type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), nodes.cells),
         )
         if key not in setting.made:
@@ -285,7 +286,8 @@ class _Met:
         def met(first: int) -> _Met:
             each, basis = slice(first, first + size), setting.basis
             found = _events(facets, p[each], psi[each], setting.samples, setting.ways)
-            refracted = None if found.refracted is None else basis.deposited(found.refracted)
+            light = None if facets.final else found.refracted
+            refracted = None if light is None else basis.deposited(light)
             blocked = found.blocked_reflected, found.blocked_refracted, found.whole
             return cls(basis.deposited(found.reflected), refracted, found.kept, *blocked)
 
