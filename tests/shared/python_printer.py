@@ -111,7 +111,7 @@ class PythonPrinter(Printer):
             for name, fields, _ in structs
         )
 
-    def parameters(self, shown: int, remainder: int) -> str:
+    def parameters(self, shown: int, remainder: int, layout: int) -> str:
         return ""
 
     def material(self, filled: Filled) -> str:

@@ -290,9 +290,10 @@ def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
         assert made.text.count("\n") <= 320
 
 
-@pytest.mark.parametrize("name", ["coated-gold", "frosted-glass", "varnished-paint"])
+@pytest.mark.parametrize("name", ["coated-gold", "frosted-glass", "tinted-plate", "varnished-paint"])
 def test_values_that_change_are_solved_anew(name: str) -> None:
-    """What is read of other values is what a shader of these alone reads, though more is drawn of a kind of stack."""
+    """What is read of other values is what a shader of these alone reads, though more is drawn of a kind of stack: of a
+    pane it has all interfaces shape the light that passes, and any medium scatter it."""
     stack = vt.preset(name)
     other = stack.replace(layer0_eta=1.4)
     general, alone = shader(stack, values="uniforms"), shader(other)
@@ -302,7 +303,8 @@ def test_values_that_change_are_solved_anew(name: str) -> None:
     recordings = [record(stack, parameters=True), record(other)]
     colours = {f"vt_remainder[{k}]": colour[:, None] for k, colour in enumerate(found.remainder)}
     colours |= {f"vt_shown[{k}]": 1.0 for k in range(len(general.shown))}
-    case = random_case(PATTERNS[0], 40, np.random.default_rng(5))
+    colours |= {f"vt_layout[{k}]": float(x) for k, x in enumerate(found.layout)}
+    case = random_case((("dielectric" if stack.transmits else "conductor",), "round"), 40, np.random.default_rng(5))
     values = {f"{name}.{axis}": w[k] for name, w in case.directions.items() for k, axis in enumerate("xyz")}
     values |= {f"m.{place(at)}": np.reshape(constant(at, x), (-1, 1)) for at, x in other.values()}
     seen = []

@@ -68,7 +68,7 @@ def _contents(stack: Stack, made: Shader, cosines: int | None = None) -> dict[st
     if made.baked is None or isinstance(made.baked, Bake):
         return {"values": values, "solution": None}
     found = made.baked.solve(stack, cosines)
-    return {"values": values, "solution": {"texels": array(found.texels), "remainder": array(found.remainder)}}
+    return {"values": values, "solution": {name: array(x) for name, x in vars(found).items()}}
 
 
 def _free(stack: Stack, made: Shader) -> list[tuple[Address, Any]]:

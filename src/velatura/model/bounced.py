@@ -54,7 +54,7 @@ class Rest:
 
     lobe: OwnMediumLobe | None
     diffuse: Value
-    tilt: float
+    tilt: Value
     bound: Value
     leaving: Callable[[Value], Value]
 
@@ -72,14 +72,15 @@ def rest(passage: Passage, wi: Direction) -> Rest:
     n, under = passage.indices, passage.scattered
     lowest = reduce(ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(n, (*under, 1.0))))
     bound, leaving = lowest / n[-1], _leaving(passage, under)
+    tilt = TILTED * passage.clear
     if not passage.is_cloudy:
-        return Rest(None, 1.0, TILTED, bound, leaving)
+        return Rest(None, 1.0, tilt, bound, leaving)
     i = entered(passage, wi)
     scattering = [(slab, cosine) for slab, cosine in zip(passage.slabs, i.bounded) if not is_none(slab.scattering)]
     alpha = _turned(scattering)
     diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
     width = type(passage.crossings[0].width).uniform(WIDTHS.variance(alpha))
-    return Rest(_lobe(passage, i, under, width), diffuse, 0.0, bound, leaving)
+    return Rest(_lobe(passage, i, under, width), diffuse, tilt, bound, leaving)
 
 
 def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
@@ -124,8 +125,8 @@ def _leaving(passage: Passage, under: Sequence[Value]) -> Callable[[Value], Valu
 
 
 def _above(under: Sequence[Value], values: Sequence[Value]) -> Value:
-    """Of values of slabs that of the one above some interfaces."""
-    first = [flag - before for flag, before in zip(under, (0.0, *under))]
+    """Of values of slabs that of the one above some interfaces; without any, that of the last one."""
+    first = [flag - before for flag, before in zip((*under, 1.0), (0.0, *under))]
     return _sum(first, values)
 
 
@@ -161,9 +162,11 @@ def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Di
     """A direction, in the frame of `seen_below`, from uniform numbers."""
     r, phi = found.bound * ops.sqrt(u1), 2 * pi * u2
     even = r * ops.cos(phi), r * ops.sin(phi), ops.sqrt(1 - r * r)
-    if not found.lobe:
+    if not is_none(found.tilt):
         side = ops.select(2 * u < _tilted(found, i, even), 1.0, -1.0)
-        return side * even[0], side * even[1], even[2]
+        even = side * even[0], side * even[1], even[2]
+    if not found.lobe:
+        return even
     other = own_medium.sample(found.lobe, i, u1, u2)
     x, y, z = (ops.select(u < found.diffuse, a, b) for a, b in zip(even, other))
     return x, y, z

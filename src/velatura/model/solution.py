@@ -19,6 +19,7 @@ from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
 from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved_grid import COS_MIN, Folded, Grid
+from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import Made, interfaces, parts
 from velatura.model.transport.energies import INCIDENCES, energies
 from velatura.model.variables import Variables
@@ -167,12 +168,14 @@ class Solver:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
         shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
-        passage = (
-            straight_through.passage(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
-            if material.transmits
-            else None
-        )
+        passage = self.passage(material, layout)
         return Side(curves, tuple(shapes), polynomial, passage, context.colour, self.colours, self.kind)
+
+    def passage(self, material: Material, layout: Layout) -> Passage | None:
+        """What passes a material; None where nothing does."""
+        if not material.transmits:
+            return None
+        return straight_through.passage(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
 
     def bsdf(self, material: Material, made: Sequence[Side]) -> Solved:
         """A material of one side or two."""
@@ -232,10 +235,8 @@ class Solver:
         shares[-1] = np.maximum(shares[-1], least * sum(shares))
         shares = [passed.light(share, sum(shares), each) for share, each in zip(shares, heaviest)]
         total, left, passes = sum(shares), np.ones(count), None
-        if material.transmits:
-            passage = straight_through.passage(
-                _slim(material), self.variance, layout.stepped, layout.rough, layout.cloudy
-            )
+        passage = self.passage(_slim(material), layout)
+        if passage:
             passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
             passes = _evenly(passes, least)
             left = 1 - passes.share

@@ -13,7 +13,7 @@ from velatura.shader.bake import Bake, Group
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Output, Printer, Struct
 from velatura.shader.statements import statements
-from velatura.shader.symbol import REMAINDER, SHOWN, Kind, Operand, Symbol
+from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
 
 if TYPE_CHECKING:  # it loads SciPy
     from velatura.shader.solved import Tabulated
@@ -143,9 +143,10 @@ class Glsl(Printer):
             for struct in structs
         )
 
-    def parameters(self, shown: int, remainder: int) -> str:
-        colours = f"uniform vec3 {REMAINDER}[{remainder}];\n" if remainder else ""
-        return f"uniform VtMaterial {PARAMETERS};\n\nuniform float {SHOWN}[{shown}];\n{colours}"
+    def parameters(self, shown: int, remainder: int, layout: int) -> str:
+        arrays = ("float", SHOWN, shown), ("vec3", REMAINDER, remainder), ("float", LAYOUT, layout)
+        declared = (f"uniform {kind} {name}[{length}];\n" for kind, name, length in arrays if length)
+        return f"uniform VtMaterial {PARAMETERS};\n\n{''.join(declared)}"
 
     def material(self, filled: Filled) -> str:
         samplers = [

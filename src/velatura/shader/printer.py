@@ -151,8 +151,9 @@ class Printer(ABC):
         """Declarations of structs, each before those that contain it."""
 
     @abstractmethod
-    def parameters(self, shown: int, remainder: int) -> str:
-        """The uniforms that change: a material, weights of a number of lobes, and a number of colours of remainders."""
+    def parameters(self, shown: int, remainder: int, layout: int) -> str:
+        """The uniforms that change: a material, weights of a number of lobes, and of a solved one a number of colours
+        of its remainders, and of numbers of its layout."""
 
     @abstractmethod
     def material(self, filled: Filled) -> str:

@@ -96,7 +96,7 @@ def shader(
     parts = [
         printer.header(name, _described(recording.model), bool(recording.energies)),
         printer.structs(material.structs(stack, read)),
-        *([printer.parameters(len(shown), _colours(baked))] if shown else []),
+        *([printer.parameters(len(shown), *_changing(baked))] if shown else []),
         printer.material(filled),
         printer.structs(_structs(recording)),
         *([printer.tables(layouts)] if layouts else []),
@@ -119,9 +119,9 @@ def shader(
     )
 
 
-def _colours(baked: Bake | Tabulated | None) -> int:
-    """How many of the remainder change with values."""
-    return 0 if baked is None or isinstance(baked, Bake) else baked.colours
+def _changing(baked: Bake | Tabulated | None) -> tuple[int, int]:
+    """How many colours of the remainder change with values, and how many numbers of the layout."""
+    return (0, 0) if baked is None or isinstance(baked, Bake) else (baked.colours, baked.numbers)
 
 
 def _interfaces(recording: Recording) -> list[list[int]]:

@@ -7,7 +7,7 @@ constant ones are numbers in the code.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
@@ -23,11 +23,12 @@ from velatura.model.remainder import Remainder
 from velatura.model.solution import Layout, SolvedSide, Solver
 from velatura.model.solved import Columns, Side, Solved
 from velatura.model.solved_grid import Grid
+from velatura.model.straight_through import Passage
 from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.shader.bake import Group, Texture, together
-from velatura.shader.symbol import REMAINDER, SHOWN, colour, number
+from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, colour, number
 from velatura.stack import InterfaceValues, Material, MediumValues, Stack
 
 OF_POLYNOMIAL = 8  # colours
@@ -40,10 +41,12 @@ Array = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class Solution:
-    """What a shader reads of a material: texels (height, width, 4), and colours (8 sides, 3) of the remainders."""
+    """What a shader reads of a material: texels (height, width, 4), colours (8 sides, 3) of the remainders, and numbers
+    of its layout."""
 
     texels: Array
     remainder: Array
+    layout: Array
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,12 @@ class Tabulated:
     def colours(self) -> int:
         """Of the remainders of both sides."""
         return OF_POLYNOMIAL * self.sides
+
+    @property
+    def numbers(self) -> int:
+        """Of its layout."""
+        bodies = [self.body.above, *([self.body.below] if self.body.below else [])]
+        return sum(len(_flags(side.passage)) for side in bodies if side.passage)
 
     @property
     def turns(self) -> int:
@@ -145,9 +154,19 @@ class Tabulated:
     def solve(self, stack: Stack, cosines: int | None = None) -> Solution:
         """A stack of this kind, maybe at fewer cosines than usual."""
         grid = Grid(self.solver.isotropic, cosines) if cosines else self.solver.grid
-        solver = replace(self.solver, grid=grid, made={})
-        found = solver.solve(_numbers(stack), self.layouts)
-        return Solution(self.texels(_rows(solver, found)), np.concatenate(list(map(_colours, found))))
+        solver, material = replace(self.solver, grid=grid, made={}), _numbers(stack)
+        # All that its kind may draw, of its own shape
+        own = [replace(own, lobes=kind.lobes) for own, kind in zip(solver.layouts([material]), self.layouts)]
+        return self.solution(solver, solver.solve(material, own), material, own)
+
+    def solution(
+        self, solver: Solver, found: Sequence[SolvedSide], material: Material, layouts: Sequence[Layout]
+    ) -> Solution:
+        passages = map(solver.passage, solution.sides(material), layouts)
+        layout = [flag for passage in passages if passage for flag in _flags(passage)]
+        return Solution(
+            self.texels(_rows(solver, found)), np.concatenate(list(map(_colours, found))), np.array(layout, np.float32)
+        )
 
     def texels(self, rows: Array) -> Array:
         """The texture of columns, (rows, sides, nodes)."""
@@ -164,20 +183,31 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     layouts = solver.layouts([_eventful(plain) if general else plain])
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
-    sides = []
+    sides, flags = [], map(number, (f"{LAYOUT}[{k}]" for k in count()))
     for k, (seen, layout) in enumerate(zip(solution.sides(material.solid()), layouts)):
         colours = [colour(f"{REMAINDER}[{OF_POLYNOMIAL * k + j}]") for j in range(OF_POLYNOMIAL)]
         polynomial = Remainder(*(_colours(found[k]) if found else colours))
         context = replace(at_a_point(), colour=together)
-        sides.append(solver.side(seen, layout, None, polynomial, context))
+        side = solver.side(seen, layout, None, polynomial, context)
+        sides.append(replace(side, passage=_any(side.passage, flags)) if general and side.passage else side)
     columns = _placed(sides[0], rows)
     for k, beam in enumerate(_beams(len(sides), model)):
         curves = _Curves(columns, tuple(Texture(solver.shape, group, beam) for group in columns.groups))
         sides[k] = replace(_Weighed(**vars(sides[k])) if general else sides[k], curves=curves)
     made = Tabulated(solver.bsdf(material.solid(), sides), solver, layouts, columns)
-    if found is None or rows is None:
-        return made
-    return replace(made, solved=Solution(made.texels(rows), np.concatenate(list(map(_colours, found)))))
+    return made if found is None else replace(made, solved=made.solution(solver, found, plain, layouts))
+
+
+def _flags(passage: Passage) -> list[Value]:
+    """Which interfaces shape the light that passes, and whether media leave it clear."""
+    return [*passage.faces, *passage.under, *passage.scattered, passage.clear]
+
+
+def _any(passage: Passage, flags: Iterator[Value]) -> Passage:
+    """A passage of any layout."""
+    faces, under, scattered = (tuple(next(flags) for _ in passage.crossings) for _ in range(3))
+    bounces = len(passage.crossings) > 1
+    return replace(passage, faces=faces, under=under, scattered=scattered, clear=next(flags), bounces=bounces)
 
 
 def _beams(sides: int, model: Model) -> list[Value]:

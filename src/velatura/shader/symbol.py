@@ -22,6 +22,7 @@ Operand: TypeAlias = "Symbol | float | bool | tuple[float, ...]"
 
 SHOWN = "vt_shown"  # in the code: the weights of lobes
 REMAINDER = "vt_remainder"  # the colours of the remainders of both sides, where they change
+LAYOUT = "vt_layout"  # and which interfaces shape the light that passes
 
 _serials = count()
 _depth: ContextVar[int] = ContextVar("depth", default=0)  # of loops that are being recorded

@@ -24,7 +24,7 @@ export class Slot {
   #learning = null;
   #textures = {}; // by the names of their samplers
   #bake = null;
-  #solved = null; // texels, and colours of the remainder, that Python has worked out
+  #solved = null; // what Python has worked out: texels, colours of the remainder, numbers of the layout
   #placed = {}; // values by their places in the shader's struct
   #outdated = true; // whether the bake is of other values
   #coarse = false; // whether it is a coarse one
@@ -82,7 +82,8 @@ export class Slot {
     for (const [name, place] of Object.entries(this.shader.uniforms)) {
       if (name in values) this.#placed[place] = values[name];
     }
-    this.#solved = solution && { texels: decode(solution.texels).array, remainder: decode(solution.remainder).array };
+    const decoded = ([name, x]) => [name, decode(x).array];
+    this.#solved = solution && Object.fromEntries(Object.entries(solution).map(decoded));
     this.#outdated = true;
   }
 
@@ -100,8 +101,8 @@ export class Slot {
     this.#outdated = false;
     const shown = this.shader.shown.map((_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
     const parameters = Object.entries(this.#placed).map(([place, value]) => [`vt_parameters.${place}`, value]);
-    const remainder = this.#solved && { vt_remainder: this.#solved.remainder };
-    return { ...Object.fromEntries(parameters), ...this.#textures, ...remainder, vt_shown: shown };
+    const solved = this.#solved && { vt_remainder: this.#solved.remainder, vt_layout: this.#solved.layout };
+    return { ...Object.fromEntries(parameters), ...this.#textures, ...solved, vt_shown: shown };
   }
 
   // The picture
