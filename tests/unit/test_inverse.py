@@ -416,3 +416,107 @@ def test_a_pair_of_given_indices_has_them() -> None:
     found = invert_pair([[0.06]] * 3, 0.01, 1.3, eta_2=2.2, exterior=1.1)
     np.testing.assert_allclose(found.lower.eta, 2.2)
     np.testing.assert_allclose(found.upper.eta, 1.3)
+
+
+# Depths and tints of members -----------------------------------------------------------------------------------------
+
+COAT = Layers("dielectric", np.full((1, 1), 1.3), None, _roughness(np.array([0.03])), 0.0)
+
+
+@pytest.mark.parametrize("below", [False, True], ids=["in air", "below a coat"])
+@pytest.mark.parametrize(
+    ("interfaces", "kind", "names"),
+    [
+        (1, "dielectric", ["eta_1"]),
+        (1, "conductor", ["tau_0", "tint"]),
+        (2, "dielectric", ["eta_1", "eta_2", "tau_0"]),
+        (2, "conductor", ["eta_1", "tau_0", "tau_1", "tint"]),
+    ],
+)
+def test_every_member_over_all_coordinates_has_the_lobe(
+    interfaces: int, kind: str, names: list[str], below: bool
+) -> None:
+    """What the model reads of each, energies and variances, is what was asked for; some absorb, others do not."""
+    above = Above.nothing(AVERAGED)
+    if below:
+        above, _ = above.below(COAT)
+    energy, variance = np.array([[0.26], [0.22], [0.2]]) * (1 if kind == "conductor" else 0.4), 0.05
+    members = EquivalenceClass(above, energy, variance, interfaces, Choice(kind))
+    assert [one.name for one in members.coordinates] == names
+    drawn = members.draw(60, seed=1)
+    assert sorted(drawn) == names and all(x.shape[-1] == 60 for x in drawn.values())
+    clear = np.all(drawn.get("tau_0", np.zeros((3, 60))) < 1e-9, axis=0) | (interfaces == 1)
+    for one in members.coordinates:
+        low, high = (np.reshape(end, (-1, 1)) for end in (one.low, one.high))
+        if one.name.startswith("tau"):
+            assert np.all(np.ravel(one.high) > 0.1)
+            assert 0.2 < np.mean(np.any(drawn[one.name] > np.reshape(low, (-1, 1)) + 1e-3, axis=0)) < 0.8
+            assert np.ptp(drawn[one.name], axis=0).max() > 0.02
+        else:
+            inside = (drawn[one.name] >= low - 1e-9) & (drawn[one.name] <= high + 1e-9)
+            assert np.all(inside[..., clear]), one.name
+    found = members.member(**drawn)
+    assert all(np.broadcast_to(part.feasible, 60).all() for part in found)
+    total: np.ndarray = np.zeros((3, 60))
+    for part in found:
+        above, lobe = above.below(part)
+        total = total + lobe.energy
+        assert np.abs(lobe.variance.matrix()[0] - variance).max() < 1e-6
+    assert np.abs(total - energy).max() < 1e-6
+
+
+def test_the_edge_tints_of_the_paper_are_members_of_one_class() -> None:
+    """Bati et al. 2021, figure 16: a coat of index 1.2 or 1.5 that absorbs green, or not, over a conductor."""
+    members = pair_class([0.45] * 3, 0.03, model=AVERAGED, kind="conductor")
+    (coordinate,) = (one for one in members.coordinates if one.name == "tau_1")
+    assert np.all(np.array(coordinate.low) == 0) and np.all(np.array(coordinate.high) > 0.3)
+    for eta in (1.2, 1.5):
+        clear, green = members.member(eta), members.member(eta, tau_1=[0, 0.3, 0])
+        assert all(part.feasible.all() for part in (*clear, *green))
+        assert np.ravel(green[1].tau).tolist() == [0, 0.3, 0]
+        kappa = np.ravel(green[1].kappa)
+        assert kappa[1] > 1.3 * kappa[0]  # the brighter metal below makes up for it
+        assert np.max(clear[1].tau) < 1e-12
+    assert members.contains(1.5, tau_1=[0, 0.3, 0]).all()
+    assert not members.contains(1.5, tau_1=[0, 0.6, 0]).any()
+    held = members.held(tau_1=[0, 0.3, 0])
+    assert [one.name for one in held.coordinates] == ["eta_1", "tau_0", "tint"]
+    assert np.ravel(held.indices_1()) == pytest.approx(np.ravel(members.indices_1()))  # which the blur bounds
+
+
+def test_absorption_above_a_pair_leads_to_the_class_of_a_brighter_one() -> None:
+    """Bati et al. 2021, section 5: tau_0 is as if e^(2 tau_0) R were asked for without it."""
+    tau = np.array([0.1, 0.2, 0.05])
+    energy = np.array([0.1, 0.08, 0.12])
+    held, brighter = pair_class(energy).held(tau_0=tau), pair_class(energy * np.exp(2 * tau))
+    assert np.ravel(held.indices_1()) == pytest.approx(np.ravel(brighter.indices_1()), abs=1e-9)
+    for one, other in zip(held.member(1.6, 3.0), brighter.member(1.6, 3.0)):
+        np.testing.assert_allclose(one.eta, other.eta, rtol=1e-9)
+    np.testing.assert_allclose(held.member(1.6, 3.0)[1].tau, brighter.member(1.6, 3.0)[1].tau, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("members", "coordinates"),
+    [
+        (pair_class([0.1] * 3), {"tint": 0.5}),
+        (pair_class([0.1] * 3), {"tau_1": 0.1}),
+        (EquivalenceClass(Above.nothing(PLAIN), np.full((3, 1), 0.4), 0.0, 1, Choice("conductor")), {"tau_1": 0.1}),
+        (EquivalenceClass(Above.nothing(PLAIN), np.full((3, 1), 0.4), 0.0, 1), {"tau_0": 0.1}),
+    ],
+)
+def test_what_is_no_free_coordinate_cannot_be_held(members: EquivalenceClass, coordinates: dict[str, float]) -> None:
+    with pytest.raises(ValueError):
+        members.held(**coordinates)
+
+
+@pytest.mark.parametrize("width", [1e-1, 1e-3, 1e-5])
+def test_a_narrow_class_is_found_wherever_it_lies(width: float) -> None:
+    """Of dark pairs below an index the class is a band about that, where the upper interface hardly reflects."""
+    for eta_0 in (1.0, 1.37, 1.93):
+        dark, bright = fresnel.normal_incidence(np.exp(width)), 0.08
+        members = pair_class([dark, bright, bright], 1e-12, eta_0=eta_0)
+        spans = members.indices_1()
+        low, high = (max(1.0, eta_0 * np.exp(-width)), eta_0 * np.exp(width))
+        assert spans[0][0] == pytest.approx(low, rel=1e-7) and spans[-1][1] == pytest.approx(high, rel=1e-7)
+        drawn = members.draw(20, seed=2)
+        assert all(part.feasible.all() for part in members.member(**drawn))

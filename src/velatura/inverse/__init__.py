@@ -8,7 +8,7 @@ from velatura.inverse import smooth_pair
 from velatura.inverse.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.coats import Coated, coat
 from velatura.inverse.descent import Estimate, Fit, Other, fit
-from velatura.inverse.equivalence import EquivalenceClass
+from velatura.inverse.equivalence import Coordinate, EquivalenceClass
 from velatura.inverse.explain import Direction, Infeasible
 from velatura.inverse.fitting import fit_target, simplify
 from velatura.inverse.interface import MODEL, Choice, invert_interface
@@ -23,6 +23,7 @@ __all__ = [
     "Above",
     "Choice",
     "Coated",
+    "Coordinate",
     "Direction",
     "Directions",
     "EquivalenceClass",

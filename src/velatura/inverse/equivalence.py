@@ -13,24 +13,36 @@ from numpy.typing import ArrayLike
 from velatura.inverse import interface, pair, smooth_pair
 from velatura.inverse.interface import DENSER, DIELECTRIC, RARER, Choice
 from velatura.inverse.partial_stack import Above, Array, Batch, Layers, Mask, mapped, take
-from velatura.inverse.roots import intervals
+from velatura.inverse.roots import bisect, intervals
 from velatura.inverse.smooth_pair import Interval
 from velatura.model.variance import Isotropic, Roughness
 from velatura.ops import Value
 
 NODES = 512  # on which a set without a closed form is looked for
+ROUGHLY, ATTEMPTS = 16, 8  # halvings of a range that need not be exact, and draws of members
 MODERATE = 1.5  # an index that many media have; members near it, clear and with interfaces that show, are preferred
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A free coordinate of a class: its name, and the least and the largest value, by channel where it is a colour."""
+
+    name: str
+    low: float | tuple[float, ...]
+    high: float | tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class EquivalenceClass:
     """The interfaces that give one lobe below one stack.
 
-    A member is identified by its free indices of dielectrics: (eta_1, eta_2) of a pair, eta_1 of a pair over a
-    conductor or of one dielectric, none of one conductor. Everything else follows from them.
+    A member is identified by its free coordinates, which `coordinates` names: the indices eta_1 and eta_2 of
+    dielectrics, the optical depths tau_0 of the medium above a pair or a conductor and tau_1 of that between a pair's
+    dielectric and its conductor, and a conductor's tint. Everything else follows from them: roughnesses, a conductor's
+    index, and above a dielectric that ends a lobe the optical depths that its index leaves to absorb.
 
-    above: the stack (N = 1). energy: (C, 1). variance: in the space of the model's map. tau: of the medium above a
-    pair. choice: the last interface, and what is given of it.
+    above: the stack (N = 1). energy: (C, 1). variance: in the space of the model's map. tau: given depths of the medium
+    above a pair, None where they are free. choice: the last interface, and what is given of it.
     """
 
     above: Above
@@ -38,7 +50,7 @@ class EquivalenceClass:
     variance: float
     interfaces: int = 1
     choice: Choice = DIELECTRIC
-    tau: Value = 0.0
+    tau: Value | None = None
 
     # Members ---------------------------------------------------------------------------------------------------------
 
@@ -47,27 +59,84 @@ class EquivalenceClass:
         """The number of free indices."""
         return self.interfaces - (self.choice.kind != "dielectric")
 
-    def member(self, *indices: ArrayLike) -> tuple[Layers, ...]:
-        """The interfaces of given indices, (N,) each, from the top; check `.feasible` for membership.
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The free coordinates, none if the class is empty.
 
-        Without the last index it is the one that needs least absorption, on the side of `choice`.
+        Ranges are those without absorption that is not needed: of indices all values, of a depth those of the
+        `chosen` indices. Not every point within them is a member, and where tau_0 is larger, indices may be, too.
         """
-        eta = [np.atleast_2d(np.asarray(index, float)) for index in indices]
+        chosen, found = self.chosen, []
+        if chosen is None:
+            return ()
+        for name, spans in (("eta_1", self.indices_1()), ("eta_2", [(1.0, self.choice.eta_max)]))[: self.free]:
+            found.append(Coordinate(name, spans[0][0], spans[-1][1]))
+        for n, depths in self._depths(chosen).items():
+            found.append(Coordinate(f"tau_{n}", *(tuple(np.ravel(end).tolist()) for end in depths)))
+        if self._tinted:
+            found.append(Coordinate("tint", 0.0, 1.0))
+        return tuple(found)
+
+    def held(
+        self, tau_0: ArrayLike | None = None, tau_1: ArrayLike | None = None, tint: ArrayLike | None = None
+    ) -> EquivalenceClass:
+        """The members with given optical depths, and of a given tint: numbers, or of depths colours (C,).
+
+        Raises:
+            ValueError: a depth that follows from an index, tau_1 of one interface, tint of a dielectric.
+        """
+        last, choice = self.interfaces - 1, self.choice
+        if (tint is not None and choice.kind != "conductor") or (tau_1 is not None and not last):
+            raise ValueError("tint is of conductors, tau_1 of pairs")
+        if tint is not None:
+            choice = dataclasses.replace(choice, tint=tint)
+        depth = tau_1 if last else tau_0
+        if depth is not None:
+            if choice.kind == "dielectric":
+                raise ValueError(f"tau_{last} follows from the index of a dielectric")
+            choice = dataclasses.replace(choice, tau=_colours(depth))
+        above = self.tau if tau_0 is None or not last else _colours(tau_0)
+        return dataclasses.replace(self, choice=choice, tau=above)
+
+    def member(
+        self,
+        eta_1: ArrayLike | None = None,
+        eta_2: ArrayLike | None = None,
+        tau_0: ArrayLike | None = None,
+        tau_1: ArrayLike | None = None,
+        tint: ArrayLike | None = None,
+    ) -> tuple[Layers, ...]:
+        """The interfaces of given coordinates from the top; check `.feasible` for membership.
+
+        Indices and tint are numbers or (N,), depths numbers, colours (C,) or (C, N). Depths that are not given are the
+        least possible; the last index is that of least absorption, on the side of `choice`.
+
+        Raises:
+            ValueError: as `held`, or an index that is missing or one too many.
+        """
+        eta = [np.atleast_2d(np.asarray(index, float)) for index in (eta_1, eta_2) if index is not None]
+        if not self.interfaces - 1 <= len(eta) <= self.free:
+            raise ValueError(f"takes {self.interfaces - 1} to {self.free} indices, got {len(eta)}")
+        here = self.held(tau_0, tau_1, tint)
         given = len(eta) == self.free > 0 and self.choice.kind == "dielectric"
-        choice = dataclasses.replace(self.choice, eta=eta.pop()) if given else self.choice
+        choice = dataclasses.replace(here.choice, eta=eta.pop()) if given else here.choice
         if self.interfaces == 1:
             return (interface.solve(self.above, self.energy, self._blur, choice).layers,)
-        upper, lower = pair.solve(self.above, self.energy, self._blur, eta[0], self.tau, choice)
+        upper, lower = pair.solve(self.above, self.energy, self._blur, eta[0], here._tau, choice)
         return upper.layers, lower.layers
 
-    def contains(self, *indices: ArrayLike, channel: int | None = None) -> Mask:
-        """Whether members have these indices, (N,) each; in one channel, or in all (their intersection)."""
+    def contains(self, *indices: ArrayLike, channel: int | None = None, **depths: ArrayLike) -> Mask:
+        """Whether members have these indices, (N,) each; in one channel, or in all (their intersection).
+
+        depths: other coordinates, as of `member`.
+        """
         each = [np.atleast_1d(np.asarray(x, float)) for x in np.broadcast_arrays(*indices)]
-        if channel is None and (self.choice.kind != "dielectric" or self.above.model.tir != "off"):
-            return np.asarray(np.logical_and.reduce([part.feasible for part in self.member(*each)]))
+        if depths or (channel is None and (self.choice.kind != "dielectric" or self.above.model.tir != "off")):
+            return np.asarray(np.logical_and.reduce([part.feasible for part in self.member(*each, **depths)]))
         below, rest, possible = self._last(*each[: self.interfaces - 1])
-        depths = _depth(below, rest, each[-1])
-        ok = possible & (depths >= -interface.NEGLIGIBLE) & ((depths <= interface.NEGLIGIBLE) | (not self._clear))
+        optical = _depth(below, rest, each[-1])
+        ok = (possible >= 0) & (optical >= -interface.NEGLIGIBLE)
+        ok = ok & ((optical <= interface.NEGLIGIBLE) | (not self._clear))
         within = [interface.within(eta[None], self.choice.eta_max) >= 0 for eta in each]
         return np.asarray(np.logical_and.reduce([*within, *ok[self._channels(channel)]]))
 
@@ -75,12 +144,12 @@ class EquivalenceClass:
         """Optical depths between pairs of indices, (C, len(eta_1), len(eta_2)): negative, or NaN, in no member."""
         depths = np.full((len(self.energy), len(eta_1), len(eta_2)), np.nan)
         below, rest, possible = self._last(eta_1)
-        some = np.flatnonzero(possible.any(axis=0))
+        some = np.flatnonzero((possible >= 0).any(axis=0))
         if not len(some):
             return depths
         columns, of_columns = (mapped(take(x, some, len(eta_1)), lambda x: x[..., None]) for x in (below, rest))
         depths[:, some] = _depth(columns, of_columns, np.broadcast_to(eta_2, (len(some), len(eta_2))))
-        depths[~np.broadcast_to(possible, depths.shape[:2])] = np.nan
+        depths[np.broadcast_to(possible, depths.shape[:2]) < 0] = np.nan
         return depths
 
     # Sets of indices -------------------------------------------------------------------------------------------------
@@ -89,7 +158,7 @@ class EquivalenceClass:
     def empty(self) -> bool:
         """Whether there is no member."""
         if self.interfaces == 2 and not self._smooth_in_one_medium:
-            return not bool(self._reachable(self._axis, None).any())
+            return not bool((self._margin(self._axis) >= 0).any() or self.indices_1())
         return not self.indices_1() if self.free else not bool(self.member()[0].feasible.all())
 
     def indices_1(self, channel: int | None = None) -> list[Interval]:
@@ -100,9 +169,9 @@ class EquivalenceClass:
         if self.interfaces == 1:
             return self._beyond(channel)
         if self._smooth_in_one_medium:
-            e = self.energy[self._channels(channel)]
+            e = (self.energy * np.exp(2 * np.asarray(self._tau)))[self._channels(channel)]
             return smooth_pair.indices_1(self._eta_0, float(e.min()), float(e.max()), self.choice.eta_max)
-        return intervals(lambda eta: self._reachable(eta, channel), self._axis)
+        return intervals(lambda eta: self._margin(eta, channel), self._axis)
 
     def indices_2(self, eta_1: float, channel: int | None = None) -> list[Interval]:
         """All values of the second index below a pair's first one: N2 of Bati et al. 2021, Eq. 14."""
@@ -111,18 +180,23 @@ class EquivalenceClass:
     def indices_blur(self) -> list[Interval]:
         """All values of a pair's first index for which its second interface need not be smoother than smooth: V of
         Bati et al. 2021, section 5.2.2."""
-        return intervals(lambda eta: self._last(eta)[1].blur >= 0, self._axis)
+        return intervals(lambda eta: self._last(eta)[1].blur, self._axis)
 
     @cached_property
     def highest(self) -> float:
         """The largest energy, equal in all channels, of a lobe with as many interfaces and the same blur."""
-        if self._smooth_in_one_medium:
+        if self._smooth_in_one_medium and np.all(np.asarray(self._tau) == 0):
             return smooth_pair.highest(self._eta_0, self.choice.eta_max)
+        return self._highest()
+
+    def _highest(self, roughly: bool = False) -> float:
+        """`highest`, or `roughly` that of few indices."""
         low, high = 0.0, 1.0
-        for _ in range(40):
+        for _ in range(ROUGHLY if roughly else 40):
             middle = (low + high) / 2
-            empty = dataclasses.replace(self, energy=np.full((1, 1), middle)).empty
-            low, high = (low, middle) if empty else (middle, high)
+            one = dataclasses.replace(self, energy=np.full((1, 1), middle))
+            possible = bool(np.any(one._margin(self._coarse) >= 0)) if roughly else not one.empty
+            low, high = (middle, high) if possible else (low, middle)
         return low
 
     @property
@@ -145,6 +219,79 @@ class EquivalenceClass:
             return columns.reshape(-1, self.free)
         rarer, denser = self._roots(None, columns)
         return np.stack([columns, _draw_between(rarer, denser, self.choice.eta_max, rng.random(count))], axis=1)
+
+    def draw(self, count: int, seed: int = 0) -> dict[str, Array]:
+        """Members drawn at random over all free coordinates, as arguments of `member`: indices and tint (N,), depths
+        (C, N).
+
+        Half of them have each depth at its least, a quarter more in all channels alike. Empty where the class is.
+        """
+        if self.empty:
+            return {}
+        rng = np.random.default_rng(seed)
+        parts, missing = list[dict[str, Array]](), count
+        for _ in range(ATTEMPTS):
+            drawn = self._drawn(count, rng)
+            layers = self.member(**drawn)
+            ok = np.logical_and.reduce(np.broadcast_arrays(np.ones(count, bool), *(x.feasible for x in layers)))
+            parts.append({name: values[..., ok] for name, values in drawn.items()})
+            missing -= np.count_nonzero(ok)
+            if missing <= 0 or not drawn:
+                break
+        return {name: np.concatenate([part[name] for part in parts], axis=-1)[..., :count] for name in parts[0]}
+
+    def _drawn(self, count: int, rng: np.random.Generator) -> dict[str, Array]:
+        """Points drawn at random, of which almost all are members."""
+        last, found = self.interfaces - 1, dict[str, Array]()
+        here = self
+        if self._tinted:
+            found["tint"] = rng.random(count)
+            here = self.held(tint=found["tint"])
+        if last:
+            found["eta_1"], tau_0 = self._drawn_below(count, rng)
+            if self.tau is None:
+                found["tau_0"], here = tau_0, here.held(tau_0=tau_0)
+        if self.choice.kind == "dielectric":
+            rarer, denser = here._roots(None, *([found["eta_1"]] if last else []))
+            rarer, denser = (np.broadcast_to(root, count) for root in (rarer, denser))
+            eta = np.where(rng.random(count) < 0.5, rarer, denser)
+            eta = np.where(np.isnan(eta), np.where(np.isnan(rarer), denser, rarer), eta)
+            if not (self._clear or self.choice.eta is not None):
+                eta = _draw_between(rarer, denser, self.choice.eta_max, rng.random(count))
+            found[f"eta_{last + 1}"] = eta
+        elif self._free_depth:
+            below, rest, _ = here._last(*([found["eta_1"]] if last else []))
+            low, high = metal_depths(below, rest.r, rest.roughness, here.choice, (len(self.energy), count))
+            found[f"tau_{last}"] = low + random_depths(high - low, rng)
+        return found
+
+    def _drawn_below(self, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """First indices, (N,), of pairs drawn at random, and depths above these, (C, N), where they are free."""
+        spans, colours = self.indices_1(), len(self.energy)
+        eta, tau = _draw(spans, rng.random(count)), np.zeros((colours, count))
+        if self.tau is not None:
+            return eta, tau
+
+        # As far along a random direction as there is an index
+        tau = random_depths(np.broadcast_to(self._deepest_above()[:, None], (colours, count)), rng)
+        some = np.flatnonzero(np.any(tau > 0, axis=0))
+        nodes = np.unique(np.concatenate([self._coarse, *(np.linspace(*span, 16) for span in spans)]))
+
+        def inside(share: Array) -> Mask:
+            """Which nodes (some, nodes) have members at shares of the depths."""
+            depths = np.repeat(share * tau[:, some], len(nodes), axis=1)
+            margin = self.held(tau_0=depths)._margin(np.tile(nodes, len(some)))
+            return np.reshape(margin >= 0, (len(some), -1))
+
+        share = bisect(lambda x: np.any(inside(x), axis=1), np.zeros(len(some)), np.ones(len(some)), rounds=8)
+        tau[:, some] *= share * rng.random(len(some))
+        found = inside(np.ones(len(some)))
+        for n, own in zip(some, found):
+            eta[n] = rng.choice(nodes[own]) if own.any() else eta[n]
+            tau[:, n] *= own.any()
+        near = eta * np.exp((rng.random(count) - 0.5) * np.log(nodes[1] / nodes[0]))
+        near = np.clip(near, 1.0, self.choice.eta_max)
+        return np.where(self.held(tau_0=tau)._margin(near) >= 0, near, eta), tau
 
     def boundary(self, count: int = 256, channel: int | None = None) -> list[Array]:
         """The curves of pairs of dielectrics without absorption, (n, 2) each: in one channel, or of all."""
@@ -229,8 +376,51 @@ class EquivalenceClass:
         return np.unique(np.r_[np.geomspace(1, eta_max, NODES), np.clip(self._eta_0, 1, eta_max)])
 
     @property
+    def _coarse(self) -> Array:
+        """Few of these points."""
+        return np.unique(np.r_[self._axis[::16], self._axis[-1], np.clip(self._eta_0, 1, self.choice.eta_max)])
+
+    @property
+    def _tau(self) -> Value:
+        """Of the medium above a pair."""
+        return 0.0 if self.tau is None else self.tau
+
+    @property
+    def _tinted(self) -> bool:
+        return self.choice.kind == "conductor" and self.choice.eta is None and self.choice.kappa is None
+
+    @property
+    def _free_depth(self) -> bool:
+        """Whether the medium above a conductor may absorb more than the lobe needs."""
+        several = self.choice.eta is None or self.choice.kappa is None
+        return self.choice.kind == "conductor" and several and not self._clear
+
+    def _depths(self, member: tuple[Layers, ...]) -> dict[int, tuple[Array, Array]]:
+        """The least and the largest depths (C,) of media that are free, by the interface below these."""
+        found, last = {}, self.interfaces - 1
+        if last and self.tau is None:
+            most = self._deepest_above()
+            found[0] = np.zeros_like(most), most
+        if self._free_depth:
+            below, rest, _ = self._last(*([np.ravel(member[0].eta)] if last else []))
+            low, high = metal_depths(below, rest.r, rest.roughness, self.choice, (len(self.energy), 1))
+            found[last] = low[:, 0], high[:, 0]
+        return found
+
+    def _deepest_above(self) -> Array:
+        """The largest depths above a pair of each channel by itself, (C,): Bati et al. 2021, Eq. 16."""
+        energy, state = self.energy[:, 0], self.above.state
+        each = [np.broadcast_to(x, (len(energy), 1)) for x in (state.t_0i, state.t_i0, state.r_i0)]
+        alike = all(np.ptp(x) <= interface.SLACK for x in each)
+        own = (
+            [self] if alike else [dataclasses.replace(self, above=_channel(self.above, c)) for c in range(len(energy))]
+        )
+        most = [one.highest if one._smooth_in_one_medium else one._highest(roughly=True) for one in own]
+        return 0.5 * np.log(np.maximum(np.array(most) / np.maximum(energy, interface.ENERGY_MIN), 1.0))
+
+    @property
     def _smooth_in_one_medium(self) -> bool:
-        alone = self.above.over is None and np.all(np.asarray(self.tau) == 0)
+        alone = self.above.over is None
         open_ = self.choice.kind == "dielectric" and self.choice.eta is None and self.choice.tau is None
         return bool(alone and open_ and self.interfaces == 2 and self.variance == 0)
 
@@ -242,14 +432,14 @@ class EquivalenceClass:
     def _channels(self, channel: int | None) -> slice:
         return slice(None) if channel is None else slice(channel, channel + 1)
 
-    def _last(self, *eta_1: Array) -> tuple[Above, _Rest, Mask]:
-        """The stack above the last interface, the demands on that, and the channels that can meet them, (C, N).
+    def _last(self, *eta_1: Array) -> tuple[Above, _Rest, Array]:
+        """The stack above the last interface, the demands on that, and by which margin they can be met, (C, N).
 
         Below a pair's first interface of indices eta_1, and the medium under it.
         """
         above, left, blur = self.above, self.energy, np.zeros(1)
         if eta_1:
-            upper = pair.top(above, self.energy, self._blur, eta_1[0][None], self.tau, self.choice.eta_max)
+            upper = pair.top(above, self.energy, self._blur, eta_1[0][None], self._tau, self.choice.eta_max)
             above, left, blur = upper.below, self.energy - upper.energy, upper.layers.margins["blur"]
         bright = interface.attenuated(above, left)
         if self.choice.tau is not None:
@@ -257,19 +447,24 @@ class EquivalenceClass:
         r = interface.attenuated(above, left)
         s_r = interface.reflected(above, self._blur, r, bright)
         blur = np.minimum(blur, interface.margin(interface.least(s_r)))
-        return above, _Rest(left, r, interface.floor(s_r).roughness(above.f), blur), (left >= 0) & (blur >= 0)
+        possible = np.minimum(left / np.maximum(self.energy, interface.ENERGY_MIN), blur)
+        return above, _Rest(left, r, interface.floor(s_r).roughness(above.f), blur), possible
 
-    def _reachable(self, eta_1: Array, channel: int | None) -> Mask:
-        """Whether the second interface of a pair can reflect the energy that the first one leaves."""
+    def _margin(self, eta_1: Array, channel: int | None = None) -> Array:
+        """The margin, (N,), with which a pair's second interface can reflect the energy that the first one leaves."""
         below, rest, possible = self._last(eta_1)
         some = self._channels(channel)
-        ok: Mask = np.all(possible[some], axis=0)
+        found = np.array(np.min(possible[some], axis=0))
         if self.choice.kind != "dielectric" or self.choice.eta is not None or self._clear:
+            ok = found >= 0
             above, energy = take((below, rest.energy), ok, len(ok))
-            ok[ok] = interface.solve(above, energy, self._blur, self.choice).layers.feasible
-            return ok
+            # What is given to absorb there is part of the stack above already
+            choice = self.choice if self.choice.tau is None else dataclasses.replace(self.choice, tau=0.0)
+            layers = interface.solve(above, energy, self._blur, choice).layers
+            found[ok] = np.minimum(found[ok], np.min(np.broadcast_arrays(*layers.margins.values()), axis=0))
+            return found
         ends = [_depth(below, rest, np.full(len(eta_1), eta))[some] for eta in (1.0, self.choice.eta_max)]
-        return np.asarray(ok & (np.max(np.min(ends, axis=1), axis=0) >= -interface.NEGLIGIBLE))
+        return np.minimum(found, interface.margin(np.max(np.min(ends, axis=1), axis=0), interface.NEGLIGIBLE))
 
     def _roots(self, channel: int | None, *eta_1: Array) -> tuple[Array, Array]:
         """Last indices that need least absorption, (N,) on either side, NaN if there is none."""
@@ -278,7 +473,7 @@ class EquivalenceClass:
         for side in (RARER, DENSER):
             choice = dataclasses.replace(self.choice, side=side)
             layers = interface.dielectric(below, rest.r[some], rest.roughness, choice)
-            ok = layers.feasible & np.all(possible[some], axis=0)
+            ok = layers.feasible & np.all(possible[some] >= 0, axis=0)
             if self._clear:  # then one index must do for all channels
                 ok = ok & (np.ptp(_depth(below, rest, np.ravel(layers.eta))[some], axis=0) <= interface.NEGLIGIBLE)
             found.append(np.where(ok, np.ravel(layers.eta), np.nan))
@@ -337,3 +532,33 @@ def _draw_between(rarer: Array, denser: Array, eta_max: float, u: Array) -> Arra
     at = u * (first + second)
     in_first = ~np.isnan(rarer) & ((at < first) | np.isnan(denser))
     return np.where(in_first, np.exp(at), np.where(np.isnan(denser), 1.0, denser) * np.exp(at - first))
+
+
+def metal_depths(
+    above: Above, r: Array, roughness: Roughness, choice: Choice, shape: tuple[int, int]
+) -> tuple[Array, Array]:
+    """The least and the largest optical depths (C, N) above conductors that are to reflect r below them."""
+    metals = interface.Metals(above, roughness, choice, shape[0])
+    dark, bright = (metals.reflectance(np.broadcast_to(end, shape)) for end in metals.ends)
+    low, high = (0.5 * np.log(np.maximum(x / r, 1.0)) for x in (dark, bright))
+    return np.broadcast_to(low, shape), np.broadcast_to(high, shape)
+
+
+def random_depths(most: Array, rng: np.random.Generator) -> Array:
+    """Optical depths (C, N) up to the largest: half of them 0, a quarter alike in all channels, others coloured."""
+    alike = np.min(most, axis=0) * rng.random(most.shape[1])
+    kind = rng.integers(4, size=most.shape[1])
+    return np.select(
+        [kind < 2, kind == 2], [np.zeros_like(most), np.broadcast_to(alike, most.shape)], most * rng.random(most.shape)
+    )
+
+
+def _colours(value: ArrayLike) -> Value:
+    """A number, or colours (C, N), of one colour (C,) too."""
+    value = np.asarray(value, float)
+    return float(value) if value.ndim == 0 else value.reshape(len(value), -1)
+
+
+def _channel(above: Above, channel: int) -> Above:
+    """Stacks as one channel sees them."""
+    return mapped(above, lambda x: x[channel : channel + 1] if x.ndim == 2 and len(x) > 1 else x)

@@ -271,44 +271,73 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     return layers(index(solved)).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))
 
 
-def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
-    """The conductor that reflects r in every channel (Bati et al. 2021, Eqs. 8-10; numerically where it is rough)."""
-    eta_1 = above.eta
-    pinned = None if choice.eta is None else _colour(choice.eta) / eta_1
-    given = None if choice.kappa is None else _colour(choice.kappa) / eta_1
+@dataclass(frozen=True)
+class Metals:
+    """The conductors of one choice below N stacks, by their reflectance u (C, N) when smooth.
 
-    def indices(u: Array) -> tuple[Array, Array]:
-        """Relative eta and kappa of a smooth conductor of reflectance u."""
-        if given is not None:
+    Bati et al. 2021, Eqs. 8-10; the reflectance of rough ones is numerical.
+    """
+
+    above: Above
+    roughness: Roughness
+    choice: Choice
+    channels: int
+
+    @property
+    def given(self) -> tuple[Array | None, Array | None]:
+        """Relative eta and kappa where they are given, (C, N) or (C, 1)."""
+        eta, kappa = (None if x is None else _colour(x) / self.above.eta for x in (self.choice.eta, self.choice.kappa))
+        return eta, kappa
+
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """The least and the largest u, (C, N) or (C, 1)."""
+        eta, kappa = self.given
+        shape = (self.channels, 1)
+        if kappa is not None:  # eta from kappa down to almost nothing
+            k = np.broadcast_to(kappa, np.broadcast_shapes(kappa.shape, shape))
+            least = fresnel.normal_incidence(k, k)
+            # Where both are given there is one metal
+            return (least, np.full(k.shape, 1 - 1e-9)) if eta is None else (fresnel.normal_incidence(eta, k),) * 2
+        if eta is not None:  # kappa from eta upwards
+            n = np.broadcast_to(eta, np.broadcast_shapes(eta.shape, shape))
+            return fresnel.normal_incidence(n, n), np.full(n.shape, CONDUCTOR_MAX)
+        return np.full(shape, CONDUCTOR_MIN + 1e-12), np.full(shape, CONDUCTOR_MAX)
+
+    def layers(self, u: Array) -> Layers:
+        """The metals."""
+        eta, kappa = self.given
+        if eta is not None and kappa is not None:
+            n, k = np.broadcast_arrays(eta, kappa, u)[:2]
+        elif kappa is not None:
             # eta below kappa, the lower root of Bati et al. 2021, Eq. 1
             b = (1 + u) / (1 - u)
-            n = b - np.sqrt(np.maximum(b * b - 1 - given * given, 0))
-            return n, np.broadcast_to(given, n.shape)
-        n = conductor_index(u, choice.tint) if pinned is None else np.broadcast_to(pinned, u.shape)
-        return n, conductor_extinction(u, n)
+            n, k = b - np.sqrt(np.maximum(b * b - 1 - kappa * kappa, 0)), np.broadcast_to(kappa, u.shape)
+        else:
+            n = conductor_index(u, self.choice.tint) if eta is None else np.broadcast_to(eta, u.shape)
+            k = conductor_extinction(u, n)
+        return Layers("conductor", n * self.above.eta, k * self.above.eta, self.roughness, 0.0)
 
-    def layers(n: Value, k: Value) -> Layers:
-        return Layers("conductor", n * eta_1, k * eta_1, roughness, 0.0)
+    def reflectance(self, u: Array) -> Array:
+        """What they reflect below their stacks."""
+        return np.asarray(self.above.reflectance(self.layers(u)))
 
-    if pinned is not None and given is not None:
-        both = np.broadcast_arrays(pinned, given, np.empty((1, r.shape[-1])))
-        bound = margin(np.min(both[1] - both[0], axis=0))
-        return layers(both[0], both[1]).with_margins(index=bound)
+
+def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
+    """The conductor that reflects r in every channel."""
+    metals = Metals(above, roughness, choice, len(r))
+    low, high = (np.broadcast_to(end, r.shape) for end in metals.ends)
+    eta, kappa = metals.given
+    if eta is not None and kappa is not None:
+        bound = margin(np.min(np.broadcast_to(kappa - eta, r.shape), axis=0))
+        return metals.layers(low).with_margins(index=bound)
 
     def excess(u: Array) -> Array:
-        return above.reflectance(layers(*indices(u))) / r - 1
+        return metals.reflectance(u) / r - 1
 
-    low, high = np.full(r.shape, CONDUCTOR_MIN + 1e-12), np.full(r.shape, CONDUCTOR_MAX)
-    if given is not None:  # eta from kappa down to almost nothing
-        k2 = np.broadcast_to(given * given, r.shape)
-        low = fresnel.normal_incidence(np.sqrt(k2), np.sqrt(k2))
-        high = np.full(r.shape, 1 - 1e-9)
-    elif pinned is not None:  # kappa from eta upwards
-        n = np.broadcast_to(pinned, r.shape)
-        low = fresnel.normal_incidence(n, n)
     least, most = excess(low), excess(high)
     u = false_position(excess, low, high, least, most)
-    found = layers(*indices(u))
+    found = metals.layers(u)
     margins = {"bright": np.minimum(margin(np.min(most, axis=0), NEGLIGIBLE), _writable(found.eta, found.kappa))}
     if not choice.absorbs or choice.tau is not None:
         margins["metal"] = margin(np.min(-least, axis=0), NEGLIGIBLE)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ROUNDS = 60
+ZOOMS, PEAKS, BETWEEN = 6, 8, 4  # of a grid about its highest peaks, and points between these and their neighbours
 
 
 def false_position(
@@ -52,13 +53,34 @@ def bisect(holds: Callable[[Array], NDArray[np.bool_]], inside: Array, outside: 
     return inside
 
 
-def intervals(holds: Callable[[Array], NDArray[np.bool_]], grid: Array) -> list[tuple[float, float]]:
-    """The intervals on which a condition holds, as resolved by a grid, with ends found by bisection."""
-    ok = holds(grid)
+def intervals(margin: Callable[[Array], Array], grid: Array) -> list[tuple[float, float]]:
+    """The intervals on which a margin is not negative, with ends found by bisection.
+
+    Those that a grid steps over are found where the margin has a peak between its points.
+    """
+    grid, value = _about_peaks(margin, grid)
+    ok = value >= 0
     starts, ends = np.flatnonzero(ok & ~np.r_[False, ok[:-1]]), np.flatnonzero(ok & ~np.r_[ok[1:], False])
     if not len(starts):
         return []
     inside = np.r_[grid[starts], grid[ends]]
     outside = np.r_[grid[np.maximum(starts - 1, 0)], grid[np.minimum(ends + 1, len(grid) - 1)]]
-    low, high = np.split(bisect(holds, inside, outside), 2)
+    low, high = np.split(bisect(lambda x: margin(x) >= 0, inside, outside), 2)
     return list(zip(low.tolist(), high.tolist()))
+
+
+def _about_peaks(margin: Callable[[Array], Array], grid: Array) -> tuple[Array, Array]:
+    """The grid with more points about the peaks of a margin below 0, and the margin there."""
+    value = margin(grid)
+    for _ in range(ZOOMS):
+        rises = np.pad(value, 1, constant_values=-np.inf)
+        peaks = np.flatnonzero((value < 0) & np.isfinite(value) & (value >= rises[:-2]) & (value >= rises[2:]))
+        if not len(peaks):
+            break
+        peaks = peaks[np.argsort(-value[peaks])[:PEAKS]]
+        low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
+        added = np.setdiff1d(np.linspace(low, high, 2 * BETWEEN + 1), grid)
+        grid, found = np.r_[grid, added], margin(added) if len(added) else added
+        order = np.argsort(grid)
+        grid, value = grid[order], np.r_[value, found][order]
+    return grid, value

@@ -245,14 +245,13 @@ def start(target: Target, model: Model) -> Above:
 
 def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> EquivalenceClass:
     """The class of one lobe below given layers."""
-    last = lobe.interfaces - 1
     return EquivalenceClass(
         above=above,
         energy=np.array(lobe.colour)[:, None],
         variance=float(above.f.variance(lobe.roughness)),
         interfaces=lobe.interfaces,
-        tau=0.0 if lobe.interfaces == 1 or (tau := _pinned(lobe, "tau", 0)) is None else tau,
-        choice=_choice(lobe, last, target, absorbs=last > 0 or not first),
+        tau=_pinned(lobe, "tau", 0) if lobe.interfaces == 2 else 0.0,
+        choice=_choice(lobe, lobe.interfaces - 1, target, absorbs=True),
     )
 
 
