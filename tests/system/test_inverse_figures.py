@@ -169,6 +169,12 @@ def lobe(numbers: dict[str, Any], name: str, n: int) -> tuple[Any, float]:
     return np.array(look["energies"][n][0]), look["variances"][n][0]
 
 
+def test_two_stacks_share_a_sphere() -> None:
+    """Expected: the left half is that of the first picture, the right half that of the second."""
+    seen = {"left": np.zeros((4, 4, 3)), "right": np.ones((4, 4, 3))}
+    assert (looks.halves(looks.Panel("", ("left", "right")), seen)[..., 0] == [0, 0, 1, 1]).all()
+
+
 def test_members_of_a_class_differ_at_grazing_angles(unlit: None, tmp_path: Path) -> None:
     """Figures 5, 10, 15 and 16. Expected: alike head-on; at grazing angles as captioned."""
     found, at = bati2021_05.compute(), looks.GRAZING
@@ -176,6 +182,10 @@ def test_members_of_a_class_differ_at_grazing_angles(unlit: None, tmp_path: Path
         assert np.allclose(looks.energy(found, a), looks.energy(found, b), atol=1e-6)
     air, coated = (looks.energy(found, f"{part} green edge", at) for part in "bc")
     assert air[1] / air[0] > 1.3 > 1.1 > coated[1] / coated[0] > 1.01
+    # (d): below the coat Fresnel is the same, and only up to 41.8 degrees is reached
+    (_, in_air), (above, in_coat) = (bati2021_05.below(look) for look in found["looks"] if "green edge" in look["name"])
+    assert above == 1.5 and np.allclose(in_air, in_coat, atol=1e-6)
+    assert in_coat[41] < 0.65 < in_coat[60]
     drawn(bati2021_05, found, tmp_path)
 
     found = bati2021_10.compute()
@@ -197,9 +207,14 @@ def test_members_of_a_class_differ_at_grazing_angles(unlit: None, tmp_path: Path
     pink = {name: red / green for name in bati2021_16.CHOICES for red, green, _ in [looks.energy(found, name, at)]}
     assert pink["reference"] == pytest.approx(1) and pink["a"] == pytest.approx(1)
     assert pink["c"] > pink["b"] > 1.05
+    drawn(bati2021_16, found, tmp_path)
+    # On the chart: without absorption the effective index gives the pair its energy, in closed form
+    coat, metal = looks.interfaces(found["looks"][0])
+    index, y = bati2021_16.effective(coat["eta"], metal["eta"], metal["k"]), 2 / (1 - 0.45)
+    assert np.cosh(np.log(coat["eta"])) + np.cosh(np.log(index / coat["eta"])) == pytest.approx(y, abs=0.01)
 
 
-def test_a_coat_that_keeps_what_is_below(unlit: None) -> None:
+def test_a_coat_that_keeps_what_is_below(unlit: None, tmp_path: Path) -> None:
     """Figure 14. Expected: the kept lobes are the bare ones; a naive coat blurs (a), and splits the lobe of (b)."""
     found = bati2021_14.compute()
     for name, count in (("14 a", 1), ("14 b", 2)):
@@ -209,9 +224,10 @@ def test_a_coat_that_keeps_what_is_below(unlit: None) -> None:
     assert lobe(found, "14 a, coated", 1)[1] > 1.8 * 0.03
     first, second = (lobe(found, "14 b, coated", n)[1] for n in (1, 2))
     assert first > 1.3 * second
+    drawn(bati2021_14, found, tmp_path)
 
 
-def test_lobes_are_what_was_asked_for(unlit: None) -> None:
+def test_lobes_are_what_was_asked_for(unlit: None, tmp_path: Path) -> None:
     """Figures 18 to 22. Expected: colour, blur and haze as captioned."""
     found = bati2021_18.compute()
     assert np.allclose(looks.energy(found, "18 a, more saturated"), [0.01, 0.06, 0.11], atol=1e-6)
@@ -227,6 +243,11 @@ def test_lobes_are_what_was_asked_for(unlit: None) -> None:
     lower = {name: lobe(found, name, 2)[0] for name in bati2021_20.TARGETS}
     assert np.allclose(upper["20 left"], lower["20 right"], atol=1e-6)
     assert np.allclose(upper["20 right"], lower["20 left"], atol=1e-6)
+    for name in bati2021_20.TARGETS:  # what the upper lobe contributes is that lobe
+        for n in (0, 1):
+            whole, alone = lobe(found, name, n), lobe(found, f"{name}, upper", n)
+            assert np.allclose(whole[0], alone[0], atol=1e-9) and whole[1] == pytest.approx(alone[1], abs=1e-9)
+    drawn(bati2021_20, found, tmp_path)
 
     found = bati2021_21.compute()
     for n in (0, 1):
@@ -259,6 +280,8 @@ def test_a_diffuse_base_shows_through_the_pair(tmp_path: Path) -> None:
     found = bati2021_24.compute(size=16, spp=4)
     black, grey, orange = (np.mean(picture, axis=(0, 1)) for picture in found["pictures"])
     assert np.all(grey > black)
+    plain, *covered = (looks.energy(found, look["name"]) for look in found["looks"])
+    assert all(np.all(energy > plain + 0.01) for energy in covered)
     assert np.all(orange < grey + 0.02)
     blue = (orange - black)[2] / (orange - black)[0], 0.1 / 0.5
     assert blue[0] > 2 * blue[1]

@@ -1,12 +1,13 @@
 """Bati et al. 2021, figure 10: two stacks each that reflect 0.15 head-on, and differ at grazing angles.
 
 (a) One smooth interface, and a slab, whose lower interface is in air; (b) a smooth pair without and with absorption;
-(c) the same of variance 0.02. The indices of (b) and (c) are chosen here.
+(c) the same of variance 0.02. (d) Below, the energies and variances of the interfaces. The indices of (b) and (c) are
+chosen here.
 """
 
 from __future__ import annotations
 
-from velatura.figures import looks
+from velatura.figures.looks import MODEL, Looks, Panel
 from velatura.inverse import invert_stack, smooth_pair
 from velatura.stack import Interface, Stack
 
@@ -25,11 +26,16 @@ def stacks() -> dict[str, Stack]:
     for part, variance in (("b", 0.0), ("c", VARIANCE)):
         for name, indices in INDICES.items():
             lobe = {"energy": ENERGY, "variance": variance, "interfaces": 2, "fixed": {"eta": list(indices)}}
-            found[f"{part} {name}"] = invert_stack([lobe], looks.MODEL).stack
+            found[f"{part} {name}"] = invert_stack([lobe], MODEL).stack
     return found
 
 
-FIGURE = looks.Looks(stacks)
+PANELS = [
+    Panel("(a) clear", ("a one interface", "a slab"), ("one interface", "slab")),
+    Panel("(b) smooth pairs", ("b clear", "b absorbing"), tuple(INDICES)),
+    Panel("(c) rough pairs", ("c clear", "c absorbing"), tuple(INDICES)),
+]
+FIGURE = Looks(stacks, PANELS, detail=True)
 compute, draw = FIGURE.compute, FIGURE.draw
 
 

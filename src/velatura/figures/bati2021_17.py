@@ -1,9 +1,8 @@
 """Bati et al. 2021, figure 17: two coloured lobes in either order, alike head-on, of other colours at grazing angles.
 
 A blue and a red lobe, each of a pair of rough dielectrics with absorption. Light that reaches the lower pair passes
-through the absorption of both, the longer the more it grazes. The indices between the interfaces are chosen here, as
-the paper's are not printed; so are the sphere, which absorbs
-what enters it, and its light.
+through the absorption of both, the longer the more it grazes. The indices are those that the inverse prefers, as the
+paper's are not printed; the sphere, which absorbs what enters it, and its light are chosen here.
 """
 
 from __future__ import annotations
@@ -14,20 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
-from velatura.inverse import grazing, invert_stack, on_black, plots
+from velatura.figures import canvas, looks
+from velatura.figures.looks import MODEL
+from velatura.inverse import grazing, invert_stack, plots
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model.stack_lobes import stack_lobes
 
 ORDERS = ("17 blue over red", "17 red over blue")
-COSINES = (1.0, 0.8, 0.6, 0.4, 0.3, 0.2, 0.1)
-MODEL = "bati2021"
 
 
 def compute(
-    cosines: Sequence[float] = COSINES,
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
+    cosines: Sequence[float] = looks.COSINES,
+    size: int = looks.SIZE,
+    spp: int = looks.SAMPLES,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
@@ -36,35 +34,34 @@ def compute(
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
     """
-    numbers: dict[str, Any] = {"cosines": list(cosines), "pictures": {}}
-    for order in canvas.track(ORDERS, progress):
-        stack = invert_stack(FIGURES[order], MODEL).stack
+    numbers: dict[str, Any] = {"cosines": list(cosines)}
+    stacks = {order: invert_stack(FIGURES[order], MODEL).stack for order in ORDERS}
+    for order, stack in stacks.items():
         energy = np.sum(stack_lobes(stack, cosines, model=MODEL).energy, axis=0)
         red, _, blue = grazing(stack, MODEL).mean(axis=1)
         numbers[order] = {"stack": stack.to_dict(), "energy": energy.T.tolist(), "grazing": float(red / blue)}
-        numbers["pictures"][order] = (
-            canvas.spheres(on_black(stack), MODEL, "studio", size, spp, seed).mean(axis=0).tolist()
-        )
-    return numbers
+    return numbers | {"pictures": looks.pictures(stacks, size, spp, seed, progress)}
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each order: the classes of both lobes, the sphere, and the energy over the angle.
+    """In the middle the sphere, a half of either order, and its energies; beside it the classes of both lobes.
 
     Raises:
         InvalidInput: the file cannot be written.
     """
-    figure = canvas.canvas(15, 7)
-    for row, order in zip(figure.subplots(2, 4), ORDERS):
+    figure = canvas.canvas(13, 8)
+    left, (sphere, energy), right = figure.subplots(2, 3).T
+    for column, order in zip((left, right), ORDERS):
         solution = invert_stack(FIGURES[order], MODEL)
-        for n, (axes, members) in enumerate(zip(row, solution.classes)):
+        for n, (axes, members) in enumerate(zip(column, solution.classes)):
             plots.draw(axes, members, solution.layers[2 * n : 2 * n + 2])
-            axes.set_title(f"lobe {n + 1}")
-        canvas.show(row[2], np.array(numbers["pictures"][order]), order.partition(" ")[2])
-        angles = np.degrees(np.arccos(numbers["cosines"]))
-        for colour, energy in zip(plots.FILLS, np.transpose(numbers[order]["energy"])):
-            row[3].plot(angles, energy, color=colour, marker=".")
-        row[3].set(title="energy", xlabel="angle of incidence (°)", ylim=(0, None))
+            axes.set_title(f"{order.partition(' ')[2]}: {'lower' if n else 'upper'} lobe", fontsize="medium")
+    seen = {order: np.array(picture) for order, picture in numbers["pictures"].items()}
+    labels = [order.partition(" ")[2] for order in ORDERS]
+    looks.split(sphere, looks.halves(looks.Panel("", ORDERS), seen), "", labels)
+    angles = np.degrees(np.arccos(numbers["cosines"]))
+    looks.curves(energy, angles, [np.array(numbers[order]["energy"]) for order in ORDERS], labels)
+    energy.set(title="energy, both lobes", xlabel="angle of incidence (°)", ylim=(0, None))
     canvas.save(figure, path)
 
 

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from velatura.figures import looks
+from velatura.figures.looks import Looks
 
-TARGETS = ("18 a, less saturated", "18", "18 a, more saturated", "18 b, smooth", "18 b, rough")
-FIGURE = looks.Looks.of(TARGETS)
+TARGETS = {
+    "18 a, less saturated": "(a) less saturated",
+    "18": "initial",
+    "18 a, more saturated": "(a) more saturated",
+    "18 b, smooth": "(b) smooth",
+    "18 b, rough": "(b) rough",
+}
+FIGURE = Looks.of(TARGETS)
 compute, draw = FIGURE.compute, FIGURE.draw
 
 

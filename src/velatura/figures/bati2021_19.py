@@ -5,10 +5,10 @@ With plain Fresnel the conductor keeps its indices, as the paper says; with dire
 
 from __future__ import annotations
 
-from velatura.figures import looks
+from velatura.figures.looks import Looks
 
-TARGETS = ("19 a", "19 b", "19 c")
-FIGURE = looks.Looks.of(TARGETS, reflectance="fresnel")
+TARGETS = {"19 a": "(a) subtle haze", "19 b": "(b) initial haze", "19 c": "(c) strong haze"}
+FIGURE = Looks.of(TARGETS, reflectance="fresnel")
 compute, draw = FIGURE.compute, FIGURE.draw
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from velatura.figures import looks
+from velatura.figures.looks import Looks
 
-TARGETS = ("22 top", "22 middle", "22 bottom")
-FIGURE = looks.Looks.of(TARGETS)
+TARGETS = {
+    "22 top": "coat over yellowish",
+    "22 middle": "coat over blueish",
+    "22 bottom": "coat over blueish over yellowish",
+}
+FIGURE = Looks.of(TARGETS)
 compute, draw = FIGURE.compute, FIGURE.draw
 
 

@@ -1,6 +1,6 @@
 """Bati et al. 2021, figure 23: two smooth pairs that reflect the same and transmit differently.
 
-Members of the class of figure 15 (b), with little and with much absorption.
+Members of the class of figure 15 (b), with little and with much absorption, marked in it.
 """
 
 from __future__ import annotations
@@ -12,43 +12,55 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import bati2021_15, canvas, looks
+from velatura.figures.looks import COSINES, MODEL
+from velatura.inverse import plots
 from velatura.model.stack_lobes import stack_lobes
 
 NAMES = {"15 b, low": "low absorption", "15 b, high": "high absorption"}
 
 
 def compute(
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
+    size: int = looks.SIZE,
+    spp: int = looks.SAMPLES,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """By name, over `cosines`, the energies `reflected` and `transmitted` (rgb); and `pictures` of spheres of each.
+    """By name `indices`, over `cosines` energies `reflected` and `transmitted` (rgb); and `pictures` of spheres.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
     """
-    numbers: dict[str, Any] = {"cosines": list(looks.COSINES), "pictures": {}}
+    numbers: dict[str, Any] = {"cosines": list(COSINES), "pictures": {}}
     stacks = bati2021_15.stacks()
     for found, name in canvas.track(list(NAMES.items()), progress):
-        read = stack_lobes(stacks[found], looks.COSINES, model=looks.MODEL)
+        read = stack_lobes(stacks[found], COSINES, model=MODEL)
         assert read.transmitted is not None
         energies = {"reflected": np.sum(read.energy, axis=0).T, "transmitted": read.transmitted.energy.T}
-        numbers[name] = {key: energy.tolist() for key, energy in energies.items()}
-        passes = canvas.spheres(stacks[found], looks.MODEL, "studio", size, spp, seed)
+        numbers[name] = {"indices": [part.eta for part in stacks[found].interfaces]}
+        numbers[name] |= {key: energy.tolist() for key, energy in energies.items()}
+        passes = canvas.spheres(stacks[found], MODEL, "studio", size, spp, seed)
         numbers["pictures"][name] = passes.mean(axis=0).tolist()
     return numbers
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Both spheres, which let light pass.
+    """The class, both spheres, which let light pass, and what they reflect and transmit over the angle.
 
     Raises:
         InvalidInput: the file cannot be written.
     """
-    figure = canvas.canvas(2.8 * len(NAMES), 3)
-    for axes, name in zip(figure.subplots(1, len(NAMES)), NAMES.values()):
-        canvas.show(axes, np.array(numbers["pictures"][name]), name)
+    figure = canvas.canvas(17, 3.4)
+    members, *spheres, reflected, transmitted = figure.subplots(1, 5)
+    names = tuple(NAMES.values())
+    plots.draw(members, bati2021_15.members("15 b"))
+    looks.mark(members, [numbers[name]["indices"] for name in names], names)
+    members.set_title("(a) class", fontsize="medium")
+    for axes, part, name in zip(spheres, "bc", names):
+        canvas.show(axes, np.array(numbers["pictures"][name]), f"({part}) {name}")
+    angles = np.degrees(np.arccos(numbers["cosines"]))
+    for axes, key in ((reflected, "reflected"), (transmitted, "transmitted")):
+        looks.curves(axes, angles, [np.array(numbers[name][key]) for name in names], names)
+        axes.set(title=f"energy {key}", xlabel="angle of incidence (°)", ylim=(0, 1))
     canvas.save(figure, path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from velatura.figures import looks
+from velatura.figures.looks import Looks, Panel, inverted
 from velatura.stack import RGB, Diffuse, Stack
 
 ALBEDOS: dict[str, float | RGB] = {"black": 0.0, "grey": 0.5, "orange": (0.5, 0.3, 0.1)}
@@ -10,11 +10,11 @@ ALBEDOS: dict[str, float | RGB] = {"black": 0.0, "grey": 0.5, "orange": (0.5, 0.
 
 def stacks() -> dict[str, Stack]:
     """By the colour of the base."""
-    (pair,) = looks.inverted(("24",)).values()
+    (pair,) = inverted(("24",)).values()
     return {name: Stack([*pair.layers, Diffuse(albedo=albedo)]) for name, albedo in ALBEDOS.items()}
 
 
-FIGURE = looks.Looks(stacks)
+FIGURE = Looks(stacks, [Panel(f"({part}) {name} base", (name,)) for part, name in zip("abc", ALBEDOS)])
 compute, draw = FIGURE.compute, FIGURE.draw
 
 
