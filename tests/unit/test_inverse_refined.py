@@ -105,3 +105,24 @@ def test_requests_are_changed_until_their_answers_are_read_as_is_wanted() -> Non
     assert found is not None
     np.testing.assert_allclose(read(found), goal, rtol=1e-6)
     assert requests.met(lambda x: None, read, goal, goal, goal) is None
+
+
+@pytest.mark.parametrize("saturates", [False, True])
+def test_requests_for_what_no_answer_has_end_soon_near_the_goal(saturates: bool) -> None:
+    """Where requests beyond a bound have no answer, or all of them the same."""
+    asked: list[Any] = []
+
+    def ask(x: Any) -> Any:
+        asked.append(x)
+        return x if saturates or x[0] <= 0.6 else None
+
+    def read(x: Any) -> Any:
+        return np.minimum(x, (0.6, 1.0))
+
+    goal = np.array([0.8, 0.3])
+    found = requests.met(ask, read, 0.5 * goal, goal, goal)
+    assert found is not None
+    assert read(found)[0] == pytest.approx(0.6, abs=0.01)
+    assert read(found)[1] == pytest.approx(0.3, abs=1e-6 if saturates else 0.1)
+    assert len(asked) <= 24
+    assert np.abs(asked).max() < 5

@@ -33,7 +33,7 @@ from velatura.stack import (
 
 KEEP = 64  # partial stacks that are followed
 SMALL = 0.01  # energy or variance that is added to those of the goal, for units in which they are missed
-MISSED, HARDLY = 1e-5, 1e6  # what may be missing; the unit of what cannot be kept, so that it hardly counts
+MISSED = 1e-5  # what may be missing
 FOLLOWED, GRID, REFINED = 2, 16, 3  # those that the nearest lobe is sought for, steps on either side, and rounds
 LEAST, FARTHEST = 1e-3, 3.0  # by which its energy, as a logarithm, and its variance may differ
 
@@ -161,7 +161,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> Kept:
     request, nearest = refused[-1]
     solved = solver_reads(Material.of(stack.with_layers([*coating, *nearest[0]])))[len(coating) :]
     lost = np.abs(np.ravel([_entries(*lobe) for lobe in solved]) - request) > LEAST * scale
-    found = requests.met(near, read, request, goal, np.where(lost, HARDLY, scale)) or nearest
+    found = requests.met(near, read, request, goal, scale, ~lost) or nearest
     return found[0], found[1] or nearest[1]
 
 

@@ -32,7 +32,6 @@ INSIDE = (0.99, 0.9)  # shares of the way to a bound, of which the first that ha
 SAID = 1e-3  # changes of quantities that are mentioned, as logarithms
 TRIES = 4  # stacks that are begun with, of all that are found
 SAME = 0.03  # logarithm by which models differ about the energy of an index
-HARDLY = 1e6  # unit of what cannot be met, so that it hardly counts
 MISSED = 1e-4  # energy or variance that is mentioned
 SMALL = 0.01  # variance that is added to that of a goal, for units in which it is missed
 
@@ -156,9 +155,9 @@ def _requested(found: Solution, target: Target, model: Model) -> Solution | Boun
 
     goal = numbers(target)
     scale = np.r_[np.maximum(goal[: 3 * count], 1e-3), goal[3 * count :] + SMALL]
-    if held := _as_fixed(target, found.model) is not target:
-        scale[:3] = HARDLY
-    best = requests.met(ask, read, goal, goal, scale)
+    held = _as_fixed(target, found.model) is not target
+    free = np.arange(len(goal)) >= (3 if held else 0)
+    best = requests.met(ask, read, goal, goal, scale, free)
     if best is None:
         return Bound(count - 1, "fixed", 1, 0.0)
     reached = seen(best.stack, target, model)
