@@ -19,7 +19,6 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -62,8 +61,8 @@ def every(jobs: list[Job], results: Path | None, processes: int) -> Iterator[Row
     yield from (known[job] for job in jobs if job in known)
     left = [job for job in jobs if job not in known]
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, spawn, max_tasks_per_child=AT_A_TIME) as pool:
-        for row in pool.map(checked, left):
+    with spawn.Pool(processes, maxtasksperchild=AT_A_TIME) as pool:
+        for row in pool.imap(checked, left):
             if results:
                 with results.open("a") as stream:
                     stream.write(json.dumps(row) + "\n")
