@@ -141,7 +141,8 @@ def test_few_samples_weigh_much(brushed: bool, most: float) -> None:
 
 
 def test_an_interface_without_contrast_changes_nothing() -> None:
-    """Below the others: neither value nor density, to 1e-4; alone, all light goes straight on."""
+    """Below the others: neither value nor density, to 1e-4; alone, all light goes straight on, but for what single
+    precision needs."""
     rng = np.random.default_rng(6)
     wi, wo = directions(rng, 500), directions(rng, 500)
     layers = [vt.Interface(eta=1.5, alpha=0.15), vt.Interface(eta=1.2, alpha=0.3)]
@@ -155,9 +156,29 @@ def test_an_interface_without_contrast_changes_nothing() -> None:
             np.testing.assert_allclose(a, b, rtol=1e-4, atol=1e-6)
     alone, _ = passages(vt.Stack([vt.Interface(eta=1.0, alpha=0.4)]))
     wo = straight_through.sample(alone, wi, *rng.random((3, 500)))
-    np.testing.assert_allclose(wo, (-wi[0], -wi[1], -wi[2]), atol=1e-9)
-    energy, _ = straight_through.integrals(alone, wi)
-    assert np.all((energy > 0.5) & (energy < 1.001) | (wi[2] < 0.5))  # facets hide some of it
+    moved = np.hypot(wo[0] + wi[0], wo[1] + wi[1])
+    assert np.quantile(moved, 0.9) < 5e-4
+    energy, share = straight_through.integrals(alone, wi)
+    np.testing.assert_allclose(energy, 1, atol=5e-3)
+    np.testing.assert_allclose(share, 1, atol=5e-3)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.0005, 1.02])
+@pytest.mark.parametrize("alpha", [(0.94, 0.001), 0.002, 0.4])
+def test_samples_of_hardly_a_step_follow_their_density(eta: float, alpha: float | tuple[float, float]) -> None:
+    """From both sides: the mean over samples of a narrow distribution over their density is its integral, 1, within 4
+    standard errors; a false alarm in 10^4 each."""
+    for passage in passages(vt.Stack([vt.Interface(eta=eta, alpha=alpha, rotation=30)])):
+        rng, count = np.random.default_rng(4), 20_000
+        wi = at(0.6, 1.0, count)
+        wo = straight_through.sample(passage, wi, *rng.random((3, count)))
+        density = straight_through.eval_pdf(passage, wi, wo)[1] + (wo[2] >= 0)
+        x, y = (w * passage.indices[-1] + i for w, i in zip(wo, wi[:2]))
+        x, y = 0.75**0.5 * x + 0.5 * y, 0.75**0.5 * y - 0.5 * x
+        u, v = np.median(np.abs(x)), np.median(np.abs(y))
+        narrow = np.exp(-((x / u) ** 2) - (y / v) ** 2) / (np.pi * u * v)
+        share = np.where(wo[2] < 0, narrow / density, 0) * np.abs(wo[2]) * passage.indices[-1] ** 2
+        assert abs(share.mean() - 1) < 4 * share.std() / np.sqrt(count)
 
 
 def test_narrow_and_grazing_light_is_finite() -> None:

@@ -47,6 +47,7 @@ from velatura.stack import InterfaceValues, Material, MediumValues
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
 WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
 NARROW_MIN = 2e-5  # of it, across the brushing
+FLAT = 1e-7  # step of momentum at steep facets, at least
 COS_MIN = 0.02  # in slabs that light crosses, and in those that it cannot enter
 GRAZING = 1e-4  # cosine outside
 NODES = (16, 24)  # of the quadrature
@@ -65,8 +66,9 @@ Array = NDArray[np.floating]
 class Crossing(ops.Named):
     """An interface between media of mean indices n_1 and n_2; `eta` is the lower over the upper one, by colour.
 
-    `width` is the roughness in the space of `WIDTHS`, `area` its product over the axes, `sign` that of n_1 - n_2, and
-    `least` the step of momentum that it counts for at least.
+    `width` is the roughness in the space of `WIDTHS`, `area` its product over the axes, `sign` that of n_1 - n_2: 0
+    where facets turn light by less than single precision has. Then all make the step `least`, none hides another, and
+    light passes as at a smooth interface.
     """
 
     n_1: Value
@@ -159,13 +161,17 @@ def is_none(x: Value) -> bool:
 
 
 def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance]) -> Crossing:
-    u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
-    roughness = Roughness(u, v, layer.rotation * (pi / 180) if kind is Covariance else 0.0)
     eta = layer.eta / above
     ratio = ops.mean(layer.eta) / ops.mean(above)  # and so its inverse from the other side
-    sign = ops.select(ratio > 1, -1.0, ops.select(ratio < 1, 1.0, 0.0))
-    widths = ops.maximum(WIDTH_MIN / ops.sqrt(u * v), NARROW_MIN / ops.minimum(u, v))
-    least = n_1 * ops.sqrt(ratio) * widths
+    u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
+    # Across the brushing light has a width, too
+    step = n_1 * ops.absolute(ratio - 1)
+    narrow = ops.divide(NARROW_MIN, step)
+    u, v = ops.maximum(u, ops.minimum(narrow, v)), ops.maximum(v, ops.minimum(narrow, u))
+    roughness = Roughness(u, v, layer.rotation * (pi / 180) if kind is Covariance else 0.0)
+    least = n_1 * ops.sqrt(ratio) * WIDTH_MIN / ops.sqrt(u * v)
+    turns = step > least
+    sign, least = ops.select(turns, ops.select(ratio < 1, 1.0, -1.0), 0.0), ops.select(turns, FLAT, least)
     return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least)
 
 
@@ -239,7 +245,8 @@ def _component(passage: Passage, j: int, steps: Sequence[Value], d: Momentum | N
 
 def _weight(crossing: Crossing, step: Value) -> Value:
     """Square of the width of a step."""
-    return step * step * crossing.area + WEIGHT_MIN * crossing.n_1 * crossing.n_2
+    width2 = ops.select(_turns(crossing.sign), step * step * crossing.area, 0.0)
+    return width2 + WEIGHT_MIN * crossing.n_1 * crossing.n_2
 
 
 def _tail(crossing: Crossing, d: Momentum, width2: Value) -> Value:
@@ -293,12 +300,14 @@ def _eval_pdf(passage: Passage, wi: Direction, wo: Direction, passes: bool = Fal
             component = _component(passage, j, [*i.steps[:j], own, *o.steps[j + 1 :]], d)
             facet = _facet(crossing, i, o, j, component.step)
             alone = _masking(crossing.roughness, i, j) * _masking(crossing.roughness, o, j + 1)
+            turns = _turns(crossing.sign)
             smooth = _smooth(i, slice(j), slice(j + 1)) * _smooth(o, slice(j + 1, None), slice(j + 1, None))
-            seen = component.weight * _slopes(component.roughness, facet.slope) * alone
+            seen = component.weight * _slopes(component.roughness, facet.slope) * ops.select(turns, alone, 1.0)
             value = value + smooth * facet.passes * seen
-            visible = _slopes(sampled.roughness, facet.slope) * _masking(sampled.roughness, i, j)
-            goes_on = o.p2 < _lowest2(n[j + 1 :])
-            through = ops.select(goes_on, ops.mean(facet.passes) * visible, 0.0)
+            visible = ops.mean(facet.passes) * _masking(sampled.roughness, i, j)
+            evenly = ops.mean(i.passes[j]) / (component.step * component.step)
+            through = _slopes(sampled.roughness, facet.slope) * ops.select(turns, visible, evenly)
+            through = ops.select(o.p2 < _lowest2(n[j + 1 :]), through, 0.0)
         with ops.block("Or be reflected by it"):
             if not passes:
                 through = ops.select(below, through, _reflected(passage, i, o, j, sampled.roughness))
@@ -321,19 +330,23 @@ def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> D
         begin: Value = 0.0
         for j, (c, component, share) in enumerate(zip(passage.crossings, components, shares)):
             bounds = _lowest2(n[: j + 1]), _lowest2(n[j + 1 :])
-            every.append([c.n_1, c.n_2, c.eta, i.bounded[j], *component.roughness, *bounds, share, begin])
+            own = c.n_1, c.n_2, c.eta, c.sign, c.least, i.bounded[j], ops.mean(i.passes[j])
+            every.append([*own, *component.roughness, *bounds, share, begin])
             begin = begin + share
         chosen = every[0]
         for fields in every[1:]:
             chosen = [b if a is b else ops.select(u > fields[-1], a, b) for a, b in zip(fields, chosen)]
-        n_1, n_2, eta, cosine, alpha_u, alpha_v, rotation, up2, down2, share, begin = chosen
+        n_1, n_2, eta, sign, least, cosine, evenly, alpha_u, alpha_v, rotation, up2, down2, share, begin = chosen
         u = (u - begin) / share
     with ops.block("Draw a normal"):
         w = i.p[0] / -n_1, i.p[1] / -n_1, cosine
         h = _turned(ggx.sample_visible(_turned(w, rotation), alpha_u, alpha_v, u1, u2), -rotation)
     with ops.block("Refract or reflect"):
         p, passes = _refracted(n_1, n_2, eta, i.p, w, h, down2)
-        below = u < passes
+        r, phi, turns = least * ops.sqrt(ops.divide(u2, 1 - u2)), 2 * pi * u1, _turns(sign)
+        x, y, _ = _turned((r * alpha_u * ops.cos(phi), r * alpha_v * ops.sin(phi), 1.0), -rotation)
+        p = ops.select(turns, p[0], i.p[0] + x), ops.select(turns, p[1], i.p[1] + y)
+        below = u < ops.select(turns, passes, evenly)
         turned = 2 * ggx.dot(w, h)
         back = i.p[0] + n_1 * turned * h[0], i.p[1] + n_1 * turned * h[1]
         leaves = (turned * h[2] > cosine) & (back[0] * back[0] + back[1] * back[1] < up2)
@@ -357,10 +370,9 @@ def _facet(crossing: Crossing, i: Crossed, o: Crossed, j: int, step: Value) -> _
     slope = (o.p[0] - i.p[0]) / step, (o.p[1] - i.p[1]) / step
     v_i = 1 - crossing.sign * (i.p[0] * slope[0] + i.p[1] * slope[1]) / (n_1 * c_1)
     v_o = 1 - crossing.sign * (o.p[0] * slope[0] + o.p[1] * slope[1]) / (n_2 * c_2)
-    height = 1 / ops.sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1])
-    # As good as no step has no direction
-    made = n_1 * c_1 - n_2 * c_2
-    forwards = ops.maximum(crossing.sign * made, crossing.least - ops.absolute(made))
+    turns = _turns(crossing.sign)
+    height = ops.select(turns, 1 / ops.sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]), 1.0)
+    forwards = ops.select(turns, crossing.sign * (n_1 * c_1 - n_2 * c_2), 1.0)
     faces = (v_i > 0) & (v_o > 0) & (forwards > 0)
     v_i, v_o = ops.maximum(v_i, 0.0), ops.maximum(v_o, 0.0)
     reflectance = fresnel.dielectric_between(v_i * c_1 * height, v_o * c_2 * height, crossing.eta)
@@ -388,6 +400,7 @@ def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roug
     w = i.p[0] / -c.n_1, i.p[1] / -c.n_1, cos_i
     h = ggx.normalize((w[0] + o.p[0] / c.n_1, w[1] + o.p[1] / c.n_1, cos_i + cos_o))
     _, passes = _refracted(c.n_1, c.n_2, c.eta, i.p, w, h, _lowest2(n[j + 1 :]))
+    passes = ops.select(_turns(c.sign), passes, ops.mean(i.passes[j]))
     visible = ggx.ndf(_turned(h, roughness.rotation), roughness.alpha_u, roughness.alpha_v)
     density = visible * _masking(roughness, i, j) * (1 - passes) / (4 * cos_i * cos_o * c.n_1 * c.n_1)
     return ops.select(o.p2 < _lowest2(n[: j + 1]), density, 0.0)
@@ -406,6 +419,10 @@ def _masking(roughness: Roughness, crossed: Crossed, slab: int) -> Value:
     """Smith's G1 in a slab; the side from which light comes, and its length, make no difference."""
     p, z = crossed.p, crossed.n[slab] * crossed.bounded[slab]
     return ggx.masking(_turned((p[0], p[1], z), roughness.rotation), roughness.alpha_u, roughness.alpha_v)
+
+
+def _turns(sign: Value) -> Value:
+    return ops.absolute(sign) > 0
 
 
 def _turned(w: Direction, rotation: Value) -> Direction:
