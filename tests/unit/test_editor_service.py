@@ -164,6 +164,24 @@ def test_what_is_solved_comes_with_the_code_and_by_itself() -> None:
         VERBS["values"]({"material": COAT, "coarse": 1})
 
 
+def test_a_drag_takes_over_the_layers_that_it_leaves_alone() -> None:
+    """The same answers as without, and no more is kept however long it takes."""
+
+    def dragged(alpha: float) -> dict:
+        return VERBS["values"]({"material": changed(alpha=[alpha, 0.2]), "coarse": True})["solution"]
+
+    key = shader(changed(alpha=[0.1, 0.2]))["key"]
+    shading._lately.cache_clear()
+    alphas, answers, kept = (0.1, 0.15, 0.2), [], []
+    for alpha in alphas:
+        answers.append(dragged(alpha))
+        kept.append(len(shading._lately(key)))
+    for alpha, answer in zip(alphas, answers):
+        shading._lately.cache_clear()
+        assert dragged(alpha) == answer
+    assert 0 < max(kept) == kept[0]
+
+
 def test_tables_are_those_that_are_read(here: Path) -> None:
     """A uniform material is worked out by a tape, which reads tables by name; a textured one by a shader."""
     made = shader(COAT, model="belcour2018")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Hashable
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from velatura.tables import load
 #: Of an interface with a roughness for each axis, in the material that stands for all of its pattern.
 _STRETCHED = {"alpha_v": 0.2, "rotation": 30.0}
 
-COARSE = 12  # cosines
+KEPT = 4  # shaders
 
 
 def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
@@ -60,14 +61,14 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
 def contents(stack: Stack, model: Model, stretched: bool, coarse: bool) -> dict[str, Any]:
     """The values alone, for the code of `shading`, and where a material is solved its `solution`; a `coarse` one has
     fewer directions, for what moves."""
-    return _contents(stack, _made(pattern(stack, stretched), model), COARSE if coarse else None)
+    return _contents(stack, _made(pattern(stack, stretched), model), coarse)
 
 
-def _contents(stack: Stack, made: Shader, cosines: int | None = None) -> dict[str, Any]:
+def _contents(stack: Stack, made: Shader, coarse: bool = False) -> dict[str, Any]:
     values = {address.name: _plain(address, value) for address, value in _free(stack, made)}
     if made.baked is None or isinstance(made.baked, Bake):
         return {"values": values, "solution": None}
-    found = made.baked.solve(stack, cosines)
+    found = made.baked.solve(stack, coarse, _lately(made.key))
     return {"values": values, "solution": {name: array(x) for name, x in vars(found).items()}}
 
 
@@ -91,6 +92,12 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
 @functools.lru_cache(64)
 def _made(stack: Stack, model: Model) -> Shader:
     return shader(stack, model, values="uniforms")
+
+
+@functools.lru_cache(KEPT)
+def _lately(key: str) -> dict[Hashable, Any]:
+    """What was made of the layers of the last material of a shader: few of them change from one to the next."""
+    return {}
 
 
 def tables(key: str) -> np.ndarray:

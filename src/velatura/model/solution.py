@@ -14,6 +14,7 @@ from velatura import ops
 from velatura.model import exchange, own_medium, passed, remainder, straight_through, widths
 from velatura.model.context import Context, channels
 from velatura.model.models import Model
+from velatura.model.own_medium import NORMALS
 from velatura.model.passed import Parts
 from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
@@ -21,7 +22,7 @@ from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved_grid import COS_MIN, Folded, Grid
 from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import Made, interfaces, parts
-from velatura.model.transport.energies import INCIDENCES, energies
+from velatura.model.transport.energies import INCIDENCES, SAMPLES, energies
 from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.model.widths import Tensor
@@ -107,7 +108,8 @@ class SolvedSide:
 class Solver:
     """How materials of NumPy's values are solved for the directions of a grid, in a number of colours.
 
-    `samples` are those of `velatura.model.exchange`. Operators that materials share are `made` once.
+    `samples` are those of `velatura.model.exchange`; `normals` are those of facets, and of lobes that are integrated,
+    None for as many as usual. Operators that materials share are `made` once.
     """
 
     model: Model
@@ -116,6 +118,7 @@ class Solver:
     colours: int
     tables: Tables
     samples: int | None = None
+    normals: int | None = None
     made: Made = field(default_factory=dict)
 
     @classmethod
@@ -196,6 +199,7 @@ class Solver:
             self.tables if self.model.reflectance == "fgd-multi" else None,
             widths.nearly_straight,
             self.made,
+            samples=self.normals or SAMPLES,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
@@ -218,7 +222,7 @@ class Solver:
         energy = [(veils if each.veil else lobes)[each.interface] for each in drawn]
         weights, heaviest = [], []
         for shape, tensor, e in zip(shapes, shown, energy):
-            z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi)
+            z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, self.normals or NORMALS)
             weights.append(np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0))
             heaviest.append(weights[-1] * largest)
         z, largest = (np.repeat(each, len(folded.kept), axis=-1) for each in _integrals(polynomial, folded.at_cosines))

@@ -7,7 +7,7 @@ constant ones are numbers in the code.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
@@ -24,6 +24,7 @@ from velatura.model.solution import Layout, SolvedSide, Solver
 from velatura.model.solved import Columns, Side, Solved
 from velatura.model.solved_grid import Grid
 from velatura.model.straight_through import Passage
+from velatura.model.transport.adding import Made
 from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -34,6 +35,7 @@ from velatura.stack import InterfaceValues, Material, MediumValues, Stack
 OF_POLYNOMIAL = 8  # colours
 FAINTLY = 1e-3  # chance that is added to that of every reflected part, where some are shown alone
 NORMAL = (0.0, 0.0, 1.0)
+COARSE = 12, 144  # cosines, and normals
 SCATTERING = 1.0, 0.9  # optical depth and asymmetry of media below which veils are seen
 
 Array = NDArray[np.floating]
@@ -151,13 +153,21 @@ class Tabulated:
         found = [sum(energy for energy, each in lobes if each == k) for k in dict.fromkeys(self.interfaces)]
         return [*found, columns.rest, *([] if columns.passed is None else [columns.passed])]
 
-    def solve(self, stack: Stack, cosines: int | None = None) -> Solution:
-        """A stack of this kind, maybe at fewer cosines than usual."""
-        grid = Grid(self.solver.isotropic, cosines) if cosines else self.solver.grid
-        solver, material = replace(self.solver, grid=grid, made={}), _numbers(stack)
+    def solve(self, stack: Stack, coarse: bool = False, lately: Made | None = None) -> Solution:
+        """A stack of this kind; a `coarse` one is quicker. It takes from `lately` what the one before it has made of
+        layers, and leaves there what it has."""
+        made = _Made(lately or {})
+        solver, material = replace(self.solver, made=made), _numbers(stack)
+        if coarse:
+            cosines, normals = COARSE
+            solver = replace(solver, grid=Grid(solver.isotropic, cosines), normals=normals)
         # All that its kind may draw, of its own shape
         own = [replace(own, lobes=kind.lobes) for own, kind in zip(solver.layouts([material]), self.layouts)]
-        return self.solution(solver, solver.solve(material, own), material, own)
+        found = self.solution(solver, solver.solve(material, own), material, own)
+        if lately is not None:
+            lately.clear()
+            lately.update(made)
+        return found
 
     def solution(
         self, solver: Solver, found: Sequence[SolvedSide], material: Material, layouts: Sequence[Layout]
@@ -237,6 +247,21 @@ def _placed(side: Side, rows: Array | None) -> Places:
         groups += [Group(name, begin, texels)] if texels else []
         begin += texels
     return Places(groups, [x if x is not None else places[k] for k, x in zip(first, constants)])
+
+
+class _Made(dict[Hashable, Any]):
+    """What a solve has made, or has taken from what was made `before`."""
+
+    def __init__(self, before: Made) -> None:
+        super().__init__()
+        self.before = before.copy()
+
+    def __contains__(self, key: object) -> bool:
+        return super().__contains__(key) or key in self.before
+
+    def __missing__(self, key: Hashable) -> Any:
+        found = self[key] = self.before[key]
+        return found
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ from velatura.tables import Tables
 Array = NDArray[np.floating]
 
 NODES = 24
-SAMPLES = 377  # normals for light from each node, and of each beam
+SAMPLES = 377  # normals
 MODES = 3  # of the azimuth, of the remainder
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
 UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
@@ -80,12 +80,14 @@ def energies(
     forward: Straight,
     made: Made | None = None,
     incidences: Array = INCIDENCES,
+    samples: int = SAMPLES,
 ) -> Energies:
     """Energies for beams at cosines and azimuths (M,).
 
     `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
     into veils. `made` keeps what materials may share. The remainder is known at the cosines `incidences`, (I,); without
-    any, lobes are all that is worked out, which is quicker.
+    any, lobes are all that is worked out, which is quicker. `samples` are normals for light from each node, and of each
+    beam.
     """
     made = {} if made is None else made
     everything = _ended(parts(material))
@@ -95,7 +97,7 @@ def energies(
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
     nodes = Nodes.of(indices(everything), NODES)
     basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES if len(incidences) else 1)
-    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, SAMPLES, often, made)
+    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often, made)
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
@@ -133,7 +135,7 @@ def energies(
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
     count = np.size(cos_theta)
     if brushed and len(incidences):
-        remainder = _of_isotropic(material, rest[:, count:], often, forward, made, incidences)
+        remainder = _of_isotropic(material, rest[:, count:], often, forward, made, incidences, samples)
     else:
         remainder = (total.columns - _sum(of_lobes(kept)).columns)[..., count:]
     straight = sharp.energy(sharp.straight)
@@ -173,13 +175,19 @@ def _sum(lights: Sequence[Operator]) -> Operator:
 
 
 def _of_isotropic(
-    material: Material, energy: Array, often: Tables | None, forward: Straight, made: Made, incidences: Array
+    material: Material,
+    energy: Array,
+    often: Tables | None,
+    forward: Straight,
+    made: Made,
+    incidences: Array,
+    samples: int,
 ) -> Array:
     """The remainder of brushed interfaces, by mode and node: that of isotropic ones of the mean roughness, with the
     energy that it has on average over azimuths.
     """
     stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
-    found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences)
+    found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, samples)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
     return found.remainder * (mean / np.maximum(found.rest, TINY))[:, None, None]
 
