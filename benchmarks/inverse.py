@@ -171,7 +171,7 @@ def configuration() -> float:
             {"energy": [0.025, 0.045, 0.05], "variance": 0.028, "interfaces": 2, "fixed": {"eta": [1.45, 3.3]}},
         ]
     }
-    return best(lambda: invert_stack(target), 100)
+    return best(lambda: invert_stack(target, "bati2021"), 100)
 
 
 def pairs(count: int = 1 << 17) -> float:

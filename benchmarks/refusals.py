@@ -1,6 +1,6 @@
 """Whether every refusal of inverse design has a way out and a reason that can be right, and how long it takes.
 
-    python benchmarks/refusals.py [--wishes 200] [--seed 0] [--model bati2021]
+    python benchmarks/refusals.py [--wishes 200] [--seed 0] [--model velatura]
 
 Random wishes of one to three lobes, of any energies, blurs, forms and fixed values, that have no stack. Each must have
 a nearest target, which is solved when it is fed back, and whose material can be written; and its reason must be one
@@ -19,7 +19,7 @@ import numpy as np
 
 from velatura.errors import VelaturaError
 from velatura.inverse import Infeasible, Target, invert_stack
-from velatura.inverse.interface import MODEL
+from velatura.model import DEFAULT
 
 
 def wish(rng: np.random.Generator, most: int = 3) -> Target:
@@ -45,7 +45,7 @@ def wish(rng: np.random.Generator, most: int = 3) -> Target:
     return Target(lobes)
 
 
-def refused(count: int, seed: int, model: str = MODEL, most: int = 3) -> Iterator[tuple[Target, Infeasible, float]]:
+def refused(count: int, seed: int, model: str = DEFAULT, most: int = 3) -> Iterator[tuple[Target, Infeasible, float]]:
     """Random wishes without a stack, their refusals, and the seconds that these took."""
     rng = np.random.default_rng(seed)
     while count:
@@ -58,7 +58,7 @@ def refused(count: int, seed: int, model: str = MODEL, most: int = 3) -> Iterato
             yield target, error, time.process_time() - start
 
 
-def wrong(target: Target, refusal: Infeasible, model: str = MODEL) -> str | None:
+def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | None:
     """What is wrong with a refusal; None where nothing is."""
     if refusal.constraint != "sum":
         lobe = target.lobes[refusal.lobe - 1]
@@ -90,7 +90,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--wishes", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--model", default=MODEL)
+    parser.add_argument("--model", default=DEFAULT)
     options = parser.parse_args()
 
     faults, reasons, kinds, seconds = 0, Counter[str](), Counter[str](), []

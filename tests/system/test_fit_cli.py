@@ -37,7 +37,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_table_becomes_a_material(run: Run, folder: Path) -> None:
     """Expected: the stack that the table is of, in a file that other verbs read."""
-    status, out, err = run("fit", "table.csv", "target.yaml", "-o", "found.yaml")
+    status, out, err = run("fit", "table.csv", "target.yaml", "--model", "bati2021", "-o", "found.yaml")
     assert (status, err) == (0, "")
     assert out.splitlines()[-1] == "found.yaml"
     (found,) = vt.load("found.yaml").interfaces
@@ -46,9 +46,10 @@ def test_a_table_becomes_a_material(run: Run, folder: Path) -> None:
 
 def test_a_fit_says_what_the_table_determines(run: Run, folder: Path) -> None:
     """Expected: every parameter with its interval, as a table and as JSON; pairs that trade places; other stacks."""
-    out = run("fit", "table.csv", "target.yaml")[1]
+    arguments = ("fit", "table.csv", "target.yaml", "--model", "bati2021")
+    out = run(*arguments)[1]
     assert "layer0_alpha" in out and "layer0_eta" in out
-    report = json.loads(run("fit", "table.csv", "target.yaml", "--json")[1])
+    report = json.loads(run(*arguments, "--json")[1])
     assert [one["name"] for one in report["parameters"]] == ["layer0_alpha", "layer0_eta"]
     assert all(one["low"] <= one["value"] <= one["high"] for one in report["parameters"])
     assert {"trades", "others"} <= report.keys()
@@ -63,7 +64,7 @@ def test_a_brushed_table_is_read(run: Run, folder: Path) -> None:
     rows = [",".join(map(str, [*angles[:, n], *value[:, n]])) for n in range(value.shape[1])]
     Path("brushed.csv").write_text("\n".join(["theta_i,phi_i,theta_o,phi_o,r,g,b", *rows]))
     Path("metal.yaml").write_text("lobes:\n  - {energy: 0.85, alpha: 0.2, base: conductor}\n")
-    status, _, err = run("fit", "brushed.csv", "metal.yaml", "--starts", "1", "-o", "found.yaml")
+    status, _, err = run("fit", "brushed.csv", "metal.yaml", "--starts", "1", "--model", "bati2021", "-o", "found.yaml")
     assert (status, err) == (0, "")
     found: Any = vt.load("found.yaml").interfaces[0]
     assert (*found.alpha, found.rotation) == pytest.approx((0.1, 0.3, 120), rel=1e-2)
@@ -71,14 +72,15 @@ def test_a_brushed_table_is_read(run: Run, folder: Path) -> None:
 
 def test_a_material_becomes_a_simpler_one(run: Run, folder: Path) -> None:
     """Expected: JSON with the material and its error by angle; an interface that does nothing is gone."""
-    status, out, err = run("simplify", "pair.yaml", "--interfaces", "2", "--json")
+    arguments = ("simplify", "pair.yaml", "--interfaces", "2", "--model", "bati2021")
+    status, out, err = run(*arguments, "--json")
     report = json.loads(out)
     assert (status, err) == (0, "")
     assert len(vt.Stack.from_dict(report["stack"]).interfaces) == 2
     assert report["error"] < 1e-4
     assert len(report["by_angle"]) == 5
     assert report["energies"][0]["after"] == pytest.approx(report["energies"][0]["before"], abs=1e-3)
-    assert "Energy that is reflected" in run("simplify", "pair.yaml", "--interfaces", "2")[1]
+    assert "Energy that is reflected" in run(*arguments)[1]
 
 
 def test_a_coat_tells_of_a_diffuse_base(run: Run, folder: Path) -> None:

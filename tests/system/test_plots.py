@@ -50,7 +50,7 @@ def test_classes_have_axes_and_a_legend(run: Run, drawn: list[Figure]) -> None:
     status, _, err = run("invert", "target.yaml", "--plot")
     assert (status, err) == (0, "")
     (figure,) = drawn
-    assert title(figure) == "Hazy metal: what gives each lobe, by bati2021"
+    assert title(figure) == "Hazy metal: what gives each lobe, by velatura"
     titles = ["a pair that ends in a dielectric", "one dielectric", "one conductor"]
     assert [axes.get_title() for axes in figure.axes] == [f"lobe {n}: {text}" for n, text in enumerate(titles, 1)]
     assert [axes.get_xlabel() for axes in figure.axes] == ["eta of the upper interface", "eta", "eta"]
@@ -84,7 +84,7 @@ def test_a_sheet_names_its_stacks(run: Run, drawn: list[Figure]) -> None:
     assert (status, err) == (0, "")
     (figure,) = drawn
     assert title(figure).startswith(
-        "Hazy metal: stacks with the same lobes head-on, by bati2021. Difference from the first"
+        "Hazy metal: stacks with the same lobes head-on, by velatura. Difference from the first"
     )
     assert "difference 0.000" in figure.axes[0].get_title()
     assert all(axes.get_title().startswith("eta ") for axes in figure.axes)

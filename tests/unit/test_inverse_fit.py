@@ -37,7 +37,7 @@ def energy(stack: Stack) -> np.ndarray:
 def test_a_rendered_table_gives_back_its_stack() -> None:
     """From a guess that is 25 % off; the metal's two indices and the absorption above it all but trade places."""
     table = table_of(COATED, Directions.about_lobes(False), AVERAGED)
-    found = fit_target(table, GUESS, starts=2)
+    found = fit_target(table, GUESS, starts=2, model=AVERAGED)
     assert found.error < 1e-4
     assert found.errors == sorted(found.errors) and len(found.errors) == 2
     top, base = found.stack.interfaces
@@ -107,7 +107,7 @@ def test_an_interface_that_does_nothing_is_left_out(model: Model) -> None:
 
 def test_fewer_interfaces_come_less_close() -> None:
     stack = Stack([Interface(eta=1.3, alpha=0.05), Medium(sigma_a=0.1), *COATED.layers])
-    two, one = (simplify(stack, count) for count in (2, 1))
+    two, one = (simplify(stack, count, AVERAGED) for count in (2, 1))
     assert 0 < two.error < one.error
     assert [row["theta_i"] for row in two.by_angle] == [0, 20, 40, 55, 70]
     assert all(row["error"] == pytest.approx(row["relative"] * row["wanted"]) for row in two.by_angle)
@@ -139,7 +139,7 @@ def test_one_interface_keeps_energy_and_hue(model: str, stack: str) -> None:
 def test_media_of_what_is_left_out_are_kept() -> None:
     """Their optical depths add up in the medium that stays."""
     layers: list[Any] = [Interface(eta=1.5, alpha=0.1), Medium(depth=2.0, sigma_a=0.1), Interface(eta=1.5, alpha=0.1)]
-    found = simplify(Stack([*layers, Medium(sigma_a=0.3), Interface(conductor="mirror", alpha=0.2)]), 2)
+    found = simplify(Stack([*layers, Medium(sigma_a=0.3), Interface(conductor="mirror", alpha=0.2)]), 2, AVERAGED)
     assert found.error < 1e-5
     medium: Any = found.stack.layers[1]
     assert np.mean(medium.sigma_a) == pytest.approx(0.5, rel=1e-2)
@@ -208,7 +208,7 @@ def test_negative_values_are_noise(tmp_path: Path) -> None:
     true = table_of(Stack([Interface(eta=1.8, alpha=0.1)]), plain, AVERAGED)
     noisy = ReflectanceTable(plain, true.value + 0.01 * rng.standard_normal(true.value.shape))
     assert noisy.value.min() < -0.01
-    (found,) = fit_target(noisy, [{"energy": 0.06, "alpha": 0.15}], starts=1).stack.interfaces
+    (found,) = fit_target(noisy, [{"energy": 0.06, "alpha": 0.15}], starts=1, model=AVERAGED).stack.interfaces
     assert (found.eta, found.alpha) == pytest.approx((1.8, 0.1), rel=0.01)
 
 
@@ -216,7 +216,7 @@ def test_a_brushed_sample_is_found_with_its_direction() -> None:
     """From a round guess: the axes, and by how much they are turned."""
     true = Stack([Interface(eta=1.4, k=3.0, alpha=(0.08, 0.3), rotation=30)])
     table = table_of(true, Directions.about_lobes(True), AVERAGED)
-    found = fit_target(table, [{"energy": 0.6, "alpha": 0.15, "base": "conductor"}], starts=2)
+    found = fit_target(table, [{"energy": 0.6, "alpha": 0.15, "base": "conductor"}], starts=2, model=AVERAGED)
     base: Any = found.stack.interfaces[0]
     assert found.error < 1e-5
     assert (*base.alpha, base.rotation) == pytest.approx((0.08, 0.3, 30), rel=1e-3)
@@ -300,7 +300,7 @@ def test_no_such_table_and_no_such_stack(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"none\.csv: cannot be read: no such file"):
         load_table(tmp_path / "none.csv")
     with pytest.raises(Infeasible):
-        fit_target(table_of(COATED, Directions.about_lobes(False), AVERAGED), [{"energy": 0.6}])
+        fit_target(table_of(COATED, Directions.about_lobes(False), AVERAGED), [{"energy": 0.6}], model=AVERAGED)
 
 
 def test_media_that_become_one_keep_their_depths_and_mean_angle() -> None:
@@ -341,7 +341,9 @@ def test_a_simpler_stack_that_fits_as_well_is_reported() -> None:
     """The table of one interface, fitted by two: the stack with one is among the others."""
     table = table_of(Stack([Interface(eta=1.8, alpha=0.2)]), Directions.about_lobes(False), AVERAGED)
     start = Stack([Interface(eta=1.7, alpha=0.15), Medium(sigma_a=0.5), Interface(eta=1.75, alpha=0.3)])
-    found = fit_target(table, [{"energy": 0.07, "alpha": 0.2}, {"energy": 0.005, "alpha": 0.4}], starts=1)
+    found = fit_target(
+        table, [{"energy": 0.07, "alpha": 0.2}, {"energy": 0.005, "alpha": 0.4}], starts=1, model=AVERAGED
+    )
     assert any(len(other.stack.interfaces) == 1 and other.error < 1e-4 for other in found.others)
     alone = fit(table, [start], AVERAGED)
     assert all(len(other.stack.interfaces) == 2 for other in alone.others)

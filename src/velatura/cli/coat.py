@@ -28,7 +28,7 @@ def coat(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="F", help="The coated material (YAML or JSON).")
     ] = None,
-    model: invert.ModelName = None,
+    model: options.Model = None,
     settings: options.Settings = None,
     as_json: options.Json = False,
 ) -> None:
@@ -41,7 +41,7 @@ def coat(
     if output:
         files.check_writable(output, "a material file", invert.ENDINGS)
 
-    name = inverse.MODEL if model is None else model
+    name = options.model_name(model)
     coated = inverse.coat(stack, eta, alpha, keep_appearance, model=name, **switches)
     if output:
         save(coated.stack, output)
@@ -71,11 +71,12 @@ def _diffuse(coated: Coated) -> dict[str, dict[str, list[float]]]:
 
 
 def _say_how_kept(stack: Stack, coated: Coated) -> None:
-    """Print how far the lobes change by the model that renders by default, where they are kept by another."""
+    """Print by which model the lobes are kept, and how far they change by the one that renders where it is another."""
     import velatura
     from velatura.model import DEFAULT
 
     if coated.model.name == DEFAULT or not stack.interfaces:
+        invert.say_for_which(coated.model)
         return
     rendered = replace(coated, before=velatura.lobes(stack, 1.0), after=velatura.lobes(coated.stack, 1.0))
     by = {

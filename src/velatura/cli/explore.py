@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from velatura.cli import invert, progress
+from velatura.cli import invert, options, progress
 from velatura.errors import InvalidInput
 
 COLUMNS = 4  # of the contact sheet
@@ -30,7 +30,7 @@ def explore(
     spp: Annotated[int, typer.Option(min=1, max=2**16, metavar="N", help="Samples per pixel.")] = 32,
     size: Annotated[int, typer.Option(min=16, max=2048, metavar="N", help="Pixels of each picture.")] = 192,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random stacks.")] = 0,
-    model: invert.ModelName = None,
+    model: options.Model = None,
     settings: invert.Switches = None,
 ) -> None:
     """List stacks that look alike head-on; how they differ at grazing.

@@ -38,7 +38,7 @@ def fit(
     output: Output = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of these stacks.")] = 0,
     plot: Annotated[bool, typer.Option("--plot", help="Draw table and fit to TABLE, ending in .png, here.")] = False,
-    model: invert.ModelName = None,
+    model: options.Model = None,
     settings: invert.Switches = None,
     as_json: options.Json = False,
 ) -> None:

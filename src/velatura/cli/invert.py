@@ -21,7 +21,6 @@ SHOWN = 5e-5  # difference of energies or roughnesses that four digits show
 ENDINGS = (".yaml", ".yml", ".json")
 
 TargetFile = Annotated[str, typer.Argument(metavar="TARGET", help="A target file (YAML or JSON).")]
-ModelName = Annotated[str | None, typer.Option("--model", metavar="NAME", help=f"{options.MODELS}; default: bati2021.")]
 Switches = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="A switch of the model (tir=off); may be repeated."),
@@ -45,7 +44,7 @@ def invert(
     ] = 1,
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, metavar="N", help="Seed of the random stacks.")] = 0,
     plot: Annotated[bool, typer.Option("--plot", help="Draw the classes to TARGET, ending in .png, here.")] = False,
-    model: ModelName = None,
+    model: options.Model = None,
     settings: Switches = None,
     as_json: options.Json = False,
 ) -> None:
@@ -120,14 +119,16 @@ def read(target: str, model: str | None, settings: list[str] | None) -> tuple[Ta
         if key not in SWITCHES:
             raise InvalidInput(f"--set {key}: {unknown('switch', key, SWITCHES)}")
         switches[key] = value
-    return inverse.load_target(target), inverse.MODEL if model is None else model, switches
+    return inverse.load_target(target), options.model_name(model), switches
 
 
 def say_for_which(model: Model) -> None:
-    """Print for which model an answer holds, where renders are by another unless it is named there too."""
+    """Print for which model an answer holds."""
     from velatura.model import DEFAULT
 
-    if model.name != DEFAULT:
+    if model.name == DEFAULT:
+        print(f"Holds for {DEFAULT}, which renders.")
+    else:
         print(
             f"Holds for {model.name}; renders are by {DEFAULT}, whose lobes differ: --model {DEFAULT} answers for it."
         )

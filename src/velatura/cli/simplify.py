@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from velatura.cli import fit, invert, options
+from velatura.cli import fit, options
 
 
 def simplify(
     material: options.Material,
     interfaces: Annotated[int, typer.Option(min=1, metavar="N", help="Interfaces to keep.")],
     output: fit.Output = None,
-    model: invert.ModelName = None,
+    model: options.Model = None,
     settings: options.Settings = None,
     as_json: options.Json = False,
 ) -> None:
@@ -23,5 +23,5 @@ def simplify(
     from velatura import inverse
 
     fit.check(output)
-    found = inverse.simplify(stack, interfaces, inverse.MODEL if model is None else model, **switches)
+    found = inverse.simplify(stack, interfaces, options.model_name(model), **switches)
     fit.show(found, output, as_json)

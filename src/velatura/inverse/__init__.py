@@ -11,7 +11,7 @@ from velatura.inverse.descent import Estimate, Fit, Other, fit
 from velatura.inverse.equivalence import Coordinate, EquivalenceClass
 from velatura.inverse.explain import Direction, Infeasible
 from velatura.inverse.fitting import fit_target, simplify
-from velatura.inverse.interface import MODEL, Choice, invert_interface
+from velatura.inverse.interface import Choice, invert_interface
 from velatura.inverse.pair import Pair, invert_pair
 from velatura.inverse.partial_stack import Above, Layers
 from velatura.inverse.stacks import Solution, alternatives, grazing, invert_stack, on_black
@@ -19,7 +19,6 @@ from velatura.inverse.table_files import load_table
 from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
 
 __all__ = [
-    "MODEL",
     "Above",
     "Choice",
     "Coated",

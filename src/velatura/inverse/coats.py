@@ -12,10 +12,10 @@ from velatura.inverse import interface, requests
 from velatura.inverse.descent import written
 from velatura.inverse.equivalence import dislike
 from velatura.inverse.explain import REASONS
-from velatura.inverse.interface import DENSER, MODEL, RARER, Choice, conductor_tint
+from velatura.inverse.interface import DENSER, RARER, Choice, conductor_tint
 from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, join
 from velatura.inverse.stacks import Partial, pruned
-from velatura.model import Model, lobes, named, prepare, variance_kind
+from velatura.model import DEFAULT, Model, lobes, named, prepare, variance_kind
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic, PerAxis, Roughness, Variance
@@ -76,7 +76,7 @@ def coat(
     alpha: float = 0.0,
     keep_appearance: bool = False,
     eta_max: float = 4.0,
-    model: str | Model = MODEL,
+    model: str | Model = DEFAULT,
     **switches: str,
 ) -> Coated:
     """A material under a dielectric coat.

@@ -14,10 +14,9 @@ from velatura.errors import InvalidInput
 from velatura.inverse import angles
 from velatura.inverse.angles import Directions, ReflectanceTable
 from velatura.inverse.descent import Descent, Fit, descended, fit, written
-from velatura.inverse.interface import MODEL
 from velatura.inverse.stacks import alternatives, model_of
 from velatura.inverse.target import Target, read
-from velatura.model import Model, named, variance_kind
+from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.variance import Isotropic
 from velatura.stack import (
     Diffuse,
@@ -42,7 +41,7 @@ def fit_target(
     table: ReflectanceTable,
     target: Target | Sequence[dict[str, object]],
     starts: int = STARTS,
-    model: str | Model = MODEL,
+    model: str | Model = DEFAULT,
     seed: int = 0,
     **switches: str,
 ) -> Fit:
@@ -66,7 +65,7 @@ def fit_target(
 
 
 def simplify(
-    stack: MaterialLike, interfaces: int, model: str | Model = MODEL, eta_max: float = 4.0, **switches: str
+    stack: MaterialLike, interfaces: int, model: str | Model = DEFAULT, eta_max: float = 4.0, **switches: str
 ) -> Fit:
     """The stack of fewer interfaces whose reflectance comes closest to that of a stack, at all angles.
 

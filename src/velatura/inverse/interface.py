@@ -23,7 +23,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.stack.values import INDEX_HIGH, INDEX_LOW
 
-MODEL = "bati2021"
+CLOSED_FORM = "bati2021"  # the model of the paper, by which interfaces follow from lobes one by one
 DENSER, RARER = 1, -1
 SLACK = 1e-9  # by which a constraint may be broken: rounding of solutions
 NEGLIGIBLE = 1e-7  # the same for numerical solutions
@@ -74,7 +74,7 @@ def invert_interface(
     exterior: ArrayLike = 1.0,
     above: Above | None = None,
     choice: Choice = DIELECTRIC,
-    model: str | Model = MODEL,
+    model: str | Model = CLOSED_FORM,
     **switches: str,
 ) -> Layers:
     """The interfaces that give lobes of these energies and variances.

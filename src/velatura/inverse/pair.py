@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura.inverse import interface
-from velatura.inverse.interface import DIELECTRIC, MODEL, Choice, Found
+from velatura.inverse.interface import CLOSED_FORM, DIELECTRIC, Choice, Found
 from velatura.inverse.partial_stack import Above, Array, Layers, Mask
 from velatura.model import Model, named
 from velatura.model.variance import Isotropic, Variance
@@ -44,7 +44,7 @@ def invert_pair(
     tau: Value = 0.0,
     choice: Choice = DIELECTRIC,
     printed: bool = False,
-    model: str | Model = MODEL,
+    model: str | Model = CLOSED_FORM,
     **switches: str,
 ) -> Pair:
     """The pairs of interfaces that give one lobe of these energies and variances: Bati et al. 2021, Algorithms 1

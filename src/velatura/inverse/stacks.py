@@ -17,11 +17,11 @@ import numpy as np
 
 from velatura.inverse import interface, pair
 from velatura.inverse.equivalence import EquivalenceClass, dislike
-from velatura.inverse.interface import DENSER, MODEL, RARER, Choice
+from velatura.inverse.interface import DENSER, RARER, Choice
 from velatura.inverse.partial_stack import Above, Array, Batch, Layers, take
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import Target, TargetLobe, read
-from velatura.model import Model, named
+from velatura.model import DEFAULT, Model, named
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic
 from velatura.stack import Diffuse, MaterialLike, Stack, load
@@ -88,7 +88,7 @@ class Solution:
 
 def invert_stack(
     target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
-    model: str | Model = MODEL,
+    model: str | Model = DEFAULT,
     **switches: str,
 ) -> Solution:
     """A stack whose lobes at normal incidence are those of the target.
@@ -150,7 +150,7 @@ def solutions(target: Target, model: Model, paths: Partial, which: Iterable[int]
 def alternatives(
     target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path,
     count: int,
-    model: str | Model = MODEL,
+    model: str | Model = DEFAULT,
     seed: int = 0,
     **switches: str,
 ) -> list[Solution]:
@@ -210,7 +210,7 @@ def on_black(stack: MaterialLike) -> Stack:
     return Stack([*stack.layers, Diffuse(albedo=0.0)], exterior=stack.exterior) if stack.transmits else stack
 
 
-def grazing(stack: MaterialLike, model: str | Model = MODEL) -> Array:
+def grazing(stack: MaterialLike, model: str | Model = DEFAULT) -> Array:
     """Energy of all lobes together at the cosines of GRAZING, (3, len(GRAZING)).
 
     Raises:
