@@ -151,6 +151,77 @@ def test_layers_are_dragged_added_duplicated_turned_off_and_removed(visit: Open)
     page.settled()
 
 
+def test_red_paint_is_built_from_nothing_without_a_message(visit: Open) -> None:
+    """Expected: varnished paint over metal in eleven steps, each drawn and without a message."""
+    page = visit()
+    layers = page.page.locator(".layer")
+    said_wrong: list[str] = []
+
+    def step() -> None:
+        page.settled()
+        said_wrong.extend(each["text"] for each in page.page.evaluate("velatura.problems"))
+
+    page.page.get_by_role("button", name="New", exact=True).click()
+    step()
+    layers.nth(1).get_by_label("Albedo, hexadecimal").fill("#c83220")
+    page.page.keyboard.press("Enter")
+    step()
+    layers.nth(0).get_by_role("button", name="Remove").click()
+    step()
+    assert [layer["kind"] for layer in page.state("layers")] == ["diffuse"]
+    assert layers.nth(0).get_by_role("button", name="Remove").is_disabled()
+    for place, kind in ((0, "interface"), (1, "medium")):
+        page.page.get_by_label(f"Add a layer at place {place}").click()
+        page.page.locator(f"[data-kind={kind}]").click()
+        step()
+    layers.nth(1).get_by_label("Colour twice through, hexadecimal").fill("#ffc060")
+    page.page.keyboard.press("Enter")
+    step()
+    layers.nth(2).get_by_label("Kind of layer").select_option("metal")
+    step()
+    assert [layer["kind"] for layer in page.state("layers")] == ["interface", "medium", "interface"]
+    page.page.get_by_label("Add a layer at place 3").click()
+    page.page.locator("[data-kind=medium]").click()  # where light does not come
+    step()
+    assert [layer["enabled"] for layer in page.state("layers")] == [True, True, True, False]
+    assert said_wrong == []
+
+    red, green, blue = page.state("layers.1.keys.sigma_a")
+    assert red == 0
+    assert np.exp([-2 * green, -2 * blue]) == pytest.approx([linear(0xC0), linear(0x60)], rel=1e-3)
+    assert layers.nth(1).get_by_label("Colour twice through, hexadecimal").input_value() == "#ffc060"
+
+
+def test_a_colour_dragged_by_hue_returns_to_where_it_began(visit: Open) -> None:
+    """Expected: through black and grey, which have no hue, in 100 events and back."""
+    page = visit()
+    page.page.get_by_role("button", name="New", exact=True).click()
+    base = page.page.locator(".layer").nth(1)
+    base.get_by_label("Albedo, hexadecimal").fill("#c86428")
+    page.page.keyboard.press("Enter")
+    base.get_by_label("Albedo by").select_option("hsv")
+    page.settled()
+    for name in ("value", "saturation", "hue"):
+        control = base.get_by_label(f"Albedo, {name}, slider")
+        start = int(control.input_value())
+        drag(control, [*(start - start * n // 50 for n in range(51)), *(start * n // 50 for n in range(51))])
+        page.settled()
+    np.testing.assert_allclose(page.state("layers.1.keys.albedo"), [linear(b) for b in (200, 100, 40)], atol=0.01)
+
+
+def test_a_material_is_found_by_its_picture_or_its_name(visit: Open) -> None:
+    page = visit()
+    page.page.get_by_role("button", name="Open", exact=True).click()
+    pictures = page.page.locator("dialog.open img")
+    assert pictures.count() == len(vt.presets())
+    page.page.wait_for_function("() => document.querySelector('dialog.open img').naturalWidth === 160")
+    page.page.get_by_label("Search").fill("enamel")
+    assert pictures.count() == 1
+    page.page.locator("dialog.open li button").click()
+    assert page.page.title() == f"{vt.preset('red-enamel').name} - Velatura"
+    page.settled()
+
+
 def test_reloading_loses_nothing(visit: Open) -> None:
     page = visit()
     open_preset(page, "Wet copper")
@@ -550,8 +621,12 @@ def test_two_models_differ_where_they_do(visit: Open) -> None:
     page.page.get_by_label("Compare", exact=True).select_option("difference")
     page.page.get_by_label("With", exact=True).select_option("velatura")
     assert np.ptp(page.picture()) < 2
+    scale = page.page.locator(".scale")
+    scale.get_by_text("mean 0.0000").wait_for()
     page.page.get_by_label("With", exact=True).select_option("belcour2018")
     assert np.ptp(page.picture()) > 10
+    page.page.wait_for_function("() => Number(document.querySelector('.measure').textContent.slice(5)) > 1e-3")
+    assert re.match(r"Belcour 2018 darker .* brighter than Velatura", " ".join(scale.inner_text().split()))
 
     page.page.get_by_label("Compare", exact=True).select_option("split")
     line = page.page.get_by_role("slider", name="Where the picture is split")

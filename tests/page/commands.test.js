@@ -12,6 +12,7 @@ const NAMES = {
   dielectrics: { bk7: 1.5168 },
   conductors: { Al: { eta: [1.65749, 0.880369, 0.521229], k: [9.22387, 6.26952, 4.837] } },
 };
+const FRESH = { interface: { eta: 1.5, alpha: 0.1 }, diffuse: { albedo: [0.5, 0.5, 0.5] } };
 const MATERIAL = {
   name: 'Lacquer',
   layers: [
@@ -54,6 +55,39 @@ test('a coat goes on top, a medium between interfaces, a base below everything',
   );
 });
 
+test('a layer goes where it is put, with an index that shows', () => {
+  const fresh = { eta: 1.5, alpha: 0.1 };
+  const lowest = commands.addLayer(opened(), 'interface', fresh, 1).layers[1];
+  assert.deepEqual(lowest.keys, { eta: 1.5, alpha: 0.1 }, 'a name is no number to keep away from');
+  const glass = { layers: [{ interface: { eta: 1.5 } }] };
+  const pane = commands.addLayer(commands.initial(glass, SESSION), 'interface', fresh, 1);
+  assert.deepEqual(documentOf(pane).layers[1].interface.eta, 1, 'a pane ends in the exterior');
+  const coated = commands.addLayer(commands.initial(glass, SESSION), 'interface', fresh, 0);
+  assert.deepEqual(documentOf(coated).layers[0].interface.eta, 1.33);
+});
+
+test('what cannot stand is turned off', () => {
+  const painted = commands.addLayer(opened(), 'diffuse', FRESH.diffuse);
+  const bare = commands.removeLayer(painted, painted.layers.at(-1).id);
+  assert.deepEqual(
+    documentOf(bare).layers.map((layer) => Object.keys(layer)[0]),
+    ['interface'],
+    'a medium above nothing',
+  );
+  const metal = commands.setVariant(painted, 1, 'metal', NAMES, FRESH);
+  assert.deepEqual(documentOf(metal).layers, [{ interface: { conductor: 'Al', alpha: 0.1 } }]);
+});
+
+test('any base becomes any other', () => {
+  const paths = ['diffuse', 'metal', 'custom', 'mirror', 'diffuse', 'dielectric', 'diffuse', 'custom', 'dielectric'];
+  let state = commands.removeLayer(opened(), 2);
+  for (const variant of paths) {
+    state = commands.setVariant(state, 3, variant, NAMES, FRESH);
+    assert.equal(variantOf(state.layers.at(-1)), variant);
+  }
+  assert.equal(documentOf(state).layers.length, 2);
+});
+
 test('layers have identities of their own', () => {
   let state = opened();
   for (const kind of ['interface', 'medium', 'interface']) state = commands.addLayer(state, kind);
@@ -77,7 +111,7 @@ test('a layer moves to a place, and no further than the ends', () => {
 
 test('a metal that becomes custom keeps its indices, and the surface its roughness', () => {
   const [, , { keys }] = commands.setVariant(opened(), 3, 'custom', NAMES).layers;
-  assert.equal(variantOf(keys), 'custom');
+  assert.equal(variantOf({ kind: 'interface', keys }), 'custom');
   assert.deepEqual(keys.eta, [1.657, 0.8804, 0.5212]);
   assert.deepEqual([keys.alpha, keys.rotation], [[0.1, 0.3], 30]);
   assert.equal(layerName({ kind: 'interface', keys }), 'metal');

@@ -1,12 +1,15 @@
 // What the page says, and what becomes of values under the hand.
 
 import assert from 'node:assert/strict';
-import { mock, test } from 'node:test';
+import { afterEach, beforeEach, mock, test } from 'node:test';
 
 import { Offline } from '../../src/velatura/editor/page/connection.js';
 import { createEdits } from '../../src/velatura/editor/page/state/edits.js';
 import { createMessages } from '../../src/velatura/editor/page/state/messages.js';
 import { createStore } from '../../src/velatura/editor/page/state/store.js';
+
+beforeEach(() => mock.timers.enable({ apis: ['setTimeout'] }));
+afterEach(() => mock.timers.reset());
 
 const texts = (messages) => messages.problems.map(({ text }) => text);
 
@@ -39,8 +42,22 @@ test('what has failed goes with the next act, what the server missed when it is 
   assert.deepEqual(texts(messages), []);
 });
 
-test('a drag is one step, from the first move until a while after the last', (context) => {
-  context.mock.timers.enable({ apis: ['setTimeout'] });
+test('what is passing goes by itself once it has been read, and so does a note', async () => {
+  const messages = createMessages(() => {});
+  messages.complain('picture', 'must hold a layer');
+  await messages.attempt('file', () => Promise.reject(new Error('not readable')));
+  mock.timers.tick(6000);
+  await messages.attempt('file', () => Promise.reject(new Error('still not readable')));
+  messages.say('Saved.');
+  mock.timers.tick(6000);
+  assert.deepEqual(texts(messages), ['must hold a layer', 'still not readable']);
+  assert.equal(messages.note, 'Saved.');
+  mock.timers.tick(6000);
+  assert.deepEqual(texts(messages), ['must hold a layer']);
+  assert.equal(messages.note, '');
+});
+
+test('a drag is one step, from the first move until a while after the last', () => {
   const moving = mock.fn();
   const store = createStore({ value: 0 });
   const set = Object.assign((state, value) => ({ ...state, value }), { title: 'set' });
@@ -48,9 +65,9 @@ test('a drag is one step, from the first move until a while after the last', (co
   const edit = createEdits({ store, viewport: { moving }, messages }).of('key', (value) => [set, value], 'thing', 3);
   for (const value of [1, 2, 3]) edit.move(value);
   edit.settle();
-  context.mock.timers.tick(399);
+  mock.timers.tick(399);
   assert.equal(store.dragging, true);
-  context.mock.timers.tick(1);
+  mock.timers.tick(1);
   assert.equal(store.dragging, false);
   assert.equal(store.history().past.length, 1);
   assert.deepEqual(moving.mock.calls.at(-1).arguments, [false]);

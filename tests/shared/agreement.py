@@ -47,6 +47,7 @@ SEQUENCES: tuple[tuple[Kind, ...], ...] = (
     (D, S, D, S, C),
     (D, D, S, L),
     (D, D, D, C),
+    (L,),
 )
 #: How the roughnesses of the interfaces lie: the same along both axes, along the frame's axes, turned.
 SHAPES = ("round", "straight", "turned")

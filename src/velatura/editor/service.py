@@ -115,7 +115,8 @@ def _titled(name: str) -> str:
 
 def _preset(name: str) -> Answer:
     stack = preset(name)
-    return {"name": name, "title": stack.name or _titled(name), "material": document(stack)}
+    group = "Glass" if stack.transmits else "Paint" if stack.base else "Metal"
+    return {"name": name, "title": stack.name or _titled(name), "group": group, "material": document(stack)}
 
 
 def _model(model: Model) -> Answer:

@@ -157,7 +157,5 @@ def _structs(recording: Recording) -> list[Struct]:
     members = [Field("reflected", "VtLobe", count)] if count else []
     members += [Field("transmitted", "VtLobe")] if "transmitted" in places else []
     members += [Field(name, kind) for name, kind in kinds.items() if "." not in name]
-    return [
-        Struct("VtLobe", [Field(name, kind) for name, kind in parts.items()], "rotation in radians"),
-        Struct("VtLobes", members, "of light from one direction"),
-    ]
+    lobe = Struct("VtLobe", [Field(name, kind) for name, kind in parts.items()], "rotation in radians")
+    return [*([lobe] if parts else []), Struct("VtLobes", members, "of light from one direction")]

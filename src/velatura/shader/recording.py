@@ -82,14 +82,11 @@ def record(
     of the stack, with a weight for every lobe, and, without textures, with lobes that are read.
 
     Raises:
-        InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture;
-            no interface.
+        InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture.
     """
     chosen = named(model, **switches)
     if chosen.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
-    if not stack.interfaces:
-        raise InvalidInput("layers: a shader needs an interface, and this material is a diffuse base alone")
     flat = stack.flat()
     for name in constant:
         if name not in flat:
@@ -98,7 +95,8 @@ def record(
 
     # Run the model
     uniform = not any(isinstance(value, Varying) for value in flat.values())
-    chosen = chosen if uniform else chosen.adder  # which is worked out at every point
+    if not (uniform and stack.interfaces):
+        chosen = chosen.adder  # which is worked out at every point, and is Lambert's law for a diffuse base alone
     solved = not chosen.recursion.closed_form
     constants = flat if solved and not parameters else constant
     recorded = Material.of(

@@ -119,7 +119,9 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   });
 
   function update() {
-    if (page) render(page.view(), element);
+    if (!page) return;
+    render(page.view(), element);
+    if (address) document.title = `${store.get().name || 'Material'} - Velatura`;
   }
 
   function conflict(file) {
@@ -153,7 +155,10 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   element.addEventListener('input', () => messages.forgiveAll('passing'), { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
   root.addEventListener('drop', (event) => onDrop(event, files.take), { signal });
-  const counting = window.setInterval(() => showSamples(element, viewport), COUNTED);
+  const counting = window.setInterval(() => {
+    showSamples(element, viewport);
+    showDifference(element, viewport);
+  }, COUNTED);
 
   return {
     ...{ store, session, live, viewport, canvas, element },
@@ -259,9 +264,17 @@ function onDrop(event, take) {
   take(file);
 }
 
+const counted = (count, noun) => `${count} ${noun}${count === 1 ? '' : 's'}`;
+
+async function showDifference(element, viewport) {
+  const mean = await viewport.difference();
+  const place = element.querySelector('.measure');
+  if (place && mean !== null) place.textContent = `mean ${mean.toFixed(4)}`;
+}
+
 /** The count of samples, which changes too often to draw the page for it. */
 function showSamples(element, { samples, truth }) {
-  const shown = Number.isFinite(samples) && samples > 0 ? `${samples} samples` : 'preview';
+  const shown = Number.isFinite(samples) && samples > 0 ? counted(samples, 'sample') : 'preview';
   const place = element.querySelector('.samples');
   place.textContent = truth ? `${shown}, truth ${truth.samples || 'on its way'}` : shown;
 }

@@ -1,6 +1,6 @@
 // Bundles the page and the notebook's widget into ../static, and unpacks the environments.
 
-import { copyFile, mkdir, readFile, readdir, rm, stat, writeFile } from 'node:fs/promises';
+import { copyFile, cp, mkdir, readFile, readdir, rm, stat, writeFile } from 'node:fs/promises';
 import { join } from 'node:path';
 import { build, context } from 'esbuild';
 
@@ -52,6 +52,7 @@ const carried = [...Object.keys(dependencies), 'fflate', '@pmndrs/assets']; // t
 const begun = Date.now() - 1000; // file systems round times
 await mkdir(`${STATIC}/environments`, { recursive: true });
 await copyFile('index.html', `${STATIC}/index.html`);
+await cp('thumbnails', `${STATIC}/thumbnails`, { recursive: true });
 await writeFile(`${STATIC}/LICENSES.txt`, await licences(carried));
 for (const name of ENVIRONMENTS) await writeFile(`${STATIC}/environments/${name}.exr`, await environment(name));
 const entries = [page, widget];

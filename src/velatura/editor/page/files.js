@@ -31,6 +31,12 @@ export function createFiles({ store, session, call, storage, messages, address, 
       store.run(commands.openMaterial, material, place);
       messages.say(`Opened ${material.name || 'a material'}.`);
     },
+    /** Begins a new material: a coat over a diffuse base. */
+    begin() {
+      const layers = ['interface', 'diffuse'].map((kind) => ({ [kind]: session.layers[kind].fresh }));
+      store.run(commands.openMaterial, { layers });
+      messages.say('A new material, not in a file yet.');
+    },
     openFile: (file) =>
       messages.attempt('open', async () => {
         const { material, version } = await call('open', { file });

@@ -1,8 +1,9 @@
 // The canvas: one picture or two, each a preview, a sum of paths or in between; and the truth in the place of one.
 
-import { blending, display } from './glsl/display.glsl.js';
+import { blending, display, metering } from './glsl/display.glsl.js';
 
 const FIRST = 4; // samples from which on they are shown
+const PARTS = [16, 9]; // of a picture, in which differences are summed
 const TRUSTED = 16; // samples from which on the preview shows through no more
 
 /** Whether a slot has paths enough to be judged by them alone. */
@@ -13,6 +14,7 @@ export class Screen {
   #device;
   #blending = null;
   #display = null;
+  #sums = null;
 
   constructor(device) {
     this.#device = device;
@@ -36,9 +38,25 @@ export class Screen {
 
   /** Draws the slots that are seen, by the settings of the view. */
   paint(slots, { mode, split, exposure }) {
-    const [a, b = this.truth?.texture ?? a] = slots.map((slot) => this.#textureOf(slot));
+    const [a, b] = this.#pictures(slots);
     const shown = { exposure, split: mode === 'split' ? split : 1, difference: mode === 'difference' };
     this.#device.draw(this.#display, { picture_a: a, picture_b: b, ...shown }, null);
+  }
+
+  /** The mean absolute difference in luminance of the two slots that are seen. */
+  async difference(slots, { exposure }) {
+    const program = await this.#device.program(metering);
+    const [a, b] = this.#pictures(slots);
+    this.#sums ??= this.#device.target(...PARTS, ['RGBA32F']);
+    this.#device.draw(program, { picture_a: a, picture_b: b, exposure, parts: PARTS }, this.#sums);
+    const found = await this.#device.readLater(this.#sums);
+    const total = (channel) => found.reduce((sum, x, index) => sum + (index % 4 === channel ? x : 0), 0);
+    return total(0) / total(1);
+  }
+
+  #pictures(slots) {
+    const [a, b = this.truth?.texture ?? a] = slots.map((slot) => this.#textureOf(slot));
+    return [a, b];
   }
 
   /** Draws one picture as the canvas would show it. */

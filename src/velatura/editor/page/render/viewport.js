@@ -203,6 +203,12 @@ export class Viewport {
     return radianceOf(this.device, this.slots[slot].sum);
   }
 
+  /** The mean absolute difference in luminance, exposed, of what is compared; null where nothing is, yet. */
+  async difference() {
+    if (this.settings.mode !== 'difference' || !this.screen.ready || this.lost) return null;
+    return this.screen.difference(this.#seen(), this.settings);
+  }
+
   /** A small square picture of another material on the same object, from here; an ImageData. */
   thumbnail(shader, contents, size, samples) {
     const uniforms = this.uniforms({ width: size, height: size });

@@ -87,16 +87,45 @@ function inserted(state, layer, index) {
   return { ...state, layers: [...state.layers.slice(0, index), layer, ...state.layers.slice(index)] };
 }
 
-/** Adds a layer where it makes sense: a coat on top, a medium between interfaces, a base below everything. */
-export const addLayer = titled('add a layer', (state, kind, keys = {}) => {
+/**
+ * Adds a layer at the place `at` among all, or where it makes sense: a coat on top, a medium between interfaces, a base
+ * below everything. A new interface has an index that differs from those of its neighbours.
+ */
+export const addLayer = titled('add a layer', (state, kind, keys = {}, at = null) => {
   const layer = { id: freshId(state), kind, enabled: true, keys };
-  if (kind === 'interface') return inserted(state, layer, 0);
   if (isBase(layer)) {
     const covered = state.layers.map((other) => (isOpaque(other) ? { ...other, enabled: false } : other));
     return inserted({ ...state, layers: covered }, layer, state.layers.length);
   }
-  return inserted(state, layer, gap(state));
+  const index = at ?? (kind === 'interface' ? 0 : gap(state));
+  const fresh = typeof keys.eta === 'number' ? { ...layer, keys: stepped(state, keys, index) } : layer;
+  return standing(inserted(state, fresh, index));
 });
+
+const STEPS = [1.33, 1.7]; // indices of interfaces next to one of a fresh index
+const STEP = 0.05; // of the index, which is seen
+
+/** The keys of an interface whose index would be that of a neighbour: with another one, at the bottom the exterior's. */
+function stepped({ layers, exterior }, keys, at) {
+  const isInterface = ({ kind, enabled }) => enabled && kind === 'interface';
+  const next = [layers.slice(0, at).findLast(isInterface), layers.slice(at).find(isInterface)];
+  const [above, below] = next.map((layer) => layer?.keys.eta);
+  const differs = (eta) => [above, below].every((other) => !(Math.abs(eta - other) < STEP));
+  const bottom = above !== undefined && layers.slice(at).every((layer) => !layer.enabled);
+  const found = [...(bottom ? [exterior] : []), keys.eta, ...STEPS].find(differs);
+  return { ...keys, eta: found };
+}
+
+/** Turns off what cannot stand: what lies below an opaque layer, and media above nothing. */
+function standing(state) {
+  const covered = state.layers.findIndex((layer) => layer.enabled && isOpaque(layer));
+  const lowest = state.layers.findLastIndex(({ enabled, kind }) => enabled && kind !== 'medium');
+  const last = covered >= 0 ? covered : lowest;
+  return {
+    ...state,
+    layers: state.layers.map((layer, index) => (index > last ? { ...layer, enabled: false } : layer)),
+  };
+}
 
 /** The lowest place between two layers that can take a medium, or else the top. */
 function gap({ layers }) {
@@ -106,10 +135,9 @@ function gap({ layers }) {
   return 0;
 }
 
-export const removeLayer = titled('remove a layer', (state, id) => ({
-  ...state,
-  layers: state.layers.filter((layer) => layer.id !== id),
-}));
+export const removeLayer = titled('remove a layer', (state, id) =>
+  standing({ ...state, layers: state.layers.filter((layer) => layer.id !== id) }),
+);
 
 /** Moves a layer to the place `index` among all. */
 export const moveLayer = titled('move a layer', (state, id, index) => {
@@ -133,24 +161,30 @@ export const setValue = titled('change a value', (state, id, key, value) =>
   changed(state, id, ({ keys }) => ({ keys: { ...keys, [key]: value } })),
 );
 
-/** Makes an interface a `dielectric`, `metal`, `custom` or `mirror`; indices that it has are kept. */
-export const setVariant = titled('change the kind of an interface', (state, id, variant, names) =>
-  changed(state, id, ({ keys }) => {
-    if (variantOf(keys) === variant) return {};
-    const { eta, k, conductor, ...surface } = keys;
-    const metal = conductor === undefined || conductor === 'mirror' ? 'Al' : conductor;
-    const index = {
-      dielectric: () => ({ eta: typeof eta === 'string' && names.conductors[eta] ? 1.5 : (eta ?? 1.5) }),
-      metal: () => ({ conductor: metal }),
-      custom: () => ({
-        eta: eta ?? rounded(indices(metal, 'eta', names)),
-        k: k ?? rounded(indices(metal, 'k', names)),
-      }),
-      mirror: () => ({ conductor: 'mirror' }),
-    };
-    return { keys: { ...index[variant](), ...surface } };
-  }),
+/**
+ * Makes an interface or a base `diffuse`, `dielectric`, `metal`, `custom` or `mirror`; indices that it has are kept. What
+ * another kind takes that it has not is `fresh`, by the names of layers.
+ */
+export const setVariant = titled('change the kind of a layer', (state, id, variant, names, fresh) =>
+  standing(changed(state, id, ({ kind, keys }) => become(variant, kind, keys, names, fresh))),
 );
+
+function become(variant, kind, keys, names, fresh) {
+  if (variantOf({ kind, keys }) === variant) return {};
+  if (variant === 'diffuse') return { kind: 'diffuse', keys: fresh.diffuse };
+  const { eta, k, conductor, ...surface } = kind === 'interface' ? keys : fresh.interface;
+  const metal = conductor === undefined || conductor === 'mirror' ? 'Al' : conductor;
+  const index = {
+    dielectric: () => ({ eta: typeof eta === 'string' && names.conductors[eta] ? 1.5 : (eta ?? 1.5) }),
+    metal: () => ({ conductor: metal }),
+    custom: () => ({
+      eta: kind === 'interface' && eta !== undefined ? eta : rounded(indices(metal, 'eta', names)),
+      k: k ?? rounded(indices(metal, 'k', names)),
+    }),
+    mirror: () => ({ conductor: 'mirror' }),
+  };
+  return { kind: 'interface', keys: { ...index[variant](), ...surface } };
+}
 
 const rounded = (colour) => colour.map((channel) => Number(channel.toPrecision(4)));
 

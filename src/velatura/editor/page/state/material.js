@@ -23,8 +23,9 @@ export function documentOf(state) {
   };
 }
 
-/** What an interface is: `dielectric`, `metal` (by name), `custom` (eta and k) or `mirror`. */
-export function variantOf(keys) {
+/** What a layer is: an interface `dielectric`, `metal` (by name), `custom` (eta and k) or `mirror`, else its kind. */
+export function variantOf({ kind, keys }) {
+  if (kind !== 'interface') return kind;
   if (keys.conductor !== undefined) return keys.conductor === 'mirror' ? 'mirror' : 'metal';
   return keys.k === undefined ? 'dielectric' : 'custom';
 }
@@ -33,13 +34,14 @@ export function variantOf(keys) {
 export const isBase = ({ kind }) => kind === 'diffuse';
 
 export const isOpaque = (layer) =>
-  isBase(layer) || (layer.kind === 'interface' && variantOf(layer.keys) !== 'dielectric');
+  isBase(layer) || (layer.kind === 'interface' && variantOf(layer) !== 'dielectric');
 
 /** How a message or a button calls a layer; `declared` are the layers of the session. */
-export function layerName({ kind, keys }, declared) {
+export function layerName(layer, declared) {
+  const { kind, keys } = layer;
   if (kind !== 'interface') return declared[kind].title;
   if (keys.conductor !== undefined) return keys.conductor;
-  return typeof keys.eta === 'string' ? keys.eta : variantOf(keys) === 'custom' ? 'metal' : 'dielectric';
+  return typeof keys.eta === 'string' ? keys.eta : variantOf(layer) === 'custom' ? 'metal' : 'dielectric';
 }
 
 /** A number or three, where a name may stand: indices of `names` ({dielectrics, conductors}). */

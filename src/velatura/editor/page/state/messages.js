@@ -2,7 +2,9 @@
 
 import { Offline } from '../connection.js';
 
-/** Messages; `changed` is called after every change of them. */
+const READ = 12000; // milliseconds until a passing message, or a note, has been read
+
+/** Messages; `changed` is called after every change of them. Notes and passing problems go by themselves. */
 export function createMessages(changed) {
   const problems = new Map(); // by what they are about
   let note = '';
@@ -10,8 +12,10 @@ export function createMessages(changed) {
   const messages = {
     /** Reports a problem until it is forgiven, or the next action (`passing`), or the server is back (`away`). */
     complain(about, text, { layer = null, actions = [], passing = false, away = false } = {}) {
+      const problem = { text, layer, actions, passing, away };
       problems.delete(about); // the latest comes last
-      problems.set(about, { text, layer, actions, passing, away });
+      problems.set(about, problem);
+      if (passing) setTimeout(() => problems.get(about) === problem && messages.forgive(about), READ);
       changed();
     },
     /** The same of an act that has failed. */
@@ -38,6 +42,11 @@ export function createMessages(changed) {
     say(text) {
       note = text;
       changed();
+      setTimeout(() => {
+        if (note !== text) return;
+        note = '';
+        changed();
+      }, READ);
     },
     /** An action was done: messages about earlier ones end, and are not redrawn for that alone. */
     done() {

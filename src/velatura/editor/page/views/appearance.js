@@ -9,7 +9,8 @@ import { createClass } from './appearance/class.js';
 import { handles } from './appearance/handles.js';
 import { about, changed, hue, withMean } from './appearance/looks.js';
 import { asker, oneAtATime } from './appearance/questions.js';
-import { capital, colourRow, hex, menu, number } from './controls.js';
+import { colourRow, hex } from './colour.js';
+import { capital, menu, number } from './controls.js';
 import { mean, shown } from './plots/scale.js';
 import { line } from './settings.js';
 

@@ -211,7 +211,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
           onCursor: setCursor,
         }),
         read: {
-          title: `f cos at ${shown(angle)}°${cursor < 0 && side === '' ? ', towards the light' : ''}${side && ' beyond'}`,
+          title: `BSDF × cosine at ${shown(angle)}°${cursor < 0 && side === '' ? ', towards the light' : ''}${side && ' beyond'}`,
           parts: slice.parts.map((values) => values[place]),
           all: slice.all[place],
           other: other && { parts: other.parts.map((values) => values[place]), all: other.all[place] },
@@ -243,7 +243,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
           )}
         </div>`,
         read: {
-          title: cursor ? `f cos at ${cursor.point.map(shown).join(', ')}` : 'f cos: point at a disc',
+          title: cursor ? `BSDF × cosine at ${cursor.point.map(shown).join(', ')}` : 'BSDF × cosine: point at a disc',
           parts: parts ?? [],
           all: cursor ? colourAt(a.disc(SIZE, sides[which]), cursor.point) : null,
         },
@@ -350,6 +350,8 @@ export function mountInspector(element, { store, session, viewport, call, pictur
     return seenLayers(layers).map((layer) => `${layer} ${described(all[layer], session.layers)}`).join(', ');
   }
 
+  const titleOf = ({ state }) => session.models.find(({ name }) => name === state.model).title;
+
   function legend({ title, parts, all, other, swatches = true }) {
     const swatch = (look) => (swatches ? html`<span class="swatch ${look}"></span>` : nothing);
     const row = (k, name, look, value, second) => html`<tr class=${k !== null && k === lobe() ? 'alone' : ''}>
@@ -367,8 +369,8 @@ export function mountInspector(element, { store, session, viewport, call, pictur
       <thead>
         <tr>
           <th scope="col">${title}</th>
-          <th scope="col">${other ? slices.a.state.model : nothing}</th>
-          ${other ? html`<th scope="col">- - ${slices.b.state.model}</th>` : nothing}
+          <th scope="col">${other ? titleOf(slices.a) : nothing}</th>
+          ${other ? html`<th scope="col">- - ${titleOf(slices.b)}</th>` : nothing}
         </tr>
       </thead>
       <tbody>

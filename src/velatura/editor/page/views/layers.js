@@ -15,10 +15,10 @@ import {
   setThin,
   setVariant,
 } from '../state/commands.js';
-import { isBase, layerName, variantOf } from '../state/material.js';
+import { enabled, isBase, layerName, variantOf } from '../state/material.js';
 import { capital, flag, iconButton, menu, numberField } from './controls.js';
 import { icons } from './icons.js';
-import { parameter, parametersOf } from './parameter.js';
+import { parameter, parametersOf, tintOf } from './parameter.js';
 import { text } from './typing.js';
 
 const VARIANTS = [
@@ -27,10 +27,13 @@ const VARIANTS = [
   ['custom', 'Metal by eta and k'],
   ['mirror', 'Mirror'],
 ];
+const BASES = [...VARIANTS, ['diffuse', 'Diffuse']];
+const BETWEEN = ['interface', 'medium']; // kinds that may lie above others
 
 /** A view of the layers of the state. */
 export function createLayers(services) {
-  const panel = { ...services, dropAt: null }; // the place where a card that is dragged would go
+  // The places where a card that is dragged would go, and where a new one is chosen
+  const panel = { ...services, dropAt: null, openAt: null, spaces: new Map() };
   return () => layers(panel);
 }
 
@@ -42,8 +45,9 @@ function layers(panel) {
       ${repeat(
         state.layers,
         ({ id }) => id,
-        (layer, index) => card(panel, layer, index),
+        (layer, index) => html`${between(panel, index)}${card(panel, layer, index)}`,
       )}
+      ${state.layers.some(isBase) ? nothing : between(panel, state.layers.length)}
     </ol>
     <div class="add" role="group" aria-label="Add a layer">
       <span>Add</span>
@@ -55,6 +59,44 @@ function layers(panel) {
       )}
     </div>
   `;
+}
+
+/** A place for a new layer, and where it was chosen the kinds that may lie there. */
+function between(panel, index) {
+  const { store, session } = panel;
+  const open = panel.openAt === index;
+  const show = (at) => {
+    panel.openAt = at;
+    panel.update();
+  };
+  const add = (kind) => {
+    show(null);
+    store.run(addLayer, kind, session.layers[kind].fresh, index);
+    panel.focus(`[data-layer="${store.get().layers[index].id}"] .grip`);
+  };
+  const kinds = index === store.get().layers.length ? Object.keys(session.layers) : BETWEEN;
+  return html`<li class="between">
+    <button
+      type="button"
+      class="small plus"
+      title="Add a layer here"
+      aria-label=${`Add a layer at place ${index}`}
+      aria-expanded=${open}
+      @click=${() => show(open ? null : index)}
+    >
+      ${icons.plus}
+    </button>
+    ${
+      open
+        ? kinds.map(
+            (kind) =>
+              html`<button type="button" data-kind=${kind} @click=${() => add(kind)}>
+                ${capital(session.layers[kind].title)}
+              </button>`,
+          )
+        : nothing
+    }
+  </li>`;
 }
 
 function top({ store, session, edits }, { name, exterior, thin }) {
@@ -73,7 +115,7 @@ function top({ store, session, edits }, { name, exterior, thin }) {
     <label title=${material.exterior.doc}>
       Exterior ${numberField({ label: 'Exterior index', value: exterior, spec: material.exterior, edit })}
     </label>
-    ${flag({ label: 'Thin', value: thin, title: material.thin.doc, choose: (on) => store.run(setThin, on) })}
+    ${flag({ label: 'Thin pane', value: thin, title: material.thin.doc, choose: (on) => store.run(setThin, on) })}
   </div>`;
 }
 
@@ -84,6 +126,8 @@ function card(panel, layer, index) {
   const name = layerName(layer, session.layers);
   const problem = panel.messages.problemOf(layer.id);
   const number = numberOf(store.get(), layer.id);
+  const standing = enabled(store.get()).filter(({ kind }) => kind !== 'medium');
+  const only = standing.length === 1 && standing[0] === layer; // without which there is no material
   return html`<li
     class="layer ${layer.kind} ${layer.enabled ? '' : 'off'} ${panel.dropAt === index ? 'drop' : ''}"
     data-layer=${layer.id}
@@ -107,6 +151,7 @@ function card(panel, layer, index) {
           type="checkbox"
           title="On or off"
           aria-label=${`${name} is on`}
+          ?disabled=${only}
           .checked=${live(layer.enabled)}
           @change=${({ target }) => store.run(enableLayer, layer.id, target.checked)}
         />
@@ -119,11 +164,17 @@ function card(panel, layer, index) {
                 act: () => store.run(duplicateLayer, layer.id),
               })
         }
-        ${iconButton({ label: `Remove ${name}`, icon: 'remove', act: () => remove(panel, layer, index) })}
+        ${iconButton({
+          label: `Remove ${name}`,
+          icon: 'remove',
+          act: () => remove(panel, layer, index),
+          disabled: only,
+        })}
       </span>
     </div>
     ${problem ? html`<p class="problem">${problem}</p>` : nothing}
     <div class="parameters" ?hidden=${!layer.enabled}>
+      ${layer.kind === 'medium' ? tintOf(panel, layer) : nothing}
       ${repeat(
         parametersOf(layer, session.schema),
         (key) => key,
@@ -134,10 +185,12 @@ function card(panel, layer, index) {
 }
 
 function kindOf({ store, session }, layer) {
-  if (layer.kind !== 'interface')
+  if (layer.kind === 'medium')
     return html`<span class="kind">${capital(session.layers[layer.kind].title)}</span>`;
-  const choose = (variant) => store.run(setVariant, layer.id, variant, session.names);
-  return menu({ label: 'Kind of interface', value: variantOf(layer.keys), options: VARIANTS, choose });
+  const fresh = Object.fromEntries(Object.entries(session.layers).map(([kind, { fresh }]) => [kind, fresh]));
+  const choose = (variant) => store.run(setVariant, layer.id, variant, session.names, fresh);
+  const options = enabled(store.get()).at(-1) === layer ? BASES : VARIANTS;
+  return menu({ label: 'Kind of layer', value: variantOf(layer), options, choose });
 }
 
 function remove(panel, layer, index) {
@@ -160,7 +213,7 @@ function moveByKey(panel, event, layer, index) {
 function moveByHand(panel, event, layer) {
   if (event.button !== 0) return;
   const grip = event.currentTarget;
-  const cards = [...grip.closest('.layers').children];
+  const cards = [...grip.closest('.layers').querySelectorAll('.layer')];
   const over = ({ clientY }) => {
     const index = cards.findIndex((card) => clientY < card.getBoundingClientRect().bottom);
     return index < 0 ? cards.length - 1 : index;

@@ -2,6 +2,7 @@
 
 import { html, nothing } from 'lit-html';
 import { styleMap } from 'lit-html/directives/style-map.js';
+import { LARGEST_DIFFERENCE } from '../render/glsl/display.glsl.js';
 import { setView } from '../state/commands.js';
 
 /**
@@ -23,7 +24,7 @@ export function createPage({ store, session, edits, messages, canvas, focus, upd
     ${parts.toolbar()}
     <main class="stage">
       <div class="picture">
-        ${canvas} ${divider({ store, session, edits })}
+        ${canvas} ${compared({ store, session, edits })}
         <span class="samples" aria-hidden="true"></span>
         ${bubbles(messages)}
       </div>
@@ -114,12 +115,30 @@ function bubbles(messages) {
   </div>`;
 }
 
-/** The line between two models, which can be dragged, and moved by keys. */
-function divider({ store, session, edits }) {
+/** What is compared, by name: two models on either side of a line, or the scale of their difference. */
+function compared({ store, session, edits }) {
   const { view, model } = store.get();
-  if (view.mode !== 'split') return nothing;
-  const { models, default_model: standard } = session;
-  const titleOf = (name) => models.find((known) => known.name === name).title;
+  const titleOf = (name) => session.models.find((known) => known.name === name).title;
+  const a = view.other?.material ? 'A' : titleOf(model);
+  const b = view.other?.title ?? titleOf(view.other?.model ?? session.default_model);
+  if (view.mode === 'split')
+    return html`${divider({ view, edits })}<span class="side left">${a}</span><span class="side right">${b}</span>`;
+  return view.mode === 'difference' ? scale({ a, b }) : nothing;
+}
+
+function scale({ a, b }) {
+  return html`<div class="scale" title="Difference in luminance, exposed as the picture is">
+    <span>${b} darker</span>
+    <span class="ramp" aria-hidden="true"
+      ><i>−${LARGEST_DIFFERENCE}</i><i>0</i><i>+${LARGEST_DIFFERENCE}</i></span
+    >
+    <span>brighter than ${a}</span>
+    <span class="measure" role="status"></span>
+  </div>`;
+}
+
+/** The line between two models, which can be dragged, and moved by keys. */
+function divider({ view, edits }) {
   const move = (split) => edits.drag('split', setView, { split: Math.max(0, Math.min(1, split)) });
   const onKey = (event) => {
     const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];
@@ -148,7 +167,5 @@ function divider({ store, session, edits }) {
       @pointermove=${byHand}
       @pointerup=${edits.settle}
     ></div>
-    <span class="side left">${view.other?.material ? 'A' : titleOf(model)}</span>
-    <span class="side right">${view.other?.title ?? titleOf(view.other?.model ?? standard)}</span>
   `;
 }

@@ -1,9 +1,10 @@
 // A parameter of a layer: its name, the control for its kind, and its alternatives.
 
 import { html, nothing } from 'lit-html';
-import { axes, indices, variantOf } from '../state/material.js';
+import { axes, enabled, indices, isOpaque, variantOf } from '../state/material.js';
 import { setValue } from '../state/commands.js';
-import { channelsOf, colour, dial, iconButton, menu, number, numberField, texture } from './controls.js';
+import { channelsOf, colour, tint } from './colour.js';
+import { dial, iconButton, menu, number, numberField, texture } from './controls.js';
 
 const NAMES = {
   eta: 'Index',
@@ -14,7 +15,7 @@ const NAMES = {
   depth: 'Depth',
   sigma_a: 'Absorption',
   sigma_s: 'Scattering',
-  g: 'Mean cosine',
+  g: 'Forward (g)',
   albedo: 'Albedo',
 };
 const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fields take any
@@ -27,14 +28,30 @@ const isBrushing = (value) => value?.brushing !== undefined;
 const INDICES = { dielectric: ['eta'], metal: ['conductor'], custom: ['eta', 'k'], mirror: [] };
 
 /** Which parameters a layer shows: of the indices, an interface has those of its kind only. */
-export function parametersOf({ kind, keys }, schema) {
-  const all = Object.keys(schema[kind]);
-  if (kind !== 'interface') return all;
+export function parametersOf(layer, schema) {
+  const all = Object.keys(schema[layer.kind]);
+  if (layer.kind !== 'interface') return all;
   const hidden = Object.values(INDICES).flat();
-  return [...INDICES[variantOf(keys)], ...all.filter((key) => !hidden.includes(key))];
+  return [...INDICES[variantOf(layer)], ...all.filter((key) => !hidden.includes(key))];
 }
 
-/** `services` are {session, edits, messages, choose, upload}. */
+/** The colour of a medium, which is that of its absorption; nothing where an image or a table has it. */
+export function tintOf({ store, session, edits }, layer) {
+  const { sigma_a: sigma, depth } = { ...standards(session.schema.medium), ...layer.keys };
+  if (typeof depth !== 'number' || depth <= 0 || typeof sigma !== 'number' && !Array.isArray(sigma)) return nothing;
+  const twice = isOpaque(enabled(store.get()).at(-1));
+  const label = `Colour ${twice ? 'twice' : 'once'} through`;
+  const act = (next) => [setValue, layer.id, 'sigma_a', next];
+  const edit = edits.of(`${layer.id}.sigma_a`, act, `layer.${layer.id}`, layer.id);
+  return html`<div class="parameter" title="What absorption leaves of white light, at the normal; changes sigma_a">
+    <span class="name">${label}</span>
+    <div class="control">${tint({ label, sigma, way: (twice ? 2 : 1) * depth, edit })}</div>
+  </div>`;
+}
+
+const standards = (schema) => Object.fromEntries(Object.entries(schema).map(([key, spec]) => [key, spec.default]));
+
+/** `services` are {session, edits, messages, choose, upload, spaces}; `spaces` holds the colours that are shown by hue. */
 export function parameter(services, layer, key) {
   const { session, edits } = services;
   const spec = session.schema[layer.kind][key];
@@ -81,17 +98,26 @@ function simple(context, control, span = SPANS[context.key]) {
   const { value } = context;
   if (isTexture(value)) return textured(context);
   if (isSpectrum(value)) return measured(context);
-  return {
-    control: control({ ...context, ...(span && { span }) }),
-    extras: html`${control === colour ? channelsSwitch(context) : nothing}${textureButton(context)}`,
-  };
+  const channels = control === colour && { hsv: spaceOf(context), beside: channelsMenu(context) };
+  return { control: control({ ...context, ...channels, ...(span && { span }) }), extras: textureButton(context) };
 }
 
-function channelsSwitch({ label, value, edit }) {
+const placeOf = ({ layer, key }) => `${layer.id}.${key}`;
+const spaceOf = ({ services, ...context }) => services.spaces.get(placeOf(context)) ?? null;
+
+/** Whether a colour is one number, or three, or three by hue. */
+function channelsMenu(context) {
+  const { services, label, value, spec, edit } = context;
   const several = Array.isArray(value);
-  const act = () =>
-    edit.set(several ? Number((value.reduce((a, b) => a + b) / 3).toPrecision(4)) : channelsOf(value));
-  return iconButton({ label: `${label} by channel`, icon: 'channels', pressed: several, act });
+  const options = [['grey', 'Grey'], ['rgb', 'RGB'], ...(spec.high === 1 ? [['hsv', 'HSV']] : [])];
+  const choose = (name) => {
+    services.spaces.delete(placeOf(context));
+    if (name === 'hsv') services.spaces.set(placeOf(context), { latest: null });
+    if (name === 'grey') edit.set(Number((value.reduce((a, b) => a + b) / 3).toPrecision(4)));
+    else if (!several) edit.set(channelsOf(value));
+    else services.update();
+  };
+  return menu({ label: `${label} by`, value: several ? (spaceOf(context) ? 'hsv' : 'rgb') : 'grey', options, choose });
 }
 
 /** An index: a name of a measured material, or numbers. */
@@ -100,7 +126,7 @@ function index(context) {
   if (isTexture(value)) return textured(context);
   if (isSpectrum(value)) return measured(context);
   const { dielectrics, conductors } = services.session.names;
-  const opaque = variantOf(layer.keys) === 'custom';
+  const opaque = variantOf(layer) === 'custom';
   const group = (title, names) => {
     const known = Object.keys(names);
     return { group: title, options: known };

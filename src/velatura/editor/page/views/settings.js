@@ -48,7 +48,7 @@ function view({ store, session, edits, picture, choose, takeEnvironment }) {
   return html`
     ${choice('Object', view.object, withOwn(objects, view.object), chooseObject)}
     ${choice('Light', view.environment, withOwn(known, view.environment), change('environment').set)}
-    ${line('Turned by', dial({ label: 'Rotation of the light', value: view.rotation, edit: change('rotation') }))}
+    ${line('Light turned', dial({ label: 'Rotation of the light', value: view.rotation, edit: change('rotation') }))}
     ${line('Exposure', number({ ...exposure, value: view.exposure, edit: change('exposure') }))}
     ${line('Lobes', lobes({ store, session, picture }))}
     <div class="actions">

@@ -1,6 +1,7 @@
 // The toolbar: files, history, the picture, and whether the server is there; the dialogs that it opens.
 
 import { html, nothing } from 'lit-html';
+import { live } from 'lit-html/directives/live.js';
 import { ref, createRef } from 'lit-html/directives/ref.js';
 import { isChanged, placeOf } from '../state/commands.js';
 import { iconButton } from './controls.js';
@@ -14,6 +15,7 @@ export function createToolbar(services) {
     dialogs,
     listed: null, // files of the folder
     targets: null, // of the papers
+    sought: '', // in the titles of what can be opened
     saveAs: () => dialogs.save.value.showModal(),
     saveAgain() {
       const { file, version } = placeOf(store.get());
@@ -30,6 +32,7 @@ function toolbar(bar) {
   return html`
     <header class="toolbar" role="toolbar" aria-label="File and history">
       <span class="brand">Velatura</span>
+      <button type="button" @click=${bar.files.begin} title="A coat over a diffuse base">New</button>
       <button type="button" @click=${() => openDialog(bar)}>Open</button>
       <button type="button" @click=${bar.saveAgain} title="Ctrl-S">Save</button>
       <button type="button" @click=${bar.saveAs}>Save as</button>
@@ -46,7 +49,7 @@ function toolbar(bar) {
       ${step('Redo', 'redo', store.redo, store.canRedo, store.redoes)}
       <span class="gap"></span>
       <span class="document" title=${changed ? 'There are changes that are not saved' : ''}>
-        ${file ?? 'not in a file'}${changed ? ' · unsaved changes' : nothing}
+        ${file ?? 'Not saved'}${file && changed ? ' · unsaved changes' : nothing}
       </span>
       <span class="rest"></span>
       <button type="button" @click=${bar.savePicture} title="As PNG">Save picture</button>
@@ -63,6 +66,7 @@ const step = (word, icon, act, can, title) =>
 
 async function openDialog(bar) {
   bar.listed = null;
+  bar.sought = '';
   bar.update();
   bar.dialogs.open.value.showModal();
   await bar.messages.attempt('list', async () => (bar.listed = (await bar.call('list', {})).files));
@@ -73,34 +77,56 @@ async function openDialog(bar) {
 
 function openPanel(bar) {
   const close = () => bar.dialogs.open.value.close();
-  const entry = (title, act) =>
-    html`<li>
-      <button type="button" @click=${() => close() || act()}>${title}</button>
-    </li>`;
+  const sought = bar.sought.trim().toLowerCase();
+  const found = (entries) => entries.filter(({ title }) => title.toLowerCase().includes(sought));
   const fromHere = async () => {
     const file = await bar.choose('.yaml,.yml,.json');
     if (file) bar.files.readFile(file);
   };
+  const seek = ({ target }) => {
+    bar.sought = target.value;
+    bar.update();
+  };
+  const presets = bar.session.presets.map(({ name, title, group, material }) => ({
+    title,
+    group,
+    picture: bar.address && new URL(`thumbnails/${name}.jpg`, bar.address).href,
+    act: () => bar.files.open(material),
+  }));
+  const groups = [...new Set(presets.map(({ group }) => group))].sort();
+  const targets = (bar.targets ?? []).map((target) => ({ title: target.title, act: () => bar.openTarget(target) }));
+  const listed = (bar.listed ?? []).map((file) => ({ title: file, act: () => bar.files.openFile(file) }));
+  const section = (title, entries, empty = nothing) => html`
+    <h2>${title}</h2>
+    ${entries.length ? nothing : empty}
+    <ul class=${entries[0]?.picture ? 'cards' : 'names'}>
+      ${entries.map((entry) => card(entry, close))}
+    </ul>
+  `;
+  const some = (title, entries, empty) => {
+    const these = found(entries);
+    return these.length || (empty && !sought) ? section(title, these, empty) : nothing;
+  };
   return html`<dialog class="open" aria-label="Open a material" ${ref(bar.dialogs.open)}>
-    <h2>Presets</h2>
-    <ul class="names">
-      ${bar.session.presets.map(({ title, material }) => entry(title, () => bar.files.open(material)))}
-    </ul>
-    <h2>From the papers</h2>
-    ${bar.targets ? nothing : html`<p>On their way.</p>`}
-    <ul class="names">
-      ${(bar.targets ?? []).map((target) => entry(target.title, () => bar.openTarget(target)))}
-    </ul>
-    <h2>Files of the folder</h2>
-    ${bar.listed?.length === 0 ? html`<p>There are none.</p>` : nothing}
-    <ul class="names">
-      ${(bar.listed ?? []).map((file) => entry(file, () => bar.files.openFile(file)))}
-    </ul>
-    <div class="actions">
+    <div class="head">
+      <input type="search" aria-label="Search" placeholder="Search" .value=${live(bar.sought)} @input=${seek} />
       <button type="button" @click=${() => close() || fromHere()}>From this computer</button>
       <button type="button" @click=${close}>Cancel</button>
     </div>
+    ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
+    ${some('Files of the folder', listed, html`<p>${bar.listed ? 'There are none.' : 'On their way.'}</p>`)}
+    ${some('From the papers', targets, html`<p>On their way.</p>`)}
   </dialog>`;
+}
+
+const byTitle = (entries) => entries.sort((a, b) => a.title.localeCompare(b.title));
+
+function card({ title, picture, act }, close) {
+  return html`<li>
+    <button type="button" @click=${() => close() || act()}>
+      ${picture ? html`<img src=${picture} alt="" width="160" height="120" loading="lazy" />` : nothing}${title}
+    </button>
+  </li>`;
 }
 
 // Save -----------------------------------------------------------------------------------------------

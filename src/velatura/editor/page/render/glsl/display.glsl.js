@@ -38,6 +38,34 @@ void main() {
 }
 `;
 
+/** Sums of absolute differences of luminance over parts of the picture, and counts of their pixels. */
+export const metering = /* glsl */ `#version 300 es
+precision highp float;
+uniform highp sampler2D picture_a;
+uniform highp sampler2D picture_b;
+uniform float exposure; // stops
+uniform vec2 parts; // along both sides
+out vec4 sum;
+
+vec3 radiance(sampler2D picture, ivec2 pixel) {
+  vec4 sum = texelFetch(picture, pixel, 0);
+  return exp2(exposure) * sum.rgb / max(sum.a, 1e-6);
+}
+
+void main() {
+  vec2 size = vec2(textureSize(picture_a, 0)) / parts, corner = floor(gl_FragCoord.xy) * size;
+  float total = 0.0, count = 0.0;
+  for (int y = int(corner.y); y < int(corner.y + size.y); y++) {
+    for (int x = int(corner.x); x < int(corner.x + size.x); x++) {
+      vec3 apart = radiance(picture_b, ivec2(x, y)) - radiance(picture_a, ivec2(x, y));
+      total += abs(dot(apart, vec3(0.2126, 0.7152, 0.0722)));
+      count += 1.0;
+    }
+  }
+  sum = vec4(total, count, 0.0, 0.0);
+}
+`;
+
 /**
  * Adds a pass to what was summed up: every sample to all pixels near it, by Mitsuba's Gaussian of half a
  * pixel.

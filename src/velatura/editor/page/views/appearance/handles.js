@@ -1,7 +1,7 @@
 // All lobes in one plot, blur against energy, each with a handle.
 
 import { nothing, svg, html } from 'lit-html';
-import { hex } from '../controls.js';
+import { hex } from '../colour.js';
 import { mean, shown } from '../plots/scale.js';
 import { DARKEST, hue } from './looks.js';
 
