@@ -151,6 +151,9 @@ def test_colours_have_part_of_their_classes_in_common(tmp_path: Path) -> None:
     found = bati2021_12.compute(count=40)
     assert np.allclose(found["eta_1"], [[1, 1.79958], [2.11396, 2.57927]], atol=1e-4)
     assert 0 < found["share"] < min(channel["share"] for channel in found["channels"])
+    # The curve of green leaves the bounds, and comes back as another one
+    steps = [np.hypot(*np.diff(curve, axis=0).T) for curve in bati2021_12.members().boundary(channel=1)]
+    assert len(steps) == 3 and max(step.max() for step in steps) < 0.2
     drawn(bati2021_12, found, tmp_path)
 
 

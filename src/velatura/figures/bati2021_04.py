@@ -19,6 +19,7 @@ from velatura.model import named
 from velatura.optics import fresnel
 
 DIELECTRICS, CONDUCTORS, MEDIA = (0.04, 0.1, 0.2, 0.3), (0.3, 0.45, 0.6, 0.8), (1.0, 1.5, 2.0)
+KEPT = (1.0, 1.5)  # of these media the conductors in figure 5
 ETA_MAX, MODEL = 4.0, named("bati2021", reflectance="fresnel")
 
 
@@ -56,7 +57,9 @@ def compute(
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The three plots.
+    """The three plots: conductors thick within bounds, else dashed from dielectric to dielectric (dots).
+
+    Where k < eta it is hatched; crosses are the conductors of figure 5.
 
     Raises:
         InvalidInput: the file cannot be written.
@@ -74,12 +77,27 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     for axes, part, title in zip(others, parts, titles):
         for n, case in enumerate(part):
             label = f"R {case['reflectance']:g}, eta 0 {case['eta_0']:g}"
-            axes.plot(case["eta"], case["k"], color=f"C{n}", label=label)
-        axes.plot((0, 6), (0, 6), color="0.8", linewidth=1, zorder=0)
-        axes.set(title=title, xlabel="eta 1", ylabel="k 1", xlim=(0, None), ylim=(0, None))
+            axes.plot(case["eta"], case["k"], color=f"C{n}", linewidth=2.5, label=label)
+            eta, kappa = _whole(case["reflectance"], case["eta_0"])
+            axes.plot(eta, kappa, "--", color=f"C{n}", linewidth=1)
+            axes.plot(eta[[0, -1]], [0, 0], "o", color=f"C{n}")
+        limit = 1.1 * max(max(case["eta"] + case["k"]) for case in part)
+        axes.fill_between((0, limit), (0, limit), facecolor="none", edgecolor="0.85", hatch="//", zorder=0)
+        axes.set(title=title, xlabel="eta 1", ylabel="k 1", xlim=(0, limit), ylim=(0, limit))
+    for case in numbers["conductors"][count:]:
+        if case["eta_0"] in KEPT:  # in figure 5: at both bounds
+            others[1].plot(np.array(case["eta"])[[0, -1]], np.array(case["k"])[[0, -1]], "kx", zorder=3)
     for axes in figure.axes:
         axes.legend(fontsize="small")
     canvas.save(figure, path)
+
+
+def _whole(reflectance: float, eta_0: float) -> tuple[Any, Any]:
+    """All eta and k of that reflectance, out of bounds too: from one dielectric to the other one."""
+    root = np.sqrt(reflectance)
+    ends = (1 - root) / (1 + root), (1 + root) / (1 - root)
+    eta = sum(ends) / 2 - (ends[1] - ends[0]) / 2 * np.cos(np.linspace(0, np.pi, 200))
+    return eta_0 * eta, eta_0 * np.sqrt(np.maximum((eta - ends[0]) * (ends[1] - eta), 0))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,9 @@ from velatura.figures import canvas
 from velatura.inverse import Above, EquivalenceClass, smooth_pair
 from velatura.model import named
 
+#: Of both points of each name, as the paper's text uses them: A to F lie in this order around the curve.
+LETTERS = {"matched above": "CF", "matched below": "DA", "slab": "EB"}
+KINDS = {"A, D": "no lower interface", "C, F": "no upper interface", "B, E": "slab"}
 ENERGIES, MEDIA = (0.05, 0.15, 0.3, 0.45), (1.0, 1.5, 2.0)
 MODEL = named("bati2021", reflectance="fresnel")
 
@@ -63,13 +66,17 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             for points in case["inside"]:
                 axes.plot(*np.transpose(points), color=f"C{n}", linewidth=2.5)
         axes.plot((0, 7), (0, 7), color="0.8", linewidth=1, zorder=0)
+        for at in (axes.axvline, axes.axhline):  # where the upper interface vanishes in air, and the slab
+            at(1, color="0.8", linewidth=1, zorder=0)
         axes.fill_between((1, 4), 1, 4, color="0.95", zorder=-1)
         axes.set(title=f"({part}) {title}", xlabel="eta 1", ylabel="eta 2", xlim=(0, 4.5), ylim=(0, 4.5))
         axes.legend(fontsize="small", loc="lower right")
     for name, points in numbers["cases"][0]["points"].items():
         figure.axes[0].plot(*np.transpose(points), "ko", markersize=5)
-        for point in points:
-            figure.axes[0].annotate(name, point, xytext=(5, 3), textcoords="offset points", fontsize="x-small")
+        for letter, point in zip(LETTERS[name], points):
+            figure.axes[0].annotate(letter, point, xytext=(6, -10), textcoords="offset points", fontweight="bold")
+    key = "\n".join(f"{letters}: {kind}" for letters, kind in KINDS.items())
+    figure.axes[0].text(0.03, 0.97, key, transform=figure.axes[0].transAxes, va="top", fontsize="small")
     canvas.save(figure, path)
 
 

@@ -18,22 +18,26 @@ from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Interface, Stack
 
 ENERGY = 0.15
-RATIOS = (1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2)  # of eta 1, on the branch of the slab and on the other one
+RATIOS = (1.2, 1.4, 1.6, 1.85, 2.0, 2.2)  # of eta 1, on the branch of the slab and on the other one
 MODEL = "bati2021"
 
 
 def compute(
     ratios: Sequence[float] = RATIOS, count: int = 90, progress: Callable[[int, int], None] | None = None
 ) -> dict[str, Any]:
-    """By `point` its indices (eta_1, eta_2), and its energy over `angles` (degrees) less that of one interface."""
+    """By `point` its indices (eta_1, eta_2), and its energy over `angles` (degrees) less that of one interface.
+
+    Points lie in their order along the curve, from one interface to the slab.
+    """
     points = smooth_pair.points(1.0, ENERGY)
-    named = {"slab": points["slab"][0], "one interface": points["matched above"][0]}
+    named = {"one interface": points["matched above"][0]}
     c = 2 / (1 - ENERGY)
-    for ratio in ratios:
-        apart = np.arccosh(c - np.cosh(np.log(ratio)))
-        for side, eta_2 in (("denser", ratio * np.exp(apart)), ("rarer", ratio * np.exp(-apart))):
-            if eta_2 >= 1:
-                named[f"{side} below, eta 1 {ratio:g}"] = (ratio, float(eta_2))
+    apart = {ratio: np.arccosh(c - np.cosh(np.log(ratio))) for ratio in ratios}
+    named |= {f"denser below, eta 1 {ratio:g}": (ratio, float(ratio * np.exp(x))) for ratio, x in apart.items()}
+    for ratio, x in reversed(apart.items()):
+        if (eta_2 := float(ratio * np.exp(-x))) >= 1:
+            named[f"rarer below, eta 1 {ratio:g}"] = (ratio, eta_2)
+    named["slab"] = points["slab"][0]
     angles = np.linspace(0, 89, count)
     energies = {}
     for name, indices in canvas.track(list(named.items()), progress):
@@ -56,15 +60,17 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     figure = canvas.canvas(11, 4.6)
     gains, places = figure.subplots(1, 2, width_ratios=(2, 1))
     places.plot(*np.transpose(smooth_pair.curve(1.0, ENERGY)), color="0.7")
-    for n, point in enumerate(numbers["points"]):
-        colour = f"C{n % 10}"
+    for point, colour in zip(numbers["points"], canvas.shades(len(numbers["points"]))):
         style = "--" if point["name"].startswith("rarer") else "-"
         gains.plot(numbers["angles"], point["gain"], style, color=colour, label=point["name"])
         places.plot(*point["indices"], "o", color=colour)
     gains.axhline(0, color="0.8", linewidth=1)
     gains.set(xlabel="angle of incidence (°)", ylabel="energy, less that of one interface")
     gains.legend(fontsize="x-small", ncols=2)
-    places.set(xlabel="eta 1", ylabel="eta 2")
+    for letter, name in (("C", "one interface"), ("E", "slab")):
+        (place,) = (point["indices"] for point in numbers["points"] if point["name"] == name)
+        places.annotate(letter, place, xytext=(6, -10), textcoords="offset points", fontweight="bold")
+    places.set(xlabel="eta 1", ylabel="eta 2", title="places, with letters as in figure 7")
     canvas.save(figure, path)
 
 

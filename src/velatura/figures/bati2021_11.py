@@ -46,7 +46,7 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         for m, curve in enumerate(row["curves"]):
             label = f"alpha {row['alpha']:g}" if m == 0 else None
             axes.plot(*np.transpose(curve), color=f"C{n}", label=label)
-        axes.axvline(row["ends"][-1][1], color=f"C{n}", linestyle="--", linewidth=0.8)
+        axes.axvline(row["ends"][-1][1], color=f"C{n}", linestyle="--", linewidth=0.8, label=None if n else "ends")
     axes.set(xlabel="eta 1", ylabel="eta 2", xlim=(1, 3), ylim=(1, 4.2))
     axes.legend(fontsize="small")
     canvas.save(figure, path)

@@ -45,8 +45,11 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     figure = canvas.canvas(5.5, 5)
     axes = figure.subplots()
     plots.draw(axes, members())
-    for span in numbers["eta_1"]:
-        axes.plot(span, (1.02, 1.02), "k", linewidth=4)
+    for n, span in enumerate(numbers["eta_1"]):
+        axes.plot(span, (1.02, 1.02), "k", linewidth=4, label=None if n else "first indices of all")
+    energies = ", ".join(f"{case['energy']:g}" for case in numbers["channels"])
+    axes.set_title(f"R {energies} below index {ETA_0:g}", fontsize="medium")
+    axes.legend(fontsize="small")
     canvas.save(figure, path)
 
 

@@ -143,6 +143,13 @@ def canvas(width: float, height: float) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def shades(count: int, name: str = "plasma") -> Array:
+    """Colours (count, 4), from a colour map of matplotlib, of items that have an order."""
+    from matplotlib import colormaps
+
+    return np.asarray(colormaps[name](np.linspace(0, 0.9, count)))
+
+
 def error_label(numbers: Mapping[str, Any], name: str) -> str:
     """The result of `errors` for a name."""
     return f"RMSE {numbers['rmse'][name]:.4f} ± {numbers['rmse_error'][name]:.4f}"

@@ -299,8 +299,9 @@ class EquivalenceClass:
         for low, high in self.indices_1(channel):
             columns = low + (high - low) * (1 - np.cos(np.linspace(0, np.pi, count))) / 2  # close where curves turn
             for eta in self._roots(channel, columns):
-                kept = ~np.isnan(eta)
-                curves.append(np.stack([columns[kept], eta[kept]], axis=1))
+                found = np.flatnonzero(~np.isnan(eta))
+                for run in np.split(found, np.flatnonzero(np.diff(found) > 1) + 1):
+                    curves.append(np.stack([columns[run], eta[run]], axis=1))
         return [curve for curve in curves if len(curve)]
 
     def nearest(self, *indices: float) -> Array:

@@ -50,13 +50,12 @@ def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None
         axis = np.linspace(1, eta_max, RESOLUTION)
         depths = members.grid(axis, axis)
         for channel, colour in enumerate(colours):
-            inside = depths[channel] >= 0
-            axes.contourf(axis, axis, inside.T, levels=(0.5, 1.5), colors=[colour], alpha=0.2)
+            axes.contourf(axis, axis, depths[channel].T, levels=(0, np.inf), colors=[colour], alpha=0.2)
             for curve in members.boundary(channel=channel):
                 axes.plot(*curve.T, color=colour, linewidth=1)
-        inside = np.all(depths >= 0, axis=0)
-        axes.contourf(axis, axis, inside.T, levels=(0.5, 1.5), colors=["0.7"])
-        axes.contour(axis, axis, inside.T, levels=(0.5,), colors="black", linewidths=1)
+        least = np.min(depths, axis=0)
+        axes.contourf(axis, axis, least.T, levels=(0, np.inf), colors=["0.7"])
+        axes.contour(axis, axis, np.where(np.isnan(least), -1, least).T, levels=(0,), colors="black", linewidths=1)
         axes.set(xlabel="eta of the upper interface", ylabel="eta of the lower one")
         axes.set(xlim=(1, eta_max), ylim=(1, eta_max))
         _name_fills(axes, colours)
