@@ -239,6 +239,13 @@ def test_a_furnace_stays_white() -> None:
         assert np.allclose(albedo, 1, atol=0.02)
 
 
+def test_a_furnace_of_rough_interfaces_gains_nothing() -> None:
+    """The law of energy, which is wrong by chance once in 1000 checks, with an index that depends on wavelength."""
+    index = {"type": "regular", "wavelength_min": 360, "wavelength_max": 830, "values": "1.31, 1.3"}
+    bsdf = kernel.load_dict({"type": "layered", "material": "furnace-rough", "layer0_eta": index})
+    assert vt.check(bsdf)["energy"].passed
+
+
 def test_rays_add_no_noise() -> None:
     """The spread of what samples of neutral metal carry is that of RGB, whichever wavelengths the rays have.
 

@@ -48,14 +48,17 @@ class Remainder(ops.Named):
     def value(self, wi: Direction, wo: Direction) -> Value:
         """f(wi, wo) |cos theta_o|, a colour; 0 unless both are above the surface."""
         above = (wi[2] > 0) & (wo[2] > 0)
+        return ops.select(above, ops.maximum(self.unclipped(wi, wo), 0.0) * wo[2] * (1 / pi), 0.0)
+
+    def unclipped(self, wi: Direction, wo: Direction) -> Value:
+        """pi f(wi, wo), a colour, of directions above; negative in places."""
         z = wo[2]
         k = self._at(wi[2])
         s = -1 * (wi[0] * wo[0] + wi[1] * wo[1])
         both = (1 - wi[2] * wi[2]) * (1 - z * z)
         ops.names(k=[*k], s=s, both=both)
         mean = k[0] + z * k[1] + _grazing(z) * k[2]
-        polynomial = mean + self.b * s + self.a * (2 * s * s - both)
-        return ops.select(above, ops.maximum(polynomial, 0.0) * z * (1 / pi), 0.0)
+        return mean + self.b * s + self.a * (2 * s * s - both)
 
     def albedo(self, cos_theta: Value) -> Value:
         """Energy for light from a cosine, a colour, without clipping."""

@@ -14,7 +14,6 @@ from velatura import ops
 from velatura.model import exchange, own_medium, passed, remainder, straight_through, widths
 from velatura.model.context import Context, channels
 from velatura.model.models import Model
-from velatura.model.own_medium import NORMALS
 from velatura.model.passed import Parts
 from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
@@ -36,6 +35,7 @@ from velatura.tables import Tables
 Array = NDArray[np.floating]
 
 RGB = 3
+NORMALS = {True: 1597, False: 987}  # over which lobes are integrated, of isotropic materials and of others
 EVENLY = 377  # directions over which the remainder is integrated
 DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
 BRIGHTEST = 4.0  # by how much it is scaled at most
@@ -66,10 +66,12 @@ class Layout:
 
 @dataclass(frozen=True)
 class SolvedSide:
-    """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; the remainder, (C,)."""
+    """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; numbers of the remainder,
+    (C,), and the albedo that it gains by being clipped at 0, (C, cosines)."""
 
     columns: Columns
     polynomial: Remainder
+    clipped: Array
 
     @property
     def rows(self) -> Array:
@@ -108,13 +110,15 @@ class SolvedSide:
 class Solver:
     """How materials of NumPy's values are solved for the directions of a grid, in a number of colours.
 
-    `samples` are those of `velatura.model.exchange`; `normals` are those of facets, and of lobes that are integrated,
-    None for as many as usual. Operators that materials share are `made` once.
+    `shape` is that of the grid on which a renderer has the columns. `samples` are those of `velatura.model.exchange`;
+    `normals` are those of facets, and of lobes that are integrated, None for as many as usual. Operators that materials
+    share are `made` once.
     """
 
     model: Model
     variance: type[Variance]
     grid: Grid
+    shape: tuple[int, ...]
     colours: int
     tables: Tables
     samples: int | None = None
@@ -125,7 +129,14 @@ class Solver:
     def of(cls, model: Model, variance: type[Variance], context: Context) -> Solver:
         assert context.colour is not None
         colours = RGB if context.colour is channels else len(context.colour())
-        return cls(model, variance, Grid.of(variance is Isotropic), colours, context.tables)
+        return cls.over(colours, model, variance, context)
+
+    @classmethod
+    def over(cls, colours: int, model: Model, variance: type[Variance], context: Context) -> Solver:
+        """In a number of colours that is not that of the renderer's."""
+        isotropic = variance is Isotropic
+        shape = directional_grid.LINE if isotropic else directional_grid.PLANE
+        return cls(model, variance, Grid.of(isotropic), shape, colours, context.tables)
 
     @property
     def isotropic(self) -> bool:
@@ -135,11 +146,6 @@ class Solver:
     def kind(self) -> type[Variance]:
         """Of lobes; those of isotropic interfaces have axes in the plane of incidence."""
         return PerAxis if self.isotropic else Covariance
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Of the grid on which a renderer has the columns."""
-        return directional_grid.LINE if self.isotropic else directional_grid.PLANE
 
     def layouts(self, materials: Sequence[Material]) -> list[Layout]:
         """Of each side, for materials that differ in values."""
@@ -203,6 +209,7 @@ class Solver:
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
+        polynomial = Remainder(*(x[:, None] for x in vars(polynomial).values()))
         lobes, veils = solved.lobes[..., :count], solved.veils[..., :count]
         rest, straight, bounced, through = (
             x[:, :count] for x in (solved.rest, solved.straight, solved.bounced, solved.passed)
@@ -222,12 +229,13 @@ class Solver:
         energy = [(veils if each.veil else lobes)[each.interface] for each in drawn]
         weights, heaviest = [], []
         for shape, tensor, e in zip(shapes, shown, energy):
-            z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, self.normals or NORMALS)
+            normals = self.normals or NORMALS[self.isotropic]
+            z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, normals)
             weights.append(np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0))
             heaviest.append(weights[-1] * largest)
-        z, largest = (np.repeat(each, len(folded.kept), axis=-1) for each in _integrals(polynomial, folded.at_cosines))
-        scale = _scale(rest, z)
-        heaviest.append(scale * largest)
+        clipped, largest = _clipped(polynomial, folded.at_cosines)
+        scale = _scale(rest, polynomial.albedo(cosine) + folded.around(clipped))
+        heaviest.append(scale * folded.around(largest))
 
         # Share samples by energies
         shares, facets = [ops.mean(each) for each in energy], None
@@ -258,7 +266,8 @@ class Solver:
             self._colours(through) if passes else None,
         )
         columns = folded.unfolded(columns)
-        return SolvedSide(columns, Remainder(*(np.broadcast_to(x, self.colours) for x in vars(polynomial).values())))
+        numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
+        return SolvedSide(columns, numbers, self._colours(clipped))
 
     def spread(self, side: SolvedSide) -> Array:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
@@ -266,8 +275,9 @@ class Solver:
         rows = self.grid.spread(side.rows, self.shape)
         if self.model.form == "forward":
             cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
-            z, _ = _integrals(side.polynomial, (np.sqrt(1 - cosine * cosine), 0 * cosine, cosine))
-            whole = np.repeat(z, math.prod(self.shape[1:]), axis=-1)
+            polynomial = Remainder(*(x[:, None] for x in vars(side.polynomial).values()))
+            whole = polynomial.albedo(cosine) + self.grid.along(side.clipped, self.shape[0])
+            whole = np.repeat(whole, math.prod(self.shape[1:]), axis=-1)
             scale, rest = (slice(k, k + self.colours) for k in side.places)
             rows[scale] = _scale(rows[rest], whole)
         return rows
@@ -376,13 +386,14 @@ def _slim(material: Material) -> Material:
     return material.each(lambda _, value: slim(value) if np.ndim(value) else value)
 
 
-def _integrals(polynomial: Remainder, wi: Direction) -> list[Array]:
-    """Mean and largest weight of samples of the remainder as it is clipped, (C, M)."""
-    numbers = Remainder(*(np.reshape(x, (-1, 1, 1)) for x in vars(polynomial).values()))
+def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
+    """Of the remainder, by numbers (C, 1): the albedo that it gains by being clipped, and the largest weight of its
+    samples, (C, M)."""
+    numbers = Remainder(*(x[..., None] for x in vars(polynomial).values()))
     x, y, z = (each[:, None] for each in wi)
     wo = numbers.sample((x, y, z), *low_discrepancy.square(EVENLY))
-    weights = numbers.value((x, y, z), wo) / numbers.density((x, y, z), wo)
-    return [weights.mean(axis=-1), weights.max(axis=-1)]
+    values, share = numbers.unclipped((x, y, z), wo), wo[2] / (np.pi * numbers.density((x, y, z), wo))
+    return (np.maximum(-values, 0) * share).mean(axis=-1), np.maximum(values * share, 0).max(axis=-1)
 
 
 def _scale(energy: Array, albedo: Array) -> Array:

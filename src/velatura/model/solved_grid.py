@@ -85,8 +85,11 @@ class Grid:
             waves = np.fft.rfft(values, axis=-1) / self.turns * both
             least = values.min(axis=-1, keepdims=True)
             values = np.maximum((waves @ np.exp(2j * order[:, None] * phi)).real, np.minimum(least, 0))
-        fine = PchipInterpolator(self.nodes, values, axis=-2)(np.linspace(0, 1, shape[0]))
-        return np.asarray(fine.reshape(*rows.shape[:-1], -1))
+        return self.along(values.swapaxes(-1, -2), shape[0]).swapaxes(-1, -2).reshape(*rows.shape[:-1], -1)
+
+    def along(self, values: Array, count: int) -> Array:
+        """Values at the cosines, (..., cosines), interpolated by splines at as many places."""
+        return np.asarray(PchipInterpolator(self.nodes, values, axis=-1)(np.linspace(0, 1, count)))
 
 
 @dataclass(frozen=True)
@@ -138,6 +141,10 @@ class Folded:
 
     def _of(self, values: Array) -> Array:
         return values.reshape(-1, self.grid.turns)[:, self.kept].ravel()
+
+    def around(self, values: Array) -> Array:
+        """Values for cosines, (..., cosines), at all of these directions."""
+        return np.repeat(values, len(self.kept), axis=-1)
 
     def unfolded(self, columns: Columns) -> Columns:
         """Columns at these directions, at all of the grid; the middle entries of matrices change sign in mirrors."""

@@ -21,11 +21,10 @@ from velatura.model.models import Model
 from velatura.model.remainder import Remainder
 from velatura.model.solution import Layout, SolvedSide, Solver, plain, sides
 from velatura.model.solved import Solved
-from velatura.model.solved_grid import Grid
 from velatura.model.transport.adding import Lambert, Part, parts
 from velatura.model.transport.interfaces import Facets
 from velatura.model.variables import Variables
-from velatura.model.variance import Isotropic, Variance
+from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import differences, directional_grid
@@ -99,8 +98,8 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     material = material.solid()
     chosen = _chosen(plain(material), places)
     material, places = material.each(lambda _, value: _channels(value, chosen)), places[chosen]
-    given, start, grid = Variables.of(material), plain(material), Grid.of(variance is Isotropic)
-    solver = Solver(model, variance, grid, len(places), context.tables)
+    given, start = Variables.of(material), plain(material)
+    solver = Solver.over(len(places), model, variance, context)
     layouts = solver.layouts([start])
     orders: list[Sequence[bool]] = []
 
@@ -128,16 +127,12 @@ def axis(material: Material, places: Array) -> Wavelengths:
 
 def _flat(side: SolvedSide, solver: Solver, places: Array) -> list[Array]:
     """The numbers, the colours and the remainder of a side, at nodes, flat."""
-    columns = [np.atleast_2d(each) for each in side.columns.all]
+    counts = [len(np.atleast_2d(each)) for each in side.columns.all]
+    columns = np.split(solver.spread(side), np.cumsum(counts)[:-1])
     numbers = np.concatenate([each for each in columns if len(each) == 1])
-    colours = np.array([each for each in columns if len(each) > 1])
+    colours = over_nodes(np.array([each.T for each in columns if len(each) > 1]), places)
     polynomial = np.array(list(vars(side.polynomial).values()))
-    spread = over_nodes(solver.grid.spread(colours, solver.shape).swapaxes(1, 2), places)
-    return [
-        solver.grid.spread(numbers, solver.shape).T.ravel(),
-        np.moveaxis(spread, 0, -1).ravel(),
-        over_nodes(polynomial, places).T.ravel(),
-    ]
+    return [numbers.T.ravel(), np.moveaxis(colours, 0, -1).ravel(), over_nodes(polynomial, places).T.ravel()]
 
 
 def over_nodes(values: Array, places: Array) -> Array:

@@ -221,13 +221,14 @@ def _tabulated(
     middle = [axis.values[axis.count // 2] for axis in spanned]
     start = axes.placed(solution.plain(material), spanned, middle)
     solver = Solver.of(model, variance, context)
-    solver = replace(solver, grid=replace(solver.grid, cosines=COSINES[isotropic]), samples=SAMPLES)
+    grid = replace(solver.grid, cosines=COSINES[isotropic])
+    solver = replace(solver, grid=grid, shape=SHAPES[isotropic], samples=SAMPLES)
     textures = {name for axis in spanned for name in axis.changed(0.0)}
     fixed = b"".join(np.asarray(x).tobytes() for address, x in start.values() if address.name not in textures)
     given = Variables.of(material)
     if isinstance(before, Tables) and not given.given and before.holds(solver, spanned, fixed):
         return before
-    size, shape = TOGETHER[isotropic], SHAPES[isotropic]
+    size = TOGETHER[isotropic]
     groups = [tuple(spanned[k : k + size]) for k in range(0, len(spanned), size)]
     ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
     layouts = solver.layouts([start, *(axes.placed(start, spanned, values) for values in ends)])
@@ -244,7 +245,7 @@ def _tabulated(
         context.progress(len(nodes), len(nodes))
         reads[:] = [side.groups for side in solves[0]]
         by_side = zip(*solves)
-        return [(np.array([x.rows for x in side]), np.array([x.numbers for x in side])) for side in by_side]
+        return [(np.array([solver.spread(x) for x in side]), np.array([x.numbers for x in side])) for side in by_side]
 
     adds: list[Array] = []
     packings: dict[tuple[int, int], tuple[Packing, ...]] = {}  # of columns and polynomials, by group and side
@@ -269,7 +270,7 @@ def _tabulated(
                         for values, each in ((columns, reads[side]), (polynomials, [0] * polynomials.shape[1]))
                     )
                 packing, of_polynomial = packings[k, side]
-                found += [_flat(solver.grid.spread(x, shape), group) for x in packing.split(columns, 1)]
+                found += [_flat(x, group) for x in packing.split(columns, 1)]
                 found += [_flat(x, group) for x in of_polynomial.split(polynomials, 1)]
         return found
 
@@ -282,7 +283,7 @@ def _tabulated(
                 directional_grid.interleaved(next(flat), (*directions, *places), context.number) for _ in packing.tables
             )
             for side in range(len(layouts))
-            for packing, directions in zip(packings[k, side], (shape, ()))
+            for packing, directions in zip(packings[k, side], (solver.shape, ()))
         ]
         terms.append(Term(group, tuple(made[::2]), tuple(made[1::2])))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)
