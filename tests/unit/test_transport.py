@@ -117,6 +117,24 @@ def test_lossless_stacks_keep_all_light_from_below(name: str) -> None:
     assert (reflected(found) + found.passed)[0] == pytest.approx(np.ones(4), abs=1e-3)
 
 
+@pytest.mark.parametrize("alpha", [0.0011, (0.0, 0.0011), 0.05])
+@pytest.mark.parametrize("step", [1e-3, 0.01, 0.03, 0.05])
+def test_indices_that_are_close_keep_all_light(step: float, alpha: Any) -> None:
+    """The nodes about them are shared, and some have a weight below 0."""
+    stack = Stack([Interface(eta=1.5 - step, alpha=alpha), Interface(eta=1.5), Interface(eta=1.0, alpha=0.5)])
+    found = solved(stack)
+    assert (reflected(found) + found.passed)[0] == pytest.approx(np.ones(4), abs=2e-3)
+
+
+def test_the_remainder_of_brushed_interfaces_is_bounded() -> None:
+    """Even where that of isotropic ones, which lends it its shape, is no more than rounding."""
+    coats = Interface(eta="salt", alpha=1.0), Interface(eta=(1.5966, 1.3792, 1.4225))
+    glass, ink = Interface(eta="sapphire", alpha=(0.2737, 0.3259)), Medium(depth=1.9088, sigma_a=1.9893)
+    stack = Stack([*coats, glass, ink, Interface(eta=1.0, alpha=(0.324, 0.2689))], exterior=1.33, thin=True)
+    found = solved(stack, cosines=np.array([0.9, 0.5]))
+    assert np.abs(found.remainder[:, 0]).sum(axis=1).max() < 10 * max(found.rest.max(), 1e-3)
+
+
 def test_light_from_inside_leaves_beyond_the_critical_angle() -> None:
     """Expected: as Walter's refraction by facets, integrated here over a fine grid of normals."""
     material = Material.of(Stack([Interface(eta=1.5, alpha=0.3)])).reversed()

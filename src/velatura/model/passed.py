@@ -73,7 +73,7 @@ def parts(
     of_straight, passes = straight_through.integrals(passage, wi)
     of_bounced = own_medium.integral(lobe, i) if lobe else np.zeros_like(of_straight)
     weight_straight = np.minimum(ops.divide(straight, of_straight), MOST)
-    bounces = bounces + straight - weight_straight * of_straight
+    bounces = np.maximum(bounces + straight - weight_straight * of_straight, 0)
     weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MOST)
     energies = weight_straight * of_straight, weight_bounced * of_bounced
     rest = np.maximum(passed - energies[0] - energies[1], 0)

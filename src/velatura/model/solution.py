@@ -251,7 +251,7 @@ class Solver:
         if passage:
             passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
             passes = _evenly(passes, least)
-            left = 1 - passes.share
+            left = np.maximum(1 - passes.share, 0)
             straight, bounced, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
             passes = replace(passes, straight=straight, bounced=bounced, rest=scattered)
         columns = Columns(

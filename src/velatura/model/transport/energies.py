@@ -41,6 +41,7 @@ Array = NDArray[np.floating]
 NODES = 24
 SAMPLES = 377  # normals
 MODES = 3  # of the azimuth, of the remainder
+CANCELS = 0.3  # of columns of light: a sum that is less
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
 UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
 AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
@@ -189,7 +190,9 @@ def _of_isotropic(
     stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
     found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, samples)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
-    return found.remainder * (mean / np.maximum(found.rest, TINY))[:, None, None]
+    # Columns that cancel out are rounding
+    size = np.abs(found.remainder[:, 0]).sum(axis=1)
+    return found.remainder * (mean / np.maximum(np.maximum(found.rest, CANCELS * size), TINY))[:, None, None]
 
 
 def _isotropic(each: LayerValues) -> LayerValues:

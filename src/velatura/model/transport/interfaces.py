@@ -325,7 +325,8 @@ class _Side:
         r, t = operators(at_nodes.reflected, of_beams.reflected), operators(at_nodes.refracted, of_beams.refracted)
         if setting.often is None:
             return cls(r, t, None)
-        weights = basis.nodes.weights(float(ops.mean(facets.above)))
+        # Of nodes about the index of a medium some may have less than none
+        weights = np.maximum(basis.nodes.weights(float(ops.mean(facets.above))), 0)
         blocked = []
         shares = [_again_shares(facets, setting, q, met) for q, met in ((p, at_nodes), (setting.p, of_beams))]
         for nodes, beams in zip(*shares):
