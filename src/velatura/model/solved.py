@@ -24,7 +24,7 @@ from velatura.model.prepare import PreparedInterface
 from velatura.model.remainder import Remainder
 from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.straight_through import Passage
-from velatura.model.variance import Roughness, Variance
+from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
@@ -134,7 +134,8 @@ class Side:
         return self._seen(w, self.at(w))
 
     def _seen(self, w: Direction, columns: Columns) -> Seen:
-        azimuth = ops.arctan2(w[1], w[0])
+        # The axes of isotropic interfaces lie in the plane of incidence
+        azimuth = ops.arctan2(w[1], w[0]) if self.kind is PerAxis else 0.0
         lobes = []
         for shape, weight, numbers in zip(self.shapes, columns.weights, columns.roughness):
             u, v, rotation = self.kind(*numbers).roughness(ROOTS)

@@ -147,7 +147,8 @@ class Folded:
         return np.repeat(values, len(self.kept), axis=-1)
 
     def unfolded(self, columns: Columns) -> Columns:
-        """Columns at these directions, at all of the grid; the middle entries of matrices change sign in mirrors."""
+        """Columns at these directions, at all of the grid. Matrices are of the frame of the plane of incidence, where
+        middle entries change sign in mirrors; now they are of that of the material, where they hardly vary."""
 
         def each(values: Any) -> Any:
             if values is None:
@@ -163,4 +164,11 @@ class Folded:
         if self.grid.isotropic:
             return found
         sign = np.tile(np.where(self.mirrored, -1, 1), self.grid.cosines)
-        return replace(found, roughness=[(xx, sign * xy, yy) for xx, xy, yy in found.roughness])
+        c, s = np.cos(self.grid.phi), np.sin(self.grid.phi)
+
+        def turned(xx: Array, xy: Array, yy: Array) -> tuple[Array, ...]:
+            mixed = 2 * c * s * sign * xy
+            across = c * s * (xx - yy) + (c * c - s * s) * sign * xy
+            return c * c * xx - mixed + s * s * yy, across, s * s * xx + mixed + c * c * yy
+
+        return replace(found, roughness=[turned(*matrix) for matrix in found.roughness])
