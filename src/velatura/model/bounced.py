@@ -32,6 +32,7 @@ from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.ggx import Direction
+from velatura.sampling import low_discrepancy
 
 BOUNCES = 0.3  # of the two faces of the slab that light bounces in
 COS_MIN = 0.22  # at which slabs are crossed, for widths
@@ -179,10 +180,10 @@ def _tilted(found: Rest, i: Direction, o: Direction) -> Value:
 
 def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
     """Energy (3, N) of `eval_pdf_rest` from directions (N,) each."""
-    x, weight = np.polynomial.legendre.leggauss(NODES)
+    x, weight = low_discrepancy.gauss(NODES)
     # Even over p^2; nodes crowd at grazing directions
-    r2 = (np.asarray(found.bound)[..., None] ** 2) * (1 - (0.5 * (x + 1)) ** 2)
-    diffuse = np.sum(found.leaving(np.sqrt(1 - r2)) * (weight * 0.5 * (x + 1)), axis=-1)[..., None]
+    r2 = (np.asarray(found.bound)[..., None] ** 2) * (1 - x * x)
+    diffuse = np.sum(found.leaving(np.sqrt(1 - r2)) * (2 * weight * x), axis=-1)[..., None]
     if not found.lobe:
         return np.asarray(diffuse + np.zeros((1, len(i[2]))))
     return np.asarray((1 - found.diffuse) * own_medium.integral(found.lobe, i) + found.diffuse * diffuse)

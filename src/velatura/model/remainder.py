@@ -11,6 +11,7 @@ a stack at nodes of the length of momentum.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
@@ -29,6 +30,7 @@ MOMENTS = (1.0, 2 / 3, 1 / 15)  # means of u over the projected disc
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # a and b, of C_ab
 EXACT = 3.0  # weight of the energy of a direction beside that of nodes
 DARK = 1e-6  # albedo
+KEPT = 16  # sets of nodes whose deposits are kept
 BRIGHT = 0.5  # share of samples by the root of the cosine, for a horizon that is twice as bright as all
 
 
@@ -106,15 +108,13 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
         cosines: of the directions, (M,).
         albedos: of the stack for these, (C, M); errors count relative to them.
     """
-    outside = np.flatnonzero(nodes.p <= 1 + 1e-9)
-    even = 1 / np.sqrt(np.maximum(nodes.weights(1.0)[outside], 1 / QUADRATURE))
+    outside, even, deposits, once, twice = _of_nodes(nodes)
     sine = np.sqrt(1 - cosines * cosines)[:, None]
-    u, deposits = _basis(cosines)[..., None], [_deposited(nodes, 0, a)[outside] for a in range(3)]
+    u = _basis(cosines)[..., None]
     # Columns (M, N) of each mode, and what their energies are (M,)
     mean = [(u[a] * deposits[b] + u[b] * deposits[a]) / (1 + (a == b)) for a, b in PAIRS]
     energy = [(u[a, :, 0] * MOMENTS[b] + u[b, :, 0] * MOMENTS[a]) / (1 + (a == b)) for a, b in PAIRS]
-    once = [0.5 * sine * _deposited(nodes, 1, 0)[outside]]
-    twice = [0.5 * sine * sine * _deposited(nodes, 2, 0)[outside]]
+    of_once, of_twice = [0.5 * sine * once], [0.5 * sine * sine * twice]
 
     numbers = []
     for light, albedo in zip(measures, albedos):
@@ -124,10 +124,19 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
         rows = np.concatenate([_rows(mean, weight), _rows(energy, exact)])
         target = np.concatenate([(weight * seen[0]).ravel(), exact * light[0].sum(axis=0)])
         parts = [(rows, target)]
-        parts += [(_rows(each, weight), (weight * mode).ravel()) for each, mode in zip((once, twice), seen[1:])]
+        parts += [(_rows(each, weight), (weight * mode).ravel()) for each, mode in zip((of_once, of_twice), seen[1:])]
         parts += [(np.eye(1), np.zeros(1))] * (3 - len(parts))
         numbers.append(np.concatenate([np.linalg.lstsq(*part, rcond=None)[0] for part in parts]))
     return Remainder(*np.stack(numbers, axis=-1))
+
+
+@functools.lru_cache(KEPT)
+def _of_nodes(nodes: Nodes) -> tuple[NDArray[np.integer], Array, list[Array], Array, Array]:
+    """Numbers of the nodes that leave, weights of their errors, and there, by function of u, deposits of all modes."""
+    outside = np.flatnonzero(nodes.p <= 1 + 1e-9)
+    even = 1 / np.sqrt(np.maximum(nodes.weights(1.0)[outside], 1 / QUADRATURE))
+    mean, once, twice = ([_deposited(nodes, m, a)[outside] for a in range(3 if m == 0 else 1)] for m in range(3))
+    return outside, even, mean, once[0], twice[0]
 
 
 def _rows(columns: Sequence[Array], weight: Array) -> Array:

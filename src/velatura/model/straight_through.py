@@ -42,6 +42,7 @@ from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
+from velatura.sampling import low_discrepancy
 from velatura.stack import InterfaceValues, Material, MediumValues
 
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
@@ -456,8 +457,7 @@ def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[in
     widths = [c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(passage.crossings, i.steps)]
     u, v, rotation = (np.asarray(x)[..., None, None] for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
     # Cast rays from the middle
-    x, weight = np.polynomial.legendre.leggauss(nodes[0])
-    share, weight = 0.5 * (x + 1), 0.5 * weight
+    share, weight = low_discrepancy.gauss(nodes[0])
     # Both sides of the plane of incidence are alike where interfaces have no axes
     alike = all(isinstance(crossing.width, Isotropic) for crossing in passage.crossings)
     phi = (np.arange(nodes[1]) + 0.5) * ((pi if alike else 2 * pi) / nodes[1])

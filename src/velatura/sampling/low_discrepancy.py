@@ -37,6 +37,15 @@ def fibonacci(count: int) -> tuple[np.ndarray, np.ndarray]:
     return u, v
 
 
+@functools.cache
+def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes in [0, 1] and weights of the quadrature of Gauss and Legendre, (count,) each; not to be written to."""
+    x, weight = (0.5 * each for each in np.polynomial.legendre.leggauss(count))
+    x += 0.5
+    x.flags.writeable = weight.flags.writeable = False
+    return x, weight
+
+
 def at_nodes(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:
     """Three uniform numbers for every sample, the same at all nodes, that fill the cube evenly, the last two the
     square."""

@@ -68,7 +68,7 @@ def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
 
 
 def layers(found: Sequence[Part], setting: Setting, made: Made | None = None) -> list[tuple[Layer, Layer]]:
-    """What each layer does to light, where facets are met once, and as the setting says; interfaces are `made` once."""
+    """What each layer does to light, where facets are met once, and as the setting says; all are `made` once."""
     made = {} if made is None else made
     return [_layer(part, of, made) for part, of in zip(found, settings(found, setting))]
 
@@ -80,13 +80,15 @@ def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
 
 
 def _layer(part: Part, setting: Setting, made: Made) -> tuple[Layer, Layer]:
-    if isinstance(part, Facets):
-        key = part.key, setting.key
-        if key not in made:
+    numbers = (None if x is None else np.asarray(x).tobytes() for x in vars(part).values())
+    key = type(part), *numbers, setting.key
+    if key not in made:
+        if isinstance(part, Facets):
             made[key] = interface(part, setting)
-        return made[key]
-    alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
-    return alike, alike
+        else:
+            alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
+            made[key] = alike, alike
+    return made[key]
 
 
 def _lambert(part: Lambert, setting: Setting) -> Layer:

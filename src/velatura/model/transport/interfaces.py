@@ -50,11 +50,6 @@ class Facets:
     final: bool = False
 
     @property
-    def key(self) -> Hashable:
-        """All that it is."""
-        return tuple(None if x is None else np.asarray(x).tobytes() for x in vars(self).values())
-
-    @property
     def opaque(self) -> bool:
         return self.below is None or self.k is not None
 
