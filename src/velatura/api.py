@@ -111,7 +111,7 @@ def render(
     Args:
         scene: "ball", "sphere", "teapot", "plane", "wedges", "lid", or a Mitsuba scene file whose BSDF "material" is to
             be replaced.
-        env: "studio", "sky", "furnace", or an .exr or .hdr file.
+        env: "studio", "sky", "furnace", a photograph ("lobby"), or an .exr or .hdr file.
         spp: samples per pixel.
         progress: called with (samples per pixel done, spp) now and then.
 

@@ -28,7 +28,11 @@ def render(
     ] = "ball",
     env: Annotated[
         str | None,
-        typer.Option(metavar="NAME|F", help="studio, sky, furnace, or an .hdr or .exr file; default: the scene's own."),
+        typer.Option(
+            metavar="NAME|F",
+            help="studio, sky, furnace, apartment, city, forest, lobby, sunset, workshop, or an .hdr or .exr file; "
+            "default: the scene's own.",
+        ),
     ] = None,
     model: options.Bsdf = None,
     spp: Annotated[int, typer.Option(min=1, max=2**20, metavar="N", help="Samples per pixel.")] = 64,

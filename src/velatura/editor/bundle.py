@@ -27,8 +27,3 @@ def finding() -> Finding:
     what = f"--editable {SOURCES.parents[3]}" if SOURCES.is_dir() else "--force-reinstall --no-deps velatura"
     mend = f"{sys.executable} -m pip install {what}"
     return Finding("Editor's page", "bundled", True) if there else Finding("Editor's page", "missing", False, mend)
-
-
-def environments() -> dict[str, str]:
-    """The photographed environments that come with the page, and their addresses on the server."""
-    return {path.stem: f"/environments/{path.name}" for path in sorted(STATIC.glob("environments/*.exr"))}

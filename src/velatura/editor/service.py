@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
-from velatura import __version__
-from velatura.editor import appearance, bundle, class_maps, truth, validations
+from velatura import __version__, kernel
+from velatura.editor import appearance, class_maps, truth, validations
 from velatura.editor.messages import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
 from velatura.editor.shading import contents, shading
 from velatura.editor.shading import tables as kept_tables
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, MODELS, SWITCHES, Model
-from velatura.scenes.environments import studio
+from velatura.scenes.environments import PHOTOGRAPHS, sky, studio
 from velatura.scenes.objects import OBJECTS, ground, plinth
 from velatura.scenes.surfaces import Surface
 from velatura.stack import Named, Stack, Texture, dumps, loads, names, preset, presets, rgb
@@ -47,8 +47,12 @@ KINDS: dict[type[Parameter], str] = {
 #: Pictures of light that need no file.
 ENVIRONMENTS: dict[str, Callable[[], ArrayLike]] = {
     "studio": studio,
+    "sky": kernel.exclusive(sky),
     "furnace": lambda: np.ones((2, 4, 3), np.float32),
 }
+
+#: Photographs by their addresses on the server.
+FILES = {f"/environments/{path.name}": path for path in PHOTOGRAPHS.values()}
 
 
 # Verbs ---------------------------------------------------------------------------------------------------------------
@@ -61,7 +65,7 @@ def session(body: Body) -> Answer:
 
 @functools.cache
 def _constants() -> Answer:
-    environments = [(name, None) for name in ENVIRONMENTS] + list(bundle.environments().items())
+    environments = [(name, None) for name in ENVIRONMENTS] + [(path.stem, url) for url, path in FILES.items()]
     return {
         "version": __version__,
         "schema": {where: _keys(model) for where, model in _RECORDS.items()},

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import kernel
-from velatura.editor import bundle
 from velatura.editor.messages import Answer, Body, Verb, array, material_of
 from velatura.errors import InvalidInput
 from velatura.stack import Stack
@@ -31,9 +30,8 @@ def truth(body: Body) -> Answer:
     name, environment = body.get("object"), body.get("environment", "studio")
     if name not in scenes.OBJECTS:
         raise InvalidInput(f"object: must be one of {', '.join(scenes.OBJECTS)}, got {name!r}")
-    known = {*scenes.ENVIRONMENTS, *bundle.environments()}
-    if environment not in known:
-        raise InvalidInput(f"environment: must be one of {', '.join(sorted(known))}, got {environment!r}")
+    if environment not in scenes.ENVIRONMENTS:
+        raise InvalidInput(f"environment: must be one of {', '.join(scenes.ENVIRONMENTS)}, got {environment!r}")
     size = body.get("size")
     if not isinstance(size, list) or len(size) != 2:
         raise InvalidInput("size: must be a width and a height")
@@ -64,16 +62,12 @@ def _rendered(
     from velatura.api import bsdf
 
     mi = kernel.mitsuba()
-    lit = bundle.STATIC / "environments" / f"{environment}.exr"
-    light = str(lit) if environment in bundle.environments() else environment
-    scene = scenes.scene_dict(name, light, bsdf(stack, "reference"), size)
-    transform = mi.ScalarTransform4f()
+    scene = scenes.scene_dict(name, environment, bsdf(stack, "reference"), size)
+    scene["light"] = scenes.emitter(mi, environment, rotation)
     scene["sensor"] |= {
-        "to_world": transform.look_at(camera["origin"], camera["target"], [0, 1, 0]),
+        "to_world": mi.ScalarTransform4f().look_at(camera["origin"], camera["target"], [0, 1, 0]),
         "fov": camera["fov"],
     }
-    if environment not in ("sky", "furnace"):
-        scene["light"]["to_world"] = transform.rotate([0, 1, 0], rotation)
     return np.array(mi.render(mi.load_dict(scene), spp=spp, seed=seed))[..., :3]
 
 

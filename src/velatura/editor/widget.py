@@ -12,7 +12,7 @@ from urllib.parse import unquote
 from velatura.editor import bundle
 from velatura.editor.folder import PICTURES, Conflict, Folder
 from velatura.editor.messages import Answer, admitted, document, field, material_of, model_of
-from velatura.editor.service import VERBS
+from velatura.editor.service import FILES, VERBS
 from velatura.errors import InvalidInput, VelaturaError, needs
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.stack import MaterialLike, Stack, load
@@ -166,6 +166,6 @@ class Editor(anywidget.AnyWidget):
 
     def _file(self, address: str) -> bytes:
         """The content at an address of the server: an environment, or a texture of the folder."""
-        if address in bundle.environments().values():
-            return (bundle.STATIC / address.lstrip("/")).read_bytes()
+        if address in FILES:
+            return FILES[address].read_bytes()
         return self._folder.existing(unquote(address.removeprefix("/files/")), PICTURES).read_bytes()

@@ -1,4 +1,4 @@
-"""The lights of the stage: a studio of softboxes, a clear sky, a furnace, or an image file."""
+"""The lights of the stage: a studio of softboxes, a clear sky, a furnace, photographs, or an image file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import kernel
 from velatura.errors import InvalidInput
 
+#: Photographs of light, which come with the editor's page, by name.
+PHOTOGRAPHS = {path.stem: path for path in sorted(Path(__file__).parents[1].glob("editor/static/environments/*.exr"))}
+
 #: What `env` may name, besides an .exr or .hdr file.
-ENVIRONMENTS = ("studio", "sky", "furnace")
+ENVIRONMENTS = ("studio", "sky", "furnace", *PHOTOGRAPHS)
+
+SUN = (-0.55, 0.62, 0.55)  # where it stands in the sky
+NEAR_SUN = 1.2  # degrees from its centre, whose texels are averages over a grid of FINER ones
+FINER = 64
 
 #: The largest radiance of a texel, so that what many of them send together is still a number.
 BRIGHTEST = 1e12
@@ -37,17 +45,29 @@ SOFTBOXES = (
 )
 
 
-def emitter(mi: Any, env: str | os.PathLike[str]) -> dict[str, Any]:
-    """The Mitsuba emitter of an environment, y up. Raises InvalidInput for an unknown name or an unreadable file."""
-    if env == "studio":
-        return {"type": "envmap", "bitmap": mi.Bitmap(studio())}
+def emitter(mi: Any, env: str | os.PathLike[str], rotation: float = 0.0) -> dict[str, Any]:
+    """The Mitsuba emitter of an environment, y up, turned about y by degrees.
+
+    Raises:
+        InvalidInput: an unknown name or an unreadable file.
+    """
     if env == "furnace":
         return {"type": "constant", "radiance": 1.0}
+    turned = mi.ScalarTransform4f().rotate([0, 1, 0], rotation)
     if env == "sky":
         # Mitsuba's sky has z up and W/(m2 sr nm) for a unit; the scale brings it to the studio's exposure
         sky: dict[str, Any] = {"type": "sunsky", "turbidity": 5.0, "sun_scale": 2.5, "sky_scale": 2.5}
-        return sky | {"sun_direction": [-0.55, 0.62, 0.55], "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], -90)}
-    return {"type": "envmap", "bitmap": _read(mi, Path(env))}
+        return sky | {"sun_direction": turned @ mi.ScalarVector3f(SUN), "to_world": turned.rotate([1, 0, 0], -90)}
+    return {"type": "envmap", "bitmap": _picture(mi, env), "to_world": turned}
+
+
+def _picture(mi: Any, env: str | os.PathLike[str]) -> Any:
+    if env == "studio":
+        return mi.Bitmap(studio())
+    if env in PHOTOGRAPHS:
+        # They were made smaller with a filter that overshoots below 0
+        return mi.Bitmap(np.maximum(_rgb(mi, PHOTOGRAPHS[str(env)]), 0.0))
+    return _read(mi, Path(env))
 
 
 def _read(mi: Any, path: Path) -> Any:
@@ -55,33 +75,66 @@ def _read(mi: Any, path: Path) -> Any:
         raise InvalidInput(f"unknown environment {str(path)!r}: give {', '.join(ENVIRONMENTS)}, or a file .exr or .hdr")
     if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such environment file")
-    try:
-        picture = mi.Bitmap(str(path))
-        if picture.channel_count() > 4:
-            raise InvalidInput(f"{path}: has {picture.channel_count()} channels; a light has one or three, and opacity")
-        light = picture.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False)
-    except (RuntimeError, MemoryError) as error:
-        raise InvalidInput(f"{path}: {' '.join(str(error).split())}") from error
-    texels = np.array(light)
+    texels = _rgb(mi, path)
     if not texels.size:
         raise InvalidInput(f"{path}: has no texels")
     if not np.all((texels >= 0) & (texels <= BRIGHTEST)):
         raise InvalidInput(f"{path}: has texels that are negative, not finite, or above {BRIGHTEST:g}")
-    return light
+    return mi.Bitmap(texels)
+
+
+def _rgb(mi: Any, path: Path) -> NDArray[np.float32]:
+    """The texels of a file, linear RGB."""
+    try:
+        picture = mi.Bitmap(str(path))
+        if picture.channel_count() > 4:
+            raise InvalidInput(f"{path}: has {picture.channel_count()} channels; a light has one or three, and opacity")
+        return np.array(picture.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False))
+    except (RuntimeError, MemoryError) as error:
+        raise InvalidInput(f"{path}: {' '.join(str(error).split())}") from error
 
 
 @functools.cache
 def studio(width: int = 256) -> NDArray[np.float32]:
     """The studio as an equirectangular picture (width / 2, width, 3): softboxes over a dark grey gradient."""
-    # Find every pixel's direction: in Mitsuba +y is at the top, +z in the middle, and +x to the left of it
-    rows, columns = np.meshgrid(np.arange(width // 2) + 0.5, np.arange(width) + 0.5, indexing="ij")
-    theta, phi = np.pi * rows / (width // 2), 2.0 * np.pi * columns / width
-    look = np.stack([np.sin(phi) * np.sin(theta), np.cos(theta), -np.cos(phi) * np.sin(theta)], axis=-1)
-
+    look = _directions(width)
     radiance = 0.03 + 0.085 * (1.0 + look[..., 1])
     for box in SOFTBOXES:
         radiance += box.radiance * _shape(box, look)
     return np.repeat(radiance[..., None], 3, axis=-1).astype(np.float32)
+
+
+@functools.cache
+def sky(width: int = 512) -> NDArray[np.float32]:
+    """The sky as an equirectangular picture (width / 2, width, 3); those near the sun are averages."""
+    mi = kernel.mitsuba()
+    described = {"type": "scene", "light": emitter(mi, "sky"), "object": {"type": "sphere"}}
+    light = mi.load_dict(described).emitters()[0]
+
+    def radiance(look: NDArray[np.float64]) -> NDArray[np.float32]:
+        hit = mi.SurfaceInteraction3f()
+        hit.wi = mi.Vector3f(-look.reshape(-1, 3).T)
+        return np.array(light.eval(hit)).T.reshape(look.shape)
+
+    look = _directions(width)
+    found = radiance(look)
+    sun = look @ np.array(SUN) / np.linalg.norm(SUN)
+    for row, column in np.argwhere(sun > np.cos(np.radians(NEAR_SUN))):
+        found[row, column] = radiance(_directions(width, row, column, FINER)).mean(axis=(0, 1))
+    return found
+
+
+def _directions(width: int, row: int = 0, column: int = 0, finer: int = 0) -> NDArray[np.float64]:
+    """Of all texels (width / 2, width, 3), or within one of them (finer, finer, 3).
+
+    In Mitsuba +y is at the top, +z in the middle, and +x to the left of it.
+    """
+    count = (finer, finer) if finer else (width // 2, width)
+    rows, columns = np.meshgrid(*(np.arange(n) + 0.5 for n in count), indexing="ij")
+    if finer:
+        rows, columns = row + rows / finer, column + columns / finer
+    theta, phi = np.pi * rows / (width // 2), 2.0 * np.pi * columns / width
+    return np.stack([np.sin(phi) * np.sin(theta), np.cos(theta), -np.cos(phi) * np.sin(theta)], axis=-1)
 
 
 def _shape(box: Softbox, look: NDArray[np.float64], feather: float = 0.12) -> NDArray[np.float64]:

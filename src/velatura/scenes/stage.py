@@ -41,7 +41,7 @@ def scene_dict(
     Args:
         scene: a name of `OBJECTS` ("ball", "sphere", ...), or a Mitsuba scene file (.xml), in which every shape whose
             bsdf has the id "material" gets the material, and which keeps its own cameras, integrator and lights.
-        env: "studio", "sky", "furnace", or an .exr or .hdr file; None means a scene file's own lights, or else the
+        env: one of `ENVIRONMENTS`, or an .exr or .hdr file; None means a scene file's own lights, or else the
             studio. In the furnace the object floats alone, so that a material that loses no light vanishes.
         bsdf: a `mi.BSDF`, or the dictionary of one.
         size: width and height in pixels; None means a scene file's own, or else 512 x 512.

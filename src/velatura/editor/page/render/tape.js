@@ -108,10 +108,10 @@ export class Tape {
    * a single number where it is the same for all of them.
    */
   run(inputs, take) {
-    let total = 1;
+    const lengths = Object.values(inputs).filter((x) => x instanceof Float64Array).map(({ length }) => length);
+    const total = Math.max(1, ...lengths); // also where the tape reads none of these
     for (const [name, { channels, count }] of this.inputs) {
-      if (count > 1) total = inputs[name].length;
-      else channels.forEach((channel, c) => (channel[0] = channels.length > 1 ? inputs[name][c] : inputs[name]));
+      if (count === 1) channels.forEach((channel, c) => (channel[0] = channels.length > 1 ? inputs[name][c] : inputs[name]));
     }
     this.once.forEach(call);
     const calls = this.needed(), columns = this.outputs.map((k) => this.values[k].channels[0]);
