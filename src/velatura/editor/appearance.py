@@ -267,7 +267,7 @@ def _further(wish: Target, found: DraggedStack) -> DraggedStack:
 
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
-    found = stacks.search(wish, model.in_closed_form, EFFORT)
+    found = stacks.search(wish, model.in_closed_form)
     fresh = DraggedStack.of(found.stack, wish, model) if found else None
     if fresh is not None:
         moved, bound = fresh.towards(wish)

@@ -20,6 +20,7 @@ from velatura.ops import Value
 
 NODES = 512  # on which a set without a closed form is looked for
 ROUGHLY, ATTEMPTS = 16, 8  # halvings of a range that need not be exact, and draws of members
+NOTHING, VANISHED = 2e-3, 10.0  # logarithm of a step of the index that is no interface, and the cost of that
 MODERATE = 1.5  # an index that many media have; members near it, clear and with interfaces that show, are preferred
 
 
@@ -505,7 +506,8 @@ def dislike(eta_0: Value, layers: Layers) -> Array:
     if layers.kind != "dielectric":
         return absorbs
     extreme, step = (np.abs(np.log(np.atleast_2d(layers.eta / eta)))[0] for eta in (MODERATE, eta_0))
-    return absorbs + 0.2 * extreme + 0.5 * np.maximum(1 - step / 0.2, 0)  # the last: the interface almost vanishes
+    almost = 0.5 * np.maximum(1 - step / 0.2, 0) + VANISHED * (step < NOTHING)
+    return absorbs + 0.2 * extreme + almost
 
 
 def _depth(below: Above, rest: _Rest, eta: Array) -> Array:

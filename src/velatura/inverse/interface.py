@@ -326,7 +326,8 @@ class Metals:
 def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
     """The conductor that reflects r in every channel."""
     metals = Metals(above, roughness, choice, len(r))
-    low, high = (np.broadcast_to(end, r.shape) for end in metals.ends)
+    shape = np.broadcast_shapes(r.shape, np.shape(choice.tint))
+    low, high = (np.broadcast_to(end, shape) for end in metals.ends)
     eta, kappa = metals.given
     if eta is not None and kappa is not None:
         bound = margin(np.min(np.broadcast_to(kappa - eta, r.shape), axis=0))

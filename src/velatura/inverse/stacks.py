@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from velatura.inverse import interface, pair
-from velatura.inverse.equivalence import EquivalenceClass, dislike
+from velatura.inverse.equivalence import VANISHED, EquivalenceClass, dislike
 from velatura.inverse.interface import DENSER, RARER, Choice
 from velatura.inverse.partial_stack import Above, Array, Batch, Layers, take
 from velatura.inverse.roots import false_position
@@ -24,10 +24,12 @@ from velatura.inverse.target import Target, TargetLobe, read
 from velatura.model import DEFAULT, Model, named
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic
+from velatura.ops import Value
 from velatura.stack import Diffuse, MaterialLike, Stack, load
 
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
 GRAZING = (0.5, 0.4, 0.3, 0.2, 0.1)  # cosines at which members of a class may differ
+DRAWS = 4  # times that alternatives are drawn
 ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that is fixed, and may where that is sought
 
 
@@ -129,17 +131,25 @@ def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EF
 
 
 def found(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Partial | None:
-    """The stacks of a model in closed form that are found at the lowest effort that finds any."""
+    """The stacks of a model in closed form that are found at the lowest effort that finds any.
+
+    If all efforts find none, or only stacks with an interface that vanishes, the indices between theirs are tried.
+    """
+    paths = None
     for spread, keep in efforts:
-        paths = None
         for paths in follow(target, model, spread, keep):
             if not len(paths.cost):
                 break
         if paths is not None and len(paths.cost):
-            return paths
-        if not any(_open(lobe) for lobe in target.lobes):
             break
-    return None
+        if not any(is_open(lobe) for lobe in target.lobes):
+            return None
+    some = paths if paths is not None and len(paths.cost) else None
+    if len(efforts) == len(EFFORTS) and (some is None or some.cost.min() >= VANISHED):
+        from velatura.inverse import sampling  # which is made of the steps here
+
+        return sampling.closer(target, model, some)
+    return some
 
 
 def solutions(target: Target, model: Model, paths: Partial, which: Iterable[int]) -> Iterator[Solution]:
@@ -156,48 +166,37 @@ def alternatives(
 ) -> list[Solution]:
     """Stacks that all have the lobes of a target: the one of `invert_stack`, then others drawn at random.
 
+    They are drawn over all free coordinates of all lobes: indices, optical depths and tints.
+
     Fewer than `count` where the target leaves nothing open.
 
     Raises:
         InvalidInput, Infeasible: as `invert_stack`.
     """
+    from velatura.inverse import sampling
+
     first = invert_stack(target, model, **switches)
-    rng = np.random.default_rng(seed)
-    found = [first]
+    rng, found = np.random.default_rng(seed), [first]
     near = first.in_closed_form
-    *_, paths = follow(near.target, near.model, *EFFORTS[1])
-    for drawn in solutions(near.target, near.model, paths, rng.integers(len(paths.cost), size=4 * count).tolist()):
-        if len(found) == count:
-            break
-        other = _met(_last_redrawn(drawn, rng), first)
-        if other is not None and all(other.stack != each.stack for each in found):
-            found.append(other)
+    for _ in range(DRAWS):
+        paths = sampling.drawn(near, rng)
+        for drawn in solutions(near.target, near.model, paths, range(min(len(paths.cost), 2 * count))):
+            if len(found) == count:
+                return found
+            other = _met(drawn, first)
+            if other is not None and all(other.stack != each.stack for each in found):
+                found.append(other)
     return found
 
 
-def _met(drawn: Solution | None, first: Solution) -> Solution | None:
+def _met(drawn: Solution, first: Solution) -> Solution | None:
     """What is drawn, moved to where the model of the first stack reads its lobes; None if there is no such stack."""
-    if drawn is None or first.model.recursion.closed_form:
+    if first.model.recursion.closed_form:
         return drawn
     from velatura.inverse import refined
 
     met = refined.moved(drawn, first.target, first.model)
     return met if isinstance(met, Solution) else None
-
-
-def _last_redrawn(solution: Solution, rng: np.random.Generator) -> Solution | None:
-    """With the last lobe given by another member of its class, on which no other lobe depends."""
-    lobe, last = solution.target.lobes[-1], solution.classes[-1]
-    if lobe.base == "conductor":
-        tint = rng.random()
-        last = dataclasses.replace(last, choice=dataclasses.replace(last.choice, tint=tint))
-    indices = last.sample(1, int(rng.integers(2**31)))
-    if not len(indices):
-        return None
-    layers = last.member(*indices.T)
-    if not all(part.feasible.all() for part in layers):
-        return None
-    return dataclasses.replace(solution, layers=(*solution.layers[: -lobe.interfaces], *layers))
 
 
 def on_black(stack: MaterialLike) -> Stack:
@@ -255,14 +254,18 @@ def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> Equ
     )
 
 
-def extended(paths: Partial, lobe: TargetLobe, target: Target, spread: int, first: bool) -> Partial:
-    """All partial stacks with all free choices of a lobe, feasible or not."""
-    variance = Isotropic(np.atleast_1d(paths.above.f.variance(lobe.roughness)))
+def extended(
+    paths: Partial, lobe: TargetLobe, target: Target, spread: int, first: bool, given: Array | None = None
+) -> Partial:
+    """All partial stacks with all free choices of a lobe, feasible or not; `given`: an index between its interfaces for
+    each, (N,)."""
     energy = np.array(lobe.colour)[:, None]
-    choice = _choice(lobe, lobe.interfaces - 1, target, absorbs=lobe.interfaces == 2 or not first)
+    choice = choice_of(lobe, target, first)
 
     # Let the index between two interfaces run, that of the medium above included, where the upper one vanishes
-    if lobe.interfaces == 2:
+    if lobe.interfaces == 2 and given is not None:
+        paths, energy = with_upper(paths, lobe, target, given[None], pinned_above(lobe))
+    elif lobe.interfaces == 2:
         count = len(paths.cost)
         pinned = lobe.fixed.of("eta", 0)
         tried = np.array([pinned]) if pinned is not None else np.geomspace(1, target.eta_max, spread)
@@ -270,14 +273,9 @@ def extended(paths: Partial, lobe: TargetLobe, target: Target, spread: int, firs
         if pinned is None:
             eta = np.r_[eta, np.broadcast_to(paths.above.eta, (1, count))[0]]
         index = np.r_[np.repeat(np.arange(count), len(tried)), np.arange(count)][: len(eta)]
-        tau = _pinned(lobe, "tau", 0)
         if pinned is None and lobe.fixed.of("alpha", 1) is not None:
-            index, eta = _of_fixed_roughness(paths, lobe, variance, choice, tried)
-        paths, eta = paths.take(index), eta[None]
-        upper = pair.top(paths.above, energy, variance, eta, 0.0 if tau is None else tau, target.eta_max)
-        layers = _held(upper.layers, lobe, 0)
-        paths = Partial(upper.below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
-        energy = energy - upper.energy
+            index, eta = _of_fixed_roughness(paths, lobe, _variance(paths, lobe), choice, tried)
+        paths, energy = with_upper(paths.take(index), lobe, target, eta[None], pinned_above(lobe))
 
     # Take either index of the interface that gives what is left
     if choice.kind == "dielectric" and choice.eta is None:
@@ -285,9 +283,28 @@ def extended(paths: Partial, lobe: TargetLobe, target: Target, spread: int, firs
         index = np.tile(np.arange(count), 2)
         paths, energy = paths.take(index), take(energy, index, count)
         choice = dataclasses.replace(choice, side=np.repeat([DENSER, RARER], count))
-    lower = interface.solve(paths.above, energy, variance, choice)
-    layers = _held(lower.layers, lobe, lobe.interfaces - 1)
-    return Partial(lower.below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
+    return with_last(paths, energy, lobe, choice)
+
+
+def with_upper(paths: Partial, lobe: TargetLobe, target: Target, eta: Array, tau: Value) -> tuple[Partial, Array]:
+    """Partial stacks with the upper interfaces of a pair, and the energy that these leave, (C, N)."""
+    energy = np.array(lobe.colour)[:, None]
+    upper = pair.top(paths.above, energy, _variance(paths, lobe), eta, tau, target.eta_max)
+    return _with(paths, _held(upper.layers, lobe, 0), upper.below), energy - upper.energy
+
+
+def with_last(paths: Partial, energy: Array, lobe: TargetLobe, choice: Choice) -> Partial:
+    """Partial stacks with the last interfaces of a lobe, for the energy that is left."""
+    last = interface.solve(paths.above, energy, _variance(paths, lobe), choice)
+    return _with(paths, _held(last.layers, lobe, lobe.interfaces - 1), last.below)
+
+
+def _with(paths: Partial, layers: Layers, below: Above) -> Partial:
+    return Partial(below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
+
+
+def _variance(paths: Partial, lobe: TargetLobe) -> Isotropic:
+    return Isotropic(np.atleast_1d(paths.above.f.variance(lobe.roughness)))
 
 
 def _of_fixed_roughness(
@@ -316,8 +333,20 @@ def _of_fixed_roughness(
     return np.r_[index[same], index[passes]], np.r_[eta[same], found]
 
 
-def _open(lobe: TargetLobe) -> bool:
+def is_open(lobe: TargetLobe) -> bool:
+    """Whether the index between the interfaces of a lobe is free."""
     return lobe.interfaces == 2 and lobe.fixed.of("eta", 0) is None
+
+
+def pinned_above(lobe: TargetLobe) -> Value:
+    """Optical depths of the medium above a pair, 0 where they are free."""
+    tau = _pinned(lobe, "tau", 0)
+    return 0.0 if tau is None else tau
+
+
+def choice_of(lobe: TargetLobe, target: Target, first: bool) -> Choice:
+    """The choice of the last interface of a lobe; nothing absorbs above the first interface unless that is fixed."""
+    return _choice(lobe, lobe.interfaces - 1, target, absorbs=lobe.interfaces == 2 or not first)
 
 
 def _choice(lobe: TargetLobe, n: int, target: Target, absorbs: bool) -> Choice:
