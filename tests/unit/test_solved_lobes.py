@@ -159,3 +159,12 @@ def test_the_roughness_of_what_a_pane_passes_is_that_of_walks() -> None:
     assert found is not None and truth is not None
     np.testing.assert_allclose(found.energy, truth.energy, rtol=0.01)
     assert abs(np.log(found.alpha.mean(axis=0) / truth.alpha[0])).max() < 0.1
+
+
+def test_roughness_outside_has_no_steps() -> None:
+    """Of a wide lobe in a dense medium, part of whose light is totally reflected: it grows steadily with its own."""
+    alpha = np.linspace(0.22, 0.34, 61)
+    lobe = OwnMediumLobe(1.0, Roughness(alpha, alpha, 0 * alpha), 2.15, None, leaving)
+    found = outside.roughness(outside.of_lobe(lobe, (0 * alpha, 0 * alpha, 1 + 0 * alpha)), 0 * alpha)
+    slopes = np.diff(found.alpha_u) / np.diff(alpha)
+    assert slopes.min() > 0 and slopes.max() < 2

@@ -26,6 +26,7 @@ from velatura.sampling import low_discrepancy
 Array = NDArray[np.floating]
 
 SAMPLES = 4 * 377  # of a lobe; four times a Fibonacci number
+ESCAPING = 4 * 987  # normals whose light leaves a lobe's medium: near total reflection it changes fast with them
 STEPS = 8  # of the search for a roughness
 ENOUGH = 1e-4  # change of a roughness at which it ends
 ALPHA_LIMITS = 1e-4, 1.0
@@ -44,12 +45,15 @@ class Samples:
 
 
 def of_lobe(lobe: OwnMediumLobe, wi: Direction) -> Samples:
-    """Of a lobe with numbers (N,), and a weight (C, N), for directions wi."""
-    each = replace(lobe, weight=_each(lobe.weight), roughness=Roughness(*map(_each, lobe.roughness)))
-    i = _direction(wi)
-    u1, u2 = (u.ravel() for u in _lattice(_azimuth(wi) - lobe.roughness.rotation))
-    wo = own_medium.sample(each, i, u1, u2)
-    return _weighted(wi, wo, *own_medium.eval_pdf(each, i, wo))
+    """Of a lobe with numbers (N,), and a weight (C, N), for directions wi.
+
+    No sample appears or vanishes with a share, so that the roughness has no steps.
+    """
+    columns = Roughness(*(value[:, None] for value in lobe.roughness))
+    i = wi[0][:, None], wi[1][:, None], wi[2][:, None]
+    u1, u2 = _lattice(_azimuth(wi) - lobe.roughness.rotation, ESCAPING)
+    wo, share = own_medium.escaping(replace(lobe, roughness=columns), i, u1, u2)
+    return Samples(wi, wo, np.mean(np.atleast_2d(lobe.weight)[..., None] * share, axis=0))
 
 
 def of_passed(passage: Passage, parts: Parts, wi: Direction) -> Samples:
@@ -87,7 +91,7 @@ def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
 
     Medians grow almost in proportion to the roughness, so Newton's step is that of the median.
     """
-    u1, u2 = _lattice(azimuth)
+    u1, u2 = _lattice(azimuth, SAMPLES)
     wi = wi[0][:, None], wi[1][:, None], wi[2][:, None]
     alpha = np.clip(target, *ALPHA_LIMITS)
     for _ in range(STEPS):
@@ -101,10 +105,10 @@ def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
     return alpha
 
 
-def _lattice(azimuth: Array) -> tuple[Array, Array]:
+def _lattice(azimuth: Array, samples: int) -> tuple[Array, Array]:
     """Uniform numbers (N, M) for visible normals, in any frame alike on both sides of the plane of incidence, and
     along and across it; its azimuth in the frame, (N,), is given, as the normal itself has one in no frame."""
-    u1, u2 = low_discrepancy.fibonacci(SAMPLES // 4)
+    u1, u2 = low_discrepancy.fibonacci(samples // 4)
     turn = azimuth[:, None] / (2 * np.pi)
     turned = np.concatenate([u1, 1 - u1, u1 + 0.25, 1.25 - u1])
     return (turned + turn) % 1, np.tile(u2, 4) + 0 * turn
