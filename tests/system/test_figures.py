@@ -83,6 +83,7 @@ SMALL: dict[str, dict[str, Any]] = {
     "weier2020-13": {"size": 24, "spp": 32, "paths": 60_000},
     "weier2020-14": {"paths": 300_000},
     "weier2020-table2": {"size": 24, "spp": 16, "repeats": 1},
+    "yamaguchi2019-01": {"names": ("(b)",), "size": 32, "spp": 32},
     "yamaguchi2019-02": {},
     "yamaguchi2019-03": {"angles": (0, 45), "count": 800},
     "yamaguchi2019-04": {"names": ("(b)",), "size": 32, "spp": 32},
@@ -386,6 +387,8 @@ def test_opposing_anisotropies_make_a_diamond(made: Made) -> None:
 
 def test_layers_are_brushed_each_in_its_own_way(made: Made) -> None:
     """Yamaguchi et al. 2019, figures 4, 6, 7 and 8. Expected: as the truth along the normal, not at the rim."""
+    (shown,) = made("yamaguchi2019-01")["cells"]
+    assert shown["rmse"]["anisotropic"] < 0.6 * shown["rmse"]["isotropic"]
     (cell,) = made("yamaguchi2019-04")["cells"]
     assert cell["mean"]["yamaguchi2019"] == pytest.approx(cell["mean"]["reference"], rel=0.05)
     (brushed,) = made("yamaguchi2019-06")["cells"]
@@ -433,6 +436,7 @@ def test_what_anisotropy_costs(made: Made) -> None:
     assert means[0] == pytest.approx(means[1], rel=0.03)
     assert all(min(scene["seconds"].values()) > 0 for scene in found["scenes"].values())
     found = made("yamaguchi2019-05")
+    assert found["directional"]["ratio"] > 0 and found["walk"]["equal_noise"] > found["walk"]["ratio"] > 0
     seconds = {name: each[0] for name, each in found["seconds"].items()}
     assert min(seconds.values()) > 0
     for other, overhead in found["overhead"].items():

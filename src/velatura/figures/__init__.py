@@ -73,6 +73,7 @@ FIGURES = (
     "weier2020-13",
     "weier2020-14",
     "weier2020-table2",
+    "yamaguchi2019-01",
     "yamaguchi2019-02",
     "yamaguchi2019-03",
     "yamaguchi2019-04",

@@ -4,6 +4,9 @@ The model of Belcour 2018 with the choices of Yamaguchi's, on two isotropic laye
 turned apart; a sphere in the studio. Indices and roughnesses are those chosen for figure 4 (a) and (d). Where nothing
 is anisotropic or textured the lobes are prepared once for all pixels here, which they are not in the paper: `textured`
 has one interface whose roughness is read from an image of a single value. Seconds are the processor's.
+
+The paper's two other times are here as ratios: that of the random walk to the model, at as many samples and at as much
+noise, and that of a picture of one sample in light from one direction to one in the studio.
 """
 
 from __future__ import annotations
@@ -34,7 +37,8 @@ def compute(
     """Over `samples` of a pixel, the `seconds` of a picture (the median of `repeats`) by material.
 
     `overhead` is what `anisotropic` takes more than the other two, as a share of each, `overhead_error` its standard
-    error.
+    error. `walk` and `directional` have the `ratio` of the two other times to that of `anisotropic` at most samples,
+    and its `ratio_error`; `equal_noise` is that of the walk for as much variance of the pixels.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
@@ -50,7 +54,7 @@ def compute(
         loaded = {}
         for name, (material, model) in materials.items():
             bsdf = canvas.bsdf(material, model, **_CHOICES)
-            loaded[name] = kernel.load_dict(scenes.scene_dict("sphere", "studio", bsdf, (size, size)))
+            loaded[name] = _scene(bsdf, size)
     others = ("isotropic", "textured")
     numbers: dict[str, Any] = {"samples": list(counts), "seconds": {name: [] for name in materials}}
     numbers |= {name: {other: [] for other in others} for name in ("overhead", "overhead_error")}
@@ -62,7 +66,26 @@ def compute(
             ratio, error = canvas.ratio(times["anisotropic"], times[other])
             numbers["overhead"][other].append(ratio - 1)
             numbers["overhead_error"][other].append(error)
+
+    # Compare the walk, and one sample in light from one direction
+    stacked, model = materials["anisotropic"]
+    walk = _scene(canvas.bsdf(stacked, "reference"), size)
+    beam = _scene(bsdf, size, light={"type": "directional", "direction": [1.0, -1.0, -1.0]})
+    _, times = canvas.timed({"walk": walk, "model": loaded["anisotropic"]}, counts[-1], repeats, seed)
+    _, single = canvas.timed({"directional": beam}, 1, repeats, seed)
+    for name, seconds in (("walk", times["walk"]), ("directional", single["directional"])):
+        numbers[name] = dict(zip(("ratio", "ratio_error"), canvas.ratio(seconds, times["model"])))
+    true, modelled = (
+        canvas.spheres(stacked, name, "studio", size, counts[-1], seed, **choices).var(axis=0, ddof=1).mean()
+        for name, choices in (("reference", {}), (model, _CHOICES))
+    )
+    numbers["walk"]["equal_noise"] = float(numbers["walk"]["ratio"] * true / modelled)
     return numbers
+
+
+def _scene(bsdf: Any, size: int, **changes: Any) -> Any:
+    """A sphere in the studio, or in what else is given, loaded."""
+    return kernel.load_dict(scenes.scene_dict("sphere", "studio", bsdf, (size, size)) | changes)
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
