@@ -46,16 +46,24 @@ def title(figure: Figure) -> str:
 
 
 def test_classes_have_axes_and_a_legend(run: Run, drawn: list[Figure]) -> None:
-    """Expected: a panel for each lobe, with its interfaces, what is on the axes, and which member was chosen."""
+    """Expected: a panel for each lobe, with its interfaces, what is on the axes, which member was chosen, and what else
+    is free, with its range."""
     status, _, err = run("invert", "target.yaml", "--plot")
     assert (status, err) == (0, "")
     (figure,) = drawn
     assert title(figure) == "Hazy metal: what gives each lobe, by velatura"
     titles = ["a pair that ends in a dielectric", "one dielectric", "one conductor"]
     assert [axes.get_title() for axes in figure.axes] == [f"lobe {n}: {text}" for n, text in enumerate(titles, 1)]
-    assert [axes.get_xlabel() for axes in figure.axes] == ["eta of the upper interface", "eta", "eta"]
-    assert [axes.get_ylabel() for axes in figure.axes] == ["eta of the lower one", "channel", "k"]
-    assert [tick.get_text() for tick in figure.axes[1].get_yticklabels()] == ["all", "red", "green", "blue"]
+    labels, others = zip(*(axes.get_xlabel().partition("\n")[::2] for axes in figure.axes))
+    assert labels == ("eta of the upper interface", "eta", "eta")
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "eta of the lower one",
+        "optical depth of the medium above",
+        "k",
+    ]
+    assert (
+        others[0].startswith("also free: tau_0 0 to [") and others[1] == "" and others[2].startswith("also free: tau_0")
+    )
     for axes in figure.axes:
         legend = axes.get_legend()
         assert legend and any(text.get_text().startswith("chosen") for text in legend.get_texts())

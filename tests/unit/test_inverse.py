@@ -479,6 +479,11 @@ def test_the_edge_tints_of_the_paper_are_members_of_one_class() -> None:
         assert np.max(clear[1].tau) < 1e-12
     assert members.contains(1.5, tau_1=[0, 0.3, 0]).all()
     assert not members.contains(1.5, tau_1=[0, 0.6, 0]).any()
+    least, most = members.depths_1(np.array([1.2, 1.5]))
+    assert np.all(least < 1e-12)
+    for n, eta in enumerate((1.2, 1.5)):
+        assert members.contains(eta, tau_1=0.999 * most[:, n]).all()
+        assert not members.contains(eta, tau_1=1.001 * most[:, n]).any()
     held = members.held(tau_1=[0, 0.3, 0])
     assert [one.name for one in held.coordinates] == ["eta_1", "tau_0", "tint"]
     assert np.ravel(held.indices_1()) == pytest.approx(np.ravel(members.indices_1()))  # which the blur bounds

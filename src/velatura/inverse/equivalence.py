@@ -183,6 +183,17 @@ class EquivalenceClass:
         Bati et al. 2021, section 5.2.2."""
         return intervals(lambda eta: self._last(eta)[1].blur, self._axis)
 
+    def depths_1(self, eta_1: Array) -> tuple[Array, Array]:
+        """The least and the largest optical depths (C, N) of the medium above the last interface, by the first index.
+
+        Of a dielectric both are what its own index needs, of a pair that which least absorption leaves.
+        """
+        if not self._free_depth:
+            tau = np.broadcast_to(self.member(eta_1)[-1].tau, (len(self.energy), len(eta_1)))
+            return tau, tau
+        below, rest, _ = self._last(*([eta_1] if self.interfaces == 2 else []))
+        return metal_depths(below, rest.r, rest.roughness, self.choice, (len(self.energy), len(eta_1)))
+
     @cached_property
     def highest(self) -> float:
         """The largest energy, equal in all channels, of a lobe with as many interfaces and the same blur."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import io
 from collections.abc import Sequence
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from velatura.errors import needs
 from velatura.inverse.angles import ReflectanceTable, grouped, table_of
 from velatura.inverse.descent import Fit
-from velatura.inverse.equivalence import EquivalenceClass
+from velatura.inverse.equivalence import Coordinate, EquivalenceClass
 from velatura.inverse.partial_stack import Layers
 
 RESOLUTION = 256
@@ -20,7 +19,14 @@ PANELS, PAIRS = 6, 12  # angles of incidence, and correlations, that are drawn o
 SIZE, DPI = (4.2, 4.2), 90  # of a picture: inches, and pixels in one
 FILLS = ("#d62728", "#2ca02c", "#1f77b4")  # of red, green and blue
 CHANNELS = ("red", "green", "blue")
-STAR: dict[str, Any] = {"color": "white", "marker": "*", "markersize": 12, "markeredgecolor": "black", "linestyle": ""}
+STAR: dict[str, Any] = {
+    "color": "white",
+    "marker": "*",
+    "markersize": 12,
+    "markeredgecolor": "black",
+    "linestyle": "",
+    "clip_on": False,
+}
 
 
 def png(members: EquivalenceClass) -> bytes:
@@ -29,7 +35,7 @@ def png(members: EquivalenceClass) -> bytes:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
-    figure = Figure(figsize=SIZE if members.free != 1 else (SIZE[0], SIZE[1] / 3), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     draw(figure.add_subplot(), members, members.chosen)
     picture = io.BytesIO()
@@ -41,9 +47,13 @@ def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None
     """A class on matplotlib's axes, per channel and intersected, and the member that was chosen.
 
     Of a pair of dielectrics over (eta_1, eta_2), channels filled in their colours, with the curves without absorption,
-    and all of them together in grey; else the values of eta_1, a row for each channel and one for all; of a conductor
-    its eta and k over tint.
+    and all of them together in grey; of a pair over a conductor over eta_1 and what the coat absorbs, of one dielectric
+    over its index and what absorbs above it; of a conductor its eta and k over tint. Beside a chosen member, dashed is
+    what is left below a medium that absorbs half of what one above may, and the other coordinates have their ranges.
     """
+    coordinates = {one.name: one for one in members.coordinates} if chosen else {}
+    half = {name: np.array(one.high) / 2 for name, one in coordinates.items() if name == "tau_0"}
+    drawn = {"eta_1", "eta_2", "tau_1"} if members.free else {"tint"}
     eta_max = members.choice.eta_max
     colours = FILLS if np.ptp(members.energy) > 0 else ("0.4",)
     if members.free == 2:
@@ -56,34 +66,63 @@ def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None
         least = np.min(depths, axis=0)
         axes.contourf(axis, axis, least.T, levels=(0, np.inf), colors=["0.7"])
         axes.contour(axis, axis, np.where(np.isnan(least), -1, least).T, levels=(0,), colors="black", linewidths=1)
+        if half:
+            below = np.nan_to_num(np.min(members.held(**half).grid(axis, axis), axis=0), nan=-1)
+            axes.contour(axis, axis, below.T, levels=(0,), colors="black", linewidths=1, linestyles="--")
         axes.set(xlabel="eta of the upper interface", ylabel="eta of the lower one")
         axes.set(xlim=(1, eta_max), ylim=(1, eta_max))
         _name_fills(axes, colours)
     elif members.free == 1:
-        rows = {"all": ("black", members.indices_1())}
-        if len(colours) > 1:
-            own = ((colour, members.indices_1(channel)) for channel, colour in enumerate(colours))
-            rows |= dict(zip(CHANNELS, own))
-        for y, (colour, spans) in enumerate(rows.values()):
-            for span in spans:
-                axes.plot(span, (y, y), color=colour, linewidth=6, solid_capstyle="butt", marker="|", markersize=14)
-        axes.set(xlabel="eta", xlim=(1, eta_max), ylabel="channel", ylim=(-1, len(rows)))
-        axes.set_yticks(range(len(rows)), rows)
+        for channel, colour in enumerate(colours):
+            name = CHANNELS[channel] if len(colours) > 1 else "all channels"
+            for low, high in members.indices_1():
+                axis = np.linspace(low, high, 65)
+                least, most = (depth[channel] for depth in members.depths_1(axis))
+                axes.fill_between(axis, least, most, color=colour, alpha=0.25)
+                axes.plot(axis, least, color=colour, linewidth=1.5, label=name)
+                name = "_"
+        if half:
+            for low, high in members.held(**half).indices_1():
+                axis = np.linspace(low, high, 65)
+                for channel, colour in enumerate(colours):
+                    most = members.held(**half).depths_1(axis)[1][channel]
+                    axes.plot(axis, most, color=colour, linewidth=1, linestyle="--")
+        which = "coat" if members.interfaces == 2 else "medium above"
+        axes.set(xlabel="eta", xlim=(1, eta_max), ylabel=f"optical depth of the {which}")
+        axes.set_ylim(bottom=0)
     else:
         tint = np.linspace(0, 1, 33)
         for channel, colour in enumerate(colours):
-            eta, kappa = np.transpose([_conductor(members, float(t), channel) for t in tint])
+            eta, kappa = _conductor(members, tint, channel)
             axes.plot(eta, kappa, color=colour, label=CHANNELS[channel] if len(colours) > 1 else "all channels")
             if channel == 0:
                 axes.text(eta[0], kappa[0], "tint 0", fontsize="small", ha="right", va="bottom")
                 axes.text(eta[-1], kappa[-1], "tint 1", fontsize="small", ha="right", va="bottom")
+            if half:
+                axes.plot(*_conductor(members.held(**half), tint, channel), color=colour, linewidth=1, linestyle="--")
         axes.margins(0.12)
         axes.set(xlabel="eta", ylabel="k")
     if chosen is not None:
         x, y = _place(members, chosen)
         numbers = [f"{np.ravel(part.eta)[0]:.2f}" for part in chosen[: members.free]]
         axes.plot(x, y, label=" ".join(["chosen", *(["eta", ", ".join(numbers)] if numbers else [])]), **STAR)
+    if half:
+        axes.plot([], [], color="black", linewidth=1, linestyle="--", label=f"below tau_0 {_numbers(half['tau_0'])}")
+    if chosen is not None:
         axes.legend(fontsize="small")
+    others = [f"{name} {_range(one)}" for name, one in coordinates.items() if name not in drawn]
+    if others:
+        axes.set_xlabel(f"{axes.get_xlabel()}\nalso free: {'; '.join(others)}")
+
+
+def _range(one: Coordinate) -> str:
+    return f"{_numbers(one.low)} to {_numbers(one.high)}"
+
+
+def _numbers(value: Any) -> str:
+    """A number, or those of channels where they differ."""
+    numbers = [f"{x:.2g}" for x in np.ravel(value)]
+    return numbers[0] if len(set(numbers)) == 1 else "[" + " ".join(numbers) + "]"
 
 
 def _name_fills(axes: Any, colours: Sequence[str]) -> None:
@@ -98,15 +137,14 @@ def _place(members: EquivalenceClass, chosen: tuple[Layers, ...]) -> tuple[Any, 
     if members.free == 0:
         return np.ravel(chosen[-1].eta), np.ravel(chosen[-1].kappa)
     point = [float(np.ravel(part.eta)[0]) for part in chosen[: members.free]]
-    return point[0], point[1] if len(point) > 1 else 0
+    return point[0], point[1] if len(point) > 1 else float(np.mean(chosen[-1].tau))
 
 
-def _conductor(members: EquivalenceClass, tint: float, channel: int) -> tuple[float, float]:
-    one = dataclasses.replace(members, choice=dataclasses.replace(members.choice, tint=tint))
-    (layers,) = one.member()
-    assert layers.kappa is not None
-    eta, kappa = (float(np.broadcast_to(x, (3, 1))[channel, 0]) for x in (layers.eta, layers.kappa))
-    return eta, kappa
+def _conductor(members: EquivalenceClass, tint: np.ndarray, channel: int) -> tuple[np.ndarray, np.ndarray]:
+    """eta and k of a channel over the tint."""
+    (layers,) = members.member(tint=tint)
+    eta, kappa = (np.broadcast_to(x, (len(members.energy), len(tint))) for x in (layers.eta, layers.kappa))
+    return eta[channel], kappa[channel]
 
 
 # Fits ----------------------------------------------------------------------------------------------------------------
