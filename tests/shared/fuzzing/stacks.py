@@ -43,6 +43,39 @@ def random_stack(rng: np.random.Generator, absurd: bool = False, most: int = 4, 
     return draw.accepted(lambda: Stack(layers, exterior=draw.exterior(), thin=base == "thin"))
 
 
+def in_range(rng: np.random.Generator, lossless: bool = False, brushed: bool = False) -> Stack:
+    """A stack of one to four interfaces: of an index in 1.05 to 2.5, over a metal, a mirror, glass or a pane, every
+    alpha in 0 to .8 and the axes of brushed ones at most 8 times apart, with media that absorb or scatter."""
+    alpha = lambda: 0.0 if rng.random() < 0.15 else float(rng.uniform(0.01, 0.8))  # noqa: E731
+
+    def surface(**index: Any) -> Interface:
+        along = alpha()
+        if not (brushed or rng.random() < 0.4):
+            return Interface(alpha=along, **index)
+        across = min(along * 8 ** float(rng.uniform(-1, 1)), 0.8)
+        return Interface(alpha=(along, across), rotation=float(rng.uniform(0, 180)), **index)
+
+    def medium() -> Medium:
+        absorbs = 0.0 if lossless else float(rng.uniform(0, 1))
+        return Medium(
+            depth=float(rng.uniform(0, 2)),
+            sigma_a=absorbs,
+            sigma_s=float(rng.uniform(0, 2)),
+            g=float(rng.uniform(-0.5, 0.9)),
+        )
+
+    layers: list[Layer] = []
+    for _ in range(rng.integers(1, 4)):
+        layers += [surface(eta=float(rng.uniform(1.05, 2.5))), *([medium()] if rng.random() < 0.3 else [])]
+    kinds = ["mirror", "glass", "pane"] + ([] if lossless else ["metal"])
+    kind = str(rng.choice(kinds))
+    if kind == "metal":
+        layers.append(surface(eta=float(rng.uniform(0.2, 2.0)), k=float(rng.uniform(1.5, 5.0))))
+    else:
+        layers.append(surface(conductor="mirror") if kind == "mirror" else surface(eta=float(rng.uniform(1.05, 2.5))))
+    return Stack(layers, thin=kind == "pane")
+
+
 def textured(stack: Stack, rng: np.random.Generator, image: str) -> Stack:
     """The stack with one or two of its values from an image in colour."""
     names = [name for name in stack.flat() if name != "exterior"]
