@@ -117,3 +117,14 @@ def test_light_from_below_sees_the_material_turned_over(stack: MaterialLike) -> 
     below = found.eval_pdf((i[0], i[1], -i[2]), (o[0], o[1], -o[2]), POWER)
     above = turned.eval_pdf(i, o, POWER)
     assert below[0] == pytest.approx(above[0], rel=1e-9) and below[1] == pytest.approx(above[1], rel=1e-9)
+
+
+def test_shares_of_samples_sum_up_to_1_between_the_nodes() -> None:
+    """Near the critical angle of a gap, where they change fast."""
+    gap = [Interface(eta=1.7, alpha=0), Interface(eta=1.0, alpha=0.7), Interface(eta=1.6, alpha=0.1)]
+    below = body(Stack(gap))[1].below
+    assert below
+    cosine = np.linspace(0.02, 1, 999)
+    of = below.seen((np.sqrt(1 - cosine**2), 0 * cosine, cosine))
+    assert of.columns.passes
+    np.testing.assert_allclose(sum(of.chances) + of.columns.passes.share, 1, atol=1e-6)

@@ -87,9 +87,19 @@ class SolvedSide:
     @property
     def places(self) -> list[int]:
         """The first rows of the remainder's scale, and of its energy."""
+        return self._places([self.columns.scale, self.columns.rest])
+
+    @property
+    def chances(self) -> list[int]:
+        """Rows of all shares of samples."""
+        passes = self.columns.passes
+        through = [passes.of_straight, passes.of_bounced, passes.of_rest] if passes else []
+        return self._places([*self.columns.chances, self.columns.chance, *through])
+
+    def _places(self, values: Sequence[Value]) -> list[int]:
         of = [id(x) for x in self.columns.all]
         rows = [len(np.atleast_2d(x)) for x in self.columns.all]
-        return [sum(rows[: of.index(id(x))]) for x in (self.columns.scale, self.columns.rest)]
+        return [sum(rows[: of.index(id(x))]) for x in values]
 
     @property
     def numbers(self) -> Array:
@@ -271,8 +281,9 @@ class Solver:
 
     def spread(self, side: SolvedSide) -> Array:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
-        energy there, too."""
+        energy there, too, and shares of samples sum up to 1."""
         rows = self.grid.spread(side.rows, self.shape)
+        rows[side.chances] /= rows[side.chances].sum(axis=0)
         if self.model.form == "forward":
             cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
             polynomial = Remainder(*(x[:, None] for x in vars(side.polynomial).values()))
