@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +16,7 @@ from velatura.shader.bake import Bake, Group
 from velatura.shader.material import Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Output, Struct
 from velatura.shader.solved import Solution, Tabulated
-from velatura.shader.statements import statements
+from velatura.shader.statements import assignments, statements
 from velatura.shader.symbol import Kind, Operand, Symbol
 
 _COMPARE = {"less": "<", "greater": ">", "at_most": "<=", "at_least": ">="}
@@ -93,6 +93,9 @@ class PythonPrinter(Printer):
     def store(self, array: str, place: str, text: str) -> str:
         return f"{array}[{place}] = {text}"
 
+    def put(self, place: str, text: str) -> str:
+        return f"{place} = {text}"
+
     def advance(self, name: str, following: str) -> str:
         return f"{name} = list({following})"
 
@@ -143,13 +146,12 @@ class PythonPrinter(Printer):
             for x in bake.groups
         )
 
-    def helpers(self) -> str:
+    def helpers(self, called: Set[tuple[str, Kind]]) -> str:
         return ""
 
     def lobes(self, outputs: Mapping[str, Output]) -> str:
-        lines, texts = statements(list(outputs.values()), self)
-        assigned = [f"l.{name} = {text}" for name, text in zip(outputs, texts)]
-        return _function("def vt_lobes(m, wi)", [*lines, "l = VtLobes()", *assigned, "return l"])
+        lines = assignments({f"l.{name}": output for name, output in outputs.items()}, self)
+        return _function("def vt_lobes(m, wi)", ["l = VtLobes()", *lines, "return l"])
 
     def energies(self, found: Sequence[Output]) -> str:
         return self._returned("def vt_energies(m, wi)", found)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
+from itertools import groupby
 from math import inf
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +13,14 @@ import numpy as np
 from velatura.shader.atlas import WIDTH, Layout, height
 from velatura.shader.bake import Bake, Group
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
-from velatura.shader.printer import ATOM, Output, Printer, Struct
-from velatura.shader.statements import statements
+from velatura.shader.printer import ATOM, Field, Output, Printer, Struct
+from velatura.shader.statements import assignments, statements
 from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
 
 if TYPE_CHECKING:  # it loads SciPy
     from velatura.shader.solved import Tabulated
+
+LINE = 120  # characters of declarations
 
 _TYPES: dict[str, str] = {"number": "float", "colour": "vec3", "condition": "bool", "conditions": "bvec3"}
 _COMPARE = {"less": "lessThan", "greater": "greaterThan", "at_most": "lessThanEqual", "at_least": "greaterThanEqual"}
@@ -106,7 +110,9 @@ class Glsl(Printer):
         return [f"vec4[{count}] {name} = vt_{table}({', '.join(args)});"]
 
     def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
-        return [f"vec4[{group.texels}] {name} = vt_baked_{group.name}({self.colour(place)});"]
+        first = f"{group.begin} + i" if group.begin else "i"
+        read = f"vt_baked_texel({first}, {self.colour(place)})"
+        return [f"vec4 {name}[{group.texels}];", f"for (int i = 0; i < {group.texels}; i++) {name}[i] = {read};"]
 
     def nodes(self, name: str, nodes: Sequence[float]) -> list[str]:
         listed = f"float[{len(nodes)}]({', '.join(map(self.literal, nodes))})"
@@ -125,6 +131,9 @@ class Glsl(Printer):
     def store(self, array: str, place: str, text: str) -> str:
         return f"{array}[{place}] = {text};"
 
+    def put(self, place: str, text: str) -> str:
+        return f"{place} = {text};"
+
     def advance(self, name: str, following: str) -> str:
         return f"{name} = {following};"
 
@@ -135,11 +144,8 @@ class Glsl(Printer):
         return _HEADER.format(name=name, model=model, filled=filled)
 
     def structs(self, structs: Sequence[Struct]) -> str:
-        def member(name: str, kind: str, count: int) -> str:
-            return f"    {_TYPES.get(kind, kind)} {name}{f'[{count}]' if count else ''};"
-
         return "".join(
-            "\n".join([f"struct {struct.name} {{ // {struct.comment}", *(member(*x) for x in struct.fields), "};", ""])
+            "\n".join([f"struct {struct.name} {{ // {struct.comment}", *_members(struct.fields), "};", ""])
             for struct in structs
         )
 
@@ -173,16 +179,18 @@ class Glsl(Printer):
         return "\n".join([_TABLES.format(WIDTH, height(layouts)), _TEXELS + "".join(map(_table, layouts))])
 
     def lookup(self, bake: Bake | Tabulated) -> str:
-        texel = _BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides, height=bake.height)
-        return "".join([texel, *map(_group, bake.groups)])
+        return _BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides, height=bake.height)
 
-    def helpers(self) -> str:
-        return _HELPERS
+    def helpers(self, called: Set[tuple[str, Kind]]) -> str:
+        parts = []
+        for comment, helpers in _HELPERS.items():
+            texts = [text for ops, text in helpers.items() if any(op in called for op in ops)]
+            parts += ["".join([f"// {comment}\n" if comment else "", *texts])] if texts else []
+        return "\n".join(parts)
 
     def lobes(self, outputs: Mapping[str, Output]) -> str:
-        lines, texts = statements(list(outputs.values()), self)
-        assigned = [f"l.{name} = {text};" for name, text in zip(outputs, texts)]
-        return _function("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [*lines, "", "VtLobes l;", *assigned, "return l;"])
+        lines = assignments({f"l.{name}": output for name, output in outputs.items()}, self)
+        return _function("VtLobes vt_lobes(VtMaterial m, vec3 wi)", ["VtLobes l;", *lines, "return l;"])
 
     def energies(self, found: Sequence[Output]) -> str:
         lines, texts = statements(found, self)
@@ -214,13 +222,13 @@ def _function(head: str, lines: Sequence[str]) -> str:
     return "\n".join([*_block(head, lines), ""])
 
 
-def _group(group: Group) -> str:
-    lines = [
-        f"vec4 texels[{group.texels}];",
-        f"for (int i = 0; i < {group.texels}; i++) texels[i] = vt_baked_texel({group.begin} + i, place);",
-        "return texels;",
-    ]
-    return "\n" + _function(f"vec4[{group.texels}] vt_baked_{group.name}(vec3 place)", lines)
+def _members(fields: Sequence[Field]) -> list[str]:
+    """Declarations of a struct's fields; those of one type that follow one another share lines."""
+    lines = []
+    for kind, each in groupby(fields, lambda field: _TYPES.get(field.type, field.type)):
+        names = ", ".join(f"{name}[{length}]" if length else name for name, _, length in each)
+        lines += wrap(f"{kind} {names};", LINE, initial_indent="    ", subsequent_indent="        ")
+    return lines
 
 
 def _table(layout: Layout) -> str:
@@ -350,25 +358,36 @@ vec4 vt_baked_texel(int texel, vec3 place) {{
 """,
 }
 
-_HELPERS = """\
-float vt_sqrt(float x) { return sqrt(max(x, 0.0)); }
-vec3 vt_sqrt(vec3 x) { return sqrt(max(x, 0.0)); }
-float vt_mean(vec3 x) { return (x.r + x.g + x.b) / 3.0; }
-
-// Drivers may leave sine and cosine with errors of 2e-4; this series is as good as single precision
-vec3 vt_sin(vec3 x) {
-    vec3 turns = round(x / 3.14159265), y = (x - turns * 3.140625) - turns * 9.67653590e-4, z = y * y;
-    vec3 odd = 1.0 - 2.0 * mod(turns, 2.0);
-    vec3 series = 1.0 / 120.0 - z * (1.0 / 5040.0 - z * (1.0 / 362880.0 - z / 39916800.0));
+_SINE = """\
+{0} vt_sin({0} x) {{
+    {0} turns = round(x / 3.14159265), y = (x - turns * 3.140625) - turns * 9.67653590e-4, z = y * y;
+    {0} odd = 1.0 - 2.0 * mod(turns, 2.0);
+    {0} series = 1.0 / 120.0 - z * (1.0 / 5040.0 - z * (1.0 / 362880.0 - z / 39916800.0));
     return odd * (y - y * z * (1.0 / 6.0 - z * series));
-}
-float vt_sin(float x) { return vt_sin(vec3(x)).x; }
-vec3 vt_cos(vec3 x) { return vt_sin(x + 1.57079633); }
-float vt_cos(float x) { return vt_sin(x + 1.57079633); }
-bvec3 vt_both(bvec3 a, bvec3 b) { return bvec3(a.x && b.x, a.y && b.y, a.z && b.z); }
-
-// Without branches, of which compilers for processors make much
-float vt_choice(bool where, float a, float b) { return mix(b, a, where); }
-vec3 vt_choice(bool where, vec3 a, vec3 b) { return mix(b, a, bvec3(where)); }
-bool vt_choice(bool where, bool a, bool b) { return (where && a) || (!where && b); }
+}}
 """
+
+# Functions by the operations that call them, under a comment
+_HELPERS: dict[str, dict[tuple[tuple[str, Kind], ...], str]] = {
+    "": {
+        (("sqrt", "number"),): "float vt_sqrt(float x) { return sqrt(max(x, 0.0)); }\n",
+        (("sqrt", "colour"),): "vec3 vt_sqrt(vec3 x) { return sqrt(max(x, 0.0)); }\n",
+        (("mean", "number"),): "float vt_mean(vec3 x) { return (x.r + x.g + x.b) / 3.0; }\n",
+        (
+            ("both", "conditions"),
+        ): "bvec3 vt_both(bvec3 a, bvec3 b) { return bvec3(a.x && b.x, a.y && b.y, a.z && b.z); }\n",
+    },
+    "Drivers may leave sine and cosine with errors of 2e-4; this series is as good as single precision": {
+        (("sin", "number"), ("cos", "number")): _SINE.format("float"),
+        (("sin", "colour"), ("cos", "colour")): _SINE.format("vec3"),
+        (("cos", "number"),): "float vt_cos(float x) { return vt_sin(x + 1.57079633); }\n",
+        (("cos", "colour"),): "vec3 vt_cos(vec3 x) { return vt_sin(x + 1.57079633); }\n",
+    },
+    "Without branches, of which compilers for processors make much": {
+        (("select", "number"),): "float vt_choice(bool where, float a, float b) { return mix(b, a, where); }\n",
+        (("select", "colour"),): "vec3 vt_choice(bool where, vec3 a, vec3 b) { return mix(b, a, bvec3(where)); }\n",
+        (
+            ("select", "condition"),
+        ): "bool vt_choice(bool where, bool a, bool b) { return (where && a) || (!where && b); }\n",
+    },
+}

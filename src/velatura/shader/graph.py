@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from velatura.ops import Value
-from velatura.shader.symbol import Operand, Symbol, in_order, operand
+from velatura.shader.symbol import Operand, Symbol, in_order, inside, operand
 
 COMMUTE = {"add", "multiply", "minimum", "maximum", "both"}
+DEAR = dict.fromkeys(("exp", "log", "sin", "cos", "power", "arctan2"), 4)  # as many operations
 
 
 @dataclass
@@ -44,3 +45,28 @@ class Graph:
         elif args != symbol.args:
             found = self._known[key] = symbol.with_args(args)
         return found
+
+
+def known_before(
+    outputs: Sequence[Operand], given: Collection[Symbol], later: tuple[str, ...], least: int
+) -> list[Symbol]:
+    """The numbers and colours that do not depend on inputs whose names begin as `later` says, and that values which do
+    are made of: those that take that many operations at least. What is `given` takes none."""
+    order = in_order(outputs, given)
+    bound, depend = inside(order), set[Symbol]()
+    for x in order:
+        own = x.op == "input" and x.detail.startswith(later)
+        if x not in given and (own or any(y in depend for y in x.args)):
+            depend.add(x)
+    read = {y for x in order if x in depend or bound[x] for y in x.args if isinstance(y, Symbol)}
+    found = dict.fromkeys(given)
+    for x in order:
+        known = x in read and x not in depend and not bound[x] and x.kind in ("number", "colour")
+        if known and x not in found and sum(_work(y) for y in in_order([x], found) if y not in found) >= least:
+            found[x] = None
+    return [x for x in found if x not in given]
+
+
+def _work(x: Symbol) -> int:
+    """Operations that a value takes."""
+    return 0 if x.op in ("input", "component", "item") else DEAR.get(x.op, 1)

@@ -7,7 +7,7 @@ in order; both take a printer, which gives each its text. A language is a class 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 
 from velatura.shader.symbol import Kind, Operand
@@ -136,6 +136,10 @@ class Printer(ABC):
         """A value is put into an array."""
 
     @abstractmethod
+    def put(self, place: str, text: str) -> str:
+        """A value is put into its place in a struct."""
+
+    @abstractmethod
     def advance(self, name: str, following: str) -> str:
         """An array takes the values of another."""
 
@@ -168,8 +172,8 @@ class Printer(ABC):
         """The texture of lobes over direction, and functions that look up each group of its texels."""
 
     @abstractmethod
-    def helpers(self) -> str:
-        """Functions that the statements call."""
+    def helpers(self, called: Set[tuple[str, Kind]]) -> str:
+        """Functions that statements call: for operations, with the kinds of their results."""
 
     @abstractmethod
     def lobes(self, outputs: Mapping[str, Output]) -> str:

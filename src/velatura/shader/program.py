@@ -101,7 +101,7 @@ def shader(
         printer.structs(_structs(recording)),
         *([printer.tables(layouts)] if layouts else []),
         *([printer.lookup(baked)] if baked else []),
-        printer.helpers(),
+        printer.helpers({(symbol.op, symbol.kind) for symbol in recording.symbols}),
         printer.lobes({name: (value, recording.kinds[name]) for name, value in recording.lobes.items()}),
         *([printer.energies([(value, "colour") for value in recording.energies])] if recording.energies else []),
         printer.eval_pdf((recording.value, "colour"), (recording.density, "number")),
@@ -136,7 +136,7 @@ def _shares(recording: Recording) -> list[str]:
     baked = recording.baked
     if baked and not isinstance(baked, Bake):
         return baked.shares if recording.shown else []
-    energies = [name for name in recording.kinds if name.endswith("energy")]
+    energies = [name for name in recording.kinds if part(name) in ("energy", "base_energy")]
     return [*(name for name in energies if name.startswith("t")), *(name for name in energies if name[0] != "t")]
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import chain, count
 from typing import TYPE_CHECKING, TypeGuard
 
 from velatura import ops
@@ -20,7 +21,7 @@ from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.shader import material, symbol
 from velatura.shader.bake import Bake, bake
-from velatura.shader.graph import Graph
+from velatura.shader.graph import Graph, known_before
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
 from velatura.stack import Address, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
@@ -29,9 +30,14 @@ if TYPE_CHECKING:  # it loads SciPy
     from velatura.shader.solved import Tabulated
 
 
+LATER = ("wo.", "u.")  # inputs that are known after wi
+LEAST = 4  # operations for which a value that is known once wi is has a place of its own
+
+
 @dataclass(frozen=True)
 class Recording:
-    """The model's computation for a stack: `lobes` from material and wi, the rest from these, wo, and random numbers u.
+    """The model's computation for a stack: `lobes`, and all else that is known once wi is, from material and wi; the
+    rest from these, wo, and random numbers u.
 
     Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ... `baked` is the texture that
     lobes are read from, if they are not added up; `shown` names the weights of lobes, where they have any. `energies`
@@ -128,7 +134,11 @@ def record(
     every = iter(graph.unique([*fields.values(), value, density, *drawn]))
     lobes = {name: next(every) for name in fields}
     held = {x: _held(name, kinds[name], x) for name, x in reversed(lobes.items()) if _worth(x)}
-    of_value, of_density, *sampled = Graph(held).unique(list(every))
+    others = list(every)
+    for x in known_before(others, held, LATER, LEAST):
+        name = next(name for name in _names(x) if name not in kinds)
+        kinds[name], lobes[name], held[x] = x.kind, x, _held(name, x.kind, x)
+    of_value, of_density, *sampled = Graph(held).unique(others)
     found = Graph().unique(energies)
     return Recording(stack, chosen, baked, shown, kinds, lobes, found, of_value, of_density, sampled)
 
@@ -140,6 +150,12 @@ def _lobed(
     weighed, shown = _weighed(body) if parameters else (body, [])
     base = body.above.base if added else None  # the values read of a base hold all of it
     return weighed, _fields(bsdf.scattered(weighed, wi), base.worth if base else ()), shown
+
+
+def _names(x: Symbol) -> Iterator[str]:
+    """For a value that is known once wi is."""
+    name = f"wi_{x.name.strip('_') or 'value'}"
+    return chain([name], (f"{name}_{n}" for n in count(2)))
 
 
 def _worth(x: Operand) -> TypeGuard[Symbol]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain, count
 
 from velatura.shader import atlas
@@ -17,18 +17,31 @@ _COMPARE = ("less", "greater", "at_most", "at_least")
 
 def statements(outputs: Sequence[Output], printer: Printer) -> tuple[list[str], list[str]]:
     """Lines that work out the outputs, and an expression for each, of the kind given."""
-    written = _Statements([value for value, _ in outputs], printer)
+    written = _Statements([value for value, _ in outputs], printer, {})
     return written.lines, [written.of(value, wide=kind == "colour") for value, kind in outputs]
 
 
-class _Statements:
-    """Names for values that are used more than once, that the model names, or that are long."""
+def assignments(outputs: Mapping[str, Output], printer: Printer) -> list[str]:
+    """Lines that put outputs into places, as soon as they are worked out."""
+    places: dict[Symbol, str] = {}
+    for place, (value, kind) in outputs.items():
+        if isinstance(value, Symbol) and value.op != "input" and value.kind == kind:
+            places.setdefault(value, place)
+    written, put = _Statements([value for value, _ in outputs.values()], printer, places), places.values()
+    others = ((place, value, kind == "colour") for place, (value, kind) in outputs.items() if place not in put)
+    return written.lines + [printer.put(place, written.of(value, wide=wide)) for place, value, wide in others]
 
-    def __init__(self, outputs: Sequence[Operand], printer: Printer) -> None:
+
+class _Statements:
+    """Names for values that are used more than once, that the model names, or that are long; some have `places`."""
+
+    def __init__(self, outputs: Sequence[Operand], printer: Printer, places: Mapping[Symbol, str]) -> None:
         order = in_order(outputs)
         self.printer = printer
+        self.places = places
         self.uses = Counter(x for symbol in order for x in symbol.args if isinstance(x, Symbol))
         self.uses.update(x for x in outputs if isinstance(x, Symbol))
+        self.clamped = {x.args[0] for x in order if self._clamps(x)}  # which need no text of their own
         self.inside = inside(order)
         self.open: frozenset[str] = frozenset()  # bound in the loops around this point
         self.text: dict[Symbol, tuple[str, int]] = {}
@@ -39,6 +52,8 @@ class _Statements:
     def _write(self, order: Sequence[Symbol]) -> None:
         title = ""
         for symbol in order:
+            if symbol in self.clamped:
+                continue
             named = symbol.kind in ("loop", "texels")
             text, precedence = ("", ATOM) if named else self._expression(symbol)
             if not named and self._inline(symbol, text):
@@ -47,6 +62,10 @@ class _Statements:
             if symbol.title != title:
                 title = symbol.title
                 self.lines += ["", *([self.printer.title(title)] if title else [])]
+            if place := self.places.get(symbol):
+                self.lines.append(self.printer.put(place, text))
+                self.text[symbol] = place, ATOM
+                continue
             name = self._name(symbol)
             if symbol.kind == "loop":
                 self._loop(symbol, name)
@@ -92,7 +111,7 @@ class _Statements:
         if not nodes:
             self.lines.append(printer.advance(name, filled))
         for x in body:
-            del self.text[x]
+            self.text.pop(x, None)
         self.open = outside
         self.lines = [*before, *printer.loop(index, times, self.lines)]
 
@@ -107,7 +126,11 @@ class _Statements:
         return f"({text})" if precedence < least else text
 
     def _inline(self, symbol: Symbol, text: str) -> bool:
+        if symbol in self.places:
+            return False
         if symbol.op in ("input", "component", "item") and len(text) < _LONG:
+            return True
+        if symbol.op == "negative" and text[1:].isidentifier():
             return True
         return self.uses[symbol] == 1 and not symbol.name and len(text) < _LONG
 
@@ -141,7 +164,7 @@ class _Statements:
             return f"-{self.of(args[0], ATOM)}", NEGATIVE
         if op == "select":
             return self._selected(symbol)
-        if op == "minimum" and "clip" in printer.functions and self._clamps(symbol):
+        if op == "minimum" and args[0] in self.clamped:
             assert isinstance(args[0], Symbol)
             return printer.call("clip", [self.of(x) for x in (*args[0].args, args[1])], wide), ATOM
         if op in printer.functions:
@@ -155,6 +178,8 @@ class _Statements:
 
     def _clamps(self, symbol: Symbol) -> bool:
         """Whether it keeps a value that nothing else uses between two constants."""
+        if symbol.op != "minimum" or "clip" not in self.printer.functions:
+            return False
         inner, high = symbol.args
         if not isinstance(inner, Symbol) or inner.op != "maximum" or self.uses[inner] > 1 or inner.name:
             return False

@@ -7,7 +7,7 @@ themselves: constants are floats, or NumPy arrays of three channels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextvars import ContextVar
 from itertools import count
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -135,6 +135,10 @@ def is_colour(x: Operand) -> bool:
     return x.kind in ("colour", "conditions") if isinstance(x, Symbol) else isinstance(x, tuple)
 
 
+def _is_condition(x: Operand) -> bool:
+    return x.kind == "condition" if isinstance(x, Symbol) else isinstance(x, bool)
+
+
 def component(x: Operand, channel: int) -> Operand:
     """One channel of a colour; a number is the same in all channels."""
     if isinstance(x, tuple):
@@ -207,8 +211,9 @@ class Recorder(Unrolled):
             return a if asked else b
         if chosen is other or (not isinstance(chosen, Symbol) and chosen == other):
             return a
+        kind: Kind = "condition" if _is_condition(chosen) and _is_condition(other) else "number"
         wide = any(is_colour(x) for x in (asked, chosen, other))
-        return Symbol("select", (asked, chosen, other), "colour" if wide else "number")
+        return Symbol("select", (asked, chosen, other), "colour" if wide else kind)
 
     def mean(self, x: Symbol) -> Value:
         return Symbol("mean", (x,), "number") if is_colour(x) else x
@@ -265,15 +270,16 @@ def _items(loop: Symbol, results: Sequence[Operand], first: int) -> list[Symbol]
 Symbol.dialect = Recorder()
 
 
-def in_order(outputs: Sequence[Value]) -> list[Symbol]:
-    """All symbols that the outputs are made of, inputs first, arguments before their results."""
+def in_order(outputs: Sequence[Value], given: Collection[Symbol] = ()) -> list[Symbol]:
+    """All symbols that the outputs are made of, inputs first, arguments before their results; none that only what is
+    `given` is made of."""
     found: set[Symbol] = set()
     waiting = [x for x in outputs if isinstance(x, Symbol)]
     while waiting:
         symbol = waiting.pop()
         if symbol not in found:
             found.add(symbol)
-            waiting.extend(x for x in symbol.args if isinstance(x, Symbol))
+            waiting.extend(x for x in symbol.args if isinstance(x, Symbol) and symbol not in given)
     return sorted(found, key=lambda symbol: (symbol.op != "input", symbol.serial))
 
 
@@ -282,6 +288,6 @@ def inside(order: Sequence[Symbol]) -> dict[Symbol, frozenset[str]]:
     found: dict[Symbol, frozenset[str]] = {}
     for symbol in order:
         own = {symbol.detail} if symbol.op == "bound" else set()
-        inner = own.union(*(found[x] for x in symbol.args if isinstance(x, Symbol)))
+        inner = own.union(*(found[x] for x in symbol.args if x in found))
         found[symbol] = frozenset(inner.difference(symbol.detail.bound) if symbol.kind == "loop" else inner)
     return found
