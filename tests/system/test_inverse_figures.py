@@ -70,8 +70,12 @@ def test_the_order_of_lobes_shows_at_the_edge(tmp_path: Path) -> None:
     blue, red = (found[order] for order in bati2021_17.ORDERS)
     assert np.allclose(blue["energy"][0], red["energy"][0], atol=1e-6)
     assert np.allclose(blue["energy"][0], np.add([0.025, 0.045, 0.05], [0.052, 0.025, 0.025]), atol=1e-6)
-    assert blue["grazing"] < 0.8
-    assert red["grazing"] > 1.1
+    assert blue["grazing"] <= blue["most"] < 0.8
+    assert red["grazing"] >= red["least"] > 1.1
+    # No interface of the stacks that are shown vanishes
+    for order in (blue, red):
+        eta = [1.0, *(layer["interface"]["eta"] for layer in order["stack"]["layers"] if "interface" in layer)]
+        assert np.abs(np.diff(np.log(eta))).min() > 0.02
     drawn(bati2021_17, found, tmp_path)
 
 

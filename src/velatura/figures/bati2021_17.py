@@ -15,9 +15,10 @@ import numpy as np
 
 from velatura.figures import canvas, looks
 from velatura.figures.looks import MODEL
-from velatura.inverse import grazing, invert_stack, plots
+from velatura.inverse import alternatives, grazing, invert_stack, plots
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model.stack_lobes import stack_lobes
+from velatura.stack import Stack
 
 ORDERS = ("17 blue over red", "17 red over blue")
 
@@ -27,9 +28,12 @@ def compute(
     size: int = looks.SIZE,
     spp: int = looks.SAMPLES,
     seed: int = 0,
+    members: int = 29,
     progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
     """By order: the `stack`, its `energy` over `cosines` (rgb), red over blue at `grazing` angles; and `pictures`.
+
+    `least` and `most` are the bounds of that of so many `members` of the class.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
@@ -38,9 +42,16 @@ def compute(
     stacks = {order: invert_stack(FIGURES[order], MODEL).stack for order in ORDERS}
     for order, stack in stacks.items():
         energy = np.sum(stack_lobes(stack, cosines, model=MODEL).energy, axis=0)
-        red, _, blue = grazing(stack, MODEL).mean(axis=1)
-        numbers[order] = {"stack": stack.to_dict(), "energy": energy.T.tolist(), "grazing": float(red / blue)}
+        drawn = [_tint(other.stack) for other in alternatives(FIGURES[order], members, MODEL, seed)]
+        numbers[order] = {"stack": stack.to_dict(), "energy": energy.T.tolist(), "grazing": _tint(stack)}
+        numbers[order] |= {"least": min(drawn), "most": max(drawn)}
     return numbers | {"pictures": looks.pictures(stacks, size, spp, seed, progress)}
+
+
+def _tint(stack: Stack) -> float:
+    """Red over blue at grazing angles."""
+    red, _, blue = grazing(stack, MODEL).mean(axis=1)
+    return float(red / blue)
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:

@@ -167,8 +167,9 @@ def draw_fit(figure: Any, table: ReflectanceTable, found: Fit, title: str) -> No
         axes = above.add_subplot(-(-len(shown) // 3), min(len(shown), 3), n + 1, title=f"incidence at {angle:g}°")
         for c, colour in enumerate(FILLS):
             points = table.value[c, own] * cosine[own]
-            axes.plot(tilt[own], points, "o", color=colour, markersize=3, alpha=0.4, label=f"{CHANNELS[c]}, table")
-            axes.plot(tilt[own], fitted[c, own], "x", color=colour, markersize=4, label=f"{CHANNELS[c]}, fit")
+            label = CHANNELS[c]
+            axes.plot(tilt[own], points, "o", color=colour, markersize=6, mfc="none", mew=0.7, label=f"{label}, table")
+            axes.plot(tilt[own], fitted[c, own], "x", color=colour, markersize=3, mew=0.7, label=f"{label}, fit")
         least = np.quantile(np.abs(table.value[:, own] * cosine[own]), 0.05) + 1e-6
         axes.set_yscale("symlog", linthresh=float(least))
         axes.set(xlabel="tilt of the half-vector (degrees)", ylabel="f cos theta_o (1/sr)")
