@@ -1,10 +1,11 @@
 """How exact inverse design is, and how fast.
 
-    python benchmarks/inverse.py [--targets 10000]
+    python benchmarks/inverse.py [--targets 10000] [--physical 300]
 
 Exactness is a round trip: random targets of one to three lobes, those that have a stack, are inverted, written as
 materials, and read by `vt.lobes`. For a model without a closed form they are those of the nearest model that has one.
-Times are the best of several runs.
+Lobes that `velatura` reads of random stacks are targets, too, of which
+none may be refused. Times are the best of several runs.
 """
 
 from __future__ import annotations
@@ -13,22 +14,24 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from velatura.inverse import Above, Choice, EquivalenceClass, Target, interface, invert_stack, pair, stacks
+from velatura.inverse.drag import seen
 from velatura.inverse.partial_stack import Layers, join, take
 from velatura.model import MODELS, Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic
-from velatura.stack import Stack
+from velatura.stack import Interface, Layer, Medium, Stack
 
 EXACT = 1e-4  # of energies and variances, at normal incidence
 CONFIGURATION, PAIRS, REACH = 5e-3, 2e5, 50e-3  # seconds, targets a second, seconds
+LEAST_STEP = 0.08  # of the logarithm of the index, of random stacks
 CHUNK = 4096  # targets at once: what the caches of a core hold
 
 #: One to three lobes: of one interface or a pair, the last one dielectric or a metal.
@@ -150,6 +153,36 @@ def exactness(model: Model, targets: int, seed: int = 0) -> tuple[int, float, fl
     return done, float(worst[0]), float(worst[1])
 
 
+def physical(kinds: Sequence[str], rng: np.random.Generator, model: Model) -> Target:
+    """The lobes of a random stack, rougher from lobe to lobe, as a model reads them: of a pair, their mean blur."""
+    layers: list[Layer] = []
+    lobes, eta, alpha = [], 1.0, 0.0
+    for n, kind in enumerate(kinds):
+        alpha = 0.0 if n == 0 and rng.random() < 0.3 else alpha + float(rng.uniform(0.01, 0.15))
+        count, metal = 1 + ("pair" in kind), "metal" in kind
+        for k in range(count):
+            if layers and rng.random() < 0.6:
+                layers.append(Medium(sigma_a=tuple(rng.uniform(0, 0.4, 3).tolist())))
+            if metal and k == count - 1:
+                index = rng.uniform(0.3, 2, 3)
+                extinction = index * rng.uniform(1.2, 4, 3)
+                layers.append(Interface(eta=tuple(index.tolist()), k=tuple(extinction.tolist()), alpha=alpha))
+            else:
+                above = eta
+                while abs(np.log(eta / above)) < LEAST_STEP:
+                    eta = float(rng.uniform(1.1, 2.2))
+                layers.append(Interface(eta=eta, alpha=alpha))
+        base = "conductor" if metal else "dielectric"
+        lobes.append({"energy": 0.1, "alpha": alpha, "interfaces": count, "base": base})
+    return seen(Stack(layers), Target(lobes), model)
+
+
+def physical_targets(count: int, model: Model, seed: int = 0) -> Iterator[Target]:
+    """Such targets, of all kinds in turn."""
+    rng = np.random.default_rng(seed)
+    return (physical(KINDS[n % len(KINDS)], rng, model) for n in range(count))
+
+
 # Speed ---------------------------------------------------------------------------------------------------------------
 
 
@@ -198,9 +231,15 @@ def reach() -> float:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--targets", type=int, default=10_000, help="of the round trip, for each closed form")
-    targets = parser.parse_args().targets
+    parser.add_argument("--physical", type=int, default=300, help="random stacks whose lobes are asked for")
+    options = parser.parse_args()
+    targets, own = options.targets, named("velatura")
 
-    failed = False
+    refused = [target for target in physical_targets(options.physical, own) if stacks.search(target, own) is None]
+    print(f"lobes of random stacks, {own.name}: {len(refused)} of {options.physical} refused")
+    for target in refused:
+        print(" ", target.to_dict()["lobes"])
+    failed = bool(refused)
     for model in [*MODELS, named("bati2021", channels="separate"), named("bati2021", reflectance="fresnel")]:
         # Where solutions are corrected until the model reads what was asked for, a tenth has to do
         done, energy, variance = exactness(model, targets if model.tir == "off" else max(targets // 10, len(KINDS)))

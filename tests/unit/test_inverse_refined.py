@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks import benchmark
 
 import velatura as vt
 from velatura.inverse import Infeasible, Target, alternatives, invert_stack, requests
@@ -126,3 +127,9 @@ def test_requests_for_what_no_answer_has_end_soon_near_the_goal(saturates: bool)
     assert read(found)[1] == pytest.approx(0.3, abs=1e-6 if saturates else 0.1)
     assert len(asked) <= 24
     assert np.abs(asked).max() < 5
+
+
+def test_lobes_of_random_stacks_are_not_refused() -> None:
+    """A slice of the benchmark: single lobes and lobes below coats."""
+    for target in benchmark("inverse").physical_targets(6, MODEL, seed=2):
+        assert missed(target, invert_stack(target, MODEL).stack) < 1e-4

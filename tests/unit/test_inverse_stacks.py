@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import importlib.util
 import itertools
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks import benchmark
 
 import velatura as vt
 from velatura.errors import InvalidInput, NoSolution
@@ -106,23 +105,13 @@ def _told(target) -> list[float]:
 # Random targets ------------------------------------------------------------------------------------------------------
 
 
-def _benchmark(name: str = "inverse"):
-    path = Path(__file__).parents[2] / "benchmarks" / f"{name}.py"
-    spec = importlib.util.spec_from_file_location(f"benchmarks_{name}", path)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.parametrize(
     "model", [*MODELS, named("bati2021", channels="separate")], ids=lambda m: f"{m.name} {m.channels}"
 )
 def test_round_trip(model: Model) -> None:
     """What is read of the materials is what was asked for: one to three lobes, of all kinds, coloured."""
     count = 22 if model.recursion.closed_form else 11
-    done, energy, variance = _benchmark().exactness(model, count, seed=5)
+    done, energy, variance = benchmark("inverse").exactness(model, count, seed=5)
     assert done == count
     assert energy < 1e-4
     assert variance < 1e-4
@@ -453,7 +442,7 @@ def test_a_lobe_is_changed_and_the_others_stay() -> None:
 
 def test_random_refusals_have_ways_out() -> None:
     """A slice of the benchmark, one lobe: reasons that can be, and ways out that are solved when they are fed back."""
-    refusals = _benchmark("refusals")
+    refusals = benchmark("refusals")
     for target, refusal, _ in refusals.refused(8, seed=1, model="bati2021", most=1):
         assert refusals.wrong(target, refusal, "bati2021") is None
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import bounced, own_medium, passed
+from velatura.model.mixture import ALPHA_MIN
 from velatura.model.own_medium import OwnMediumLobe
 from velatura.model.passed import Parts
 from velatura.model.straight_through import Passage
@@ -26,9 +27,8 @@ from velatura.sampling import low_discrepancy
 Array = NDArray[np.floating]
 
 SAMPLES = 4 * 377  # of a lobe; four times a Fibonacci number
-ESCAPING = 4 * 987  # normals whose light leaves a lobe's medium: near total reflection it changes fast with them
-STEPS = 8  # of the search for a roughness
-ENOUGH = 1e-4  # change of a roughness at which it ends
+STEPS = 12  # of the search for a roughness
+ENOUGH = 1e-7  # change of a roughness at which it ends
 ALPHA_LIMITS = 1e-4, 1.0
 ROUND = 1e-4  # difference of variances, of their sum, below which a lobe hardly has axes
 COS_MIN = 1e-6  # of sums of directions
@@ -47,13 +47,18 @@ class Samples:
 def of_lobe(lobe: OwnMediumLobe, wi: Direction) -> Samples:
     """Of a lobe with numbers (N,), and a weight (C, N), for directions wi.
 
-    No sample appears or vanishes with a share, so that the roughness has no steps.
+    Samples are those of a GGX reflection outside that is as wide to first order: there the value of a lobe falls off
+    steadily towards the horizon, so that the roughness has no steps, as samples inside that are totally reflected have.
     """
-    columns = Roughness(*(value[:, None] for value in lobe.roughness))
-    i = wi[0][:, None], wi[1][:, None], wi[2][:, None]
-    u1, u2 = _lattice(_azimuth(wi) - lobe.roughness.rotation, ESCAPING)
-    wo, share = own_medium.escaping(replace(lobe, roughness=columns), i, u1, u2)
-    return Samples(wi, wo, np.mean(np.atleast_2d(lobe.weight)[..., None] * share, axis=0))
+    u1, u2 = _lattice(_azimuth(wi) - lobe.roughness.rotation)
+    i = ggx.rotate(_columns(wi), lobe.roughness.rotation[:, None])
+    wider = np.sqrt(lobe.n * lobe.n - 1 + i[2] * i[2]) / np.maximum(i[2], COS_MIN)
+    u, v = (np.clip(alpha[:, None] * wider, ALPHA_MIN, 1.0) for alpha in lobe.roughness[:2])
+    h = ggx.sample_visible(i, u, v, u1, u2)
+    density = ggx.masking(i, u, v) * ggx.ndf(h, u, v) / (4 * np.maximum(i[2], COS_MIN))
+    x, y, z = (w.ravel() for w in ggx.rotate(ggx.reflect(i, h), -lobe.roughness.rotation[:, None]))
+    each = replace(lobe, weight=_each(lobe.weight), roughness=Roughness(*map(_each, lobe.roughness)))
+    return _weighted(wi, (x, y, z), own_medium.eval_pdf(each, _direction(wi), (x, y, z))[0], density.ravel())
 
 
 def of_passed(passage: Passage, parts: Parts, wi: Direction) -> Samples:
@@ -73,7 +78,7 @@ def together(samples: Sequence[Samples]) -> Samples:
 
 def roughness(samples: Samples, axis: Array | None = None) -> Roughness:
     """The equivalent roughness, (N,) each; `axis` is the rotation where symmetry gives it."""
-    i, o = [w[:, None] for w in samples.wi], samples.wo
+    i, o = _columns(samples.wi), samples.wo
     x, y, z = ggx.normalize((i[0] + o[0], i[1] + o[1], np.maximum(i[2] + o[2], COS_MIN)))
     # Light of no energy has the shape of its samples
     total = samples.energy.sum(axis=-1, keepdims=True)
@@ -91,8 +96,8 @@ def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
 
     Medians grow almost in proportion to the roughness, so Newton's step is that of the median.
     """
-    u1, u2 = _lattice(azimuth, SAMPLES)
-    wi = wi[0][:, None], wi[1][:, None], wi[2][:, None]
+    u1, u2 = _lattice(azimuth)
+    wi = _columns(wi)
     alpha = np.clip(target, *ALPHA_LIMITS)
     for _ in range(STEPS):
         u, v = alpha[..., None]
@@ -105,10 +110,10 @@ def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
     return alpha
 
 
-def _lattice(azimuth: Array, samples: int) -> tuple[Array, Array]:
+def _lattice(azimuth: Array) -> tuple[Array, Array]:
     """Uniform numbers (N, M) for visible normals, in any frame alike on both sides of the plane of incidence, and
     along and across it; its azimuth in the frame, (N,), is given, as the normal itself has one in no frame."""
-    u1, u2 = low_discrepancy.fibonacci(samples // 4)
+    u1, u2 = low_discrepancy.fibonacci(SAMPLES // 4)
     turn = azimuth[:, None] / (2 * np.pi)
     turned = np.concatenate([u1, 1 - u1, u1 + 0.25, 1.25 - u1])
     return (turned + turn) % 1, np.tile(u2, 4) + 0 * turn
@@ -150,6 +155,10 @@ def _weighted(wi: Direction, wo: Direction, value: Array, density: Array) -> Sam
     energy = ops.divide(np.mean(np.atleast_2d(value), axis=0), density)
     x, y, z = (np.broadcast_to(w, energy.shape).reshape(shape) for w in wo)
     return Samples(wi, (x, y, z), energy.reshape(shape))
+
+
+def _columns(w: Direction) -> Direction:
+    return w[0][:, None], w[1][:, None], w[2][:, None]
 
 
 def _direction(w: Direction) -> Direction:

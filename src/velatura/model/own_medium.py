@@ -132,30 +132,19 @@ def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tup
 def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value, Value]:
     """For columns of directions (N, 1)."""
     u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
-    # Azimuths from the plane of incidence: the same normals for any axes of a round lobe
-    x, y, _ = _in_frame(lobe, wi)
-    _, value = escaping(lobe, wi, (u1 + np.arctan2(y, x) / (2 * np.pi)) % 1, u2)
-    return np.mean(value, axis=-1, dtype=float), np.max(value, axis=-1)
-
-
-def escaping(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> tuple[Direction, Value]:
-    """Directions outside (N, M) of light that normals visible inside reflect, in NumPy, and the share of it that
-    leaves, (N, M) or (C, N, M), for columns of directions wi (N, 1); 0 where it does not leave.
-
-    Light that leaves flatly does so in small shares: both change steadily with the roughness.
-    """
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
+    # Azimuths from the plane of incidence: the same normals for any axes of a round lobe
+    u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     o = ggx.reflect(i, h)
-    x, y = n * o[0], n * o[1]
-    p2 = x * x + y * y
+    p2 = n * n * (o[0] * o[0] + o[1] * o[1])
     value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
     # Of reflectances, colours are the leading axis, and light the last one
     if lobe.facets:
         value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h), 0.0, 1.0))
     if lobe.leaving:
         value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
-    return _out_of_frame(lobe, (x, y, ops.sqrt(1 - p2))), value
+    return np.mean(value, axis=-1, dtype=float), np.max(value, axis=-1)
 
 
 def _single(x: Value, part: slice = slice(None)) -> Value:

@@ -37,6 +37,7 @@ from velatura.stack import InterfaceValues, Kind, Material, MediumValues, Stack,
 
 SLACK = 1e-8  # by which a bound may be broken
 STEP = 1e-5  # of a coordinate, to see how the lobes change
+NEAR = 1e-3  # coordinates above which it is to smaller values
 SAME = 1e-6  # difference of tints that count as equal
 SMOOTH = 1e-10  # variance below which an interface is smooth
 REFLECTANCE_MAX = 0.95  # of a dielectric
@@ -154,9 +155,13 @@ class Space:
         return found if self.factors is None else self.factors[:, None] * found
 
     def points(self, x: Array, free: Array) -> Array:
-        """A point, and those of differences along some coordinates, (D, 1 + free)."""
+        """A point, and those of differences along some coordinates, (D, 1 + free).
+
+        Differences are to smaller values, away from the singular indices of the darkest metals, except near 0.
+        """
         points = np.repeat(x[:, None], len(free) + 1, axis=1)
-        points[free, 1 + np.arange(len(free))] += STEP * (np.abs(x[free]) + 0.01)
+        away = np.where(x[free] > NEAR, -STEP, STEP)
+        points[free, 1 + np.arange(len(free))] += away * (np.abs(x[free]) + 0.01)
         return points
 
     def reading(self, x: Array, free: Array, before: tuple[Array, Reading] | None = None) -> Reading:
