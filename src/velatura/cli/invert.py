@@ -61,7 +61,9 @@ def invert(
     \b
     Of a lobe:
       energy      share of the light: a number, or [r, g, b]
-      alpha       GGX roughness, 0 to 1, 0 unless given; or variance in its place
+      alpha       GGX roughness, 0 to 1, 0 unless given; or variance in its place;
+                  [u, v] along two axes of a brushed lobe
+      rotation    of these, in degrees anticlockwise as seen from outside
       interfaces  that make it: 1, or a pair, 2
       base        dielectric or, of the last lobe, conductor
       tint        of a conductor, 0 (strongest edge tint) to 1
@@ -203,13 +205,15 @@ def _table(solution: Solution) -> Table:
 
     title = f"{solution.target.name or 'stack'} ({solution.model.name})"
     table = Table("lobe", "", title=Text(title), title_justify="left")
-    for column in ("tau above", "eta", "k", "alpha"):
+    brushed = any(lobe.brushed for lobe in solution.target.lobes)
+    for column in ("tau above", "eta", "k", "alpha", *(["rotation"] if brushed else [])):
         table.add_column(column, justify="right")
-    layers = iter(solution.layers)
+    layers = iter(zip(solution.layers, solution.stack.interfaces))
     for n, lobe in enumerate(solution.target.lobes, 1):
         for k in range(lobe.interfaces):
-            part = next(layers)
-            cells = (_cell(x) for x in (part.tau, part.eta, part.kappa, part.alpha))
+            part, written = next(layers)
+            values = part.tau, part.eta, part.kappa, written.alpha, *([written.rotation] if brushed else [])
+            cells = (_cell(x) for x in values)
             table.add_row(str(n) if k == 0 else "", part.kind, *cells)
         table.add_section()
     return table
@@ -217,15 +221,16 @@ def _table(solution: Solution) -> Table:
 
 def _missed(solution: Solution) -> list[str]:
     """A line for each lobe that the stack misses since too much is fixed."""
+    from velatura.inverse import Fixed
+
     if solution.reached is None:
         return []
     lines = []
     for n, lobes in enumerate(zip(solution.target.lobes, solution.reached.lobes), 1):
-        asked, has = ((*lobe.colour, lobe.roughness) for lobe in lobes)
+        asked, has = ((*lobe.colour, *lobe.axes[:2]) for lobe in lobes)
         if max(abs(a - b) for a, b in zip(asked, has)) > SHOWN:
-            lines.append(
-                f"lobe {n}: has energy {_cell(has[:3])} and alpha {_cell(has[3])}; what is fixed allows no more"
-            )
+            why = "what is fixed allows no more" if lobes[0].fixed != Fixed() else "none was found that is nearer"
+            lines.append(f"lobe {n}: has energy {_cell(has[:3])} and alpha {_cell(has[3:])}; {why}")
     return lines
 
 

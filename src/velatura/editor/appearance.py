@@ -83,6 +83,7 @@ def appearance(body: Body) -> Answer:
     stack, model = material_of(body), model_of(body)
     try:
         parts = plain(stack)
+        _check_round(stack)
     except InvalidInput as error:
         return _shown(stack, model, str(error))
 
@@ -102,6 +103,13 @@ def appearance(body: Body) -> Answer:
     }
 
 
+def _check_round(stack: Stack) -> None:
+    """Raises `InvalidInput` where an interface is brushed."""
+    for n, layer in enumerate(stack.layers):
+        if isinstance(layer, Interface) and isinstance(layer.alpha, tuple):
+            raise InvalidInput(f"layer {n} (interface): is brushed; the panel shows round lobes")
+
+
 def haze(target: Target, model: Model) -> list[Answer]:
     """Ratios of energies, by channel, and of widths, of every lobe and the next one below."""
     found = []
@@ -117,7 +125,7 @@ def _counts(variances: np.ndarray) -> list[int]:
     counts: list[int] = []
     previous = None
     for s in variances:
-        if previous is not None and abs(s - previous) <= ALIKE and counts[-1] == 1:
+        if previous is not None and np.abs(s - previous).max() <= ALIKE and counts[-1] == 1:
             counts[-1] = 2
         else:
             counts.append(1)

@@ -15,7 +15,7 @@ from velatura.inverse.interface import DENSER, DIELECTRIC, RARER, Choice
 from velatura.inverse.partial_stack import Above, Array, Batch, Layers, Mask, mapped, take
 from velatura.inverse.roots import bisect, intervals
 from velatura.inverse.smooth_pair import Interval
-from velatura.model.variance import Isotropic, Roughness
+from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 
 NODES = 512  # on which a set without a closed form is looked for
@@ -42,13 +42,14 @@ class EquivalenceClass:
     dielectric and its conductor, and a conductor's tint. Everything else follows from them: roughnesses, a conductor's
     index, and above a dielectric that ends a lobe the optical depths that its index leaves to absorb.
 
-    above: the stack (N = 1). energy: (C, 1). variance: in the space of the model's map. tau: given depths of the medium
-    above a pair, None where they are free. choice: the last interface, and what is given of it.
+    above: the stack (N = 1). energy: (C, 1). variance: in the space of the model's map, a number if all axes are alike.
+    tau: given depths of the medium above a pair, None where they are free. choice: the last interface, and what is
+    given of it.
     """
 
     above: Above
     energy: Array
-    variance: float
+    variance: float | Variance
     interfaces: int = 1
     choice: Choice = DIELECTRIC
     tau: Value | None = None
@@ -375,8 +376,10 @@ class EquivalenceClass:
     # How it is found -------------------------------------------------------------------------------------------------
 
     @property
-    def _blur(self) -> Isotropic:
-        return Isotropic(np.atleast_1d(np.asarray(self.variance, float)))
+    def _blur(self) -> Variance:
+        if isinstance(self.variance, Variance):
+            return self.variance
+        return self.above.variance.uniform(np.atleast_1d(np.asarray(self.variance, float)))
 
     @property
     def _eta_0(self) -> float:

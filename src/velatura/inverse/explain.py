@@ -282,10 +282,10 @@ def _of_blur(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
         return f"{what} {digits(t.lobes[n].variance or 0.0)}"
 
     def sharper(x: float) -> Target:
-        return target.with_lobe(n, alpha=None, variance=float(s * np.exp(-x)))
+        return target.with_variance(n, float(s * np.exp(-x)))
 
     def wider(x: float) -> Target:
-        return target.with_lobe(n, alpha=None, variance=float(max(s, LEAST) * np.exp(x)))
+        return target.with_variance(n, float(max(s, LEAST) * np.exp(x)))
 
     if s > 0:
         yield Way(what, target, sharper, words, FAR, cost)
@@ -317,7 +317,7 @@ def _of_others(target: Target, n: int) -> Iterator[Way]:
             return _with_energy(target, k, own * np.exp(-x))
 
         def sharper(x: float, k: int = k, s: float = s) -> Target:
-            return target.with_lobe(k, alpha=None, variance=float(s * np.exp(-x)))
+            return target.with_variance(k, float(s * np.exp(-x)))
 
         def energy(t: Target, k: int = k) -> str:
             return f"lobe {k + 1} energy {digits(t.lobes[k].energy)}"
@@ -371,7 +371,7 @@ def _to_sure(target: Target) -> Iterator[Way]:
             for n, lobe in enumerate(target.lobes):
                 s = max(2.5 * s, float(BLUR.variance(lobe.roughness)), LEAST)
                 energy = 0.4 if lobe.base == "conductor" else dark
-                sure = _with_energy(sure, n, np.full(3, energy)).with_lobe(n, alpha=None, variance=s)
+                sure = _with_energy(sure, n, np.full(3, energy)).with_variance(n, s)
 
             def along(x: float, kept: Target = kept, sure: Target = sure) -> Target:
                 changed = kept
@@ -379,7 +379,7 @@ def _to_sure(target: Target) -> Iterator[Way]:
                     one, two = (np.log(np.maximum(each.colour, LEAST)) for each in (lobe, to))
                     a, b = (max(float(BLUR.variance(each.roughness)), LEAST) for each in (lobe, to))
                     changed = _with_energy(changed, n, np.exp(one + x * (two - one)))
-                    changed = changed.with_lobe(n, alpha=None, variance=float(a * (b / a) ** x))
+                    changed = changed.with_variance(n, float(a * (b / a) ** x))
                 return changed
 
             yield Way("lobes", target, along, _described, 1.0, OTHER)

@@ -95,7 +95,7 @@ def invert_interface(
     if above is None:
         above = Above.nothing(named(model, **switches), as_index(exterior))
         choice = dataclasses.replace(choice, absorbs=choice.tau is not None)
-    return solve(above, e, Isotropic(np.asarray(own_variance(above, variance))), choice).layers
+    return solve(above, e, above.variance.uniform(np.asarray(own_variance(above, variance))), choice).layers
 
 
 def own_variance(above: Above, variance: ArrayLike) -> Value:

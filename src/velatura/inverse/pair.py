@@ -16,7 +16,7 @@ from velatura.inverse import interface
 from velatura.inverse.interface import CLOSED_FORM, DIELECTRIC, Choice, Found
 from velatura.inverse.partial_stack import Above, Array, Layers, Mask
 from velatura.model import Model, named
-from velatura.model.variance import Isotropic, Variance
+from velatura.model.variance import Variance
 from velatura.ops import Value
 
 
@@ -66,7 +66,7 @@ def invert_pair(
     """
     e = np.atleast_2d(np.asarray(energy, float))
     above = above or Above.nothing(named(model, **switches), interface.as_index(exterior))
-    s = Isotropic(np.atleast_1d(interface.own_variance(above, variance)))
+    s = above.variance.uniform(np.atleast_1d(interface.own_variance(above, variance)))
     if eta_2 is not None:
         choice = dataclasses.replace(choice, eta=interface.as_index(eta_2))
     upper, lower = solve(above, e, s, interface.as_index(eta_1), tau, choice, printed)

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.inverse.target import ROUND
 from velatura.model import Model, adding, operators, prepare
 from velatura.model.diffuse import Base
-from velatura.model.lobe_statistics import StackLobes
+from velatura.model.lobe_statistics import StackLobes, with_axes_named
 from velatura.model.prepare import Prepared, PreparedInterface
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
@@ -78,15 +79,19 @@ class Layers(Batch):
         """With further constraints."""
         return dataclasses.replace(self, margins={**self.margins, **margins})
 
-    def written(self, n: int) -> list[Layer]:
-        """The n-th as layers of a material: the medium above unless it is clear, and the interface."""
+    def written(self, n: int, axis: float = 0.0) -> list[Layer]:
+        """The n-th as layers of a material: the medium above unless it is clear, and the interface.
+
+        axis: radians; the axis of its roughness that is nearer to it comes first.
+        """
         absorbs = np.where(np.asarray(self.tau) < CLEAR, 0.0, self.tau)
         tau, eta, kappa = (_plain(value, n) for value in (absorbs, self.eta, self.kappa))
-        u, v, rotation = (_plain(value, n) for value in self.roughness)
+        u, v, rotation = (_plain(value, n) for value in with_axes_named(self.roughness, axis))
         media: list[Layer] = [] if np.max(tau) == 0 else [Medium(sigma_a=tau)]
-        alpha = u if u == v else (u, v)
+        brushed = abs(u - v) > ROUND
+        alpha = (u, v) if brushed else u if u == v else (u + v) / 2
         index = {"conductor": "mirror"} if self.kind == "mirror" else {"eta": eta, "k": kappa}
-        return [*media, Interface(**index, alpha=alpha, rotation=float(np.degrees(rotation)) if u != v else 0.0)]
+        return [*media, Interface(**index, alpha=alpha, rotation=float(np.degrees(rotation)) if brushed else 0.0)]
 
 
 @dataclass(frozen=True)
@@ -172,10 +177,15 @@ class Above(Batch):
 
     def variance_of(self, roughness: Roughness) -> Variance:
         """The variance of a GGX lobe, along the axes of the frame where there are two."""
-        if self.variance is PerAxis:
-            xx, _, yy = Covariance.of(roughness, self.f).matrix()
-            return PerAxis(xx, yy)
-        return self.variance.of(roughness, self.f)
+        return variance_of(roughness, self.f, self.variance)
+
+
+def variance_of(roughness: Roughness, f: RoughnessMap, kind: type[Variance]) -> Variance:
+    """The variance of a GGX lobe, along the axes of the frame where there are two."""
+    if kind is PerAxis:
+        xx, _, yy = Covariance.of(roughness, f).matrix()
+        return PerAxis(xx, yy)
+    return kind.of(roughness, f)
 
 
 #: Records in which `take` and `join` look for arrays.

@@ -23,7 +23,6 @@ from velatura.inverse.stacks import Solution
 from velatura.inverse.target import BLUR, Target
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
-from velatura.model.variance import Isotropic
 
 GREY = Bound(0, "colour", 1, 0.0)  # one index for all channels
 EFFORT = stacks.EFFORTS[:1]  # to find a stack near which the model is met
@@ -61,7 +60,10 @@ def moved(found: Solution, target: Target, model: Model) -> Solution | Bound:
     if dragged is None or dragged.achromatic(target) is not target:
         return GREY
     there = dragged.met(target)
-    return there if isinstance(there, Bound) else Solution(target, model, tuple(there.point.layers))
+    if isinstance(there, Bound):
+        return there
+    missed = there.missed(target) > MISSED
+    return Solution(target, model, tuple(there.point.layers), there.now(target) if missed else None)
 
 
 def refused(target: Target, model: Model) -> Infeasible:
@@ -99,10 +101,12 @@ def _way(target: Target, near: Target, model: Model) -> Direction:
     words, changes = [], [0.0]
     for k, (asked, lobe) in enumerate(zip(target.lobes, near.lobes), 1):
         energies = np.array([asked.colour, lobe.colour]) + ENERGY_MIN
-        variances = np.array([float(MAPS[model.map].variance(each.roughness)) for each in (asked, lobe)]) + SMALL
+        variances = np.array([MAPS[model.map].variance(np.array(each.axes[:2])) for each in (asked, lobe)]) + SMALL
         of_energy, of_variance = (float(np.abs(np.log(x[1] / x[0])).max()) for x in (energies, variances))
+        blur = lobe.axes[:2] if lobe.brushed else lobe.roughness
         words += [f"lobe {k} energy {digits(lobe.colour)}"] if of_energy > SAID else []
-        words += [f"lobe {k} alpha {digits(lobe.roughness)}"] if of_variance > SAID else []
+        turn = f" rotation {lobe.rotation:.4g}" if lobe.brushed else ""
+        words += [f"lobe {k} alpha {digits(blur)}{turn}"] if of_variance > SAID else []
         changes += [of_energy, of_variance]
     return Direction("all lobes", ", ".join(words), max(changes), near)
 
@@ -116,7 +120,7 @@ def starts(wish: Target) -> Iterator[Target]:
             s = max(float(BLUR.variance(lobe.roughness)), WIDER * s)
             grey = k == 0 and lobe.interfaces == 1 and lobe.base == "dielectric"
             energy = (float(np.mean(lobe.colour)),) * 3 if grey else lobe.colour
-            start = start.with_lobe(k, energy=tuple(scale * e for e in energy), alpha=None, variance=s)
+            start = start.with_lobe(k, energy=tuple(scale * e for e in energy)).with_variance(k, s)
         yield start
 
 
@@ -127,7 +131,7 @@ def _as_fixed(target: Target, model: Model) -> Target:
     if eta is None or lobe.interfaces > 1 or lobe.base != "dielectric":
         return target
     above, asked = stacks.start(target, model), np.array(lobe.colour)[:, None] + ENERGY_MIN
-    variance = Isotropic(np.atleast_1d(above.f.variance(lobe.roughness)))
+    variance = lobe.blur(above.f, above.variance)
     own = interface.solve(above, asked, variance, Choice(eta=eta, absorbs=False)).energy
     same = np.abs(np.log(own / asked)).max() < SAME
     return target.with_lobe(0, energy=tuple(np.broadcast_to(own, (3, 1))[:, 0].tolist())) if same else target
@@ -136,17 +140,17 @@ def _as_fixed(target: Target, model: Model) -> Target:
 def _requested(found: Solution, target: Target, model: Model) -> Solution | Bound:
     """The stack of other requests to the model in closed form whose lobes are nearest to a target; a bound if there is
     none."""
-    f, count = MAPS[model.map], len(target.lobes)
+    f, kind, count = MAPS[model.map], target.kind, len(target.lobes)
 
     def numbers(of: Target) -> Array:
         energies = [max(e, ENERGY_MIN) for lobe in of.lobes for e in lobe.colour]
-        return np.array([*energies, *(float(f.variance(lobe.roughness)) for lobe in of.lobes)])
+        return np.concatenate([energies, *(np.ravel(list(vars(lobe.blur(f, kind)).values())) for lobe in of.lobes)])
 
     def ask(request: Array) -> Solution | None:
         asked, first = target, target.lobes[0].colour
-        for k, s in enumerate(np.maximum(request[3 * count :], 0)):
+        for k, s in enumerate(request[3 * count :].reshape(count, -1)):
             energy = tuple(np.maximum(request[3 * k : 3 * k + 3], 0).tolist())
-            asked = asked.with_lobe(k, energy=energy, alpha=float(f.roughness(s)), variance=None)
+            asked = asked.with_lobe(k, energy=energy).with_roughness(k, kind(*s).roughness(f))
         asked = _as_fixed(asked.with_lobe(0, energy=first), found.model) if held else asked
         return stacks.search(asked, found.model, EFFORT)
 
@@ -154,7 +158,7 @@ def _requested(found: Solution, target: Target, model: Model) -> Solution | Boun
         return numbers(seen(solution.stack, target, model))
 
     goal = numbers(target)
-    scale = np.r_[np.maximum(goal[: 3 * count], 1e-3), goal[3 * count :] + SMALL]
+    scale = np.r_[np.maximum(goal[: 3 * count], 1e-3), np.abs(goal[3 * count :]) + SMALL]
     held = _as_fixed(target, found.model) is not target
     free = np.arange(len(goal)) >= (3 if held else 0)
     best = requests.met(ask, read, goal, goal, scale, free)

@@ -23,7 +23,7 @@ from velatura.inverse.roots import false_position
 from velatura.inverse.target import Target, TargetLobe, read
 from velatura.model import DEFAULT, Model, named
 from velatura.model.stack_lobes import stack_lobes
-from velatura.model.variance import Isotropic
+from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.stack import Diffuse, MaterialLike, Stack, load
 
@@ -64,7 +64,8 @@ class Solution:
     @cached_property
     def stack(self) -> Stack:
         """The material."""
-        written = [layer for layers in self.layers for layer in layers.written(0)]
+        axes = [lobe.axes.rotation for lobe in self.target.lobes for _ in range(lobe.interfaces)]
+        written = [layer for layers, axis in zip(self.layers, axes) for layer in layers.written(0, axis)]
         return Stack(written, name=self.target.name, exterior=self.target.exterior)
 
     @cached_property
@@ -239,7 +240,7 @@ def pruned(tried: Partial, interfaces: int, keep: int) -> Partial:
 
 def start(target: Target, model: Model) -> Above:
     """Only the exterior medium."""
-    return Above.nothing(model, target.exterior)
+    return Above.nothing(model, target.exterior, target.kind)
 
 
 def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> EquivalenceClass:
@@ -247,7 +248,7 @@ def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> Equ
     return EquivalenceClass(
         above=above,
         energy=np.array(lobe.colour)[:, None],
-        variance=float(above.f.variance(lobe.roughness)),
+        variance=lobe.blur(above.f, above.variance) if lobe.brushed else float(above.f.variance(lobe.roughness)),
         interfaces=lobe.interfaces,
         tau=_pinned(lobe, "tau", 0) if lobe.interfaces == 2 else 0.0,
         choice=_choice(lobe, lobe.interfaces - 1, target, absorbs=True),
@@ -303,12 +304,12 @@ def _with(paths: Partial, layers: Layers, below: Above) -> Partial:
     return Partial(below, (*paths.layers, layers), paths.cost + dislike(paths.above.eta, layers))
 
 
-def _variance(paths: Partial, lobe: TargetLobe) -> Isotropic:
-    return Isotropic(np.atleast_1d(paths.above.f.variance(lobe.roughness)))
+def _variance(paths: Partial, lobe: TargetLobe) -> Variance:
+    return lobe.blur(paths.above.f, paths.above.variance)
 
 
 def _of_fixed_roughness(
-    paths: Partial, lobe: TargetLobe, variance: Isotropic, choice: Choice, tried: Array
+    paths: Partial, lobe: TargetLobe, variance: Variance, choice: Choice, tried: Array
 ) -> tuple[np.ndarray, Array]:
     """Indices between the interfaces for which the lower one is as rough as is fixed, and below which stack."""
     energy, alpha, tau = np.array(lobe.colour)[:, None], lobe.fixed.of("alpha", 1), _pinned(lobe, "tau", 0)
@@ -372,7 +373,8 @@ def _held(layers: Layers, lobe: TargetLobe, n: int) -> Layers:
     alpha = lobe.fixed.of("alpha", n)
     if alpha is None:
         return layers
-    return layers.with_margins(fixed=interface.margin(ALPHA_APART - np.abs(layers.alpha - alpha)))
+    apart = np.maximum(*(np.abs(own - alpha) for own in layers.roughness[:2]))
+    return layers.with_margins(fixed=interface.margin(ALPHA_APART - apart))
 
 
 def _thinned(paths: Partial, keep: int) -> Partial:

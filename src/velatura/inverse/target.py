@@ -7,15 +7,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput
-from velatura.model.roughness_maps import MAPS
+from velatura.model.roughness_maps import MAPS, RoughnessMap
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import RGB, io
 from velatura.stack.schema import Parameter, Record, show
-from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Scalar, Text
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Pair, Scalar, Text
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
+ROUND = 1e-6  # difference of roughnesses of a lobe that has no axes
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,10 @@ def _number(doc: str, low: float = 0.0, **options: Any) -> Scalar:
     return Scalar(doc, low=low, texturable=False, differentiable=False, **options)
 
 
+def _pair(doc: str, **options: Any) -> Pair:
+    return Pair(doc, low=0.0, texturable=False, differentiable=False, **options)
+
+
 def _colour(doc: str, low: float = 0.0, **options: Any) -> Colour:
     return Colour(doc, low=low, texturable=False, differentiable=False, **options)
 
@@ -80,11 +87,17 @@ class Fixed(Record):
 
 
 class TargetLobe(Record):
-    """A lobe: its energy, its blur (`alpha`, or `variance` in the space of Belcour's map), and its interfaces."""
+    """A lobe: its energy, its blur (`alpha`, or `variance` in the space of Belcour's map), and its interfaces.
+
+    The blur is a number, or two along axes that are turned by `rotation`.
+    """
 
     energy: Annotated[float | RGB, _colour("energy at normal incidence")]
-    alpha: Annotated[float | None, _number("GGX roughness of the lobe", high=1.0)] = None
-    variance: Annotated[float | None, _number("variance of the lobe, in place of alpha")] = None
+    alpha: Annotated[float | tuple[float, float] | None, _pair("GGX roughness of the lobe", high=1.0)] = None
+    variance: Annotated[float | tuple[float, float] | None, _pair("variance of the lobe, in place of alpha")] = None
+    rotation: Annotated[
+        float, _number("turn of its first axis, anticlockwise seen from outside", low=-1e9, unit="degrees")
+    ] = 0.0
     interfaces: Annotated[int, Count("interfaces that make the lobe", low=1, high=2)] = 1
     base: Annotated[str, Choice("what its last interface is", options=("dielectric", "conductor"))] = "dielectric"
     tint: Annotated[
@@ -120,11 +133,29 @@ class TargetLobe(Record):
         return self
 
     @property
-    def roughness(self) -> float:
-        """GGX roughness of the lobe."""
+    def axes(self) -> Roughness:
+        """GGX roughness along both axes."""
+        given = (self.alpha or 0.0) if self.variance is None else self.variance
+        u, v = given if isinstance(given, tuple) else (given, given)
         if self.variance is not None:
-            return float(BLUR.roughness(self.variance))
-        return self.alpha or 0.0
+            u, v = float(BLUR.roughness(u)), float(BLUR.roughness(v))
+        return Roughness(u, v, float(np.radians(self.rotation)))
+
+    @property
+    def brushed(self) -> bool:
+        """Whether the lobe has two roughnesses."""
+        return bool(abs(self.axes.alpha_u - self.axes.alpha_v) > ROUND)
+
+    @property
+    def roughness(self) -> float:
+        """GGX roughness of the lobe; of one with axes that of their mean variance."""
+        u, v, _ = self.axes
+        return u if not self.brushed else float(BLUR.roughness((BLUR.variance(u) + BLUR.variance(v)) / 2))
+
+    def blur(self, f: RoughnessMap, kind: type[Variance]) -> Variance:
+        """The variance of the lobe, (1,) each, of a kind that holds it, in the space of a roughness map."""
+        s = kind.of(self.axes, f)
+        return kind(*(np.atleast_1d(np.asarray(x, float)) for x in vars(s).values()))
 
     @property
     def colour(self) -> RGB:
@@ -162,6 +193,11 @@ class Target(Record):
                 raise ValueError(f"lobe {n}: base: only the last lobe may have a conductor, nothing lies below it")
         return self
 
+    @property
+    def kind(self) -> type[Variance]:
+        """The cheapest kind of variance that holds all lobes."""
+        return kind_of(lobe.axes for lobe in self.lobes)
+
     @classmethod
     def from_dict(cls, fields: Any) -> Target:
         """The target described by a mapping as it stands in a file.
@@ -178,6 +214,32 @@ class Target(Record):
         lobes = list(self.lobes)
         lobes[index] = lobes[index].model_copy(update=changes)
         return self.model_copy(update={"lobes": tuple(lobes)})
+
+    def with_variance(self, index: int, variance: float) -> Target:
+        """This target with another mean variance of one lobe, whose axes stay in proportion."""
+        lobe = self.lobes[index]
+        if not lobe.brushed:
+            return self.with_lobe(index, alpha=None, variance=variance)
+        u, v = (float(BLUR.variance(alpha)) for alpha in lobe.axes[:2])
+        scale = 2 * variance / (u + v)
+        return self.with_lobe(index, alpha=None, variance=(scale * u, scale * v))
+
+    def with_roughness(self, index: int, roughness: Roughness) -> Target:
+        """This target with another roughness of one lobe, whose rotation is in radians."""
+        u, v, rotation = (float(np.ravel(x)[0]) for x in roughness)
+        if abs(u - v) <= ROUND:
+            return self.with_lobe(index, alpha=u if u == v else (u + v) / 2, variance=None, rotation=0.0)
+        return self.with_lobe(index, alpha=(u, v), variance=None, rotation=float(np.degrees(rotation)))
+
+
+def kind_of(roughnesses: Iterable[Roughness]) -> type[Variance]:
+    """The cheapest kind of variance that holds all of some roughnesses."""
+    turned = [
+        abs((u - v) * np.sin(2 * rotation)) > ROUND or np.cos(rotation) ** 2 < 0.5
+        for u, v, rotation in roughnesses
+        if abs(u - v) > ROUND
+    ]
+    return (Covariance if any(turned) else PerAxis) if turned else Isotropic
 
 
 def load_target(path: str | Path) -> Target:
@@ -208,6 +270,8 @@ def _asked(fields: Any) -> Target:
     for n, lobe in enumerate(target.lobes, 1):
         if lobe.base != "conductor" and "tint" in lobe.model_fields_set:
             raise InvalidInput(f"lobe {n}: tint: only of a lobe with base: conductor")
+        if not lobe.brushed and "rotation" in lobe.model_fields_set:
+            raise InvalidInput(f"lobe {n}: rotation: only of a lobe with two roughnesses, alpha: [u, v]")
     return target
 
 

@@ -328,14 +328,16 @@ class Pair(Scalar):
         if len(value) != 2:
             raise self.refuse(value)
         u, v = (
-            self._texture(entry) if isinstance(entry, Mapping | Texture) else self._number(entry, value)
+            self._texture(entry)
+            if self.texturable and isinstance(entry, Mapping | Texture)
+            else self._number(entry, value)
             for entry in value
         )
         return u if u == v else (u, v)
 
     def _forms(self) -> list[dict[str, Any]]:
         (number,) = super()._forms()
-        entry = {"anyOf": [number, {"$ref": "#/$defs/texture"}]}
+        entry = {"anyOf": [number, {"$ref": "#/$defs/texture"}]} if self.texturable else number
         return [number, {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}]
 
 

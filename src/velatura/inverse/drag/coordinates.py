@@ -25,12 +25,14 @@ from velatura.inverse.interface import (
     conductor_extinction,
     conductor_index,
     conductor_tint,
+    least,
 )
-from velatura.inverse.partial_stack import NORMAL, Array, Layers, read_whole, whole
+from velatura.inverse.partial_stack import NORMAL, Array, Layers, read_whole, variance_of, whole
 from velatura.inverse.target import Target
 from velatura.model import Model, lobes, prepare
+from velatura.model.lobe_statistics import with_axes_named
 from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
-from velatura.model.variance import Isotropic, Roughness
+from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.stack import InterfaceValues, Kind, Material, MediumValues, Stack, number
@@ -49,9 +51,10 @@ class InterfaceCoordinates:
 
     side: 1 denser, -1 rarer than what is above. tint: of a conductor, (3, 1). kept: optical depths (3, 1) of the medium
     above that its reflectances do not need. absorbs: whether that medium takes away what its reflectances need.
-    variance, depth, reflectances, log_index: indices of the variance, of the factor on `kept` (None where that is
-    pinned), of the reflectances by channel or the one of all (None where the index itself is a coordinate), and of the
-    logarithm of the index.
+    axis: near that of its roughness that comes first, in radians.
+    variance, depth, reflectances, log_index: indices of the entries of the variance, of the factor on `kept` (None
+    where that is pinned), of the reflectances by channel or the one of all (None where the index itself is a
+    coordinate), and of the logarithm of the index.
     """
 
     kind: Kind
@@ -60,7 +63,8 @@ class InterfaceCoordinates:
     tint: Array
     kept: Array
     absorbs: bool
-    variance: int
+    variance: slice
+    axis: float
     depth: int | None = None
     reflectances: slice | None = None
     log_index: int | None = None
@@ -68,7 +72,8 @@ class InterfaceCoordinates:
 
 @dataclass(frozen=True)
 class Bound:
-    """A bound on a coordinate, or on the logarithm of an interface's index: `sign` times it is at least `sign * at`.
+    """A bound on a coordinate, on the logarithm of an interface's index, or on the least variance of the entries
+    `axes`: `sign` times it is at least `sign * at`.
 
     lobe, reason: the lobe that cannot be given beyond the bound, and why, a key of `REASONS`.
     """
@@ -79,6 +84,7 @@ class Bound:
     at: float
     coordinate: int | None = None
     interface: int | None = None
+    axes: slice | None = None
 
     def why(self, target: Target) -> str:
         """The reason, in words, why a target is not met."""
@@ -87,7 +93,8 @@ class Bound:
 
 @dataclass(frozen=True)
 class Reading:
-    """Energies of all lobes, then variances of all interfaces, (3 K + I,), and their derivatives (3 K + I, free)."""
+    """Energies of all lobes, then variances of all interfaces, of V entries each: (3 K + V I,), and their derivatives
+    (3 K + V I, free)."""
 
     value: Array
     slopes: Array
@@ -97,8 +104,8 @@ class Reading:
 class Space:
     """The space of coordinates of stacks of one form, below an index `exterior`, as a model reads them.
 
-    Points x have shape (D,), or (D, N) for N stacks. factors: of readings, (3 K + I,), where a model in closed form
-    stands in for another one.
+    Points x have shape (D,), or (D, N) for N stacks. factors: of readings, (3 K + V I,), where a model in closed form
+    stands in for another one. kind: of the variances.
     """
 
     model: Model
@@ -106,6 +113,7 @@ class Space:
     interfaces: tuple[InterfaceCoordinates, ...]
     bounds: tuple[Bound, ...]
     factors: Array | None = None
+    kind: type[Variance] = Isotropic
 
     # Points as layers, and as the model reads them -------------------------------------------------------------------
 
@@ -115,8 +123,7 @@ class Space:
         found = []
         for own in self.interfaces:
             tau = own.kept if own.depth is None else own.kept * x[own.depth]
-            s = np.where(x[own.variance] < SMOOTH, 0.0, np.maximum(x[own.variance], 0.0))
-            alpha = MAPS[self.model.map].roughness(s)
+            roughness = self._roughness(x[own.variance], own.axis)
             kappa = None
             if own.log_index is not None:
                 eta = np.exp(x[own.log_index][None])
@@ -126,32 +133,41 @@ class Space:
             else:
                 eta, absorbed = _dielectric(own, x[own.reflectances])
                 eta, tau = eta * eta_1, tau + absorbed
-            found.append(Layers(own.kind, eta, kappa, Roughness(alpha, alpha, np.zeros_like(alpha)), tau))
+            found.append(Layers(own.kind, eta, kappa, roughness, tau))
             if own.kind == "dielectric":
                 eta_1 = eta
         return found
 
+    def _roughness(self, entries: Array, axis: float) -> Roughness:
+        """The roughness of a variance, smooth where that is next to nothing, the axis first that is nearer to one."""
+        f = MAPS[self.model.map]
+        u, v, rotation = with_axes_named(self.kind(*entries).roughness(f), axis)
+        smooth = f.roughness(SMOOTH)
+        return Roughness(np.where(u < smooth, 0.0, u), np.where(v < smooth, 0.0, v), rotation + 0.0 * u)
+
     def read(self, x: Array) -> Array:
-        """Energies of all lobes, then variances of all interfaces, (3 K + I, N), of N points."""
+        """Energies of all lobes, then variances of all interfaces, (3 K + V I, N), of N points."""
         if not self.model.recursion.closed_form:
             return np.stack([self._solved(point[:, None]) for point in x.T], axis=-1)
         material = whole(self.layers(x), self.exterior)
-        reflected, _ = lobes(prepare(material, self.model, Isotropic), NORMAL)
-        return self._sorted(x, [(lobe.energy, lobe.roughness.alpha_u) for lobe in reflected])
+        reflected, _ = lobes(prepare(material, self.model, self.kind), NORMAL)
+        return self._sorted(x, [(lobe.energy, lobe.roughness) for lobe in reflected])
 
     def _solved(self, x: Array) -> Array:
-        """The same of one point (D, 1), by a model that reads one material at a time, (3 K + I,)."""
+        """The same of one point (D, 1), by a model that reads one material at a time, (3 K + V I,)."""
         found = read_whole(self.layers(x), self.exterior, self.model)
-        return self._sorted(x, [(energy, alpha[0]) for energy, alpha in zip(found.energy, found.alpha)])[:, 0]
+        roughnesses = [Roughness(alpha[0], alpha[1], rotation) for alpha, rotation in zip(found.alpha, found.rotation)]
+        return self._sorted(x, list(zip(found.energy, roughnesses)))[:, 0]
 
-    def _sorted(self, x: Array, reflected: Sequence[tuple[Value, Value]]) -> Array:
+    def _sorted(self, x: Array, reflected: Sequence[tuple[Value, Roughness]]) -> Array:
         """Energies and roughnesses of interfaces as they are read."""
         energy = np.zeros((3 * self.lobes, x.shape[1]))
-        variance = np.empty((len(self.interfaces), x.shape[1]))
-        for n, (own, (reflects, alpha)) in enumerate(zip(self.interfaces, reflected)):
+        variance = np.empty((len(self.interfaces), self.entries, x.shape[1]))
+        for n, (own, (reflects, roughness)) in enumerate(zip(self.interfaces, reflected)):
             energy[3 * own.lobe : 3 * own.lobe + 3] += reflects
-            variance[n] = self._brightest(own, x, MAPS[self.model.map].variance(alpha))
-        found = np.vstack([energy, np.minimum(variance, VARIANCE_MAX)])
+            s = variance_of(roughness, MAPS[self.model.map], self.kind)
+            variance[n] = [self._brightest(own, x, entry) for entry in vars(s).values()]
+        found = np.vstack([energy, np.minimum(variance, VARIANCE_MAX).reshape(-1, x.shape[1])])
         return found if self.factors is None else self.factors[:, None] * found
 
     def points(self, x: Array, free: Array) -> Array:
@@ -182,8 +198,14 @@ class Space:
         if closed:
             return Reading(read[:, 0], slopes)
         value = self.read(x[:, None])[:, 0]
-        ratio = value / np.maximum(read[:, 0], ENERGY_MIN)
+        ratio = self._sizes(value) / np.maximum(self._sizes(read[:, 0]), ENERGY_MIN)
         return Reading(value, slopes * np.clip(ratio, 0.1, 10)[:, None])
+
+    def _sizes(self, value: Array) -> Array:
+        """Sizes of a reading: of energies, and of the variances of every interface, for each of their entries."""
+        energies, variances = np.split(value, [3 * self.lobes])
+        sizes = np.abs(variances).reshape(-1, self.entries).sum(axis=1)
+        return np.r_[energies, np.repeat(sizes, self.entries)]
 
     def _brightest(self, own: InterfaceCoordinates, x: Array, s: Array) -> Array:
         """The variance of the channel in which the lobe must reflect most, if every channel has its own."""
@@ -200,12 +222,22 @@ class Space:
         """The number of lobes."""
         return self.interfaces[-1].lobe + 1
 
+    @property
+    def winds(self) -> bool:
+        """Whether readings wind as coordinates change, as those of a slow model do of lobes with axes."""
+        return self.entries > 1 and not self.model.recursion.closed_form
+
+    @property
+    def entries(self) -> int:
+        """The number of entries of a variance."""
+        return len(dataclasses.fields(self.kind))
+
     @cached_property
     def free(self) -> Array:
         """Indices of the coordinates that always move: reflectances, then variances."""
         spans = [own.reflectances for own in self.interfaces if own.reflectances is not None]
-        reflectances = [n for span in spans for n in range(span.start, span.stop)]
-        return np.array([*reflectances, *(own.variance for own in self.interfaces)])
+        spans += [own.variance for own in self.interfaces]
+        return np.array([n for span in spans for n in range(span.start, span.stop)])
 
     @cached_property
     def counted(self) -> Array:
@@ -214,7 +246,7 @@ class Space:
         for own in self.interfaces:
             if own.reflectances is not None:
                 found += [3 * own.lobe + c for c in range(own.reflectances.stop - own.reflectances.start)]
-        return np.array([*found, *(3 * self.lobes + n for n in range(len(self.interfaces)))])
+        return np.array([*found, *(3 * self.lobes + n for n in range(self.entries * len(self.interfaces)))])
 
     # Bounds ----------------------------------------------------------------------------------------------------------
 
@@ -235,6 +267,8 @@ class Space:
         """Distance of N points from a bound, negative outside, (N,)."""
         if bound.coordinate is not None:
             return bound.sign * (x[bound.coordinate] - bound.at)
+        if bound.axes is not None:
+            return bound.sign * (least(self.kind(*x[bound.axes])) - bound.at)
         assert bound.interface is not None
         return bound.sign * (np.log(self.layers(x)[bound.interface].eta[0]) - bound.at)
 
@@ -296,6 +330,7 @@ class Reader:
 
     target: Target
     model: Model
+    kind: type[Variance]
     interfaces: list[InterfaceCoordinates] = field(default_factory=list)
     bounds: list[Bound] = field(default_factory=list)
     x: list[float] = field(default_factory=list)
@@ -307,7 +342,7 @@ class Reader:
     @property
     def space(self) -> Space:
         """The space of the interfaces so far."""
-        return Space(self.model, self.target.exterior, tuple(self.interfaces), tuple(self.bounds))
+        return Space(self.model, self.target.exterior, tuple(self.interfaces), tuple(self.bounds), kind=self.kind)
 
     def add(self, k: int, n: int, part: Layers) -> None:
         """The n-th interface of the k-th lobe."""
@@ -322,7 +357,8 @@ class Reader:
             "tint": np.full((3, 1), lobe.tint),
             "kept": tau,
             "absorbs": last and not first,
-            "variance": self._coordinate(k, float(MAPS[self.model.map].variance(float(part.alpha))), "blur", 0.0),
+            "variance": self._blur(k, part.roughness),
+            "axis": lobe.axes.rotation,
         }
         if not last:
             own = self._upper(k, float(np.mean(ratio)), values)
@@ -367,6 +403,16 @@ class Reader:
         depth = self._coordinate(k, 1.0, "absorption", 0.0, 1.0) if values["absorbs"] else None
         values["tint"] = np.broadcast_to(tint, (3, 1))
         return InterfaceCoordinates(**values, depth=depth, reflectances=span)
+
+    def _blur(self, lobe: int, roughness: Roughness) -> slice:
+        """The entries of a variance."""
+        first, entries = len(self.x), vars(variance_of(roughness, MAPS[self.model.map], self.kind))
+        for name, value in entries.items():
+            self._coordinate(lobe, float(value), "blur", -np.inf if name == "xy" else 0.0)
+        span = slice(first, len(self.x))
+        if self.kind is Covariance:
+            self.bounds.append(Bound(lobe, "blur", 1, 0.0, axes=span))
+        return span
 
     def _coordinate(self, lobe: int, value: float, reason: str, low: float, high: float | None = None) -> int:
         n = len(self.x)
@@ -417,10 +463,9 @@ def plain(stack: Stack) -> list[Layers]:
             raise InvalidInput(f"{where}: a target has interfaces and media only")
         if layer.kind == "mirror":
             raise InvalidInput(f"{where}: reflects all light at any index; a target has a conductor there")
-        if layer.alpha_u != layer.alpha_v:
-            raise InvalidInput(f"{where}: is brushed; the lobes of a target are round")
         eta = layer.eta if layer.kind == "conductor" else np.full((1, 1), np.mean(layer.eta))
-        found.append(Layers(layer.kind, eta, layer.k, Roughness(layer.alpha_u, layer.alpha_u, 0.0), tau))
+        roughness = Roughness(layer.alpha_u, layer.alpha_v, np.radians(layer.rotation))
+        found.append(Layers(layer.kind, eta, layer.k, roughness, tau))
         tau = 0.0
     if not found:
         raise InvalidInput("layers: no interface; without one there is no lobe")

@@ -14,7 +14,7 @@ from velatura.inverse.drag.coordinates import SLACK, Bound, InterfaceCoordinates
 from velatura.inverse.drag.newton import Compromise, Problem, Solution
 from velatura.inverse.interface import ENERGY_MIN
 from velatura.inverse.partial_stack import Above, Array, Layers
-from velatura.inverse.target import Fixed, Target, TargetLobe
+from velatura.inverse.target import Fixed, Target, TargetLobe, kind_of
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
 from velatura.optics import fresnel
@@ -52,7 +52,9 @@ class DraggedStack:
             pinned(lobe, n == 0) for n, lobe in enumerate(target.lobes)
         ):
             return None
-        reader = Reader(target, model)
+        reader = Reader(
+            target, model, kind_of([*(lobe.axes for lobe in target.lobes), *(part.roughness for part in layers)])
+        )
         for k, lobe in enumerate(target.lobes):
             own, layers = layers[: lobe.interfaces], layers[lobe.interfaces :]
             if [part.kind for part in own] != ["dielectric"] * (lobe.interfaces - 1) + [lobe.base]:
@@ -69,7 +71,8 @@ class DraggedStack:
     @cached_property
     def stack(self) -> Stack:
         """The material."""
-        layers = [layer for part in map(self._rounded, self.point.layers) for layer in part.written(0)]
+        parts = zip(map(self._rounded, self.point.layers), self.interfaces)
+        layers = [layer for part, own in parts for layer in part.written(0, own.axis)]
         return Stack([*layers, *self.tail], name=self.name, exterior=self.space.exterior)
 
     def _rounded(self, part: Layers) -> Layers:
@@ -121,8 +124,8 @@ class DraggedStack:
 
     @property
     def variances(self) -> Array:
-        """The variances of the interfaces' lobes, as the model reads them."""
-        return self.point.reading.value[3 * self.space.lobes :]
+        """The variances of the interfaces' lobes, (interfaces, entries), as the model reads them."""
+        return self.point.reading.value[3 * self.space.lobes :].reshape(len(self.interfaces), -1)
 
     def now(self, wish: Target) -> Target:
         """The present lobes, in the form of a target."""
@@ -144,24 +147,26 @@ class DraggedStack:
 
     def above(self, n: int) -> Above:
         """The layers above the n-th interface."""
-        above = Above.nothing(self.model, self.space.exterior)
+        above = Above.nothing(self.model, self.space.exterior, self.space.kind)
         for part in self.point.layers[:n]:
             above, _ = above.below(part)
         return above
 
     def _target_of(self, reading: Array, form: Target) -> Target:
         """The target of a form with lobes as they are read."""
-        count = self.space.lobes
+        count, kind = self.space.lobes, self.space.kind
+        variances = reading[3 * count :].reshape(len(self.interfaces), -1)
         for k in range(count):
-            s = np.mean([reading[3 * count + n] for n, own in enumerate(self.interfaces) if own.lobe == k])
-            alpha, energy = float(MAPS[self.model.map].roughness(s)), tuple(reading[3 * k : 3 * k + 3].tolist())
-            form = form.with_lobe(k, energy=energy, alpha=alpha, variance=None)
+            s = np.mean([variances[n] for n, own in enumerate(self.interfaces) if own.lobe == k], axis=0)
+            form = form.with_lobe(k, energy=tuple(reading[3 * k : 3 * k + 3].tolist()))
+            form = form.with_roughness(k, kind(*s).roughness(MAPS[self.model.map]))
         return form
 
     def _wanted(self, wish: Target) -> Array:
         """The reading of the model with which a target is met."""
-        s = [MAPS[self.model.map].variance(wish.lobes[own.lobe].roughness) for own in self.interfaces]
-        return np.array([*(max(e, ENERGY_MIN) for lobe in wish.lobes for e in lobe.colour), *s])
+        f, kind = MAPS[self.model.map], self.space.kind
+        s = [np.ravel(list(vars(wish.lobes[own.lobe].blur(f, kind)).values())) for own in self.interfaces]
+        return np.concatenate([[max(e, ENERGY_MIN) for lobe in wish.lobes for e in lobe.colour], *s])
 
     # Towards other lobes ---------------------------------------------------------------------------------------------
 
@@ -179,6 +184,10 @@ class DraggedStack:
         """The stack with the lobes of a target of the same form, or the bound that is in the way."""
         found = self._met(self._problem(self._wanted(wish)))
         return self._at(found).renamed(wish) if isinstance(found, Solution) else found
+
+    def missed(self, wish: Target) -> float:
+        """The largest difference of its energies and variances from those of a target."""
+        return float(np.max(np.abs(self.point.reading.value - self._wanted(wish))))
 
     def far(self, wish: Target) -> bool:
         """Whether the lobes of a target are far away."""
