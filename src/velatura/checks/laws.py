@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 from scipy.special import chdtrc, chdtri, ndtri
 
 from velatura.checks.evidence import PILOT, SAMPLES, Drawn, Evidence
@@ -160,9 +161,13 @@ def chi_square(evidence: Evidence, alarm: float) -> Finding:
     """Compare samples in every cell with those that the pdf lets expect, where the cells resolve the pdf."""
     integrals, n = evidence.integrals, SAMPLES - PILOT
     sides = (len(integrals.counts), integrals.shape[0], -1)
-    seen = [x.reshape(sides) for x in (integrals.counts, n * integrals.density, n * n * integrals.density_variance)]
+    # An edge that nodes miss in one cell shows in the next one
+    grids = integrals.density_variance.reshape(len(integrals.counts), *integrals.shape)
+    about = maximum_filter(grids, size=(1, 1, 3, 3), mode="nearest")
+    seen = [x.reshape(sides) for x in (integrals.counts, n * integrals.density, n * n * about)]
     # Leave out a side on which the cells do not resolve the pdf, however small its share
-    counts, expected, variance = (x.sum(axis=2) for x in seen)
+    counts, expected, _ = (x.sum(axis=2) for x in seen)
+    variance = n * n * integrals.density_variance.reshape(sides).sum(axis=2)
     blurred = np.sqrt(variance) > BLURRED * np.maximum(counts, expected)
     counts, expected, variance = (np.where(blurred[..., None], 0.0, x).reshape(len(x), -1) for x in seen)
     statistics, freedoms = np.array([_chi_square(*row) for row in zip(counts, expected, variance)]).T
