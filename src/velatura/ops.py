@@ -36,13 +36,13 @@ TINY = 1e-15  # whose square, in gradients of quotients, single precision still 
 class Gridded(Protocol):
     """Input of `interpolate`: values at the nodes i/(N-1) of a grid of some shape.
 
-    Dr.Jit reads a texture; NumPy reads `data`, with channels on the last axis.
+    Dr.Jit reads packets, of a module; NumPy reads `data`, with channels on the last axis.
     """
 
     @property
     def shape(self) -> tuple[int, ...]: ...
 
-    def texture(self, dialect: Any) -> Any: ...
+    def packets(self, dialect: Any) -> Any: ...
 
 
 class Unrolled:
@@ -75,16 +75,13 @@ class _Numpy(Unrolled):
 
     @staticmethod
     def interpolate(table: Any, coordinates: Sequence[Value]) -> list[Value]:
+        def split(position: Value, last: int) -> tuple[Value, Value]:
+            cell = np.minimum(np.asarray(position).astype(int), last)
+            return cell, position - cell.astype(np.result_type(position))
+
         channels = table.data.shape[-1]
-        index: Value = 0
-        corners = [(index, 1.0)]
-        for x, nodes in zip(coordinates, table.data.shape):
-            position = np.clip(x, 0, 1) * (nodes - 1)
-            cell = np.minimum(np.asarray(position).astype(int), nodes - 2)
-            upper = position - cell.astype(np.result_type(position))
-            corners = [(i * nodes + cell + k, w * (upper if k else 1 - upper)) for i, w in corners for k in (0, 1)]
         flat = table.data.reshape(-1, channels)
-        total = sum(np.asarray(w)[..., None] * flat[i] for i, w in corners)
+        total = sum(np.asarray(w)[..., None] * flat[i] for i, w in _corners(table.data.shape, coordinates, split))
         return [total[..., c] for c in range(channels)]
 
 
@@ -109,10 +106,21 @@ class _DrJit(Unrolled):
     def __init__(self) -> None:
         import drjit as dr
 
-        self.sqrt, self.exp, self.log, self.sin, self.cos = dr.safe_sqrt, dr.exp, dr.log, dr.sin, dr.cos
+        self.exp, self.log, self.sin, self.cos = dr.exp, dr.log, dr.sin, dr.cos
         self.power, self.arctan2, self.absolute = dr.power, dr.atan2, dr.abs
-        self.minimum, self.maximum, self.select = dr.minimum, dr.maximum, dr.select
+        self.select = dr.select
         self._dr = dr
+
+    # Of `dr.maximum`, a processor makes four instructions to pass NaN on, and one of this
+
+    def maximum(self, a: Value, b: Value) -> Value:
+        return self._dr.select(a > b, a, b)
+
+    def minimum(self, a: Value, b: Value) -> Value:
+        return self._dr.select(a < b, a, b)
+
+    def sqrt(self, x: Value) -> Value:
+        return self._dr.safe_sqrt(x) if self._dr.grad_enabled(x) else self._dr.sqrt(self.maximum(x, 0.0))
 
     def _is_colour(self, x: Value) -> bool:
         return self._dr.is_array_v(x) and (self._dr.depth_v(x) > 1 or not self._dr.is_jit_v(x))
@@ -132,10 +140,36 @@ class _DrJit(Unrolled):
         if colour is not None:
             channels = [[x[c] if self._is_colour(x) else x for x in coordinates] for c in range(len(colour))]
             return [type(colour)(list(values)) for values in zip(*(interpolate(table, *x) for x in channels))]
-        number = next(type(x) for x in coordinates if not isinstance(x, float))
-        texture = table.texture(sys.modules[number.__module__])
-        centres = [(x * (n - 1) + 0.5) / n for x, n in zip(coordinates, table.shape)]
-        return texture.eval([number(x) for x in reversed(centres)])
+        dr, number = self._dr, next(type(x) for x in coordinates if not isinstance(x, float))
+        dialect: Any = sys.modules[number.__module__]
+
+        def split(position: Value, last: int) -> tuple[Value, Value]:
+            cell = dr.minimum(dialect.UInt32(position), last)
+            return cell, position - number(cell)
+
+        corners, found = _corners(table.shape, [number(x) for x in coordinates], split), []
+        packets = table.packets(dialect)
+        for begin, width in packets.parts:
+            kind, shape = (number, None) if width == 1 else (dialect.ArrayXf, (width, 1))
+            total: Value = 0.0
+            for node, weight in corners:
+                index = node * (packets.stride // width) + begin // width
+                total = dr.fma(dr.gather(kind, packets.values, index, shape=shape), weight, total)
+            found += [total] if width == 1 else list(total)
+        return found[: packets.count]
+
+
+def _corners(
+    shape: Sequence[int], coordinates: Sequence[Value], split: Callable[[Value, int], tuple[Value, Value]]
+) -> list[tuple[Value, Value]]:
+    """The nodes around a point, by their places in a flat table, and their weights. `split` a position in two: the
+    number of the node before it, at most a last one, and the rest."""
+    corners: list[tuple[Value, Value]] = []
+    for x, nodes in zip(coordinates, shape):
+        cell, upper = split(clip(x, 0.0, 1.0) * (nodes - 1), nodes - 2)
+        ends = [(cell, 1 - upper), (cell + 1, upper)]
+        corners = [(i * nodes + k, w * v) for i, w in corners for k, v in ends] if corners else ends
+    return corners
 
 
 @cache

@@ -15,6 +15,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling.low_discrepancy import integers
+from velatura.sampling.packets import Packets, packets
 
 LINE = (512,)  # nodes, where functions depend on the cosine alone
 SINE_MIN = 1e-6  # so that there is an azimuth at the normal
@@ -23,13 +24,14 @@ PLANE = (64, 33)  # nodes over the cosine and the azimuth; the latter one more t
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Values at the nodes: a texture of Dr.Jit, or an array of NumPy, with channels on the last axis."""
+    """Values at the nodes: packets of Dr.Jit, or an array of NumPy, with channels on the last axis."""
 
     data: Any
     shape: tuple[int, ...]
 
-    def texture(self, dialect: Any) -> Any:
-        return self.data
+    def packets(self, dialect: Any) -> Packets:
+        found: Packets = self.data
+        return found
 
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
         """For a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
@@ -130,11 +132,8 @@ def interleaved(flat: Any, shape: tuple[int, ...], number: type | None) -> Curve
         return Curves(np.reshape(flat, (*shape, -1)), shape)
     import drjit as dr
 
-    dialect: Any = sys.modules[number.__module__]
     dr.eval(flat)
-    kind = getattr(dialect, f"Texture{len(shape)}f")
-    tensor = dialect.TensorXf(flat, (*shape, dr.width(flat) // prod(shape)))
-    return Curves(kind(tensor, use_accel=False, wrap_mode=dr.WrapMode.Clamp), shape)
+    return Curves(packets(flat, dr.width(flat) // prod(shape), sys.modules[number.__module__]), shape)
 
 
 # Azimuths from 0 to pi as 0 to 1, without trigonometry: along the sides of a square instead of a circle

@@ -11,6 +11,7 @@ import numpy as np
 
 from velatura import ops
 from velatura.ops import Value
+from velatura.sampling.packets import Packets, packets
 from velatura.tables import coordinates
 
 Average = Callable[[Value, Value], Value]  # of cos_theta and alpha
@@ -18,7 +19,7 @@ Average = Callable[[Value, Value], Value]  # of cos_theta and alpha
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Values at the nodes of a plane, as a texture of Dr.Jit; differentiable with respect to what made them.
+    """Values at the nodes of a plane, as packets of Dr.Jit; differentiable with respect to what made them.
 
     `theta_c` is the critical angle that the angular axis follows, None for an axis in the cosine. `colour` is the type
     of the values, None where all channels are the same.
@@ -27,9 +28,9 @@ class Sheet:
     shape: tuple[int, ...]
     theta_c: Value | None
     colour: type | None
-    held: Any
+    held: Packets
 
-    def texture(self, dialect: Any) -> Any:
+    def packets(self, dialect: Any) -> Packets:
         return self.held
 
     def __call__(self, cos_theta: Value, alpha: Value) -> Value:
@@ -54,7 +55,4 @@ def sample(average: Average, number: type, shape: tuple[int, ...], theta_c: Valu
     dr.eval(flat)
     dialect = sys.modules[number.__module__]
     channels = len(values) if colour else 1
-    texture = dialect.Texture2f(
-        dialect.TensorXf(flat, (*shape, channels)), use_accel=False, wrap_mode=dr.WrapMode.Clamp
-    )
-    return Sheet(shape, theta_c, colour, texture)
+    return Sheet(shape, theta_c, colour, packets(flat, channels, dialect))

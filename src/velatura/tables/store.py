@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from velatura.files import whole
+from velatura.sampling.packets import Packets, packets
 
 FILE = Path(__file__).with_name("tables.npz")
 
@@ -27,30 +28,19 @@ class Table:
     data: np.ndarray
     nodes: tuple[float, ...] = ()
     powers: tuple[int, ...] = ()
-    _textures: dict[Any, Any] = field(default_factory=dict, repr=False)
+    _packets: dict[Any, Packets] = field(default_factory=dict, repr=False)
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Of the grid, without the channels."""
         return self.data.shape[:-1]
 
-    def texture(self, dialect: Any) -> Any:
-        """The table as a texture of a Dr.Jit module (`drjit.llvm.ad`, say), made at first use."""
+    def packets(self, dialect: Any) -> Packets:
+        """The table for a Dr.Jit module (`drjit.llvm.ad`, say), made at first use."""
         with _uploading:
-            if dialect not in self._textures:
-                self._textures[dialect] = self._uploaded(dialect)
-            return self._textures[dialect]
-
-    def _uploaded(self, dialect: Any) -> Any:
-        import drjit as dr
-
-        kind = getattr(dialect, f"Texture{self.data.ndim - 1}f")
-        return kind(
-            dialect.TensorXf(self.data),
-            use_accel=False,  # a GPU's own filter keeps eight bits of the position
-            filter_mode=dr.FilterMode.Linear,
-            wrap_mode=dr.WrapMode.Clamp,
-        )
+            if dialect not in self._packets:
+                self._packets[dialect] = packets(self.data.ravel(), self.data.shape[-1], dialect)
+            return self._packets[dialect]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +65,9 @@ class Tables:
     staying: Table
 
     def upload(self, dialect: Any) -> None:
-        """Make all textures of a Dr.Jit module now, as they cannot be made while a kernel is being recorded."""
+        """Hand all tables to a Dr.Jit module now."""
         for _, table in self.items():
-            table.texture(dialect)
+            table.packets(dialect)
 
     def items(self) -> list[tuple[str, Table]]:
         return [(f.name, getattr(self, f.name)) for f in fields(self)]

@@ -1,0 +1,48 @@
+"""Values of several functions at the nodes of a grid, as a renderer of Dr.Jit fetches them: several at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+WIDTH = 8  # values that are fetched at once, at most; a power of two
+
+
+@dataclass(frozen=True, eq=False)
+class Packets:
+    """Flat values, `stride` of one node after those of another, of which the first `count` count."""
+
+    values: Any
+    stride: int
+    count: int
+
+    @property
+    def parts(self) -> Iterator[tuple[int, int]]:
+        """Where values that are fetched together begin at a node, and how many they are: a power of two."""
+        for begin in range(0, self.count, WIDTH):
+            yield begin, 1 << (min(self.count - begin, WIDTH) - 1).bit_length()
+
+
+def packets(flat: Any, count: int, dialect: Any) -> Packets:
+    """All `count` channels of a flat array of NumPy or Dr.Jit, where those of one node follow those of another;
+    differentiable.
+
+    `dialect` is the module of Dr.Jit. While it records a kernel, arrays must be those of NumPy.
+    """
+    stride = -(-count // WIDTH) * WIDTH if count > WIDTH else 1 << (count - 1).bit_length()
+    nodes, k = np.arange(0, len(flat), count)[:, None], np.minimum(np.arange(stride), count - 1)
+    places = (nodes + k).ravel()
+    if not isinstance(flat, np.ndarray):
+        import drjit as dr
+
+        values = dr.gather(type(flat), flat, dialect.UInt32(places))
+        dr.eval(values)
+        return Packets(values, stride, count)
+    # Dr.Jit reads arrays of NumPy where they lie; at addresses that are no multiples of a packet's size, value by value
+    held = np.empty(len(places) + WIDTH, np.float32)
+    begin = -(held.ctypes.data // held.itemsize) % WIDTH
+    held[begin : begin + len(places)] = flat[places]
+    return Packets(dialect.Float(held[begin : begin + len(places)]), stride, count)
