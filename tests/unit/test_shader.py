@@ -161,7 +161,8 @@ def test_a_recording_answers_as_numpy_does(pattern, model: str) -> None:
     value, density, *drawn = evaluate([recording.value, recording.density, *recording.drawn], values)
     value = np.broadcast_to(np.reshape(value, (-1, 40)), (3, 40))
     np.testing.assert_allclose(value, truth.value, rtol=1e-5 if solved else 1e-10, atol=1e-15)
-    np.testing.assert_allclose(density, truth.density, rtol=1e-5 if solved else 1e-10, atol=1e-15)
+    # The chance of the remainder is what those of lobes leave of 1
+    np.testing.assert_allclose(density, truth.density, rtol=1e-5 if solved else 1e-10, atol=1e-8 if solved else 1e-15)
     np.testing.assert_allclose(drawn, truth.drawn, atol=1e-5 if solved else 1e-12)
 
 
@@ -274,7 +275,7 @@ def test_another_medium_is_shaded_by_the_same_program() -> None:
 # Materials that are solved
 
 
-@pytest.mark.parametrize(("name", "fetches"), [("coated-gold", 16), ("coated-rough-metal", 4), ("frosted-glass", 14)])
+@pytest.mark.parametrize(("name", "fetches"), [("coated-gold", 12), ("coated-rough-metal", 4), ("frosted-glass", 14)])
 def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
     """Energies, which neither values nor samples need, are read apart; and nothing of the layers is."""
     made = shader(vt.preset(name))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import own_medium, passed
+from velatura.model import passed
 from velatura.model.solved import Solved, exchanged
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -56,7 +56,7 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int, samples: 
         of, at_nodes = side.seen(i), side.seen(wi)
         result.append([])
         for k, energy in enumerate(at_nodes.energies):
-            wo = own_medium.sample(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else of.polynomial.sample(i, *u[1:])
+            wo = of.out_of(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else of.samples.sample(i, *u[1:])
             up = wo[0], wo[1], np.maximum(wo[2], 0.0)
             value = _weight(of.part(k, i, wo), side.seen(up).part(k, up, i)[0], i, wo)
             most = MOST if k < len(of.lobes) else MOST_REST

@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,9 +35,32 @@ BLOCK = 1 << 16  # normals at a time, which a processor's cache holds
 Reflectance = Callable[[Value], Value]
 
 
+class Index(NamedTuple):
+    """An index n relative to the medium outside, and what lobes take of it: its inverse, and the radius of the ring of
+    momenta beyond those that can leave, from 1 to n, in squares and as it is."""
+
+    n: Value
+    inverse: Value
+    ring2: Value
+    ring: Value
+
+    @classmethod
+    def of(cls, n: Value) -> Index:
+        if isinstance(n, Index):
+            return n
+        ring2 = n * n - 1
+        return cls(n, 1 / n, ring2, ops.sqrt(ops.maximum(ring2, 0.0)))
+
+    @property
+    def is_outside(self) -> bool:
+        """Whether it is known to be that of the medium outside."""
+        return isinstance(self.n, float) and self.n == 1.0
+
+
 @dataclass(frozen=True)
 class OwnMediumLobe(ops.Named):
-    """A lobe of `weight` (a colour) times a GGX reflection of `roughness` in a medium of index `n`, refracted out.
+    """A lobe of `weight` (a colour) times a GGX reflection of `roughness` in a medium of index `n`, a number or an
+    `Index`, refracted out.
 
     `facets` is the Fresnel reflectance of the facets at a cosine, and `leaving` the share of light at a cosine outside
     that the first interface lets out; None where the weight has all of it, or nothing lies above. With the energy over
@@ -51,34 +76,33 @@ class OwnMediumLobe(ops.Named):
 
 def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
-    above = (wi[2] > 0) & (wo[2] > 0)
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     p = _in_frame(lobe, wo)
-    cos_o = ops.maximum(wo[2], 0.0)
-    inverse = 1 / n
-    seen = 0.25 * _visibility(i, alpha_u, alpha_v) * cos_o * (inverse * inverse)
+    cos_o = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
     # Reflect in the medium
-    o, reached = ((p[0], p[1], ops.maximum(cos_o, COS_MIN)), True) if _is_outside(n) else _out(p[0], p[1], inverse)
+    o, reached = (p[0], p[1], ops.maximum(cos_o, COS_MIN)), True
+    if not n.is_outside:
+        o, reached = _out(p[0], p[1], n.inverse)
     m = i[0] + o[0], i[1] + o[1], i[2] + o[2]
     ops.names(i=i, o=o, m=m)
-    density = ops.select(reached, seen * ggx.ndf_along(m, alpha_u, alpha_v), 0.0)
-    value = lobe.weight * density * _visibility(o, alpha_u, alpha_v)
+    seen = 0.5 * cos_o * (n.inverse * n.inverse) / _shown(i, alpha_u, alpha_v)
+    density = ops.select(reached, seen * _facing(m, alpha_u, alpha_v), 0.0)
+    light = 2 * density / _shown(o, alpha_u, alpha_v)
     if lobe.facets:
         # The cosine of half the angle between i and o
-        value = value * lobe.facets(ops.minimum(0.5 * ops.sqrt(ggx.dot(m, m)), 1.0))
+        light = light * lobe.facets(ops.minimum(0.5 * ops.sqrt(ggx.dot(m, m)), 1.0))
     if lobe.leaving:
-        value = value * lobe.leaving(cos_o)
+        light = light * lobe.leaving(cos_o)
     pdf = density / o[2]
     # Add what falls outside the cone, and is spread over it
-    if not _is_outside(n):
-        ring = ops.sqrt(ops.maximum(n * n - 1, 0.0))
-        p2 = ops.maximum(p[0] * p[0] + p[1] * p[1], ops.TINY)
-        cos_far = ring * p2 * inverse
+    if not n.is_outside:
+        p2 = ops.maximum(wo[0] * wo[0] + wo[1] * wo[1], ops.TINY)
+        cos_far = n.ring * n.inverse * p2
         stretch = ops.sqrt((1 - cos_far * cos_far) * (1 / p2))
         m = i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + cos_far
-        ops.names(ring=ring, p2=p2, cos_far=cos_far, stretch=stretch, m_far=m)
-        pdf = pdf + seen * ggx.ndf_along(m, alpha_u, alpha_v) * (2 * n * ring)
-    return ops.select(above, value, 0.0), ops.select(above, pdf, 0.0)
+        ops.names(p2=p2, cos_far=cos_far, stretch=stretch, m_far=m)
+        pdf = pdf + seen * _facing(m, alpha_u, alpha_v) * (2 * n.n * n.ring)
+    return lobe.weight * light, pdf
 
 
 def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
@@ -90,11 +114,11 @@ def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Directio
     """
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     o = ggx.reflect(i, ggx.sample_visible(i, alpha_u, alpha_v, u1, u2))
-    if _is_outside(n):
+    if n.is_outside:
         return _out_of_frame(lobe, o)
-    x, y = n * o[0], n * o[1]
+    x, y = n.n * o[0], n.n * o[1]
     p2 = x * x + y * y
-    spread = ops.divide(n * n - p2, ops.maximum(n * n - 1, 0.0))
+    spread = ops.divide(n.n * n.n - p2, ops.maximum(n.ring2, 0.0))
     r2 = ops.select(p2 > 1, ops.sqrt(ops.minimum(spread, 1.0)), p2)
     scale = ops.select(p2 > 1, ops.sqrt(r2 / ops.maximum(p2, 1.0)), 1.0)
     z = ops.sqrt(1 - r2)
@@ -105,7 +129,7 @@ def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Directio
 def either(where: Value, a: OwnMediumLobe, b: OwnMediumLobe) -> OwnMediumLobe:
     """A lobe to `sample`: that of a where a condition holds, else of b."""
     roughness = Roughness(*(ops.select(where, x, y) for x, y in zip(a.roughness, b.roughness)))
-    return OwnMediumLobe(1.0, roughness, a.n if a.n is b.n else ops.select(where, a.n, b.n))
+    return OwnMediumLobe(1.0, roughness, _chosen(where, a.n, b.n))
 
 
 def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Value:
@@ -120,7 +144,7 @@ def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tup
     """Mean and largest weight of samples, as `integral`, for a weight of 1."""
     count, size = len(wi[2]), max(BLOCK // normals, 1)
     blocks = [
-        _integrals(replace(lobe, n=_single(lobe.n), roughness=Roughness(*roughness)), (x, y, z), normals)
+        _integrals(replace(lobe, n=_single(Index.of(lobe.n).n), roughness=Roughness(*roughness)), (x, y, z), normals)
         for x, y, z, *roughness in (
             [_single(value, slice(k, k + size)) for value in (*wi, *lobe.roughness)] for k in range(0, count, size)
         )
@@ -137,7 +161,7 @@ def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value,
     u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     o = ggx.reflect(i, h)
-    p2 = n * n * (o[0] * o[0] + o[1] * o[1])
+    p2 = n.n * n.n * (o[0] * o[0] + o[1] * o[1])
     value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
     # Of reflectances, colours are the leading axis, and light the last one
     if lobe.facets:
@@ -158,18 +182,17 @@ def _flat(reflectance: Reflectance, cosine: Value) -> Value:
     return found.reshape(*found.shape[:-1], *cosine.shape) if np.ndim(found) else found
 
 
-def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Value, Direction]:
+def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Index, Direction]:
     """Roughnesses, the index, and wi refracted into the medium, in the frame of the lobe."""
     alpha_u, alpha_v = ops.maximum(lobe.roughness.alpha_u, ALPHA_MIN), ops.maximum(lobe.roughness.alpha_v, ALPHA_MIN)
     x, y, z = _in_frame(lobe, wi)
-    n, z = lobe.n, ops.maximum(z, 0.0)
-    if _is_outside(n):
+    n, z = Index.of(lobe.n), ops.maximum(z, 0.0)
+    if n.is_outside:
         return alpha_u, alpha_v, n, (x, y, ops.maximum(z, COS_MIN))
-    radius = ops.sqrt(ops.maximum(x * x + y * y, ops.TINY))
-    inverse = 1 / n
-    scale = ops.minimum(inverse, (1 - 0.5 * COS_MIN * COS_MIN) / radius)
-    cosine = ops.sqrt(ops.maximum((n * n - 1 + z * z) * (inverse * inverse), COS_MIN * COS_MIN))
-    ops.names(radius=radius, inverse=inverse, scale=scale, cosine=cosine)
+    radius = ops.sqrt(ops.maximum(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY))
+    scale = ops.minimum(n.inverse, (1 - 0.5 * COS_MIN * COS_MIN) / radius)
+    cosine = ops.sqrt(ops.maximum((n.ring2 + z * z) * (n.inverse * n.inverse), COS_MIN * COS_MIN))
+    ops.names(scale=scale, cosine=cosine)
     return alpha_u, alpha_v, n, (scale * x, scale * y, cosine)
 
 
@@ -180,10 +203,19 @@ def _out(x: Value, y: Value, inverse: Value) -> tuple[Direction, Value]:
     return (x, y, ops.sqrt(ops.maximum(cos2, COS_MIN * COS_MIN))), cos2 > 0
 
 
-def _visibility(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:
-    """Smith's G1(w) over w_z, finite at grazing directions."""
+def _shown(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:
+    """2 w_z over Smith's G1(w), which does not vanish at grazing directions."""
     x, y = alpha_u * w[0], alpha_v * w[1]
-    return 2 / (w[2] + ops.sqrt(w[2] * w[2] + x * x + y * y))
+    return w[2] + ops.sqrt(w[2] * w[2] + x * x + y * y)
+
+
+def _facing(m: Direction, alpha_u: Value, alpha_v: Value) -> Value:
+    """GGX's density D of normals along a vector, of any length, by one division."""
+    area = alpha_u * alpha_v
+    x, y, z = alpha_v * m[0], alpha_u * m[1], area * m[2]
+    q = ggx.dot(m, m) * area / (x * x + y * y + z * z)
+    ops.names(area=area, q=q)
+    return q * q * area * (1 / pi)
 
 
 def _in_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
@@ -198,5 +230,8 @@ def _is_straight(roughness: Roughness) -> bool:
     return isinstance(roughness.rotation, float) and roughness.rotation == 0.0
 
 
-def _is_outside(n: Value) -> bool:
-    return isinstance(n, float) and n == 1.0
+def _chosen(where: Value, a: Value, b: Value) -> Value:
+    """Of two indices."""
+    if a is b:
+        return a
+    return Index(*(ops.select(where, x, y) for x, y in zip(Index.of(a), Index.of(b))))

@@ -49,22 +49,59 @@ class Remainder(ops.Named):
 
     def value(self, wi: Direction, wo: Direction) -> Value:
         """f(wi, wo) |cos theta_o|, a colour; 0 unless both are above the surface."""
-        above = (wi[2] > 0) & (wo[2] > 0)
-        return ops.select(above, ops.maximum(self.unclipped(wi, wo), 0.0) * wo[2] * (1 / pi), 0.0)
+        z = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
+        return ops.maximum(self.unclipped(wi, wo), 0.0) * (z * (1 / pi))
 
     def unclipped(self, wi: Direction, wo: Direction) -> Value:
         """pi f(wi, wo), a colour, of directions above; negative in places."""
-        z = wo[2]
-        k = self._at(wi[2])
+        z_i, z_o = wi[2], wo[2]
+        w_i, w_o = _grazing(z_i), _grazing(z_o)
         s = -1 * (wi[0] * wo[0] + wi[1] * wo[1])
-        both = (1 - wi[2] * wi[2]) * (1 - z * z)
-        ops.names(k=[*k], s=s, both=both)
-        mean = k[0] + z * k[1] + _grazing(z) * k[2]
-        return mean + self.b * s + self.a * (2 * s * s - both)
+        twice = 2 * s * s - (1 - z_i * z_i) * (1 - z_o * z_o)
+        once = self.c_01 * (z_i + z_o) + self.c_02 * (w_i + w_o)
+        both = self.c_11 * (z_i * z_o) + self.c_12 * (z_i * w_o + w_i * z_o) + self.c_22 * (w_i * w_o)
+        ops.names(s=s, twice=twice, once=once, both=both)
+        return self.c_00 + once + both + self.b * s + self.a * twice
 
     def albedo(self, cos_theta: Value) -> Value:
         """Energy for light from a cosine, a colour, without clipping."""
         return sum(k * moment for k, moment in zip(self._at(cos_theta), MOMENTS))
+
+    @property
+    def samples(self) -> Samples:
+        """How it is sampled, which all colours share."""
+        c_00, c_01, c_02, c_11, c_12, c_22, b, a = map(ops.mean, vars(self).values())
+        rows = (c_00, c_01, c_02), (c_01, c_11, c_12), (c_02, c_12, c_22)
+        even = [sum(c * moment for c, moment in zip(row, MOMENTS)) for row in rows]
+        return Samples((c_00 + c_02, c_01 + c_12, c_02 + c_22), (even[0], even[1], even[2]), b, a)
+
+    def density(self, wi: Direction, wo: Direction) -> Value:
+        """Density of `sample`, of directions above."""
+        return self.samples.density(wi, wo)
+
+    def sample(self, wi: Direction, u1: Value, u2: Value) -> Direction:
+        """A direction wo from uniform numbers."""
+        return self.samples.sample(wi, u1, u2)
+
+    def _at(self, z: Value) -> tuple[Value, Value, Value]:
+        """Coefficients of u at the other cosine."""
+        w = _grazing(z)
+        return (
+            self.c_00 + z * self.c_01 + w * self.c_02,
+            self.c_01 + z * self.c_11 + w * self.c_12,
+            self.c_02 + z * self.c_12 + w * self.c_22,
+        )
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of a remainder, by means over its colours: coefficients of u at the cosine of the light, of what leaves
+    along the horizon in the mean over azimuths, and of all that leaves; B and A."""
+
+    horizon: tuple[Value, Value, Value]
+    everywhere: tuple[Value, Value, Value]
+    b: Value
+    a: Value
 
     def density(self, wi: Direction, wo: Direction) -> Value:
         """Density of `sample`, of directions above."""
@@ -84,19 +121,11 @@ class Remainder(ops.Named):
     def _low(self, wi: Direction) -> Value:
         """Share of samples by the root of the cosine: by how bright the horizon is, on the side of the mirror
         direction, beside the mean of all directions."""
-        k, p2 = self._at(wi[2]), 1 - wi[2] * wi[2]
-        horizon = ops.mean(k[0] + k[2] + self.b * ops.sqrt(p2) + self.a * p2)
-        everywhere = ops.mean(sum(each * moment for each, moment in zip(k, MOMENTS)))
-        return ops.clip(BRIGHT * (ops.divide(horizon, everywhere) - 1), 0.0, 1.0)
-
-    def _at(self, z: Value) -> tuple[Value, Value, Value]:
-        """Coefficients of u at the other cosine."""
+        z, p2 = wi[2], 1 - wi[2] * wi[2]
         w = _grazing(z)
-        return (
-            self.c_00 + z * self.c_01 + w * self.c_02,
-            self.c_01 + z * self.c_11 + w * self.c_12,
-            self.c_02 + z * self.c_12 + w * self.c_22,
-        )
+        horizon, everywhere = (c[0] + z * c[1] + w * c[2] for c in (self.horizon, self.everywhere))
+        horizon = horizon + self.b * ops.sqrt(p2) + self.a * p2
+        return ops.clip(BRIGHT * (ops.divide(horizon, everywhere) - 1), 0.0, 1.0)
 
 
 def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remainder:

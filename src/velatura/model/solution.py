@@ -14,6 +14,7 @@ from velatura import ops
 from velatura.model import exchange, own_medium, passed, remainder, straight_through, widths
 from velatura.model.context import Context, channels
 from velatura.model.models import Model
+from velatura.model.own_medium import Index
 from velatura.model.passed import Parts
 from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
@@ -91,10 +92,10 @@ class SolvedSide:
 
     @property
     def chances(self) -> list[int]:
-        """Rows of all shares of samples."""
+        """Rows of shares of samples, but for that of the remainder."""
         passes = self.columns.passes
         through = [passes.of_straight, passes.of_bounced, passes.of_rest] if passes else []
-        return self._places([*self.columns.chances, self.columns.chance, *through])
+        return self._places([*self.columns.chances, *through])
 
     def _places(self, values: Sequence[Value]) -> list[int]:
         of = [id(x) for x in self.columns.all]
@@ -188,7 +189,9 @@ class Solver:
         assert context.colour is not None
         shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
         passage = self.passage(material, layout)
-        return Side(curves, tuple(shapes), polynomial, passage, context.colour, self.colours, self.kind)
+        return Side(
+            curves, tuple(shapes), polynomial, polynomial.samples, passage, context.colour, self.colours, self.kind
+        )
 
     def passage(self, material: Material, layout: Layout) -> Passage | None:
         """What passes a material; None where nothing does."""
@@ -283,7 +286,8 @@ class Solver:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
         energy there, too, and shares of samples sum up to 1."""
         rows = self.grid.spread(side.rows, self.shape)
-        rows[side.chances] /= rows[side.chances].sum(axis=0)
+        left = self.grid.spread(side.columns.chance[None], self.shape)
+        rows[side.chances] /= rows[side.chances].sum(axis=0) + left
         if self.model.form == "forward":
             cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
             polynomial = Remainder(*(x[:, None] for x in vars(side.polynomial).values()))
@@ -436,13 +440,13 @@ def _evenly(of: Parts, least: float) -> Parts:
 def shapes_of(prepared: Prepared, drawn: Sequence[Drawn]) -> list[Shape]:
     """One for each lobe."""
     found = [layer for layer in prepared.layers if isinstance(layer, PreparedInterface)]
-    indices: list[Value] = [1.0]
+    indices = [Index.of(1.0)]
     for layer in found:
-        indices.append(indices[-1] * layer.n12)
+        indices.append(Index.of(indices[-1].n * layer.n12))
     shapes = []
     for lobe in drawn:
         own, k = found[lobe.interface], lobe.first
         facets = own if k is None or not own.opaque else None
-        out = (1.0, None) if k is None else (indices[k], found[k])
+        out = (indices[0], None) if k is None else (indices[k], found[k])
         shapes.append(Shape(lobe.interface, indices[lobe.interface], facets, *out))
     return shapes

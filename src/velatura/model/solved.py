@@ -18,14 +18,15 @@ from typing import Any
 from velatura import ops
 from velatura.model import own_medium, passed
 from velatura.model.bsdf import Asked, chosen_direction, upright
-from velatura.model.own_medium import OwnMediumLobe
+from velatura.model.own_medium import Index, OwnMediumLobe
 from velatura.model.passed import Parts
 from velatura.model.prepare import PreparedInterface
-from velatura.model.remainder import Remainder
+from velatura.model.remainder import Remainder, Samples
 from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.straight_through import Passage
 from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
+from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 
 ALL = Asked()
@@ -43,9 +44,9 @@ class Shape:
     lets it out, with the index above that."""
 
     interface: int
-    n: Value
+    n: Index
     facets: PreparedInterface | None
-    n_first: Value
+    n_first: Index
     first: PreparedInterface | None
 
     def lobe(self, weight: Value, roughness: Roughness) -> OwnMediumLobe:
@@ -55,8 +56,8 @@ class Shape:
     def _leaving(self, cosine: Value) -> Value:
         assert self.first
         n = self.n_first
-        if not (isinstance(n, float) and n == 1.0):
-            cosine = ops.sqrt((n * n - 1 + cosine * cosine) / (n * n))
+        if not n.is_outside:
+            cosine = ops.sqrt((n.ring2 + cosine * cosine) * (n.inverse * n.inverse))
         return 1 - self.first.reflect(cosine)
 
 
@@ -79,10 +80,10 @@ class Columns:
 
     @property
     def all(self) -> list[Value]:
-        """In the order in which they are read."""
+        """In the order in which they are read; the chance of the remainder is what the others leave."""
         lobes = zip(self.weights, self.energies, self.roughness, self.chances)
         found = [x for weight, energy, roughness, chance in lobes for x in (weight, energy, *roughness, chance)]
-        found += [self.scale, self.rest, self.chance]
+        found += [self.scale, self.rest]
         if self.passes:
             found += [*vars(self.passes).values(), self.passed]
         return found
@@ -96,11 +97,15 @@ class Columns:
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a solved material, in a renderer's numbers; a colour is made of `colours` channels."""
+    """One side of a solved material, in a renderer's numbers; a colour is made of `colours` channels.
+
+    The remainder is drawn by `samples`.
+    """
 
     curves: Any
     shapes: tuple[Shape, ...]
     polynomial: Remainder
+    samples: Samples
     passage: Passage | None
     colour: Callable[..., Value]
     colours: int
@@ -122,34 +127,37 @@ class Side:
             found.append(colour())
             roughness.append(tuple(number() for _ in fields(self.kind)))
             chances.append(number())
-        scale, rest, chance = colour(), colour(), number()
-        passes, through = None, None
+        scale, rest = colour(), colour()
+        passes, through, chance = None, None, 1 - sum(chances)
         if self.passage:
             passes = Parts(colour(), colour(), colour(), *(number() for _ in range(3)))
-            through = colour()
-        return Columns(weights, roughness, chances, found, scale, chance, rest, passes, through)
+            through, chance = colour(), chance - passes.share
+        return Columns(weights, roughness, chances, found, scale, ops.maximum(chance, 0.0), rest, passes, through)
 
     def seen(self, w: Direction) -> Seen:
         """What light from a direction above sees."""
         return self._seen(w, self.at(w))
 
     def _seen(self, w: Direction, columns: Columns) -> Seen:
+        every = zip(self.shapes, columns.weights, columns.roughness)
+        lobes = [shape.lobe(weight, self.kind(*numbers).roughness(ROOTS)) for shape, weight, numbers in every]
         # The axes of isotropic interfaces lie in the plane of incidence
-        azimuth = ops.arctan2(w[1], w[0]) if self.kind is PerAxis else 0.0
-        lobes = []
-        for shape, weight, numbers in zip(self.shapes, columns.weights, columns.roughness):
-            u, v, rotation = self.kind(*numbers).roughness(ROOTS)
-            lobes.append(shape.lobe(weight, Roughness(u, v, rotation + azimuth)))
-        return Seen(self.shapes, lobes, self.polynomial, self.passage, columns)
+        plane = ggx.plane(w) if self.kind is PerAxis else None
+        return Seen(self.shapes, lobes, plane, self.polynomial, self.samples, self.passage, columns)
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A side as light from one direction sees it: its parts are lobes, the remainder, and what passes."""
+    """A side as light from one direction sees it: its parts are lobes, the remainder, and what passes.
+
+    Lobes are turned from a plane whose azimuth has the cosine and the sine `plane`; None for that of the tangent.
+    """
 
     shapes: tuple[Shape, ...]
     lobes: list[OwnMediumLobe]
+    plane: tuple[Value, Value] | None
     polynomial: Remainder
+    samples: Samples
     passage: Passage | None
     columns: Columns
 
@@ -200,8 +208,16 @@ class Seen:
     def part(self, k: int, i: Direction, o: Direction) -> tuple[Value, Value]:
         """f |cos theta_o| and density of a reflected part."""
         if k < len(self.lobes):
-            return own_medium.eval_pdf(self.lobes[k], i, o)
-        return self.columns.scale * self.polynomial.value(i, o), self.polynomial.density(i, o)
+            return own_medium.eval_pdf(self.lobes[k], self._in_plane(i), self._in_plane(o))
+        return self.columns.scale * self.polynomial.value(i, o), self.samples.density(i, o)
+
+    def out_of(self, lobe: OwnMediumLobe, i: Direction, u1: Value, u2: Value) -> Direction:
+        """A direction drawn from a lobe."""
+        o = own_medium.sample(lobe, self._in_plane(i), u1, u2)
+        return ggx.turned(o, self.plane[0], -self.plane[1]) if self.plane else o
+
+    def _in_plane(self, w: Direction) -> Direction:
+        return ggx.turned(w, *self.plane) if self.plane else w
 
 
 @dataclass(frozen=True)
@@ -217,6 +233,11 @@ class Drawn:
     def share(self) -> Value:
         """Of samples that are drawn from what passes."""
         return self.passes.share if self.passes else 0.0
+
+    @property
+    def all(self) -> bool:
+        """Whether all parts are asked for."""
+        return all(self.wanted) and self.passing
 
 
 @dataclass(frozen=True)
@@ -245,6 +266,7 @@ class Solved:
             self.above,
             shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),
             polynomial=select(where, self.above.polynomial, self.below.polynomial),
+            samples=select(where, self.above.samples, self.below.samples),
             passage=select(where, self.above.passage, self.below.passage),
         )
         return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
@@ -269,7 +291,7 @@ class Solved:
         for above, chance in zip(of.lobes[-2::-1], drawn.chances[-2:0:-1]):
             begin = begin - chance
             lobe = own_medium.either(u < begin, above, lobe)
-        wo = chosen_direction(within, own_medium.sample(lobe, i, u1, u2), of.polynomial.sample(i, u1, u2))
+        wo = chosen_direction(within, of.out_of(lobe, i, u1, u2), of.samples.sample(i, u1, u2))
         if of.passage is None or drawn.passes is None:
             return wo, 1.0
         again = ops.clip(ops.divide(u, drawn.share), 0.0, passed.BELOW_ONE)
@@ -331,7 +353,8 @@ def eval_pdf(
     scale = ops.select(wi[2] * wo[2] < 0, eta * eta, 1.0)
     # No sample is too heavy, there and, in the symmetric form, back
     most = ops.minimum(densities[1], densities[2] * cosines * scale) if back else densities[1]
-    value = ops.maximum(value * ops.minimum(ops.divide(HEAVY * most, whole), 1.0), 0.0)
+    kept = ops.clip(whole, 0.0, HEAVY * most)
+    value = kept if drawn.all else ops.maximum(value, 0.0) * ops.divide(kept, whole)
     if of.passage is None:
         lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, densities[0], 0.0)
@@ -353,7 +376,7 @@ def _either(where: Value, a: Shape, b: Shape) -> Shape:
     assert a.facets and b.facets
     facets = replace(a.facets, eta=ops.select(where, a.facets.eta, b.facets.eta))
     if a.first is None and b.first is None:
-        return Shape(a.interface, select(where, a.n, b.n), facets, 1.0, None)
+        return Shape(a.interface, select(where, a.n, b.n), facets, a.n_first, None)
     some = a.first or b.first
     assert some
     first = replace(some, eta=ops.select(where, a.first.eta if a.first else 1.0, b.first.eta if b.first else 1.0))

@@ -18,7 +18,21 @@ def rotate(w: Direction, angle: Value) -> Direction:
     """Coordinates of `w` in a frame turned by `angle` (radians, anticlockwise seen from outside)."""
     c, s = ops.cos(angle), ops.sin(angle)
     ops.names(cosine=c, sine=s)
-    return c * w[0] + s * w[1], c * w[1] - s * w[0], w[2]
+    return turned(w, c, s)
+
+
+def turned(w: Direction, cosine: Value, sine: Value) -> Direction:
+    """As `rotate`, by the cosine and the sine of the angle."""
+    return cosine * w[0] + sine * w[1], cosine * w[1] - sine * w[0], w[2]
+
+
+def plane(w: Direction) -> tuple[Value, Value]:
+    """Cosine and sine of the azimuth of `w`, which is 0 for the normal."""
+    tilted = w[0] * w[0] + w[1] * w[1] > ops.TINY
+    x, y = ops.select(tilted, w[0], 1.0), ops.select(tilted, w[1], 0.0)
+    scale = 1 / ops.sqrt(x * x + y * y)
+    ops.names(scale=scale)
+    return x * scale, y * scale
 
 
 def dot(a: Direction, b: Direction) -> Value:
@@ -44,15 +58,6 @@ def ndf(h: Direction, alpha_u: Value, alpha_v: Value) -> Value:
     q = x * x + y * y + h[2] * h[2]
     ops.names(x=x, y=y, q=q)
     return 1 / (pi * alpha_u * alpha_v * q * q)
-
-
-def ndf_along(m: Direction, alpha_u: Value, alpha_v: Value) -> Value:
-    """`ndf` of the direction of a vector, of any length, by one division."""
-    area = alpha_u * alpha_v
-    x, y, z = alpha_v * m[0], alpha_u * m[1], area * m[2]
-    q = dot(m, m) * area / (x * x + y * y + z * z)
-    ops.names(area=area, q=q)
-    return q * q * area * (1 / pi)
 
 
 def masking(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:
