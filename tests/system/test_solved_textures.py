@@ -155,6 +155,42 @@ def test_gradients_to_constants_beside_a_texture() -> None:
         assert np.isclose(float(dr.grad(parameters[key])[0]), (high - low) / (0.04 * x), rtol=0.05), key
 
 
+TO_TEXELS = {
+    "layer0_eta": (1.46, 1.54),
+    "layer1_depth": (0.4, 0.6),
+    "layer1_sigma_a": (0.1, 0.2),
+    "layer1_sigma_s": (0.2, 0.3),
+    "layer1_g": (0.5, 0.6),
+    "layer2_k": (2.9, 3.2),
+}
+
+
+@pytest.mark.parametrize("key", TO_TEXELS)
+def test_gradients_to_texels_of_any_kind(key: str) -> None:
+    """As above, of one texture, against differences of texels, to 5 %."""
+    grey = vt.Stack(
+        [
+            COATED.layers[0],
+            vt.Medium(depth=0.5, sigma_a=0.4, sigma_s=0.3, g=0.5),
+            vt.Interface(eta=0.3, k=3.0, alpha=0.3),
+        ]
+    )
+    bsdf = made(grey, **{key: texture(*TO_TEXELS[key])})
+    parameters, name = mi.traverse(bsdf), f"{key}.data"
+    texels, ends, step = np.array(parameters[name]), [], 0.1 * np.ptp(TO_TEXELS[key])
+    dr.enable_grad(parameters[name])
+    parameters.update()
+    dr.backward(seen(bsdf))
+    gradient = np.array(dr.grad(parameters[name])).sum()
+    for shift in (-step, step):
+        shifted = texels.copy()
+        shifted[:, int(U * 16)] += shift
+        parameters[name] = mi.TensorXf(shifted)
+        parameters.update()
+        ends.append(float(seen(bsdf)[0]))
+    assert np.isclose(gradient, (ends[1] - ends[0]) / (2 * step), rtol=0.05)
+
+
 def test_tables_stay_while_textures_stay_within_them() -> None:
     bsdf = made(COATED, layer2_alpha=texture(0.1, 0.3))
     parameters, tables = mi.traverse(bsdf), bsdf.bodies.textured

@@ -279,6 +279,31 @@ def test_what_steers_follows_a_change() -> None:
     assert np.allclose(before.ravel(), np.interp(STEERING_NM, *gold), rtol=1e-4)
 
 
+def test_gradients_to_values_of_a_spectrum_are_differences() -> None:
+    """Of an absorption by three values, to 1 %."""
+    tint = {"type": "regular", "wavelength_min": 400, "wavelength_max": 700, "values": "0.2, 0.5, 0.9"}
+    coat = {"type": "layered", "layer0_eta": 1.5, "layer0_alpha": 0.1, "layer1_depth": 1.0, "layer1_sigma_a": tint}
+    bsdf = kernel.load_dict(coat | {"layer2_eta": 0.3, "layer2_k": 3.0, "layer2_alpha": 0.3})
+    parameters, key, step = mi.traverse(bsdf), "layer1_sigma_a.values", 0.01
+
+    def value() -> Any:
+        return dr.sum(bsdf.eval(mi.BSDFContext(), seen(WI, RAYS[0]), towards(WO)))
+
+    given, slopes = np.array(parameters[key]), []
+    for k in range(3):
+        ends = []
+        for x in (-step, step):
+            parameters[key] = mi.Float(given + x * (np.arange(3) == k))
+            parameters.update()
+            ends.append(float(value()[0]))
+        slopes.append((ends[1] - ends[0]) / (2 * step))
+    parameters[key] = mi.Float(given)
+    dr.enable_grad(parameters[key])
+    parameters.update()
+    dr.backward(value())
+    np.testing.assert_allclose(np.array(dr.grad(parameters[key])), slopes, rtol=0.01, atol=1e-3)
+
+
 def test_a_smooth_metal_stays_a_mirror() -> None:
     bsdf = vt.bsdf(vt.Stack([vt.Interface(eta="bk7"), vt.Interface(conductor="Au")]))
     assert mi.has_flag(bsdf.flags(), mi.BSDFFlags.DeltaReflection)

@@ -22,7 +22,7 @@ NODES_MAX = 9
 ALONE_MAX = 17  # of the only axis
 FINE = 4  # places of a table from one node to the next
 ROOTS = frozenset({"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k"})  # of which nodes are even in the root
-STEPS = {"rotation": 22.5, "g": 0.2}
+STEPS = {"rotation": 22.5}
 STEP = 0.1
 QUARTER = 90.0  # of a turn, to either side
 

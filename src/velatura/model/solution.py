@@ -22,7 +22,7 @@ from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved_grid import COS_MIN, Folded, Grid
 from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import Made, interfaces, parts
-from velatura.model.transport.energies import INCIDENCES, SAMPLES, energies
+from velatura.model.transport.energies import INCIDENCES, SAMPLES, energies, media_of
 from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.model.widths import Tensor
@@ -56,13 +56,14 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Layout:
-    """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, and the
-    slabs that scatter, by the number of interfaces above."""
+    """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, the
+    slabs that scatter, by the number of interfaces above, and the indices of media that nodes are chosen for."""
 
     lobes: list[Drawn]
     stepped: list[int]
     rough: int | None
     cloudy: list[int]
+    indices: list[float]
 
 
 @dataclass(frozen=True)
@@ -219,6 +220,7 @@ class Solver:
             widths.nearly_straight,
             self.made,
             samples=self.normals or SAMPLES,
+            like=layout.indices,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
@@ -350,7 +352,7 @@ def _stacked(*channels: Array) -> Array:
 
 
 def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> Layout:
-    """Of materials that differ in values, as light from above sees them."""
+    """Of materials that differ in values, as light from above sees them; the first one is in the middle."""
     each = [interfaces(parts(material)) for material in materials]
     steps = np.max([[facets.step for facets in found] for found in each], axis=0)
     turns = np.max([[facets.step * max(facets.alpha_u, facets.alpha_v) for facets in found] for found in each], axis=0)
@@ -358,7 +360,7 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     rough = widths.stepped(turns, widths.LEAST_TURN)
     lobes = [Drawn(k, widths.first_step(steps[:k]), veil) for k, veil in both]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
-    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy)
+    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy, media_of(materials[0]))
 
 
 def _cloudy(material: Material) -> set[int]:

@@ -12,6 +12,7 @@ import functools
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,13 +83,14 @@ def energies(
     made: Made | None = None,
     incidences: Array = INCIDENCES,
     samples: int = SAMPLES,
+    like: Sequence[float] | None = None,
 ) -> Energies:
     """Energies for beams at cosines and azimuths (M,).
 
     `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
     into veils. `made` keeps what materials may share. The remainder is known at the cosines `incidences`, (I,); without
     any, lobes are all that is worked out, which is quicker. `samples` are normals for light from each node, and of each
-    beam.
+    beam; as many nodes are taken as for media of indices `like` those of the material.
     """
     made = {} if made is None else made
     everything = _ended(parts(material))
@@ -96,7 +98,7 @@ def energies(
     azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
     cosines = np.concatenate([cos_theta, np.tile(incidences, len(azimuths))])
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
-    nodes = Nodes.of(indices(everything), NODES)
+    nodes = Nodes.of(indices(everything), NODES, like)
     basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES if len(incidences) else 1)
     setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often, made)
 
@@ -136,7 +138,7 @@ def energies(
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
     count = np.size(cos_theta)
     if brushed and len(incidences):
-        remainder = _of_isotropic(material, rest[:, count:], often, forward, made, incidences, samples)
+        remainder = _of_isotropic(material, rest[:, count:], often, forward, made, incidences, samples, like)
     else:
         remainder = (total.columns - _sum(of_lobes(kept)).columns)[..., count:]
     straight = sharp.energy(sharp.straight)
@@ -150,6 +152,11 @@ def energies(
         remainder=remainder,
         nodes=nodes,
     )
+
+
+def media_of(material: Material) -> list[float]:
+    """Indices of the media of a material, as `Nodes` are for."""
+    return indices(_ended(parts(material)))
 
 
 def _ended(found: list[Part]) -> list[Part]:
@@ -182,13 +189,13 @@ def _of_isotropic(
     forward: Straight,
     made: Made,
     incidences: Array,
-    samples: int,
+    *numbers: Any,
 ) -> Array:
     """The remainder of brushed interfaces, by mode and node: that of isotropic ones of the mean roughness, with the
     energy that it has on average over azimuths.
     """
     stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
-    found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, samples)
+    found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, *numbers)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
     # Columns that cancel out are rounding
     size = np.abs(found.remainder[:, 0]).sum(axis=1)

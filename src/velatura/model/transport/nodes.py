@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.floating]
 
 CLOSE = 1.04  # ratio of indices that share an end
+SHORT = 1.01  # ratio of the ends of a part at least
 INNER = 0.6  # share of nodes below the lowest index
 STENCIL = 4
 QUADRATURE = 4000
@@ -31,18 +32,22 @@ class Nodes:
     cells: tuple[int, ...]
 
     @classmethod
-    def of(cls, indices: Sequence[float], count: int) -> Nodes:
-        """About `count` nodes for media of such indices."""
-        ends = [0.0]
-        for n in sorted(indices):
-            if len(ends) > 1 and n < ends[-1] * CLOSE:
-                continue
-            ends.append(float(n))
-        ends[-1] = max(ends[-1], float(max(indices)))
+    def of(cls, indices: Sequence[float], count: int, like: Sequence[float] | None = None) -> Nodes:
+        """About `count` nodes for media of such indices. With those of media `like` these, as many as for them on each
+        part, so that results do not jump from one to the other, unless that leaves a part too short."""
+        if like is None or len(like) != len(indices):
+            like = indices
+        media: list[int] = []
+        for k in sorted(range(len(like)), key=like.__getitem__):
+            if not media or like[k] >= like[media[-1]] * CLOSE:
+                media.append(k)
+        ends, known = ([0.0, *(float(n[k]) for k in media[:-1]), float(max(n))] for n in (indices, like))
+        if any(b < a * SHORT for a, b in pairwise(ends[1:])):
+            return cls.of(indices, count)
         if len(ends) == 2:
             return cls(tuple(ends), (count - 1,))
         inner = int(INNER * count)
-        lengths = [np.sqrt(1 - (a / b) ** 2) for a, b in pairwise(ends[1:])]
+        lengths = [np.sqrt(1 - (a / b) ** 2) for a, b in pairwise(known[1:])]
         outer = [max(STENCIL - 1, round((count - inner) * length / sum(lengths))) for length in lengths]
         return cls(tuple(ends), (inner - 1, *outer))
 
