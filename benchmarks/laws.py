@@ -7,7 +7,7 @@ Random stacks are the tame ones of `fuzz.py`, with 1 to 5 interfaces: opaque one
 metals, mirrors, glass and diffuse bases, with media that absorb and scatter. A line for each check lists the broken
 laws, and the values of the declared ones. A summary by model and form, and the broken laws, come last; the exit status
 is 1 if anything is. FILE keeps the findings of every check, a line of JSON each, and those that it has are not checked
-again. All models on all presets take five minutes, 500 random stacks in both forms of `velatura` an hour.
+again. All models on all presets take five minutes, 500 random stacks in both forms of `velatura` two hours.
 """
 
 from __future__ import annotations
