@@ -22,6 +22,7 @@ from editor import Server, Visit
 
 import velatura as vt
 from velatura.editor import appearance
+from velatura.inverse import stacks
 from velatura.scenes.objects import OBJECTS
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
@@ -313,30 +314,59 @@ def test_small_pictures_lead_to_members(visit: Open) -> None:
     assert float(np.max(np.abs(np.sum(before, axis=0) - np.sum(after, axis=0)))) < 1e-6
 
 
-def test_a_class_that_needs_no_absorption_is_one_shade(visit: Open) -> None:
-    """Expected: rounding errors are not drawn as stripes, and what moves in such a class stays grey in few words."""
+def test_the_coat_of_a_metal_is_dragged_to_a_pink_edge(visit: Open) -> None:
+    """Figure 16 as in the paper: another index at the clear edge of the map, absorption of all channels on it, then of
+    green alone by its slider, and less of it by the arrow keys. All lobes stay; the rim gets pink."""
     page = visit()
     page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
     open_material(page, "Bati 2021, figure 16")
     look = panel(page)
+    wanted = np.sum(lobes(page).energy, axis=0)
+
+    def media() -> list[Any]:
+        return [layer["keys"]["sigma_a"] for layer in page.state("layers") if layer["kind"] == "medium"]
+
     shades = """() => {
       const canvas = document.querySelector('.plane canvas');
       const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
       const pixels = Array.from({ length: data.length / 4 }, (_, i) => data.slice(4 * i, 4 * i + 4));
       return [...new Set(pixels.filter(([, , , a]) => a).map((pixel) => pixel.join()))];
     }"""
-    for x in (None, 0.2):
-        if x is not None:
-            drag_member(page, x, 0.5)
-            answered(page)
-        look.get_by_text("no absorption needed").wait_for()
-        assert len(page.page.evaluate(shades)) == 1
-        assert all(isinstance(n, int | float) for layer in page.state("layers") for n in layer["keys"].values())
-
-    # Where absorption is needed, it is shaded, and said
-    open_material(page, "Bati 2021, figure 15 a")
     look.get_by_text("absorption 0 to").wait_for()
     assert len(page.page.evaluate(shades)) > 10
+
+    drag_member(page, 0.15, 0.0)
+    answered(page)
+    index = page.state("layers.0.keys.eta")
+    assert index == pytest.approx(1.23, abs=0.03) and not media()
+    assert all(isinstance(n, int | float) for layer in page.state("layers") for n in layer["keys"].values())
+    drag_member(page, 0.15, 0.4)
+    answered(page)
+    (grey,) = media()
+    assert np.ptp(grey) < 1e-9 and 0.1 < np.mean(grey) < 0.3
+
+    for channel in ("red", "blue"):
+        field = look.get_by_label(f"Absorption of the coat, {channel}", exact=True)
+        field.fill("0")
+        field.press("Enter")
+        answered(page)
+    field = look.get_by_label("Absorption of the coat, green", exact=True)
+    field.fill("0.3")
+    field.press("Enter")
+    answered(page)
+    assert media() == [pytest.approx([0, 0.3, 0], abs=1e-6)]
+    slider = look.get_by_label("Absorption of the coat, green, slider")
+    slider.press("ArrowLeft")
+    answered(page)
+    (tau,) = media()
+    assert 0.25 < tau[1] < 0.3 and max(tau[0], tau[2]) < 1e-6
+    assert float(np.max(np.abs(np.sum(lobes(page).energy, axis=0) - wanted))) < 1e-6
+    check_physical(page)
+    red, green, blue = stacks.grazing(
+        vt.Stack.from_dict({"layers": [{layer["kind"]: layer["keys"]} for layer in page.state("layers")]}),
+        page.state("model"),
+    ).mean(axis=1)
+    assert (red + blue) / (2 * green) > 1.05
 
 
 # What cannot be ------------------------------------------------------------------------------------------------------

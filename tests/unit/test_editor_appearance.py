@@ -412,3 +412,99 @@ def test_a_wish_that_cannot_be_is_answered_by_the_nearest_with_the_reason(
     answer = appearance.invert({"target": {"lobes": [lobe]}, "model": "bati2021"})
     assert answer["target"]["lobes"][0]["energy"] == pytest.approx(energy, abs=1e-3)
     assert answer["snapped"].startswith(says)
+
+
+# Depths of members ---------------------------------------------------------------------------------------------------
+
+
+def _depths(material: dict[str, Any]) -> list[Any]:
+    return [layer["medium"]["sigma_a"] for layer in material["layers"] if "medium" in layer]
+
+
+@pytest.mark.parametrize("model", ["bati2021", "velatura"])
+def test_the_coat_of_a_metal_absorbs_what_is_asked_and_the_lobe_stays(model: str) -> None:
+    """Bati et al. 2021, figure 16: green absorbed in the coat, then another index; the edge gets pink."""
+    state = appearance.invert({"target": saved("bati2021-16")["target"], "model": model})
+    body = {"target": state["target"], "lobe": 0, "material": state["material"], "model": model}
+    card = class_maps.class_(body)
+    assert card["kind"] == "pair over a conductor"
+    assert [axis["label"] for axis in card["axes"]] == ["eta 1", "absorption of the coat"]
+    assert list(card["depths"]) == ["tau_0", "tau_1"]
+    feasible = array(card["feasible"]).astype(bool)
+    assert feasible[0].any() and feasible.any(axis=1).sum() > 20
+    most = card["depths"]["tau_1"]["high"]
+    assert min(most) > 0.3 and max(card["depths"]["tau_1"]["value"]) == 0
+    found = class_maps.member({**body, "depths": {"tau_1": [0.0, 0.3, 0.0]}})
+    assert found["snapped"] is None
+    assert _depths(found["material"]) == [pytest.approx([0.0, 0.3, 0.0], abs=1e-9)]
+    lower = class_maps.member(
+        {**body, "target": found["target"], "material": found["material"], "point": [1.2, card["point"][1]]}
+    )
+    assert Stack.from_dict(lower["material"]).interfaces[0].eta == pytest.approx(1.2)
+    edges = []
+    for one in (state, found, lower):
+        assert deviation(one["material"], state["target"], model) < EXACT
+        check_physical(one["material"])
+        red, green, blue = stacks.grazing(Stack.from_dict(one["material"]), model).mean(axis=1)
+        edges.append((red + blue) / (2 * green))
+    assert edges[0] < edges[1] < edges[2]
+    # Deeper than any metal can make up for, it ends where the brightest one does
+    far = class_maps.member({**body, "depths": {"tau_1": [0.0, 3.0, 0.0]}})
+    assert far["snapped"].startswith("lobe 1: not even") and deviation(far["material"], state["target"], model) < EXACT
+    assert _depths(far["material"])[0][1] == pytest.approx(most[1], rel=1e-4 if model == "bati2021" else 0.05)
+
+
+@pytest.mark.parametrize("name", ["15-c", "17-red-over-blue"])
+def test_what_absorbs_above_a_pair_is_taken_and_held(name: str) -> None:
+    """tau_0 above the first lobe, tau_n above a lower one; then other lobes are dragged, and it stays."""
+    state = saved(f"bati2021-{name}")
+    lobe = len(state["target"]["lobes"]) - 1
+    body = {"target": state["target"], "lobe": lobe, "material": state["material"], "model": "bati2021"}
+    card = class_maps.class_(body)
+    assert list(card["depths"]) == ["tau_0"] and max(card["depths"]["tau_0"]["value"]) == 0
+    wanted = [0.02, 0.05, 0.03]
+    found = class_maps.member({**body, "depths": {"tau_0": wanted}})
+    assert found["snapped"] is None
+    assert any(np.allclose(tau, wanted, atol=1e-9) for tau in _depths(found["material"]))
+    assert deviation(found["material"], state["target"], "bati2021") < EXACT
+    again = class_maps.class_({**body, "target": found["target"], "material": found["material"]})
+    assert again["depths"]["tau_0"]["value"] == pytest.approx(wanted)
+    wish = copy.deepcopy(found["target"])
+    wish["lobes"][lobe]["alpha"] *= 1.03
+    moved = appearance.invert({**body, "target": wish, "material": found["material"]})
+    assert moved["snapped"] is None and any(np.allclose(tau, wanted, atol=1e-9) for tau in _depths(moved["material"]))
+    back = class_maps.member(
+        {**body, "target": found["target"], "material": found["material"], "depths": {"tau_0": [0, 0, 0]}}
+    )
+    assert not back["target"]["lobes"][lobe]["fixed"] and len(back["material"]["layers"]) == len(
+        state["material"]["layers"]
+    )
+
+
+def test_what_absorbs_above_one_dielectric_follows_its_index() -> None:
+    state = saved("bati2021-19-b")
+    body = {"target": state["target"], "lobe": 0, "material": state["material"], "model": "bati2021"}
+    card = class_maps.class_(body)
+    assert card["kind"] == "dielectric" and card["depths"] == {}
+    assert array(card["feasible"]).sum() > 10
+    found = class_maps.member({**body, "point": [2.5]})
+    assert Stack.from_dict(found["material"]).interfaces[0].eta == pytest.approx(2.5, rel=1e-3)
+    assert np.ravel(_depths(found["material"])[0])[0] == pytest.approx(0.304, abs=0.001)
+    assert deviation(found["material"], state["target"], "bati2021") < EXACT
+
+
+@pytest.mark.parametrize(
+    ("name", "depths", "says"),
+    [
+        ("16", {"tau_2": [0, 0, 0]}, "depths: tau_2: must be one of tau_0, tau_1"),
+        ("15-c", {"tau_1": [0, 0, 0]}, "depths: tau_1: must be one of tau_0"),
+        ("16", {"tau_1": [0, -1, 0]}, "depths: tau_1: must lie in 0 to 50"),
+        ("16", {"tau_1": [0, 1]}, "depths: tau_1: must be a number, "),
+    ],
+)
+def test_a_wrong_depth_is_one_line(name: str, depths: dict[str, Any], says: str) -> None:
+    state = saved(f"bati2021-{name}")
+    body = {"target": state["target"], "lobe": 0, "material": state["material"], "model": "bati2021"}
+    with pytest.raises(InvalidInput) as error:
+        class_maps.member({**body, "depths": depths})
+    assert str(error.value).startswith(says)

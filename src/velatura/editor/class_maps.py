@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,15 +9,18 @@ from velatura.editor.appearance import answered, dragged, lobe_of
 from velatura.editor.messages import Answer, Body, Verb, array
 from velatura.errors import InvalidInput
 from velatura.inverse import EquivalenceClass, Target, interface, stacks
-from velatura.inverse.drag import DraggedStack
+from velatura.inverse.drag import Bound, DraggedStack, with_depth
 from velatura.inverse.interface import conductor_extinction, conductor_index
 from velatura.optics import fresnel
+from velatura.stack.values import Colour
 
 Array = NDArray[np.float64]
 
 SIZES = (8, 256)
 TINTS = 33  # points of a conductor's curve
 CHANNELS = ("r", "g", "b")
+DEPTH = Colour("", low=0.0, high=50.0, texturable=False, differentiable=False)
+DEEP, SLACK = 0.01, 1e-6  # the lowest end of an axis of depths, and by which they may miss their bounds
 
 
 def class_(body: Body) -> Answer:
@@ -27,39 +28,44 @@ def class_(body: Body) -> Answer:
 
     Arrays have rows over the second axis (y) and columns over the first (x). `feasible` and `absorption` (the mean
     optical depth) are null where all members lie on curves: those of `outlines`, by channel, `all` for the indices
-    that do for all of them. Where the model has no closed form, that of the papers stands in, with the lobes that it
-    reads of the material, so that the map is exact at the member. `conductor` is the map of a metal's eta against k
-    over its tint, `members` by channel.
+    that do for all of them. `point` is what `member` takes, `member` its place on the map. `depths` are the free
+    optical depths by name: `value`, and `low` and `high` at the present indices, by channel. Where the model has no
+    closed form, that of the papers stands in, with the lobes that it reads of the material, so that the map is exact
+    at the member. `conductor` is the map of a metal's eta against k over its tint, `members` by channel.
     """
     target, near, lobe = _held(body)
     size = body.get("size", 48)
     if not isinstance(size, int) or not SIZES[0] <= size <= SIZES[1]:
         raise InvalidInput(f"size: must be a number from {SIZES[0]} to {SIZES[1]}, got {size!r}")
-    place = next(n for n, place in enumerate(near.interfaces) if place.lobe == lobe)
-    seen = near.in_closed_form()
-    wanted = seen.target.lobes[lobe]
-    members = stacks.class_of(seen.above(place), wanted, seen.target, first=lobe == 0)
-    if wanted.interfaces == 2:
-        members = dataclasses.replace(members, tau=near.interfaces[place].kept)
+    place = _place(near, lobe)
+    free, wanted = _members(near, lobe), near.target.lobes[lobe]
+    members = free.held(tau_0=near.depths_of(lobe)[0]) if wanted.interfaces == 2 else free
     axis = np.geomspace(1.0, target.eta_max, size)
-    answer: Answer = {"member": near.point_of(lobe)}
+    answer: Answer = {"member": near.point_of(lobe), "point": near.point_of(lobe), "depths": _depths(near, lobe, free)}
     if wanted.interfaces == 2 and wanted.base == "dielectric":
         return answer | {"kind": "dielectric pair"} | _pair(members, axis)
     conductor = _conductor(near, place + wanted.interfaces - 1) if wanted.base == "conductor" else None
     if wanted.interfaces == 1 and conductor:
         return answer | conductor
     kind = "pair over a conductor" if conductor else "dielectric"
-    return answer | {"kind": kind, "conductor": conductor} | _line(members, axis, bool(conductor))
+    answer |= {"kind": kind, "conductor": conductor}
+    if not conductor:
+        return answer | _line(members, axis)
+    tau = near.depths_of(lobe)[1]
+    answer["member"] = [answer["point"][0], float(np.mean(tau))]
+    return answer | _coat(members, axis, tau)
 
 
 def member(body: Body) -> Answer:
-    """The stack with the member of a lobe's class at a point of its map, or the nearest; all lobes stay unchanged.
+    """The stack with another member of a lobe's class, or the nearest; all lobes stay unchanged.
 
-    point: as `class` gives `member`; with `map: conductor` a point [eta, k], to which the nearest tint is taken.
+    point: as `class` gives it, where it changes; with `map: conductor` a point [eta, k], to which the nearest tint is
+    taken. depths: by the names that `class` gives them, where they change.
     """
     target, near, lobe = _held(body)
-    point = body.get("point")
     wanted = near.target.lobes[lobe]
+    depths = _wanted_depths(near, lobe, body)
+    point = body.get("point") or (near.point_of(lobe) if depths else None)
     if not point:
         raise InvalidInput(f"point: must be a list of numbers, got {point!r}")
     if wanted.base == "conductor" and (wanted.interfaces == 1 or body.get("map") == "conductor") and len(point) == 2:
@@ -71,7 +77,15 @@ def member(body: Body) -> Answer:
     tints = 1 if wanted.base == "conductor" else 0
     high = [target.eta_max] * (len(here) - tints) + [1.0] * tints
     low = [1.0] * (len(here) - tints) + [0.0] * tints
-    found, bound = near.member(lobe, np.clip(point, low, high).tolist())
+    goal = np.clip(point, low, high).tolist()
+    if lobe == 0 and len(goal) == 1 and not tints:
+        # Nothing but what absorbs above it makes another first interface reflect the same
+        (part,) = _members(near, lobe).member(goal[0])
+        depths[0], goal = np.maximum(np.broadcast_to(part.tau, (3, 1))[:, 0], 0.0), here
+    found, bound = near.member(lobe, goal, depths)
+    reached = found.depths_of(lobe)
+    if bound is None and any(np.max(np.abs(reached[n] - depth)) > SLACK for n, depth in depths.items()):
+        bound = Bound(lobe, "bright", -1, 0.0)  # a medium above a metal gives way
     if tints:
         tint = found.point_of(lobe)[-1]
         found = found.renamed(found.target.with_lobe(lobe, tint=min(max(tint, 0.0), 1.0)))
@@ -85,6 +99,44 @@ def _held(body: Body) -> tuple[Target, DraggedStack, int]:
     if near is None:
         raise InvalidInput("material: does not have the interfaces of the target")
     return target, near.renamed(target), lobe_of(body, target)
+
+
+def _place(near: DraggedStack, lobe: int) -> int:
+    """The first interface of a lobe."""
+    return next(n for n, place in enumerate(near.interfaces) if place.lobe == lobe)
+
+
+def _members(near: DraggedStack, lobe: int) -> EquivalenceClass:
+    """The class of a lobe, in closed form, below the layers that the material has above; its depths are free."""
+    seen = near.in_closed_form()
+    wanted = with_depth(seen.target, lobe, None)
+    return stacks.class_of(seen.above(_place(near, lobe)), wanted.lobes[lobe], wanted, first=lobe == 0)
+
+
+def _depths(near: DraggedStack, lobe: int, members: EquivalenceClass) -> dict[str, Answer]:
+    place = _place(near, lobe)
+    own, now = near.point.layers[place : place + members.interfaces], near.depths_of(lobe)
+    found = {}
+    for one in members.depths(tuple(own)):
+        value = now[int(one.name[-1])]
+        found[one.name] = {"value": value.tolist(), "low": one.low, "high": np.maximum(one.high, value).tolist()}
+    return found
+
+
+def _wanted_depths(near: DraggedStack, lobe: int, body: Body) -> dict[int, Array]:
+    """Optical depths (3,) by the number of the interface below."""
+    wanted, found = near.target.lobes[lobe], {}
+    last = wanted.interfaces - 1
+    free = [f"tau_{n}" for n in range(wanted.interfaces) if n < last or wanted.base == "conductor"]
+    for name, value in (body.get("depths") or {}).items():
+        if name not in free:
+            allowed = f"one of {', '.join(free)}" if free else "none: they follow from the index"
+            raise InvalidInput(f"depths: {name}: must be {allowed}")
+        try:
+            found[int(name[-1])] = np.broadcast_to(np.array(DEPTH.check(value), float), 3)
+        except ValueError as error:
+            raise InvalidInput(f"depths: {name}: {error}") from None
+    return found
 
 
 # Maps ----------------------------------------------------------------------------------------------------------------
@@ -118,19 +170,36 @@ def _zeros(axis: Array, depth: Array) -> list[list[list[float]]]:
     return [curve for curve in curves if len(curve) > 1]
 
 
-def _line(members: EquivalenceClass, axis: Array, tinted: bool) -> Answer:
-    """The one free index; against the tint, where a conductor lies below, which hardly matters."""
-    parts = members.member(axis)
-    feasible = np.broadcast_to(np.logical_and.reduce([part.feasible for part in parts]), axis.shape)
-    depth = np.broadcast_to(np.mean(np.atleast_2d(parts[-1].tau), axis=0), axis.shape)
-    absorption = np.where(feasible, depth, np.nan)
-    rows = np.ones((len(axis) if tinted else 1, 1))
-    axes = [_axis("eta 1", axis), *([{"label": "tint", "low": 0.0, "high": 1.0}] if tinted else [])]
+def _line(members: EquivalenceClass, axis: Array) -> Answer:
+    """The one free index."""
+    (part,) = members.member(axis)
+    feasible = np.broadcast_to(part.feasible, axis.shape)
+    absorption = np.where(feasible, np.mean(np.atleast_2d(part.tau), axis=0), np.nan)
     return {
-        "axes": axes,
-        "feasible": array(rows * feasible > 0, "uint8"),
-        "absorption": array(rows * absorption),
+        "axes": [_axis("eta 1", axis)],
+        "feasible": array(feasible[None], "uint8"),
+        "absorption": array(absorption[None]),
         "outlines": [],
+    }
+
+
+def _coat(members: EquivalenceClass, axis: Array, tau: Array) -> Answer:
+    """The index of a coat on a conductor against what it absorbs, in the mean of the channels, which differ as now."""
+    possible = np.logical_and.reduce(np.broadcast_arrays(*(part.feasible for part in members.member(axis))))
+    low, high = members.depths_1(axis)
+    depth = np.linspace(0.0, max(float(np.max(high[:, possible], initial=0.0)), float(np.mean(tau)), DEEP), len(axis))
+    each = np.maximum(tau[:, None, None] - np.mean(tau) + depth[:, None], 0.0)
+    inside = np.all((each >= low[:, None] - SLACK) & (each <= high[:, None] + SLACK), axis=0) & possible
+    ends = high - tau[:, None] + np.mean(tau)  # of each channel, where the mean is then
+    outlines = [
+        {"channel": name, "points": np.stack([axis[possible], end[possible]], axis=1).tolist()}
+        for name, end in zip((*CHANNELS, "all"), (*ends, np.min(ends, axis=0)))
+    ]
+    return {
+        "axes": [_axis("eta 1", axis), _axis("absorption of the coat", depth)],
+        "feasible": array(inside, "uint8"),
+        "absorption": array(np.where(inside, depth[:, None], np.nan)),
+        "outlines": [one for one in outlines if len(one["points"]) > 1],
     }
 
 

@@ -179,6 +179,7 @@ KEYS: dict[str, Parameter] = {
     "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
     "point": Several("of a class", most=3),
     "map": Words("of a class"),
+    "depths": Fields("of a member: optical depths [r, g, b] by name"),
     "eta": Scalar("of a coat", texturable=False),
     "alpha": Scalar("of a coat", texturable=False),
     "keep": Flag("the appearance below the coat"),

@@ -73,8 +73,7 @@ class EquivalenceClass:
             return ()
         for name, spans in (("eta_1", self.indices_1()), ("eta_2", [(1.0, self.choice.eta_max)]))[: self.free]:
             found.append(Coordinate(name, spans[0][0], spans[-1][1]))
-        for n, depths in self._depths(chosen).items():
-            found.append(Coordinate(f"tau_{n}", *(tuple(np.ravel(end).tolist()) for end in depths)))
+        found += self.depths(chosen)
         if self._tinted:
             found.append(Coordinate("tint", 0.0, 1.0))
         return tuple(found)
@@ -411,9 +410,9 @@ class EquivalenceClass:
         several = self.choice.eta is None or self.choice.kappa is None
         return self.choice.kind == "conductor" and several and not self._clear
 
-    def _depths(self, member: tuple[Layers, ...]) -> dict[int, tuple[Array, Array]]:
-        """The least and the largest depths (C,) of media that are free, by the interface below these."""
-        found, last = {}, self.interfaces - 1
+    def depths(self, member: tuple[Layers, ...]) -> list[Coordinate]:
+        """The coordinates tau_0 and tau_1, as far as these are free, with their ranges at the indices of a member."""
+        found, last = dict[int, tuple[Array, Array]](), self.interfaces - 1
         if last and self.tau is None:
             most = self._deepest_above()
             found[0] = np.zeros_like(most), most
@@ -421,7 +420,7 @@ class EquivalenceClass:
             below, rest, _ = self._last(*([np.ravel(member[0].eta)] if last else []))
             low, high = metal_depths(below, rest.r, rest.roughness, self.choice, (len(self.energy), 1))
             found[last] = low[:, 0], high[:, 0]
-        return found
+        return [Coordinate(f"tau_{n}", *(tuple(end.tolist()) for end in ends)) for n, ends in found.items()]
 
     def _deepest_above(self) -> Array:
         """The largest depths above a pair of each channel by itself, (C,): Bati et al. 2021, Eq. 16."""

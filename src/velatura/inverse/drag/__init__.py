@@ -7,6 +7,6 @@ which this moves; all of it holds for any model.
 """
 
 from velatura.inverse.drag.coordinates import Bound, plain
-from velatura.inverse.drag.drag import DraggedStack, pinned, seen
+from velatura.inverse.drag.drag import DraggedStack, pinned, seen, with_depth
 
-__all__ = ["Bound", "DraggedStack", "pinned", "plain", "seen"]
+__all__ = ["Bound", "DraggedStack", "pinned", "plain", "seen", "with_depth"]

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from velatura.inverse.coats import scattered
-from velatura.inverse.drag.coordinates import SLACK, Bound, InterfaceCoordinates, Point, Reader, Space, plain, retinted
+from velatura.inverse.drag.coordinates import (
+    REFLECTANCE_MAX,
+    SLACK,
+    Bound,
+    InterfaceCoordinates,
+    Point,
+    Reader,
+    Space,
+    plain,
+    retinted,
+)
 from velatura.inverse.drag.newton import Compromise, Problem, Solution
-from velatura.inverse.interface import ENERGY_MIN
+from velatura.inverse.interface import CONDUCTOR_MAX, ENERGY_MIN
 from velatura.inverse.partial_stack import Above, Array, Layers
 from velatura.inverse.target import Fixed, Target, TargetLobe, kind_of
 from velatura.model import Model
@@ -243,18 +254,23 @@ class DraggedStack:
 
     # To other members of a class -------------------------------------------------------------------------------------
 
-    def member(self, k: int, point: Sequence[float]) -> tuple[DraggedStack, Bound | None]:
+    def member(
+        self, k: int, point: Sequence[float], depths: Mapping[int, Array] | None = None
+    ) -> tuple[DraggedStack, Bound | None]:
         """The stack with another member of a lobe's class, or the nearest to it, and then the bound that it reaches.
 
         point: as `point_of` gives it: free indices of dielectrics from the top, then a conductor's tint.
+        depths: optical depths (3,) that media above interfaces of the lobe are to have, by their number in it.
         """
         here, there = np.array(self.point_of(k)), np.array(point, float)
+        now = {n: self.depths_of(k)[n] for n in depths or {}}
         found, met, why = self, 0.0, None
         for step in (1.0, *(0.5**n for n in range(1, ATTEMPTS))):
             share = met + step
             if share > 1:
                 continue
-            moved = found._moved(k, here + share * (there - here))
+            tau = {n: now[n] + share * (wanted - now[n]) for n, wanted in (depths or {}).items()}
+            moved = found._moved(k, here + share * (there - here), tau)
             if isinstance(moved, Bound):
                 why = why or moved
             else:
@@ -271,14 +287,19 @@ class DraggedStack:
                 point.append(float(part.eta[0, 0]) if own.kind == "dielectric" else float(np.mean(own.tint)))
         return point
 
+    def depths_of(self, k: int) -> list[Array]:
+        """Optical depths (3,) of the media above the interfaces of a lobe."""
+        layers = [part for own, part in zip(self.interfaces, self.point.layers) if own.lobe == k]
+        return [np.broadcast_to(part.tau, (3, 1))[:, 0] for part in layers]
+
     def tint_by(self, n: int, channel: int, tint: float) -> float:
         """The mean tint of the n-th interface when one channel has this one."""
         own = self.interfaces[n].tint
         return float(np.mean(retinted(own, float(own[channel, 0]), tint)))
 
-    def _moved(self, k: int, point: Array) -> DraggedStack | Bound:
+    def _moved(self, k: int, point: Array, depths: Mapping[int, Array]) -> DraggedStack | Bound:
         """With the member of a class at a point; the violated bound if there is none."""
-        moved, held, level = self._placed(k, point)
+        moved, held, level = self._deepened(k, depths)._placed(k, point)
         problem = moved._problem(self._wanted(self.target))
         if level is not None:
             # Hold the index of the last dielectric, while what absorbs above it gives way, or is clear
@@ -294,6 +315,29 @@ class DraggedStack:
             problem, held = moved._problem(problem.goal), [*held, level.coordinate]
         met = moved._met(problem, held)
         return moved._at(met) if isinstance(met, Solution) else met
+
+    def _deepened(self, k: int, depths: Mapping[int, Array]) -> DraggedStack:
+        """With other optical depths above some interfaces of a lobe, its lobes not yet met.
+
+        What reflects below is as much brighter as the media are darker. The target keeps depths that it holds fixed.
+        """
+        x, interfaces, target = self.point.x.copy(), list(self.interfaces), self.target
+        places = [n for n, own in enumerate(interfaces) if own.lobe == k]
+        for n, depth in depths.items():
+            own = interfaces[places[n]]
+            darker = np.exp(2 * (depth - self.depths_of(k)[n]))
+            interfaces[places[n]] = dataclasses.replace(own, kept=depth[:, None])
+            if own.depth is not None:
+                x[own.depth] = 1.0
+            for below in interfaces[places[n] :]:
+                if below.reflectances is not None:
+                    u = x[below.reflectances]
+                    most = CONDUCTOR_MAX if below.kind == "conductor" else REFLECTANCE_MAX
+                    x[below.reflectances] = np.minimum(u * (darker if len(u) == 3 else np.mean(darker)), most)
+            if n == 0 and (len(places) == 2 or k == 0):
+                target = with_depth(target, k, depth)
+        space = dataclasses.replace(self.space, interfaces=tuple(interfaces))
+        return dataclasses.replace(self, point=Point(space, x), target=target)
 
     def _placed(self, k: int, point: Array) -> tuple[DraggedStack, list[int], Compromise | None]:
         """With the indices and the tint of a member, its lobes not yet met.
@@ -333,6 +377,16 @@ def seen(stack: Stack, target: Target, model: Model) -> Target:
     dragged = DraggedStack.of(stack, form, model)
     assert dragged is not None
     return dragged._target_of(dragged.space.read(dragged.point.x[:, None])[:, 0], target)
+
+
+def with_depth(target: Target, k: int, depth: Array | None) -> Target:
+    """A target with the optical depth (3,) of the medium above a lobe held fixed, not held where it is 0 or None."""
+    lobe = target.lobes[k]
+    tau: tuple[Any, ...] = ()
+    if depth is not None and np.any(depth > 0):
+        tau = (tuple(depth.tolist()), *[None] * (lobe.interfaces - 1))
+    fixed = lobe.fixed.model_copy(update={"tau": tau})
+    return target.with_lobe(k, fixed=fixed)
 
 
 def _scaled_to(reflectances: Array, most: float) -> Array:

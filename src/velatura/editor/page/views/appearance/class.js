@@ -6,7 +6,9 @@ import { decode } from '../../arrays.js';
 import { setMember } from '../../state/commands.js';
 import { layersOf, pattern } from '../../state/material.js';
 import { contentsOf } from '../../state/picture.js';
-import { shown } from '../plots/scale.js';
+import { number } from '../controls.js';
+import { mean, shown } from '../plots/scale.js';
+import { line } from '../settings.js';
 import { pathOf } from './path.js';
 import { deepest, plane } from './plane.js';
 
@@ -23,6 +25,9 @@ const KINDS = {
   'pair over a conductor': 'Dielectrics over a conductor',
 };
 
+const CHANNELS = ['red', 'green', 'blue'];
+const LEAST = 0.01; // span of a slider
+
 /**
  * @param {{store, session, call, viewport, picture, isQuiet: function}} services
  * @param {{target: function(): ?object, chosen: function(): number, held: function(): boolean, ask: function,
@@ -33,7 +38,7 @@ export function createClass(services, panel) {
   let card = null; // the map
   let asked = ''; // what it is of
   let problem = '';
-  let pictures = []; // of members along the path: {point, material, image, problem}
+  let pictures = []; // of members along the path: {place, tint, material, image, problem}
   let timer = null;
 
   /** Requests the map if its subject has changed; while it is held, it stays. */
@@ -70,7 +75,7 @@ export function createClass(services, panel) {
     for (const [picture, samples] of SAMPLES.flatMap((samples) => drawn.map((picture) => [picture, samples]))) {
       if (asked !== text || panel.held() || !viewport.budget.samples) return;
       try {
-        picture.material ??= (await call('member', { ...question, point: picture.point })).material;
+        picture.material ??= (await call('member', { ...question, ...wishOf(picture) })).material;
         if (asked !== text) return;
         picture.image = await small(services, picture.material, samples);
       } catch (error) {
@@ -84,12 +89,26 @@ export function createClass(services, panel) {
     const place = map ? card.conductor : card;
     place.member = point;
     panel.paint();
-    take(point, map);
+    take(map ? { point, map } : wishOf({ place: point }));
   }
 
-  function take(point, map) {
-    const body = { target: panel.target(), lobe: panel.chosen(), point, ...(map && { map }) };
+  function take(wish) {
+    const body = { target: panel.target(), lobe: panel.chosen(), ...wish };
     panel.want({ verb: 'member', body, command: setMember });
+  }
+
+  /** What `member` takes for a place on the map, or for a tint: above a conductor the second axis is a depth. */
+  function wishOf({ place, tint }) {
+    if (tint !== undefined) return { point: [...card.point.slice(0, -1), tint] };
+    if (card.kind !== 'pair over a conductor') return { point: place };
+    const { value } = card.depths.tau_1;
+    return { point: [place[0], card.point[1]], depths: { tau_1: alike(value, place[1]) } };
+  }
+
+  function deepen(name, value) {
+    card.depths[name] = { ...card.depths[name], value };
+    panel.paint();
+    take({ depths: { [name]: value } });
   }
 
   const drawn = (one, map) =>
@@ -100,7 +119,7 @@ export function createClass(services, panel) {
       outlines: one.outlines,
       point: one.member,
       dots: one.members,
-      path: map ? [] : pictures.map(({ point }) => point).filter((point) => point.length === one.axes.length),
+      path: map ? [] : pictures.flatMap(({ place }) => (place ? [place] : [])),
       height: one.axes.length > 1 ? TALL : LOW,
       onMove: (point) => move(point, map),
       onLetGo: panel.letGo,
@@ -109,7 +128,7 @@ export function createClass(services, panel) {
   function view() {
     if (problem) return html`<p class="problem">${problem}</p>`;
     if (!card) return html`<p class="faint">The map is on its way.</p>`;
-    if (alone(card))
+    if (alone(card) && !Object.keys(card.depths).length)
       return html`<p class="faint">
         Only one index does it: ${card.member.map(shown).join(' + ')}${card.kind === 'conductor' ? 'i' : ''}. With two
         interfaces there is a choice.
@@ -117,18 +136,45 @@ export function createClass(services, panel) {
     return html`
       <p class="faint">${KINDS[card.kind]} that look the same head-on: drag the point.</p>
       ${drawn(card)} ${card.cells ? legend(card) : nothing} ${card.conductor ? drawn(card.conductor, 'conductor') : nothing}
+      ${Object.entries(card.depths).map(([name, depth]) => depths(name, depth))}
       ${pictures.length ? strip() : nothing}
     `;
   }
 
+  /** Sliders for what a medium absorbs: in all channels by as much, and in each. */
+  function depths(name, { value, low, high }) {
+    const title = name === 'tau_1' ? 'Absorption of the coat' : 'Absorption above';
+    const slider = (channel, now, most, changed) => {
+      const move = (number) => deepen(name, changed(number));
+      const edit = {
+        move,
+        set(number) {
+          move(number);
+          panel.letGo();
+        },
+        settle: panel.letGo,
+        refuse: (words) => services.messages.complain('appearance', words, { passing: true }),
+      };
+      const label = `${title}, ${channel}`;
+      const spec = { low: 0, high: Math.max(most, LEAST), strict: false };
+      return line(channel, number({ label, value: Number(now.toPrecision(3)), spec, edit }));
+    };
+    const within = (number, index) => Math.min(Math.max(number, low[index]), high[index]);
+    return html`<p class="faint">${title}, optical depth at normal incidence:</p>
+      ${slider('all', mean(value), Math.min(...high), (number) => alike(value, number).map(within))}
+      ${CHANNELS.map((channel, index) =>
+        slider(channel, value[index], high[index], (number) => value.map((old, n) => (n === index ? number : old))),
+      )}`;
+  }
+
   const strip = () => html`<div class="members" role="group" aria-label="Members along a path through the class">
     ${pictures.map(
-      ({ point, image, problem }, index) => html`<button
+      ({ image, problem, ...stop }, index) => html`<button
         type="button"
-        title=${problem ?? titleOf(point)}
+        title=${problem ?? titleOf(stop)}
         aria-label="Take member ${index + 1} of the path"
         @click=${() => {
-          take(point);
+          take(wishOf(stop));
           panel.letGo();
         }}
       >
@@ -141,16 +187,17 @@ export function createClass(services, panel) {
     )}
   </div>`;
 
-  /** A point by the names of its axes; outside the map it is a tint. */
-  const titleOf = (point) => {
-    const onMap = point.length === card.axes.length && card.kind !== 'conductor';
-    return point.map((value, axis) => `${onMap ? card.axes[axis].label : 'tint'} ${shown(value)}`).join(', ');
-  };
+  /** A place by the names of the axes, or a tint. */
+  const titleOf = ({ place, tint }) =>
+    place ? place.map((value, axis) => `${card.axes[axis].label} ${shown(value)}`).join(', ') : `tint ${shown(tint)}`;
 
   return { follow, view, stop: () => clearTimeout(timer) };
 }
 
-/** Whether a class has one member only. */
+/** Optical depths with another mean, their differences kept as far as none is negative. */
+const alike = (value, wanted) => value.map((one) => Math.max(one + wanted - mean(value), 0));
+
+/** Whether a class has one member only, but for what absorbs. */
 const alone = ({ kind, axes, cells }) =>
   kind === 'dielectric' ? !cells.feasible.some(Boolean) : kind === 'conductor' && axes.every(isPoint);
 

@@ -2,17 +2,16 @@
 
 const COUNT = 5;
 
-/** Points {point, map} of the members to be shown; none where there is nothing to choose. */
+/** The members to be shown: {place} on the map, or {tint}; none where there is nothing to choose. */
 export function pathOf(card) {
-  if (card.kind === 'conductor') return tints([]);
+  if (card.kind === 'conductor') return tints();
   const found = [...across(card)];
-  if (found.length > 1) return found.map((point) => ({ point }));
-  return card.conductor ? tints(card.member.slice(0, -1)) : [];
+  if (found.length > 1) return found.map((place) => ({ place }));
+  return card.conductor ? tints() : [];
 }
 
 /** Of a conductor: all tints, the rest of the member unchanged. */
-const tints = (rest) =>
-  Array.from({ length: COUNT }, (_, n) => ({ point: [...rest, n / (COUNT - 1)] }));
+const tints = () => Array.from({ length: COUNT }, (_, n) => ({ tint: n / (COUNT - 1) }));
 
 /** From the lowest first index to the highest, each with the second nearest to the member's. */
 function* across({ axes, cells, member }) {
