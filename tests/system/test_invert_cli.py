@@ -206,6 +206,29 @@ def test_a_kept_appearance_is_held_to_the_model_that_renders(run: Run, folder: P
     assert row.replace("│", " ").split() == ["coat", f"{coat:.4f}", "0.1000"]
 
 
+METAL = "{energy: 0.45, variance: 0.03, interfaces: 2, base: conductor}"
+BLUE = "{energy: [0.025, 0.045, 0.05], variance: 0.028, interfaces: 2}"
+RED = "{energy: [0.052, 0.025, 0.025], variance: 0.014, interfaces: 2}"
+
+
+@pytest.mark.parametrize(
+    ("lobes", "deep"),
+    [([METAL], 0.05), ([BLUE, RED], 0.3), ([RED, BLUE], 0.3)],
+    ids=["figures 1 (b) and 16", "figure 17, blue over red", "figure 17, red over blue"],
+)
+def test_figures_of_the_paper_are_explored(run: Run, folder: Path, lobes: list[str], deep: float) -> None:
+    """Expected: stacks that differ towards the edge; the lowest medium of some absorbs, by channel; no index is 1."""
+    Path("figure.yaml").write_text("lobes:\n" + "".join(f"  - {lobe}\n" for lobe in lobes))
+    status, out, _ = run("explore", "figure.yaml", "--count", "10", "--model", "bati2021")
+    *stacks, _ = out.splitlines()
+    assert (status, len(stacks)) == (0, 10)
+    assert float(stacks[-1].split()[0]) > 0.01
+    lowest = [line.split(" | ")[-2] for line in stacks]
+    coloured = [json.loads(part.removeprefix("tau ")) for part in lowest if part.startswith("tau [")]
+    assert max(max(tau) for tau in coloured) > deep
+    assert not any("eta 1 alpha" in line for line in stacks)
+
+
 def test_stacks_by_their_difference_at_grazing_angles(run: Run, folder: Path) -> None:
     """Expected: a line for each stack, from the same to the most different, and the model; and a sheet of renders."""
     status, out, _ = run("explore", "pair.yaml", "--count", "3")

@@ -12,6 +12,7 @@ from velatura.cli import invert, options, progress
 from velatura.errors import InvalidInput
 
 COLUMNS = 4  # of the contact sheet
+SEEN = 5e-3  # optical depth that two digits show
 
 
 def explore(
@@ -79,7 +80,7 @@ def _listed(solution: Any) -> str:
     import numpy as np
 
     def colour(value: Any) -> str:
-        numbers = [f"{x:.3g}" for x in np.ravel(value)]
+        numbers = [f"{x:.4g}" for x in np.ravel(value)]
         return numbers[0] if len(set(numbers)) == 1 else "[" + ", ".join(numbers) + "]"
 
     parts = []
@@ -91,14 +92,15 @@ def _listed(solution: Any) -> str:
 
 
 def _indices(solution: Any) -> str:
-    """The indices of a stack from the top, the mean of the colours."""
+    """The indices of a stack from the top, and what absorbs above each interface, the mean of the colours."""
     import numpy as np
 
     each = [
         f"{np.mean(layers.eta):.2f}" + ("" if layers.kappa is None else f" + {np.mean(layers.kappa):.2f}i")
         for layers in solution.layers
     ]
-    return f"eta {', '.join(each)}"
+    tau = [float(np.mean(layers.tau)) for layers in solution.layers]
+    return f"eta {', '.join(each)}" + (f"\ntau {', '.join(f'{x:.2f}' for x in tau)}" if max(tau) > SEEN else "")
 
 
 def _render(
@@ -112,7 +114,7 @@ def _render(
     seen = model.with_switches(channels="mean")
     rows = -(-len(stacks) // COLUMNS)
     columns = min(len(stacks), COLUMNS)
-    figure = canvas.canvas(2.4 * columns, 2.9 * rows + 0.5)
+    figure = canvas.canvas(2.4 * columns, 3.1 * rows + 0.5)
     figure.suptitle(textwrap.fill(title, 34 * columns), fontsize="medium")
     with progress.bar(f"Rendering {path.name}") as advance:
         for n, (stack, label) in enumerate(zip(stacks, labels), 1):
