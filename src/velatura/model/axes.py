@@ -62,6 +62,10 @@ class Axis:
         begin = max(begin, least)
         return cls(tuple(addresses), float(begin), float(end), max(2, round((end - begin) / step) + 1))
 
+    @property
+    def middle(self) -> float:
+        return self.values[self.count // 2]
+
     def covers(self, other: Axis | Wavelengths) -> bool:
         return (
             isinstance(other, Axis)
@@ -101,31 +105,31 @@ class Axis:
 
 @dataclass(frozen=True)
 class Wavelengths:
-    """Values at some places on the spectrum from 0 to 1, of all that depends on wavelength alone, by flat name."""
+    """Values at some places on the spectrum from 0 to 1, of all that depends on wavelength alone, by flat name; the
+    fixed wavelengths come first. A material is solved at all of them at once, in channels: values are numbers of them,
+    and None stands for all."""
 
     nodes: tuple[float, ...]
     spectra: tuple[tuple[str, tuple[float, ...]], ...]
 
     addresses: ClassVar[tuple[Address, ...]] = ()
     places: ClassVar[int] = 64
+    values: ClassVar[list[None]] = [None]
+    middle: ClassVar[int] = ops.FIXED // 2
 
     @property
     def count(self) -> int:
         return len(self.nodes)
 
-    @property
-    def values(self) -> list[float]:
-        """Numbers of the nodes."""
-        return [*map(float, range(self.count))]
-
     def covers(self, other: Axis | Wavelengths) -> bool:
         return self == other
 
     def refined(self, values: Array, axis: int) -> Array:
-        return np.asarray(PchipInterpolator(self.nodes, values, axis=axis)(np.linspace(0, 1, self.places)))
+        nodes, first = np.unique(self.nodes, return_index=True)
+        return np.asarray(PchipInterpolator(nodes, values.take(first, axis), axis=axis)(np.linspace(0, 1, self.places)))
 
-    def changed(self, x: float) -> dict[str, float]:
-        return {name: values[int(x)] for name, values in self.spectra}
+    def changed(self, x: float | None) -> dict[str, Any]:
+        return {name: values if x is None else values[int(x)] for name, values in self.spectra}
 
 
 def _coordinate(address: Address, value: Value) -> Value:
@@ -140,14 +144,14 @@ def refined(values: Array, axes: Sequence[Axis | Wavelengths]) -> Array:
     return found
 
 
-def placed(material: Material, axes: Sequence[Axis | Wavelengths], values: Iterable[float]) -> Material:
+def placed(material: Material, axes: Sequence[Axis | Wavelengths], values: Iterable[Any]) -> Material:
     """A material of NumPy's values with others on some axes."""
-    changed: dict[str, float] = {}
+    changed: dict[str, Any] = {}
     for axis, x in zip(axes, values):
         changed.update(axis.changed(x))
 
     def value(address: Address, old: Any) -> Any:
         new = changed.get(address.name)
-        return old if new is None else np.full((1, 1), new) if address.colour else new
+        return old if new is None else np.reshape(new, (-1, 1)) if address.colour else new
 
     return material.each(value)

@@ -83,8 +83,15 @@ class SolvedSide:
     @property
     def groups(self) -> list[int]:
         """Which rows are read together: 1 for those that are read seldom."""
+        return self.groups_of(len(self.clipped))
+
+    def groups_of(self, colours: int) -> list[int]:
+        """As `groups`, of colours of so many channels."""
         columns = self.columns
-        return [int(seldom) for x, seldom in zip(columns.all, columns.seldom) for _ in np.atleast_2d(x)]
+        each = (
+            (int(seldom), colours if len(np.atleast_2d(x)) > 1 else 1) for x, seldom in zip(columns.all, columns.seldom)
+        )
+        return [group for group, count in each for _ in range(count)]
 
     @property
     def places(self) -> list[int]:

@@ -120,7 +120,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
 def axis(material: Material, places: Array) -> Wavelengths:
     """As an axis of tables, for a material with channels at places on the spectrum as `solve` takes it."""
     start = plain(material.solid())
-    chosen = sorted(_chosen(start, places), key=lambda k: places[k])
+    chosen = _chosen(start, places)
     spectra = {address.name: np.ravel(x)[chosen].tolist() for address, x in start.values() if np.size(x) == len(places)}
     return Wavelengths(tuple(places[chosen].tolist()), tuple((name, tuple(x)) for name, x in spectra.items()))
 

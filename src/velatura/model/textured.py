@@ -28,7 +28,7 @@ from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
 from velatura.model.passed import Parts
 from velatura.model.prepare import is_same
-from velatura.model.solution import Layout, Solver
+from velatura.model.solution import Layout, SolvedSide, Solver
 from velatura.model.solved import FAINT, Columns, Side, Solved
 from velatura.model.turned import Turned
 from velatura.model.variables import Variables
@@ -218,12 +218,11 @@ def _tabulated(
     isotropic = variance is Isotropic
     spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, alone=len(ranges) == 1) for x in ranges]
     material = material.solid()
-    middle = [axis.values[axis.count // 2] for axis in spanned]
-    start = axes.placed(solution.plain(material), spanned, middle)
+    start = axes.placed(solution.plain(material), spanned, [axis.middle for axis in spanned])
     solver = Solver.of(model, variance, context)
     grid = replace(solver.grid, cosines=COSINES[isotropic])
     solver = replace(solver, grid=grid, shape=SHAPES[isotropic], samples=SAMPLES)
-    textures = {name for axis in spanned for name in axis.changed(0.0)}
+    textures = {name for axis in spanned for name in axis.changed(axis.middle)}
     fixed = b"".join(np.asarray(x).tobytes() for address, x in start.values() if address.name not in textures)
     given = Variables.of(material)
     if isinstance(before, Tables) and not given.given and before.holds(solver, spanned, fixed):
@@ -238,14 +237,18 @@ def _tabulated(
     def solved(made: Material, group: Sequence[Axis | Wavelengths]) -> list[tuple[Array, Array]]:
         """Columns and numbers of each side, (nodes, ...)."""
         nodes = [axes.placed(made, group, values) for values in product(*(axis.values for axis in group))]
-        solves = []
+        wavelengths = next((axis.count for axis in group if isinstance(axis, Wavelengths)), 0)
+        of_group = replace(solver, colours=wavelengths or solver.colours)
+        solves: list[list[tuple[list[Array], list[Array]]]] = []
         for done, node in enumerate(nodes):
             context.progress(done, len(nodes))
-            solves.append(solver.solve(node, layouts))
+            sides = of_group.solve(node, layouts)
+            solves.append([_of_channels(of_group, side, solver.colours, wavelengths) for side in sides])
+            reads[:] = [side.groups_of(solver.colours) for side in sides]
         context.progress(len(nodes), len(nodes))
-        reads[:] = [side.groups for side in solves[0]]
-        by_side = zip(*solves)
-        return [(np.array([solver.spread(x) for x in side]), np.array([x.numbers for x in side])) for side in by_side]
+        by_side = ([np.array(x) for x in zip(*side)] for side in zip(*solves))
+        # Wavelengths are the leading axis of a group
+        return [(_leading(columns), _leading(numbers)) for columns, numbers in by_side]
 
     adds: list[Array] = []
     packings: dict[tuple[int, int], tuple[Packing, ...]] = {}  # of columns and polynomials, by group and side
@@ -288,6 +291,23 @@ def _tabulated(
         terms.append(Term(group, tuple(made[::2]), tuple(made[1::2])))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)
     return Tables(tuple(terms), tuple(adds), layouts, solver, point, fixed)
+
+
+def _of_channels(solver: Solver, side: SolvedSide, colours: int, wavelengths: int) -> tuple[list[Array], list[Array]]:
+    """The columns and numbers of a side, for all wavelengths or, where it was solved for none, once; a colour of one
+    wavelength has it in all channels."""
+    rows, numbers = solver.spread(side), side.numbers
+    if not wavelengths:
+        return [rows], [numbers]
+    counts = [len(np.atleast_2d(x)) for x in side.columns.all]
+    parts = np.split(rows, np.cumsum(counts)[:-1])
+    columns = [np.concatenate([x if len(x) == 1 else x[[k] * colours] for x in parts]) for k in range(wavelengths)]
+    return columns, [np.repeat(numbers.reshape(-1, wavelengths)[:, k], colours) for k in range(wavelengths)]
+
+
+def _leading(values: Array) -> Array:
+    """Values (nodes, wavelengths, ...) with the wavelengths first, in one."""
+    return values.swapaxes(0, 1).reshape(-1, *values.shape[2:])
 
 
 def _flat(values: Array, group: Sequence[Axis | Wavelengths]) -> Array:
