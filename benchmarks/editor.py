@@ -1,11 +1,11 @@
 """The editor's viewport: its stills against Mitsuba's, and what it costs (SwiftShader, so run it on a quiet machine).
 
 Stills: root mean square of the difference in linear radiance relative to white, beside the noise of either picture.
-Times: to a first picture, of frames while a value is dragged, and of a sample; and of a frame with a new roughness
-beside one of three.js with MeshPhysicalMaterial and clearcoat, by turns.
+Times: to a first picture, and of a sample; and of a frame beside one of three.js with MeshPhysicalMaterial and
+clearcoat, by turns. Dragging: frames with new values, by turns with those of a model that is not solved.
 Adding: from a click to the picture with one more layer, at once in a new page of a new server, and a while later.
 
-    python benchmarks/editor.py [--size 96] [--samples 1024] [--spp 2560] [--only stills|times|adding]
+    python benchmarks/editor.py [--size 96] [--samples 1024] [--spp 2560] [--only stills|times|dragging|adding]
 """
 
 from __future__ import annotations
@@ -43,6 +43,9 @@ ADDED_TO = (
     "furnace",
 )
 
+DRAGGED = (("turned-brushing", 0), ("coated-gold", 0), ("wet-copper", 0), ("frosted-metal", 1), ("frosted-glass", 0))
+TURNS = 3
+
 FORESEEN = 5000  # milliseconds without input, so that the page gets ready for one more layer
 
 THREE = "export * as three from 'three';"
@@ -68,18 +71,27 @@ async (kind) => {
 }
 """
 DRAG = """
-async (key) => {
-  const { shader, contents } = viewport.slots.a;
+async ([index, seconds]) => {
+  const { store, viewport } = velatura;
+  const set = (state, alpha) => {
+    const layers = state.layers.map((layer, i) => (i === index ? { ...layer, keys: { ...layer.keys, alpha } } : layer));
+    return { ...state, layers };
+  };
   viewport.moving(true);
   viewport.schedule.frames = [];
-  for (let k = 0, end = performance.now() + 3000; performance.now() < end; k++) {
-    const changed = { ...shader.values, [key]: 0.05 + 0.3 * ((k % 50) / 50) };
-    viewport.setContents('a', { ...contents, values: changed });
+  const begin = performance.now();
+  for (let k = 0; performance.now() < begin + 1000 * seconds; k++) {
+    store.drag('roughness', set, 0.05 + 0.3 * ((k % 50) / 50));
     await new Promise((resolve) => requestAnimationFrame(resolve));
   }
+  const frames = viewport.schedule.frames.length / seconds;
+  store.release();
   viewport.moving(false);
-  return viewport.schedule.framesPerSecond;
+  return frames;
 }
+"""
+MODEL = """
+(model) => velatura.store.run(Object.assign((state) => ({ ...state, model }), { title: 'the model' }))
 """
 SAMPLE = """
 async () => {
@@ -177,14 +189,28 @@ def times() -> None:
         page.evaluate("viewport.setBudget({ samples: 0 })")
         two = messages.document(vt.preset("coated-gold"))
         print(f"first picture {page.evaluate(FIRST, two) / 1e3:.2f} s")
-        print(f"dragging a roughness at 640 x 360: {page.evaluate(DRAG, 'layer0_alpha_u'):.1f} frames/s")
         print(f"a sample at 640 x 360: {page.evaluate(SAMPLE) / 1e3:.2f} s")
         found = page.evaluate(BESIDE, two)
         fine, quick, theirs = found["times"]
         print(
-            f"a frame with another roughness: {fine:.0f} ms, {quick:.0f} ms in fewer pixels, as while dragging, and "
+            f"a frame of a solved material: {fine:.0f} ms, {quick:.0f} ms in fewer pixels, as while dragging, and "
             f"{theirs:.0f} ms of MeshPhysicalMaterial: {found['fine']:.2f} and {found['quick']:.2f} times that"
         )
+
+
+def dragging(chromium: Any) -> None:
+    for preset, layer in DRAGGED:
+        with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder), preset) as server:
+            page = editor.Visit(chromium.new_page(viewport={"width": 1280, "height": 720}), server.entrance)
+            found: dict[str, list[float]] = {"velatura": [], "belcour2018": []}
+            for model in [*found] * TURNS:
+                page.page.evaluate(MODEL, model)
+                page.page.wait_for_timeout(1000)
+                page.settled()
+                found[model].append(page.page.evaluate(DRAG, [layer, 3]))
+            page.page.close()
+        rates = ", ".join(f"{median(each):.1f} of {model}" for model, each in found.items())
+        print(f"dragging a roughness of {preset}, layer {layer}: frames/s {rates}", flush=True)
 
 
 def adding(chromium: Any) -> None:
@@ -213,16 +239,17 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=96)
     parser.add_argument("--samples", type=int, default=1024)
     parser.add_argument("--spp", type=int, default=2560)
-    parser.add_argument("--only", choices=("stills", "times", "adding"))
+    parser.add_argument("--only", choices=("stills", "times", "dragging", "adding"))
     arguments = parser.parse_args()
     if why := viewport.missing():
         print(f"skipped: {why}")
         return
     if arguments.only in (None, "times"):
         times()
-    if arguments.only in (None, "adding"):
-        with editor.browser() as chromium:
-            adding(chromium)
+    for name, measure in (("dragging", dragging), ("adding", adding)):
+        if arguments.only in (None, name):
+            with editor.browser() as chromium:
+                measure(chromium)
     if arguments.only in (None, "stills"):
         stills(arguments.size, arguments.samples, arguments.spp)
 
