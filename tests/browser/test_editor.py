@@ -687,6 +687,43 @@ def test_nothing_sticks_out_of_the_window(visit: Open, width: int) -> None:
         assert panel["y"] >= picture["y"] + picture["height"]
 
 
+@pytest.mark.parametrize(("width", "height"), [(1280, 720), (1024, 768), (480, 900)])
+def test_the_picture_has_most_of_the_window_until_it_is_shared(visit: Open, width: int, height: int) -> None:
+    """Expected: half of a wide window, View and Model in sight, and above the values on a narrow one; what is opened
+    and dragged is so again after a reload."""
+    page = visit(viewport={"width": width, "height": height}, script="localStorage['velatura.layout'] ??= '{}'")
+    box = page.page.locator(".picture").bounding_box
+    sections = page.page.locator("details.section > summary")
+    if width == 480:
+        sections.last.scroll_into_view_if_needed()
+        assert box()["y"] == 0 and box()["height"] >= 0.35 * height
+        return
+    assert box()["width"] * box()["height"] >= (0.5 if width == 1280 else 0.45) * width * height
+    for summary in sections.all():
+        place = summary.bounding_box()
+        assert place["y"] + place["height"] <= height
+
+    page.page.locator(".look > summary").click()
+    sections.first.click()
+    border = page.page.get_by_role("separator", name="Width of the panel")
+    before = box()["width"]
+    border.press("ArrowLeft")
+    assert box()["width"] == pytest.approx(before - 24, abs=1)
+    lower, edge = box(), page.page.get_by_role("separator", name="Height of the plots").bounding_box()
+    page.page.mouse.move(edge["x"] + 50, edge["y"] + 3)
+    page.page.mouse.down()
+    page.page.mouse.move(edge["x"] + 50, edge["y"] + 63, steps=3)
+    page.page.mouse.up()
+    assert box()["height"] == pytest.approx(lower["height"] + 60, abs=5)
+    arranged = box()
+    page.page.reload()
+    page.ready()
+    assert box() == arranged
+    page.page.get_by_label("Light", exact=True).wait_for()
+    border.dblclick()
+    assert box()["width"] == before
+
+
 def test_the_picture_keeps_its_size_while_all_else_changes(visit: Open) -> None:
     """Every other size begins its light anew."""
     page = visit()

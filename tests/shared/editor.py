@@ -80,6 +80,11 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": source, "PYTHONUNBUFFERED": "1"}
 
 
+# Parts of the page that are closed until they are wanted, open unless the visit has closed them
+EVERYTHING_OPEN = """localStorage['velatura.layout'] ??=
+  JSON.stringify({ form: 1, value: { look: true, view: true, model: true } })"""
+
+
 class Visit:
     """A page of the editor, with what its console has complained about; a slow machine has its time."""
 
@@ -90,6 +95,7 @@ class Visit:
         self.page = page
         page.set_default_timeout(300_000)  # clicks, too, wait for shaders that the processor compiles
         self.complaints: list[str] = []
+        page.add_init_script(EVERYTHING_OPEN)
         page.on("console", self._listen)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.goto(address)

@@ -1,7 +1,8 @@
-// State that outlives a page: the history of this tab, the last material of any, and the files dropped on them.
+// State that outlives a page: the history of this tab, the last material of any, the layout, and the files dropped on them.
 
 const TAB = 'velatura.tab';
 const LAST = 'velatura.last';
+const LAYOUT = 'velatura.layout';
 const FORM = 1; // of what is stored; another one is not read
 
 /** Storage of the browser: a tab has its own history, and a new one begins with the last material of any. */
@@ -17,6 +18,8 @@ export function browserStorage({ sessionStorage, localStorage, indexedDB }) {
         steps = steps.slice(Math.ceil(steps.length / 2));
       }
     },
+    layout: () => read(localStorage, LAYOUT),
+    keepLayout: (layout) => write(localStorage, LAYOUT, layout),
     put: (name, file) => inStore(indexedDB, 'readwrite', (store) => store.put(file, name)),
     get: (name) => inStore(indexedDB, 'readonly', (store) => store.get(name)),
   };
@@ -29,6 +32,8 @@ export function memoryStorage() {
     load: () => null,
     last: () => null,
     save() {},
+    layout: () => null,
+    keepLayout() {},
     put: async (name, file) => void files.set(name, file),
     get: async (name) => files.get(name),
   };

@@ -4,6 +4,7 @@ import { html, nothing } from 'lit-html';
 import { styleMap } from 'lit-html/directives/style-map.js';
 import { LARGEST_DIFFERENCE } from '../render/glsl/display.glsl.js';
 import { setView } from '../state/commands.js';
+import { splitter } from './splitter.js';
 
 /**
  * The whole page: `view()`, and `show(face)`, which turns the panel to the layers or to their appearance.
@@ -11,8 +12,15 @@ import { setView } from '../state/commands.js';
  * @param {object} parts views `toolbar`, `layers`, `view` and `model` of what is in it, its `canvas`, and what it works on;
  *   `onFace()` is called after the panel has turned
  */
-export function createPage({ store, session, edits, messages, canvas, focus, update, onFace, ...parts }) {
+export function createPage({ store, session, storage, edits, messages, canvas, focus, update, onFace, ...parts }) {
   let face = 'layers'; // of the panel
+  const layout = { ...LAYOUT, ...storage.layout() };
+
+  function arrange(changes) {
+    Object.assign(layout, changes);
+    storage.keepLayout(layout);
+    update();
+  }
 
   function show(name) {
     face = name;
@@ -22,19 +30,43 @@ export function createPage({ store, session, edits, messages, canvas, focus, upd
 
   const view = () => html`
     ${parts.toolbar()}
-    <main class="stage">
+    <main class="stage" style=${styleMap({ '--look': pixels(layout.lookHeight) })}>
       <div class="picture">
         ${canvas} ${compared({ store, session, edits })}
         <span class="samples" aria-hidden="true"></span>
         ${bubbles(messages)}
       </div>
-      <details class="look" open>
+      ${
+        layout.look
+          ? splitter({
+              label: 'Height of the plots',
+              part: (border) => border.nextElementSibling,
+              resize: (size) => arrange({ lookHeight: size && Math.max(size, SMALLEST) }),
+            })
+          : nothing
+      }
+      <details
+        class="look"
+        ?open=${layout.look}
+        @toggle=${({ target }) => target.open !== layout.look && arrange({ look: target.open })}
+      >
         <summary>Look inside</summary>
         <div class="inspector-slot"></div>
       </details>
     </main>
-    <aside class="panel" aria-label="Material and view">
+    ${splitter({
+      label: 'Width of the panel',
+      across: true,
+      part: (border) => border.nextElementSibling,
+      resize: (size) => arrange({ panelWidth: size && Math.max(size, NARROWEST) }),
+    })}
+    <aside
+      class="panel"
+      aria-label="Material and view"
+      style=${styleMap({ '--panel': pixels(layout.panelWidth) })}
+    >
       ${faces({ face, show, focus })}
+      <div class="material">
       <div
         id="face-layers"
         role="tabpanel"
@@ -51,12 +83,31 @@ export function createPage({ store, session, edits, messages, canvas, focus, upd
         aria-labelledby="tab-appearance"
         ?hidden=${face !== 'appearance'}
       ></div>
-      ${section('View', parts.view())} ${section('Model', parts.model())}
+      </div>
+      ${section('View', 'view', parts.view())} ${section('Model', 'model', parts.model())}
     </aside>
   `;
 
+  function section(title, key, content) {
+    return html`<details
+      class="section"
+      ?open=${layout[key]}
+      @toggle=${({ target }) => target.open !== layout[key] && arrange({ [key]: target.open })}
+    >
+      <summary>${title}</summary>
+      ${content}
+    </details>`;
+  }
+
   return { view, show };
 }
+
+/** What is open, and the sizes in pixels that hands have given. */
+const LAYOUT = { look: false, view: false, model: false, lookHeight: null, panelWidth: null };
+const SMALLEST = 120;
+const NARROWEST = 280;
+
+const pixels = (size) => (size ? `${size}px` : '');
 
 const FACES = [
   ['layers', 'Layers'],
@@ -87,13 +138,6 @@ function faces({ face, show, focus }) {
       </button>`,
     )}
   </div>`;
-}
-
-function section(title, content) {
-  return html`<details class="section" open>
-    <summary>${title}</summary>
-    ${content}
-  </details>`;
 }
 
 const MESSAGES = 3; // at once
