@@ -27,6 +27,7 @@ OTHER = 1.0  # of 255: what a change of the material makes at least
 REFUSED = "the server responded with a status of 4"
 AWAY = "ERR_CONNECTION_REFUSED"
 CUT = "ERR_CONNECTION_RESET"
+AXE = Path(__file__).parents[1] / "page/node_modules/axe-core/axe.min.js"
 PREVIEWS = "[...velatura.viewport.device.programs.keys()].filter((text) => text.includes('PARTS =')).length"
 
 
@@ -642,6 +643,34 @@ def test_two_models_differ_where_they_do(visit: Open) -> None:
     assert difference(page.picture()[:, :58], alone[:, :58]) < SAME
 
 
+def test_a_material_is_pinned_and_swapped(visit: Open) -> None:
+    """Expected: what it becomes beside what it was, and the other way round once they are swapped."""
+    page = visit()
+    open_preset(page, "Gold")
+    gold = page.picture()
+    page.page.get_by_role("button", name="Pin as B").click()
+    open_preset(page, "Glossy plastic")
+    both = page.picture()
+    assert difference(both[:, 34:], gold[:, 34:]) < SAME
+    assert difference(both[:, :30], gold[:, :30]) > OTHER
+    assert page.page.locator(".side.right").inner_text() == "B: Gold"
+    page.page.get_by_role("button", name="Swap A and B").click()
+    assert page.state("name") == "Gold"
+    assert difference(page.picture()[:, :30], gold[:, :30]) < SAME
+
+
+def test_a_lost_graphics_device_is_reported_until_it_is_back(visit: Open) -> None:
+    page = visit("CONTEXT_LOST_WEBGL", "does not belong", "context lost")
+    before = page.picture()
+    page.page.evaluate("(window.losing = velatura.viewport.device.gl.getExtension('WEBGL_lose_context')).loseContext()")
+    said(page).get_by_text("The browser has taken the graphics device away").wait_for()
+    page.page.wait_for_function("() => document.querySelector('.samples').textContent === 'no graphics device'")
+    page.page.evaluate("losing.restoreContext()")
+    said(page).get_by_text("The browser has taken the graphics device away").wait_for(state="detached")
+    page.ready()
+    assert difference(page.picture(), before) < SAME
+
+
 # Looks ---------------------------------------------------------------------------------------------------------------
 
 
@@ -733,6 +762,35 @@ def test_the_picture_keeps_its_size_while_all_else_changes(visit: Open) -> None:
     page.page.get_by_role("tab", name="Disc").click()
     page.settled()
     assert page.page.locator("canvas").first.bounding_box() == size
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(visit: Open, scheme: str) -> None:
+    """Expected: no serious or critical violation of axe-core's rules, with all parts open and in every dialog."""
+    page = visit(viewport={"width": 1280, "height": 900}, color_scheme=scheme, bypass_csp=True)
+    page.page.add_script_tag(path=AXE)
+    found: list[str] = []
+
+    def look(where: str) -> None:
+        page.settled()
+        answer = page.page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+        worst = [each for each in answer["violations"] if each["impact"] in ("serious", "critical")]
+        found.extend(f"{where}: {each['id']}: {node['html'][:200]}" for each in worst for node in each["nodes"])
+
+    look("layers")
+    page.page.get_by_label("Compare", exact=True).select_option("difference")
+    look("difference")
+    page.page.get_by_label("Compare", exact=True).select_option("split")
+    for tab in ("Disc", "Energy", "Blur", "Validations"):
+        page.page.get_by_role("tab", name=tab, exact=True).click()
+        look(tab)
+    for button in ("Open", "Save as"):
+        page.page.get_by_role("button", name=button, exact=True).click()
+        look(button)
+        page.page.keyboard.press("Escape")
+    page.page.get_by_role("tab", name="Appearance").click()
+    look("appearance")
+    assert found == []
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

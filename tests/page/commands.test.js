@@ -150,6 +150,18 @@ test('messages number the layers that count', () => {
   );
 });
 
+test('a pinned material and the open one swap places', () => {
+  const changed = commands.setValue(commands.pin(opened()), 1, 'alpha', 0.7);
+  assert.deepEqual(changed.view.other.material, MATERIAL);
+  const back = commands.swap(commands.setModel(changed, 'belcour2018'));
+  assert.deepEqual(documentOf(back), MATERIAL);
+  assert.equal(back.model, 'velatura');
+  assert.equal(back.view.other.model, 'belcour2018');
+  assert.equal(back.view.other.material.layers[0].interface.alpha, 0.7);
+  const again = commands.swap(back);
+  assert.deepEqual(documentOf(again), documentOf(changed));
+});
+
 test('commands leave the state that they are given as it is', () => {
   const frozen = (value) => {
     if (value && typeof value === 'object') Object.values(Object.freeze(value)).forEach(frozen);

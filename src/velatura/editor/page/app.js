@@ -150,13 +150,16 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   });
   const ending = new AbortController(), { signal } = ending;
   window.addEventListener('pagehide', keeper.flush, { signal });
+  const away = 'The browser has taken the graphics device away: the picture follows when it is back.';
+  canvas.addEventListener('webglcontextlost', () => messages.complain('device', away), { signal });
+  canvas.addEventListener('webglcontextrestored', () => messages.forgive('device'), { signal });
   root.addEventListener('keydown', (event) => onKey(event, { store, save: toolbar.saveAgain }), { signal });
   followTyping(element, { signal });
   element.addEventListener('input', () => messages.forgiveAll('passing'), { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
   root.addEventListener('drop', (event) => onDrop(event, files.take), { signal });
   const counting = window.setInterval(() => {
-    showSamples(element, viewport);
+    showSamples(element, viewport, picture.stage);
     showDifference(element, viewport);
   }, COUNTED);
 
@@ -272,8 +275,15 @@ async function showDifference(element, viewport) {
   if (place && mean !== null) place.textContent = `mean ${mean.toFixed(4)}`;
 }
 
-/** The count of samples, which changes too often to draw the page for it. */
-function showSamples(element, { samples, truth }) {
+const STAGES = { solving: 'solving the layers \u2026', compiling: 'compiling the shader \u2026' };
+
+/** The count of samples, which changes too often to draw the page for it, or what the picture waits for. */
+function showSamples(element, { samples, truth, lost }, stage) {
+  const waits = lost ? 'no graphics device' : STAGES[stage];
+  if (waits) {
+    element.querySelector('.samples').textContent = waits;
+    return;
+  }
   const shown = Number.isFinite(samples) && samples > 0 ? counted(samples, 'sample') : 'preview';
   const place = element.querySelector('.samples');
   place.textContent = truth ? `${shown}, truth ${truth.samples || 'on its way'}` : shown;

@@ -225,6 +225,19 @@ export const setView = titled('change the view', (state, changes) => ({
   view: { ...state.view, ...changes },
 }));
 
+/** Keeps the material, as its model has it, to compare what it becomes with: a slot B. */
+export const pin = titled('pin the material', (state) => {
+  const { name, model, switches, view } = state;
+  const other = { material: documentOf(state), model, switches, title: `B: ${name || 'pinned'}` };
+  return { ...state, view: { ...view, mode: view.mode === 'single' ? 'split' : view.mode, other } };
+});
+
+/** The pinned material in the place of the open one, which is pinned. */
+export const swap = titled('swap A and B', (state) => {
+  const { material, model, switches } = state.view.other;
+  return { ...setMaterial(pin(state), material), model, switches };
+});
+
 export const setCamera = titled('move the camera', (state, camera) => ({ ...state, camera }));
 
 /** The position of a layer among those that count, as messages of Python number them. */

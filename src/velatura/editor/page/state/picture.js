@@ -10,6 +10,7 @@ class Slot {
   shader = null; // what the viewport draws now
   given = null; // and the state whose values it has
   drawn = null; // and the pattern it was asked for
+  stage = null; // what takes time now: `solving` by Python, `compiling` by the device, or null
   #name;
   #services;
   #state = null; // to be drawn
@@ -102,6 +103,7 @@ class Slot {
     while (this.#wanted && this.#timer === null) {
       const { shape, ...question } = this.#wanted;
       this.#wanted = null;
+      this.stage = 'solving';
       try {
         const shader = await call('shader', question);
         if (!this.#wanted) await this.#accept(shader, shape);
@@ -111,6 +113,7 @@ class Slot {
         if (error instanceof Offline) break;
       }
     }
+    this.stage = null;
     this.#busy = false;
   }
 
@@ -118,6 +121,7 @@ class Slot {
     const { viewport, session, onShader, onProblem } = this.#services, state = this.#state;
     const contentsNow = () => (shader.solution ? shader : contentsOf(shader, this.#state, session));
     if (shader.key !== this.shader?.key) {
+      this.stage = 'compiling';
       await viewport.setMaterial(this.#name, shader, contentsNow());
       this.shader = shader;
       this.given = state;
@@ -152,8 +156,8 @@ function otherOf(state, session) {
 }
 
 /**
- * Follows a store: `{shader(slot), drawn(slot), given(slot), quiet, again(), stop()}`; `given` is the state that is drawn,
- * `again` asks anew what could not be asked.
+ * Follows a store: `{shader(slot), drawn(slot), given(slot), stage, quiet, again(), stop()}`; `given` is the state that is
+ * drawn, `stage` what takes time (`solving`, `compiling` or null), and `again` asks anew what could not be asked.
  */
 export function follow({ store, viewport, call, session, files, onProblem, onBaked, onShader }) {
   const part = { viewport, call, session, onShader, onProblem, onBaked };
@@ -201,6 +205,9 @@ export function follow({ store, viewport, call, session, files, onProblem, onBak
     shader: (slot) => slots[slot].shader,
     drawn: (slot) => slots[slot].drawn,
     given: (slot) => slots[slot].given,
+    get stage() {
+      return slots.a.stage ?? slots.b.stage;
+    },
     get quiet() {
       return Object.values(slots).every((slot) => slot.quiet);
     },

@@ -369,7 +369,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
       <thead>
         <tr>
           <th scope="col">${title}</th>
-          <th scope="col">${other ? titleOf(slices.a) : nothing}</th>
+          ${other ? html`<th scope="col">${titleOf(slices.a)}</th>` : html`<td></td>`}
           ${other ? html`<th scope="col">- - ${titleOf(slices.b)}</th>` : nothing}
         </tr>
       </thead>

@@ -40,6 +40,7 @@ export function createPage({ store, session, storage, edits, messages, canvas, f
         layout.look
           ? splitter({
               label: 'Height of the plots',
+              size: layout.lookHeight ?? LOOK,
               part: (border) => border.nextElementSibling,
               resize: (size) => arrange({ lookHeight: size && Math.max(size, SMALLEST) }),
             })
@@ -56,6 +57,7 @@ export function createPage({ store, session, storage, edits, messages, canvas, f
     </main>
     ${splitter({
       label: 'Width of the panel',
+      size: layout.panelWidth ?? PANEL,
       across: true,
       part: (border) => border.nextElementSibling,
       resize: (size) => arrange({ panelWidth: size && Math.max(size, NARROWEST) }),
@@ -104,6 +106,7 @@ export function createPage({ store, session, storage, edits, messages, canvas, f
 
 /** What is open, and the sizes in pixels that hands have given. */
 const LAYOUT = { look: false, view: false, model: false, lookHeight: null, panelWidth: null };
+const [LOOK, PANEL] = [384, 352]; // where no hand has been
 const SMALLEST = 120;
 const NARROWEST = 280;
 

@@ -2,7 +2,7 @@
 
 import { html, nothing } from 'lit-html';
 import { partsOf } from '../render/slices.js';
-import { setCamera, setModel, setSwitch, setView } from '../state/commands.js';
+import { pin, setCamera, setModel, setSwitch, setView, swap } from '../state/commands.js';
 import { enabled, layerName } from '../state/material.js';
 import { capital, dial, menu, number } from './controls.js';
 
@@ -108,6 +108,12 @@ function model({ store, session }) {
     ${choice('Model', model, models, (name) => store.run(setModel, name))}
     ${choice('Compare', view.mode, MODES, chooseMode)}
     ${view.mode === 'single' ? nothing : choice('With', compared, others, chooseOther)}
+    <div class="actions">
+      <button type="button" title="To compare what it becomes with what it is" @click=${() => store.run(pin)}>
+        Pin as B
+      </button>
+      <button type="button" ?disabled=${!pinned.length} @click=${() => store.run(swap)}>Swap A and B</button>
+    </div>
     <details class="switches">
       <summary>Switches</summary>
       ${offered.map(selector)}

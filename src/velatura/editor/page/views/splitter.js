@@ -5,10 +5,10 @@ import { html } from 'lit-html';
 const STEP = 24; // pixels for a key
 
 /**
- * A border beside the part that `part(splitter)` finds. `resize` gets the part's new size in pixels, or null for the one
+ * A border beside the part that `part(splitter)` finds, of a `size` in pixels. `resize` gets the part's new size in pixels, or null for the one
  * that it has by itself; parts lie below the border, or where `across` to its right.
  */
-export function splitter({ label, across = false, part, resize }) {
+export function splitter({ label, across = false, size, part, resize }) {
   const sizeOf = (element) => part(element).getBoundingClientRect()[across ? 'width' : 'height'];
   const onKey = (event) => {
     const towards = across ? { ArrowLeft: 1, ArrowRight: -1 } : { ArrowUp: 1, ArrowDown: -1 };
@@ -26,6 +26,7 @@ export function splitter({ label, across = false, part, resize }) {
     role="separator"
     tabindex="0"
     aria-label=${label}
+    aria-valuenow=${Math.round(size)}
     aria-orientation=${across ? 'vertical' : 'horizontal'}
     @keydown=${onKey}
     @dblclick=${() => resize(null)}

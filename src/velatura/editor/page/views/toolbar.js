@@ -30,8 +30,8 @@ function toolbar(bar) {
   const { file } = placeOf(store.get());
   const changed = isChanged(store.get());
   return html`
-    <header class="toolbar" role="toolbar" aria-label="File and history">
-      <span class="brand">Velatura</span>
+    <header class="toolbar" aria-label="File and history">
+      <h1 class="brand">Velatura</h1>
       <button type="button" @click=${bar.files.begin} title="A coat over a diffuse base">New</button>
       <button type="button" @click=${() => openDialog(bar)}>Open</button>
       <button type="button" @click=${bar.saveAgain} title="Ctrl-S">Save</button>

@@ -114,7 +114,7 @@ export function createValidations(call, paint) {
           <thead>
             <tr>
               <th scope="col">${cursor === null ? 'Point at the chart' : `At ${shown(cursor)}`}</th>
-              <th></th>
+              <td></td>
             </tr>
           </thead>
           <tbody>
