@@ -125,7 +125,7 @@ def test_open_change_undo_reorder_save_and_reopen(visit: Open, served: Server) -
 
 
 def test_layers_are_dragged_added_duplicated_turned_off_and_removed(visit: Open) -> None:
-    page = visit()
+    page = visit(script="localStorage['velatura.layout'] ??= '{}'")
     open_preset(page, "Coated brushed aluminium")
     page.page.get_by_role("button", name="Interface", exact=True).click()
     page.page.get_by_role("button", name="Medium", exact=True).click()

@@ -168,6 +168,7 @@ def test_models_and_their_switches_go_both_ways(notebook: Notebook) -> None:
     notebook.kernel.run("one.model = vt.MODELS[0].with_switches(tir='clean')")
     notebook.one.wait("store.get().model === 'belcour2018'")
     assert notebook.one.state("switches") == {"tir": "clean"}
+    notebook.two.editor.locator("details.section > summary").last.click()
     notebook.two.editor.get_by_role("combobox", name="Model", exact=True).select_option(label="Bati 2021")
     notebook.until("two.model.name", "bati2021")
     assert notebook.kernel.run("", "(one.model.name, one.model.tir)") == ("belcour2018", "clean")
@@ -176,6 +177,7 @@ def test_models_and_their_switches_go_both_ways(notebook: Notebook) -> None:
 def test_two_editors_work_at_once(notebook: Notebook) -> None:
     """Both load a photographed light, which comes as a message, and take a stack each, in one line of Python."""
     for cell in notebook.one, notebook.two:
+        cell.editor.locator("details.section > summary").first.click()
         cell.editor.get_by_role("combobox", name="Light", exact=True).select_option(label="City")
     notebook.kernel.run("one.stack = one.stack.replace(layer0_eta=1.3); two.stack = two.stack.replace(layer0_eta=1.9)")
     for cell, eta in (notebook.one, 1.3), (notebook.two, 1.9):

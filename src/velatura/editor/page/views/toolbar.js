@@ -114,7 +114,7 @@ function openPanel(bar) {
       <button type="button" @click=${close}>Cancel</button>
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
-    ${some('Files of the folder', listed, html`<p>${bar.listed ? 'There are none.' : 'On their way.'}</p>`)}
+    ${some('Files of the folder', listed, html`<p>${bar.listed ? 'There are none.' : 'Reading the folder.'}</p>`)}
     ${some('From the papers', targets, html`<p>On their way.</p>`)}
   </dialog>`;
 }
