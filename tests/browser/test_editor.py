@@ -643,6 +643,22 @@ def test_two_models_differ_where_they_do(visit: Open) -> None:
     assert difference(page.picture()[:, :58], alone[:, :58]) < SAME
 
 
+def test_what_is_exported_is_seen_before_it_is_taken(visit: Open, tmp_path: Path) -> None:
+    page = visit()
+    open_preset(page, "Gold")
+    page.page.get_by_role("button", name="Export", exact=True).click()
+    written = page.page.get_by_label("What is written")
+    page.page.get_by_label("Format", exact=True).select_option("python")
+    page.page.wait_for_function("() => document.querySelector('dialog.export textarea')?.value.includes('import')")
+    with page.page.expect_download() as download:
+        page.page.get_by_role("button", name="Download .py").click()
+    assert download.value.suggested_filename == "gold.py"
+    assert Path(download.value.path()).read_text() == written.input_value()
+    page.page.get_by_label("Format", exact=True).select_option("glsl")
+    page.page.get_by_role("button", name="Download .tables.bin").wait_for()
+    assert "vt_eval_pdf" in written.input_value()
+
+
 def test_a_material_is_pinned_and_swapped(visit: Open) -> None:
     """Expected: what it becomes beside what it was, and the other way round once they are swapped."""
     page = visit()
@@ -784,7 +800,7 @@ def test_axe_finds_nothing_serious(visit: Open, scheme: str) -> None:
     for tab in ("Disc", "Energy", "Blur", "Validations"):
         page.page.get_by_role("tab", name=tab, exact=True).click()
         look(tab)
-    for button in ("Open", "Save as"):
+    for button in ("Open", "Save as", "Export"):
         page.page.get_by_role("button", name=button, exact=True).click()
         look(button)
         page.page.keyboard.press("Escape")

@@ -17,6 +17,7 @@ from velatura.editor.folder import Conflict, Folder
 from velatura.editor.messages import admitted
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, MissingTool
+from velatura.exports import FORMATS, export
 from velatura.model import MODELS
 from velatura.scenes import OBJECTS
 from velatura.stack import Interface, Stack, loads, preset, presets
@@ -50,6 +51,17 @@ def changed(**keys: Any) -> dict[str, Any]:
 
 
 # Session
+
+
+@pytest.mark.parametrize("to", list(FORMATS))
+def test_a_material_is_exported_as_the_command_line_does(to: str) -> None:
+    for fixed in (False, True):
+        answer = VERBS["export"]({"material": COAT, "to": to, "fixed": fixed, "model": "belcour2018"})
+        constant = ["all"] if fixed and to == "glsl" else []
+        made = export(Stack.from_dict(COAT), to, "belcour2018", constant=constant, folder=".")
+        assert answer["text"] == made.text
+        assert {ending: decoded(data).tobytes() for ending, data in answer["beside"].items()} == dict(made.beside)
+        assert answer["ending"] == FORMATS[to].endings[0]
 
 
 def test_a_session_is_json_and_names_all_there_is() -> None:
@@ -257,6 +269,7 @@ def test_a_text_is_read_as_it_was_written(here: Path) -> None:
         ("write", {"material": []}, "material: must be an object"),
         ("shader", {"material": COAT, "model": "velatur"}, "did you mean velatura"),
         ("shader", {"material": COAT, "switches": {"tir": "often"}}, "tir: must be one of"),
+        ("export", {"material": COAT, "to": "jsn"}, "did you mean json"),
         ("object", {"name": "bal"}, "did you mean ball"),
         ("environment", {"name": "moon"}, "unknown environment"),
     ],

@@ -41,7 +41,7 @@ IMPORTED_BY = {
     "cli": "__main__",
     "editor": "__init__ cli",
     "comparison": "__init__ figures cli",
-    "exports": "__init__ cli",
+    "exports": "__init__ cli editor",
     "figures": "cli editor",
 }
 

@@ -186,6 +186,8 @@ KEYS: dict[str, Parameter] = {
     "name": Words("of a table, an object, an environment, a validation"),
     "parameters": Fields("of a validation"),
     "key": Words("of tables"),
+    "to": Words("of a format"),
+    "fixed": Flag("the values of an export"),
     "text": Words("of a material file", most=TEXT),
     "file": Words("of the folder"),
     "version": Words("of a file"),

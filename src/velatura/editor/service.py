@@ -9,12 +9,13 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
-from velatura import __version__, kernel
+from velatura import __version__, exports, kernel
 from velatura.editor import appearance, class_maps, truth, validations
 from velatura.editor.messages import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
 from velatura.editor.shading import contents, shading
@@ -73,6 +74,7 @@ def _constants() -> Answer:
         "presets": [_preset(name) for name in presets()],
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
+        "formats": [{"name": name, "fixed": format.constants} for name, format in exports.FORMATS.items()],
         "names": _names(),
         "objects": list(OBJECTS),
         "environments": [{"name": name, "title": _titled(name), "url": url} for name, url in environments],
@@ -207,6 +209,18 @@ def environment(body: Body) -> Answer:
     return {"picture": array(ENVIRONMENTS[name]())}
 
 
+def export(body: Body) -> Answer:
+    """A material for other programs: the text, what lies beside it by ending, and the first ending of the text.
+
+    Values are worked in where they are `fixed` and the format allows that.
+    """
+    to = field(body, "to", str)
+    constant = ["all"] if body.get("fixed") and to in exports.with_constants() else []
+    made = exports.export(material_of(body), to, model_of(body), constant=constant, folder=Path.cwd())
+    beside = {ending: array(np.frombuffer(data, np.uint8), "uint8") for ending, data in made.beside.items()}
+    return {"text": made.text, "beside": beside, "ending": exports.FORMATS[to].endings[0]}
+
+
 _VERBS: dict[str, Verb] = {
     "session": session,
     "shader": shader,
@@ -217,6 +231,7 @@ _VERBS: dict[str, Verb] = {
     "write": write,
     "object": object_,
     "environment": environment,
+    "export": export,
     **validations.VERBS,
     **appearance.VERBS,
     **class_maps.VERBS,

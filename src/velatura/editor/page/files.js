@@ -24,6 +24,11 @@ export function createFiles({ store, session, call, storage, messages, address, 
     return file;
   };
 
+  const toClipboard = (text) =>
+    copy(text).catch(() => {
+      throw new Error('The browser does not let the page write to the clipboard.');
+    });
+
   const files = {
     // Materials
 
@@ -67,6 +72,13 @@ export function createFiles({ store, session, call, storage, messages, address, 
         const { text } = await call('write', { material: documentOf(store.get()) });
         offer(new Blob([text], { type: 'application/yaml' }), files.nameOf('yaml'));
       }),
+    /** Hands what was written of the material to the browser, as a file with an ending. */
+    give: (content, ending) => offer(new Blob([content]), files.nameOf(ending)),
+    copy: (text) =>
+      messages.attempt('copy', async () => {
+        await toClipboard(text);
+        messages.say('The text is on the clipboard.');
+      }),
     /** The file name of the open material. */
     nameOf(ending) {
       const name = store.get().name.toLowerCase();
@@ -76,9 +88,7 @@ export function createFiles({ store, session, call, storage, messages, address, 
     share: () =>
       messages.attempt('share', async () => {
         const fragment = await fragmentOf(store.get(), documentOf(store.get()));
-        await copy(address + fragment).catch(() => {
-          throw new Error('The browser does not let the page write to the clipboard.');
-        });
+        await toClipboard(address + fragment);
         messages.say('The address is on the clipboard; it opens this material.');
       }),
     openShared: (fragment) =>

@@ -5,6 +5,7 @@ import { live } from 'lit-html/directives/live.js';
 import { ref, createRef } from 'lit-html/directives/ref.js';
 import { isChanged, placeOf } from '../state/commands.js';
 import { iconButton } from './controls.js';
+import { createExports } from './exporting.js';
 
 /** `view()`, and `saveAs()` and `saveAgain()` as its buttons do. */
 export function createToolbar(services) {
@@ -12,6 +13,7 @@ export function createToolbar(services) {
   const dialogs = { open: createRef(), save: createRef() };
   const bar = {
     ...services,
+    exports: createExports(services),
     dialogs,
     listed: null, // files of the folder
     targets: null, // of the papers
@@ -52,10 +54,11 @@ function toolbar(bar) {
         ${file ?? 'Not saved'}${file && changed ? ' · unsaved changes' : nothing}
       </span>
       <span class="rest"></span>
+      <button type="button" @click=${bar.exports.show} title="For other programs">Export</button>
       <button type="button" @click=${bar.savePicture} title="As PNG">Save picture</button>
       <span class="presence" role="status">${bar.live?.online === false ? 'Offline, trying again' : ''}</span>
     </header>
-    ${openPanel(bar)} ${savePanel(bar)}
+    ${openPanel(bar)} ${savePanel(bar)} ${bar.exports.view()}
   `;
 }
 
