@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model import bounced, own_medium, passed
 from velatura.model.mixture import ALPHA_MIN
-from velatura.model.own_medium import OwnMediumLobe
+from velatura.model.own_medium import Index, OwnMediumLobe
 from velatura.model.passed import Parts
 from velatura.model.straight_through import Passage
 from velatura.model.variance import Roughness
@@ -52,7 +52,7 @@ def of_lobe(lobe: OwnMediumLobe, wi: Direction) -> Samples:
     """
     u1, u2 = _lattice(_azimuth(wi) - lobe.roughness.rotation)
     i = ggx.rotate(_columns(wi), lobe.roughness.rotation[:, None])
-    wider = np.sqrt(lobe.n * lobe.n - 1 + i[2] * i[2]) / np.maximum(i[2], COS_MIN)
+    wider = np.sqrt(Index.of(lobe.n).ring2 + i[2] * i[2]) / np.maximum(i[2], COS_MIN)
     u, v = (np.clip(alpha[:, None] * wider, ALPHA_MIN, 1.0) for alpha in lobe.roughness[:2])
     h = ggx.sample_visible(i, u, v, u1, u2)
     density = ggx.masking(i, u, v) * ggx.ndf(h, u, v) / (4 * np.maximum(i[2], COS_MIN))
