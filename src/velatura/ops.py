@@ -59,6 +59,9 @@ class Unrolled:
     def channel(self, value: Value, k: int | None) -> Value:
         return value
 
+    def fma(self, a: Value, b: Value, c: Value) -> Value:
+        return a * b + c
+
 
 class _Numpy(Unrolled):
     exp, log, power, sin, cos = np.exp, np.log, np.power, np.sin, np.cos
@@ -118,6 +121,9 @@ class _DrJit(Unrolled):
 
     def minimum(self, a: Value, b: Value) -> Value:
         return self._dr.select(a < b, a, b)
+
+    def fma(self, a: Value, b: Value, c: Value) -> Value:
+        return self._dr.fma(a, b, c)
 
     def sqrt(self, x: Value) -> Value:
         return self._dr.safe_sqrt(x) if self._dr.grad_enabled(x) else self._dr.sqrt(self.maximum(x, 0.0))
@@ -257,6 +263,11 @@ def exp(x: Value) -> Value:
 
 def log(x: Value) -> Value:
     return _dialect(x).log(x)
+
+
+def fma(a: Value, b: Value, c: Value) -> Value:
+    """a * b + c, in one step where a dialect has one."""
+    return _dialect(a, b, c).fma(a, b, c)
 
 
 def power(x: Value, exponent: Value) -> Value:

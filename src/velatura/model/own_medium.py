@@ -206,14 +206,14 @@ def _out(x: Value, y: Value, inverse: Value) -> tuple[Direction, Value]:
 def _shown(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:
     """2 w_z over Smith's G1(w), which does not vanish at grazing directions."""
     x, y = alpha_u * w[0], alpha_v * w[1]
-    return w[2] + ops.sqrt(w[2] * w[2] + x * x + y * y)
+    return w[2] + ops.sqrt(ggx.dot((x, y, w[2]), (x, y, w[2])))
 
 
 def _facing(m: Direction, alpha_u: Value, alpha_v: Value) -> Value:
     """GGX's density D of normals along a vector, of any length, by one division."""
     area = alpha_u * alpha_v
-    x, y, z = alpha_v * m[0], alpha_u * m[1], area * m[2]
-    q = ggx.dot(m, m) * area / (x * x + y * y + z * z)
+    s = alpha_v * m[0], alpha_u * m[1], area * m[2]
+    q = ggx.dot(m, m) * area / ggx.dot(s, s)
     ops.names(area=area, q=q)
     return q * q * area * (1 / pi)
 

@@ -36,7 +36,7 @@ def plane(w: Direction) -> tuple[Value, Value]:
 
 
 def dot(a: Direction, b: Direction) -> Value:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return ops.fma(a[0], b[0], ops.fma(a[1], b[1], a[2] * b[2]))
 
 
 def normalize(w: Direction) -> Direction:
