@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -18,11 +18,11 @@ from velatura.model import Model
 EFFORT = ((12, 32), (24, 128))
 STEPS, HALVINGS = 8, 12  # by which a target that can be reached is looked for, and then approached
 FAR, LEAST = 4.0, 1e-4  # the logarithm by which quantities change at most; less energy or variance than that has none
-FURTHER = (0.01, 0.03, 0.1, 0.3)  # beyond what a closed form can reach, as shares of the way there
+FURTHER = (0.0, 0.1, 0.4)  # beyond what a closed form can reach, as shares of the way there
 PAIRED, OTHER, FREED, REMADE = 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
 SURE = (0.02, 0.002, 2e-4)  # energies of lobes that are almost always possible
 ROUNDING = 1e-9  # by which lobes stay below what there is
-SHOWN = 3  # ways out, the nearest ones
+TRIED, SHOWN = 5, 3  # ways out, the nearest ones
 TOO_MUCH = "energies sum to {total:.4g}, above 1"
 REASONS = {
     "energy": "no index up to {eta_max:g} reflects as much",
@@ -158,9 +158,13 @@ class Way:
 
 @dataclass(frozen=True)
 class Search:
-    """Targets that a model has a stack for, found by bisection: in closed form first, which is quicker."""
+    """Targets that a model has a stack for, found by bisection: in closed form first, which is quicker.
+
+    followed: partial stacks below the first lobes of targets that have these in common.
+    """
 
     model: Model
+    followed: dict[tuple[TargetLobe, ...], stacks.Partial] = field(default_factory=dict)
 
     @cached_property
     def quick(self) -> Model:
@@ -169,11 +173,28 @@ class Search:
 
     def possible(self, target: Target, model: Model) -> bool:
         """Whether a target has a stack."""
-        return stacks.search(target, model, EFFORT[:1]) is not None
+        if not model.recursion.closed_form:
+            from velatura.inverse import refined  # which drags, for reasons that stand here
+
+            return refined.search(target, model) is not None
+        if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
+            return False
+        paths, (spread, keep) = stacks.beginning(target, model), EFFORT[0]
+        for n, lobe in enumerate(target.lobes):
+            known = target.lobes[: n + 1]
+            if known in self.followed:
+                paths = self.followed[known]
+                continue
+            paths = stacks.pruned(stacks.extended(paths, lobe, target, spread, n == 0), lobe.interfaces, keep)
+            if n < len(target.lobes) - 1:
+                self.followed[known] = paths
+            if not len(paths.cost):
+                return False
+        return bool(len(paths.cost))
 
     def nearest(self, ways: Iterable[Way]) -> list[Direction]:
         """The first targets along ways that have a stack, of each description one; the nearest of them."""
-        ends = {way: end for way in ways if (end := self._end(way)) is not None}
+        ends = {way: self._approached(way, *ends, self.quick, HALVINGS) for way, ends in self._bracketed(ways)}
         found: dict[str, Direction] = {}
         for way in sorted(ends, key=lambda way: way.direction(ends[way]).change):
             direction = self._met(way, ends[way]) if len(found) < SHOWN else None
@@ -208,27 +229,28 @@ class Search:
             lobes = now.lobes
         return replace(direction, target=target.model_copy(update={"lobes": lobes}))
 
-    def _end(self, way: Way) -> float | None:
-        """Where a way first has a stack in closed form."""
-        ends = self._bracketed(way)
-        return None if ends is None else self._approached(way, *ends, self.quick, HALVINGS)
-
     def _met(self, way: Way, end: float) -> Direction | None:
         """The direction there, or just beyond where the model itself has none there."""
-        if self.quick is not self.model and not self.possible(way.along(end), self.model):
-            further = [end + share * max(end, 0.1) for share in FURTHER]
-            n = next((n for n, x in enumerate(further) if self.possible(way.along(x), self.model)), None)
-            if n is None:
-                return None
-            end = self._approached(way, [end, *further][n], further[n], self.model, HALVINGS // 3)
-        return way.direction(end)
+        if self.quick is self.model:
+            return way.direction(end)
+        further = [end + share * max(end, 0.1) for share in (FURTHER if way.far else (0.0,))]
+        return next((way.direction(x) for x in further if self.possible(way.along(x), self.model)), None)
 
-    def _bracketed(self, way: Way) -> tuple[float, float] | None:
-        """Two neighbouring points of a way, of which only the further one has a stack in closed form."""
-        if way.inclusive and self.possible(way.along(0.0), self.quick):
-            return 0.0, 0.0
-        steps = [way.far * (n / STEPS) ** 2 for n in range(STEPS + 1)] if way.far else []
-        return next((ends for ends in pairwise(steps) if self.possible(way.along(ends[1]), self.quick)), None)
+    def _bracketed(self, ways: Iterable[Way]) -> Iterator[tuple[Way, tuple[float, float]]]:
+        """Ways, the nearest first, and of each two points, of which only the further one has a stack in closed form;
+        as many as may be shown."""
+        steps = []
+        for way in ways:
+            steps += [(way, (0.0, 0.0))] if way.inclusive else []
+            points = [way.far * (n / STEPS) ** 2 for n in range(STEPS + 1)] if way.far else []
+            steps += [(way, ends) for ends in pairwise(points)]
+        found = set[Way]()
+        for way, ends in sorted(steps, key=lambda step: step[0].direction(step[1][1]).change):
+            if len(found) == TRIED:
+                break
+            if way not in found and self.possible(way.along(ends[1]), self.quick):
+                found.add(way)
+                yield way, ends
 
     def _approached(self, way: Way, start: float, end: float, model: Model, halvings: int) -> float:
         """The first point that has a stack, between one that has none and one that has."""

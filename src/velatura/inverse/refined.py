@@ -37,7 +37,8 @@ SMALL = 0.01  # variance that is added to that of a goal, for units in which it 
 
 def search(target: Target, model: Model) -> Solution | None:
     """The preferred stack of the model in closed form, moved to one whose lobes, read by the model, are the target."""
-    moves = (moved(found, target, model) for found in itertools.islice(_candidates(target, model.adder), TRIES))
+    candidates = itertools.islice(_candidates(target, model.adder), TRIES)
+    moves = (moved(found, target, model, giving=n == 0) for n, found in enumerate(candidates))
     return next((met for met in moves if isinstance(met, Solution)), None)
 
 
@@ -52,14 +53,17 @@ def _candidates(target: Target, model: Model) -> Iterator[Solution]:
             yield from stacks.solutions(start, model, paths, order[some].tolist())
 
 
-def moved(found: Solution, target: Target, model: Model) -> Solution | Bound:
-    """A stack near one that is found, with the lobes of a target; the bound that is in the way if there is none."""
+def moved(found: Solution, target: Target, model: Model, giving: bool = True) -> Solution | Bound:
+    """A stack near one that is found, with the lobes of a target; the bound that is in the way if there is none.
+
+    giving: whether kept coordinates may change at bounds, which takes longer.
+    """
     if any(pinned(lobe, first=n == 0) for n, lobe in enumerate(target.lobes)):
         return _requested(found, target, model)
     dragged = _dragged(found, target, model)
     if dragged is None or dragged.achromatic(target) is not target:
         return GREY
-    there = dragged.met(target)
+    there = dragged.met(target, giving)
     if isinstance(there, Bound):
         return there
     missed = there.missed(target) > MISSED

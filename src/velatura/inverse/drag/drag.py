@@ -191,9 +191,13 @@ class DraggedStack:
             return found, None
         return self._part_of_the_way(wish, self._problem(self._wanted(wish)), found)
 
-    def met(self, wish: Target) -> DraggedStack | Bound:
-        """The stack with the lobes of a target of the same form, or the bound that is in the way."""
-        found = self._met(self._problem(self._wanted(wish)))
+    def met(self, wish: Target, giving: bool = True) -> DraggedStack | Bound:
+        """The stack with the lobes of a target of the same form, or the bound that is in the way.
+
+        giving: whether kept coordinates may change at bounds.
+        """
+        problem = self._problem(self._wanted(wish))
+        found = self._met(problem) if giving else problem.solve()
         return self._at(found).renamed(wish) if isinstance(found, Solution) else found
 
     def missed(self, wish: Target) -> float:
@@ -223,7 +227,7 @@ class DraggedStack:
     def _met(self, problem: Problem, held: Sequence[int] = ()) -> Solution | Bound:
         """The stack that meets the goal; at a bound, kept coordinates change if they can."""
         found = problem.solve()
-        if isinstance(found, Solution):
+        if isinstance(found, Solution) or found.reason == "model":
             return found
         for coordinate in self._giving(found, held):
             other = problem.solve(Compromise(found, coordinate))

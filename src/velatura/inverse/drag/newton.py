@@ -16,6 +16,7 @@ SLOW_ROUNDS, PATIENCE = 16, 3  # for models that are slow: of Broyden's method, 
 # Of lobes with axes, whose readings wind: what those rounds may miss where differences of the model itself follow,
 # rounds with these, shares of a step that are tried, and what may be missing in the end
 NEAR, MEASURED, STEPS, WINDING = 0.05, 4, (1.0, 0.3), 1e-3
+NEARER, SLOW_PATIENCE = 0.8, 5  # share of what was missing that is nearer, and such rounds without any
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,7 @@ class Problem:
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, dict[int, int]()
         before, missing = None, self._missing(self.start.reading, part)
+        least, waited = np.inf, 0
         for n in range(ROUNDS if closed else SLOW_ROUNDS):
             # See what is missing, and how that changes
             known = n == 0 and bound is None
@@ -89,6 +91,12 @@ class Problem:
             if not np.all(np.isfinite(slopes)) or not np.all(np.isfinite(missing)):
                 break
             nearest.keep(x, missing)
+
+            # Give up where nothing gets nearer
+            off = float(np.max(np.abs(missing)))
+            least, waited = (off, 0) if off < NEARER * least else (least, waited + 1)
+            if not closed and waited > SLOW_PATIENCE:
+                break
 
             # Move, within bounds
             moved = np.linalg.lstsq(slopes, -missing, rcond=1e-12)[0]
