@@ -133,3 +133,10 @@ def test_lobes_of_random_stacks_are_not_refused() -> None:
     """A slice of the benchmark: single lobes and lobes below coats."""
     for target in benchmark("inverse").physical_targets(6, MODEL, seed=2):
         assert missed(target, invert_stack(target, MODEL).stack) < 1e-4
+
+
+def test_an_answer_does_not_depend_on_earlier_questions() -> None:
+    target, other = Target(FIGURES["19 b"]), Target(FIGURES["15 c"])
+    first = invert_stack(target, MODEL).stack
+    invert_stack(other, MODEL)
+    assert invert_stack(target, MODEL).stack == first
