@@ -336,6 +336,8 @@ def test_a_coat_keeps_the_appearance_or_says_why_not() -> None:
     bare = {"layers": [{"interface": {"conductor": "Au", "alpha": 0.2}}]}
     answer = appearance.coated({"material": bare, "eta": 1.5, "alpha": 0.02, "keep": True, "model": "bati2021"})
     (row,) = answer["lobes"]
+    assert answer["coat"]["energy"] == pytest.approx([0.04] * 3, rel=0.02)
+    assert answer["coat"]["alpha"] == pytest.approx([0.02, 0.02])
     assert row["energy_after"] == pytest.approx(row["energy_before"], abs=1e-6)
     sharp = {"layers": [{"interface": {"conductor": "Au", "alpha": 0.001}}]}
     near = appearance.coated({"material": sharp, "eta": 1.5, "alpha": 0.3, "keep": True, "model": "bati2021"})

@@ -302,6 +302,15 @@ def test_a_diffuse_base_keeps_its_energy_below_a_coat(model: Model) -> None:
     assert white.diffuse is not None and white.diffuse[0] == pytest.approx(1)
 
 
+def test_what_a_coat_misses_without_a_refusal_is_named() -> None:
+    """Nothing is whiter than white below a coat that returns light to it."""
+    stack = Stack([Interface(eta=1.4, alpha=0.2), Diffuse(albedo=0.98)])
+    found = coat(stack, 1.7, 0.1, keep_appearance=True, model="bati2021")
+    (loss,) = found.losses
+    assert loss.startswith("layer 1 (diffuse): cannot keep all of its appearance under the coat: energy changes by 0.0")
+    assert found.own()["alpha"] == pytest.approx([0.1, 0.1])
+
+
 def test_coats_that_cannot_be() -> None:
     with pytest.raises(NoSolution, match=r"layer 1 \(medium\): scatters light"):
         coat(

@@ -46,7 +46,7 @@ def coat(
     if output:
         save(coated.stack, output)
     if as_json:
-        answer = {"stack": coated.stack.to_dict(), "coat": _own(coated), "lobes": coated.change(), **_diffuse(coated)}
+        answer = {"stack": coated.stack.to_dict(), "coat": coated.own(), "lobes": coated.change(), **_diffuse(coated)}
         answer |= {"losses": list(coated.losses)} if keep_appearance else {}
         print(json.dumps({"model": coated.model.name, **answer}, allow_nan=False))
         return
@@ -93,11 +93,6 @@ def _say_how_kept(stack: Stack, coated: Coated) -> None:
     )
 
 
-def _own(coated: Coated) -> dict[str, list[float]]:
-    """The coat's own lobe, which is new."""
-    return {"energy": coated.after.energy[0][:, 0].tolist(), "alpha": coated.after.alpha[0][..., 0].tolist()}
-
-
 def _table(coated: Coated) -> Table:
     """A row for the coat, one per interface of the bare material, and one for a diffuse base."""
     from rich.table import Table
@@ -106,7 +101,7 @@ def _table(coated: Coated) -> Table:
     table = Table("lobe", title=title, title_justify="left")
     for column in ("energy", "with coat", "alpha", "with coat"):
         table.add_column(column, justify="right")
-    own = _own(coated)
+    own = coated.own()
     table.add_row("coat", "", _cell(own["energy"]), "", _cell(own["alpha"]))
     for n, row in enumerate(coated.change(), 1):
         table.add_row(str(n), *(_cell(row[key]) for key in row))

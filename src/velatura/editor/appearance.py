@@ -304,7 +304,7 @@ def _form(target: Target) -> list[tuple[int, str]]:
 
 
 def coated(body: Body) -> Answer:
-    """A material under a coat, with its appearance kept or not, and its lobes before and after."""
+    """A material under a coat, with its appearance kept or not; its own lobe, and the others before and after."""
     stack, eta, alpha = material_of(body), body.get("eta", 1.5), body.get("alpha", 0.0)
     if len(stack.layers) > LOBES:
         raise InvalidInput(f"material: layers: may be {LOBES} at most below a coat, got {len(stack.layers)}")
@@ -312,7 +312,8 @@ def coated(body: Body) -> Answer:
         found = coat(stack, eta, alpha, keep_appearance=body.get("keep", False), model=model_of(body))
     except NoSolution as error:
         return {"error": str(error)}
-    return {"material": document(found.stack), "lobes": found.change(), "losses": list(found.losses)}
+    own = {"coat": found.own(), "lobes": found.change()}
+    return {"material": document(found.stack), **own, "losses": list(found.losses)}
 
 
 def targets(body: Body) -> Answer:

@@ -34,6 +34,7 @@ from velatura.stack import (
 KEEP = 64  # partial stacks that are followed
 SMALL = 0.01  # energy or variance that is added to those of the goal, for units in which they are missed
 MISSED = 1e-5  # what may be missing
+KEPT, SEEN = ("energy", "alpha"), 1e-4  # of a lobe, and what is named if it is missed
 FOLLOWED, GRID, REFINED = 2, 16, 3  # those that the nearest lobe is sought for, steps on either side, and rounds
 LEAST, FARTHEST = 1e-3, 3.0  # by which its energy, as a logarithm, and its variance may differ
 
@@ -54,6 +55,10 @@ class Coated:
     model: Model
     diffuse: tuple[Array, Array] | None
     losses: tuple[str, ...] = ()
+
+    def own(self) -> dict[str, list[float]]:
+        """Energy (rgb) and roughness (two axes) of the coat's own lobe, which is new."""
+        return {"energy": self.after.energy[0][:, 0].tolist(), "alpha": self.after.alpha[0][..., 0].tolist()}
 
     def change(self) -> list[dict[str, list[float]]]:
         """For every interface of the bare material energy (rgb) and roughness (two axes), before and after."""
@@ -113,7 +118,25 @@ def coat(
         if keep_appearance:
             coated = with_albedo(coated, wanted, chosen)
         diffuse = wanted, scattered(coated, chosen)
-    return Coated(coated, before, after, chosen, diffuse, tuple(losses))
+    found = Coated(coated, before, after, chosen, diffuse, tuple(losses))
+    return replace(found, losses=(*losses, *_missed(stack, found))) if keep_appearance else found
+
+
+def _missed(stack: Stack, found: Coated) -> list[str]:
+    """What is not kept, of lobes for which no loss stands yet."""
+    named, missed, lobes = " ".join(found.losses), list[str](), iter(found.change())
+    for n, layer in enumerate(stack.layers):
+        where = f"layer {n} ({type(layer).__name__.lower()})"
+        by: dict[str, Array] = {}
+        if isinstance(layer, Interface):
+            row = next(lobes)
+            by = {key: np.subtract(np.sort(row[f"{key}_after"]), np.sort(row[f"{key}_before"])) for key in KEPT}
+        elif isinstance(layer, Diffuse) and found.diffuse:
+            by = {"energy": found.diffuse[1] - found.diffuse[0]}
+        changes = [f"{key} changes by {x:.2g}" for key, dx in by.items() if (x := np.abs(dx).max()) > SEEN]
+        if changes and where not in named:
+            missed.append(f"{where}: cannot keep all of its appearance under the coat: {' and '.join(changes)}")
+    return missed
 
 
 def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> Kept:
