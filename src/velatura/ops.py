@@ -114,13 +114,20 @@ class _DrJit(Unrolled):
         self.select = dr.select
         self._dr = dr
 
-    # Of `dr.maximum`, a processor makes four instructions to pass NaN on, and one of this
+    # Of `dr.maximum`, a processor makes four instructions to pass NaN on, and one of this; where both are the same, the
+    # first one keeps its gradient
 
     def maximum(self, a: Value, b: Value) -> Value:
-        return self._dr.select(a > b, a, b)
+        return self._chosen(a >= b, a, b)
 
     def minimum(self, a: Value, b: Value) -> Value:
-        return self._dr.select(a < b, a, b)
+        return self._chosen(a <= b, a, b)
+
+    def _chosen(self, where: Value, a: Value, b: Value) -> Value:
+        found = self._dr.select(where, a, b)
+        # A choice may take a colour of Mitsuba's for an array
+        kind = type(a) if self._is_colour(a) else type(b)
+        return found if type(found) is kind or not self._is_colour(found) else kind(found)
 
     def fma(self, a: Value, b: Value, c: Value) -> Value:
         return self._dr.fma(a, b, c)
