@@ -96,6 +96,19 @@ def places(stack: Stack) -> list[tuple[str, int]]:
     return found
 
 
+def recovered(
+    case: int, seed: int = 0, model: str = DEFAULT, noise: float = 0.03, samples: int = 4096, starts: int = 4
+) -> tuple[Stack, Fit, float]:
+    """A random stack, the fit to its walks with noise, and the error of the stack itself."""
+    rng = np.random.default_rng((seed, case))
+    true, directions = drawn(rng), Directions.about_lobes(False)
+    value = walked(true, directions, samples, rng)
+    table = ReflectanceTable(directions, value * (1 + noise * rng.standard_normal(value.shape)))
+    found = fit_target(table, guess(true, model, rng), starts, model)
+    own, wanted = (compressed(t.value * directions.wo[2]) for t in (table_of(true, directions, model), table))
+    return true, found, float(np.sqrt(np.mean((own - wanted) ** 2)))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=10)
@@ -108,22 +121,13 @@ def main() -> int:
 
     worse, refused, inside = 0, 0, list[tuple[str, bool]]()
     for case in range(options.first, options.first + options.cases):
-        rng = np.random.default_rng((options.seed, case))
-        true, directions = drawn(rng), Directions.about_lobes(False)
-        value = walked(true, directions, options.samples, rng)
-        value *= 1 + options.noise * rng.standard_normal(value.shape)
-        table, start = ReflectanceTable(directions, value), time.process_time()
-        wish = guess(true, options.model, rng)
+        start = time.process_time()
         try:
-            found = fit_target(table, wish, model=options.model)
-        except Infeasible as error:
-            print(f"case {case}: the guess has no stack, {error.why}", flush=True)
+            true, found, error = recovered(case, options.seed, options.model, options.noise, options.samples)
+        except Infeasible as error_of_guess:
+            print(f"case {case}: the guess has no stack, {error_of_guess.why}", flush=True)
             refused += 1
             continue
-        own, wanted = (
-            compressed(t.value * directions.wo[2]) for t in (table_of(true, directions, options.model), table)
-        )
-        error = float(np.sqrt(np.mean((own - wanted) ** 2)))
         rows = held(found, true)
         worse += found.error > AS_WELL * error
         inside += rows

@@ -31,7 +31,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     rows = [",".join(map(str, (*angle, *rgb))) for angle, rgb in zip(angles, value.T)]
     (tmp_path / "table.csv").write_text("\n".join(["theta_i,theta_o,phi,r,g,b", *rows]))
     (tmp_path / "target.yaml").write_text("lobes:\n  - {energy: 0.1, alpha: 0.1}\n")
-    (tmp_path / "bright.yaml").write_text("lobes:\n  - {energy: 0.6}\n")
     return tmp_path
 
 
@@ -106,7 +105,6 @@ def test_paint_without_an_interface_is_coated(run: Run, folder: Path) -> None:
         (["fit", "target.yaml", "target.yaml"], 2, "target.yaml: line 1: must be theta_i"),
         (["fit", "table.csv", "none.yaml"], 2, "none.yaml"),
         (["fit", "table.csv", "target.yaml", "-o", "found.txt"], 2, "found.txt: a material file ends in"),
-        (["fit", "table.csv", "bright.yaml", "-o", "found.yaml"], 3, "no stack: lobe 1"),
         (["simplify", "pair.yaml", "--interfaces", "3"], 2, "interfaces: must be at least 1, and fewer than the 3"),
         (["simplify", "pair.yaml", "--interfaces", "0"], 2, "--interfaces"),
         (["simplify", "pair.yaml"], 2, "--interfaces"),

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks import benchmark
 
 from velatura.errors import InvalidInput
-from velatura.inverse import Directions, Infeasible, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
+from velatura.inverse import Directions, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
 from velatura.inverse.fitting import _merged
 from velatura.model import Model, named
 from velatura.model.stack_lobes import stack_lobes
@@ -296,11 +297,9 @@ def _tensors(fields: dict[str, np.ndarray]) -> bytes:
     return head + body
 
 
-def test_no_such_table_and_no_such_stack(tmp_path: Path) -> None:
+def test_no_such_table(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"none\.csv: cannot be read: no such file"):
         load_table(tmp_path / "none.csv")
-    with pytest.raises(Infeasible):
-        fit_target(table_of(COATED, Directions.about_lobes(False), AVERAGED), [{"energy": 0.6}], model=AVERAGED)
 
 
 def test_media_that_become_one_keep_their_depths_and_mean_angle() -> None:
@@ -335,6 +334,23 @@ def test_intervals_hold_the_true_values_of_a_noisy_table() -> None:
         eta = next(one for one in found.estimates if one.name == "layer0_eta")
         assert eta.high - eta.low < 0.25
     assert len(held) >= 37 and np.mean(held) > 0.9
+
+
+def test_a_noisy_walk_gives_back_its_stack() -> None:
+    """A slice of the benchmark: a coated metal, for which the model in closed form alone leads elsewhere.
+
+    The fit is no worse than the true stack is by the model. Intervals are counted over many stacks there.
+    """
+    true, found, error = benchmark("fit").recovered(10, samples=512, starts=1)
+    assert len(true.layers) == 3
+    assert found.error <= error
+
+
+def test_a_guess_without_a_stack_begins_at_the_nearest_one() -> None:
+    """An interface reflects .36 at most; what is fitted is the table, whose lobe is not as bright as the guess."""
+    table = table_of(Stack([Interface(eta=1.8, alpha=0.1)]), Directions.about_lobes(False), AVERAGED)
+    (found,) = fit_target(table, [{"energy": 0.6, "alpha": 0.15}], model=AVERAGED).stack.interfaces
+    assert (found.eta, found.alpha) == pytest.approx((1.8, 0.1), rel=1e-3)
 
 
 def test_a_simpler_stack_that_fits_as_well_is_reported() -> None:

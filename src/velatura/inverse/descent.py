@@ -1,7 +1,8 @@
 """Descent: the values of a stack whose reflectance over angles comes closest to a table.
 
 All that is free changes at once, by least squares with the model's own derivatives: differences, of all values in one
-call of the model. Where a model has no closed form, the nearest one that has stands in for it, corrected at every end.
+call of the model. Where a model has no closed form, the nearest one that has stands in for it, corrected at every end;
+from the closest end the model itself descends.
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ from velatura.stack import (
     load,
 )
 
-STEP = 1e-5  # of a value, to see how the model changes
-MAPPED = 5  # readings by a model without a closed form, between descents of the one that stands in for it
+STEP, STRIDE = 1e-5, 1e-3  # of a value, to see how a model changes: in closed form, and solved anew for each value
+MAPPED = 3  # readings by a model without a closed form, between descents of the one that stands in for it
+LAST = 6  # rounds of its own descent, from the closest end
 ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: the relative change in a round
 CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
 DEPTH_MAX = 10.0  # of a medium
@@ -171,8 +173,11 @@ def descended(
     table: ReflectanceTable, starts: Sequence[MaterialLike], model: Model, eta_max: float, darkest: float = 0.0
 ) -> list[End]:
     """The ends of descents from all starts, the closest first."""
-    ends = (Descent(table, load(start), model.adder, eta_max, darkest).run() for start in starts)
-    return sorted((end.of(model) for end in ends), key=lambda end: end.cost)
+    ends = [Descent(table, load(start), model.adder, eta_max, darkest).run().of(model) for start in starts]
+    ends.sort(key=lambda end: end.cost)
+    if ends and not model.recursion.closed_form:
+        ends[0] = ends[0].descent.run()
+    return ends
 
 
 @dataclass(frozen=True)
@@ -203,17 +208,19 @@ class End:
         """The end for a model without a closed form, near that for the one which stands in for it.
 
         What the two differ by at one end is added to the residuals of the next descent: space mapping
-        (Bandler et al. 1994), of residuals in place of parameters.
+        (Bandler et al. 1994), of residuals in place of parameters. Where slopes differ, it ends beside the minimum.
         """
+        if model.recursion.closed_form:
+            return self
         end = self
-        for n in range(0 if model.recursion.closed_form else MAPPED):
-            stack, _ = end.descent.placed(end.x)
-            value, energy = read(Material.of(stack), self.descent.table.directions, model)
-            true = end.descent.missed(1, value[:, None], energy[:, None])[0]
-            start = replace(end.descent, start=stack, gap=0.0).start_end
-            mapped = replace(start.descent, gap=true - start.residuals)
-            end = mapped.run() if n + 1 < MAPPED else mapped.start_end
-        return end
+        for _ in range(MAPPED):
+            near, own = end.afresh(end.descent.model), end.afresh(model)
+            end = replace(near.descent, gap=own.residuals - near.residuals).run()
+        return end.afresh(model)
+
+    def afresh(self, model: Model) -> End:
+        """The beginning of a descent from here by a model itself."""
+        return replace(self.descent, start=self.descent.placed(self.x)[0], model=model, gap=0.0).start_end
 
     def apart(self, other: End) -> bool:
         """Whether it has another form than another end, or a value outside the intervals of that one."""
@@ -356,14 +363,16 @@ class Descent:
             xtol=TOLERANCE,
             ftol=TOLERANCE,
             gtol=None,
-            max_nfev=ROUNDS,
+            max_nfev=ROUNDS if self.model.recursion.closed_form else LAST,
         )
         # Keep the start where the descent has gained nothing
-        best = first if first.cost <= 2 * found.cost else End(self, found.x, found.fun)
+        best = first if first.cost <= found.cost else End(self, found.x, found.fun)
         return replace(best, x=self._smaller_first(best.x))
 
     def residuals(self, x: Array) -> Array:
         """As `missed`, at P points x (P, free), with the gap."""
+        if not self.model.recursion.closed_form:
+            return np.array([self._read(one) for one in x])
         material = self.material
         for n, free in enumerate(self.free):
             layer, shown = material.layers[free.layer], free.shown(x[:, n, None])
@@ -372,6 +381,11 @@ class Descent:
         variance = variance_kind(Material.of(self.start, as_described))
         seen = bsdf.body(_metals(material, lambda layer: extinction(layer.eta, layer.k)), self.model, variance)
         return self.missed(len(x), *radiance(seen, self.table.directions)) + self.gap
+
+    def _read(self, x: Array) -> Array:
+        """As `missed`, at one point (free,), of the material there."""
+        value, energy = read(Material.of(self.placed(x)[0]), self.table.directions, self.model)
+        return self.missed(1, value[:, None], energy[:, None])[0]
 
     def missed(self, count: int, value: Value, energy: Value) -> Array:
         """Errors of log(1 + f cos), (P, 3 N), of a number P of points (Low et al. 2012).
@@ -393,9 +407,15 @@ class Descent:
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (3 N, free)."""
-        steps = STEP * np.eye(len(x))
-        ahead, behind = np.split(self.residuals(np.concatenate([x + steps, x - steps])), 2)
-        return ((ahead - behind) / (2 * STEP)).T
+        if self.model.recursion.closed_form:
+            steps = STEP * np.eye(len(x))
+            ahead, behind = np.split(self.residuals(np.concatenate([x + steps, x - steps])), 2)
+            return ((ahead - behind) / (2 * STEP)).T
+        # To one side, within the bounds
+        high = np.array([free.bounds[1] for free in self.free])
+        stride = np.where(x + STRIDE > high, -STRIDE, STRIDE)
+        found = self.residuals(np.concatenate([x[None], x + np.diag(stride)]))
+        return ((found[1:] - found[0]) / stride[:, None]).T
 
     def values(self, x: Array) -> Array:
         """The values of points (P, free), a metal's k among them."""

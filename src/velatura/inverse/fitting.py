@@ -14,7 +14,8 @@ from velatura.errors import InvalidInput
 from velatura.inverse import angles
 from velatura.inverse.angles import Directions, ReflectanceTable
 from velatura.inverse.descent import Descent, Fit, descended, fit, written
-from velatura.inverse.stacks import alternatives, model_of
+from velatura.inverse.explain import Infeasible
+from velatura.inverse.stacks import Solution, alternatives, model_of
 from velatura.inverse.target import Target, read
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.variance import Isotropic
@@ -49,19 +50,36 @@ def fit_target(
 
     Args:
         target: rough lobes of the table at normal incidence; they give the number of interfaces, and the descents start
-            from stacks that have them.
+            from stacks that have them by the nearest model in closed form, or have those of the nearest target of the
+            same form where there is none.
         starts: how many of these.
 
     Raises:
-        InvalidInput, Infeasible: as `invert_stack`.
+        InvalidInput: as `invert_stack`.
+        Infeasible: no target of that form near this one has a stack.
     """
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)
-    found = [_with_media(solution.stack) for solution in alternatives(wanted, starts, chosen, seed)]
+    found = [_with_media(solution.stack) for solution in _first(wanted, starts, chosen.adder, seed)]
     if table.directions.brushed:
         turned = [_brushed(stack, angle) for stack in found for angle in BRUSHED]
         found = _closest(table, turned, chosen, wanted.eta_max, starts)
     return fit(table, found, chosen, wanted.eta_max, _with_one_less)
+
+
+def _first(target: Target, count: int, model: Model, seed: int) -> list[Solution]:
+    """Stacks that have the lobes of a target, which may be a rough guess: or those of the nearest one that has any."""
+    try:
+        return alternatives(target, count, model, seed)
+    except Infeasible as error:
+        alike = [way.target for way in error.directions if _form(way.target) == _form(target)]
+        if not alike:
+            raise
+        return alternatives(alike[0], count, model, seed)
+
+
+def _form(target: Target) -> list[tuple[int, str]]:
+    return [(lobe.interfaces, lobe.base) for lobe in target.lobes]
 
 
 def simplify(
@@ -140,8 +158,9 @@ def _merged(media: Sequence[Medium]) -> Medium:
 
 
 def _with_media(stack: Stack) -> Stack:
-    """The stack with a medium, clear if there was none, between all of its interfaces."""
-    return _of_some(stack, range(len(stack.interfaces)))
+    """The stack with a medium, clear if there was none, between all of its interfaces, and none above them."""
+    first = next(n for n, layer in enumerate(stack.layers) if layer.surface)
+    return _of_some(stack.with_layers(stack.layers[first:]), range(len(stack.interfaces)))
 
 
 def _brushed(stack: Stack, angle: float) -> Stack:
