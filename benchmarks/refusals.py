@@ -74,8 +74,7 @@ def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | No
             "blur": not first or lobe.interfaces == 2,
             "index": fixed["eta"] or fixed["k"],
             "fixed": fixed["alpha"],
-            "unmet energy": True,
-            "unmet blur": True,
+            "model": True,
         }
         if not possible[refusal.constraint]:
             return f"a reason that cannot be: {refusal.constraint}"

@@ -75,6 +75,19 @@ def test_samples_of_brushed_panes_are_light(layers: list[Interface]) -> None:
         assert abs(weight.mean() - 1) < 0.02 + 4 * weight.std() / np.sqrt(SAMPLES), cosine
 
 
+def test_no_light_is_gained_between_the_nodes_about_critical_angles() -> None:
+    """Nearly smooth glass under a lower index, whose colours are reflected totally from angles of their own on: within
+    2 % of all light, beside 4 standard errors (false alarms 1 in 1000). Interpolated weights gain 75 %."""
+    glass = Interface(eta=(1.4345, 1.5284, 1.6536), alpha=0.0023)
+    _, found = body(Stack([glass, Interface(eta=1.6606)], exterior=1.7504))
+    for i, cosine in enumerate((0.3164, 0.3306, 0.4389, 0.49, 0.5814, -0.09, -0.0977, -0.36, -0.5077)):
+        x, y, z = from_cosine(abs(cosine))
+        wi = x, y, np.sign(cosine) * z
+        value, density = found.eval_pdf(wi, found.sample(wi, *uniform(i))[0], POWER)
+        weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)
+        assert np.all(weight.mean(axis=-1) < 1.02 + 4 * weight.std(axis=-1) / np.sqrt(SAMPLES)), cosine
+
+
 @pytest.mark.parametrize("base", [Interface(eta=0.2, k=3.5, alpha=0.6), Interface(eta=1.2, alpha=0.6)])
 def test_densities_integrate_to_one_at_most(base: Interface) -> None:
     """Over uniform directions, within 4.5 standard errors; samples that leave below the horizon are lost."""

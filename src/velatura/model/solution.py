@@ -21,7 +21,7 @@ from velatura.model.remainder import Remainder
 from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved_grid import COS_MIN, Folded, Grid
 from velatura.model.straight_through import Passage
-from velatura.model.transport.adding import Made, interfaces, parts
+from velatura.model.transport.adding import Made, Part, interfaces, parts
 from velatura.model.transport.energies import INCIDENCES, SAMPLES, energies, media_of
 from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
@@ -37,6 +37,8 @@ Array = NDArray[np.floating]
 
 RGB = 3
 NORMALS = {True: 1597, False: 987}  # over which lobes are integrated, of isotropic materials and of others
+BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
+NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
 EVENLY = 377  # directions over which the remainder is integrated
 DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
 BRIGHTEST = 4.0  # by how much it is scaled at most
@@ -69,11 +71,13 @@ class Layout:
 @dataclass(frozen=True)
 class SolvedSide:
     """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; numbers of the remainder,
-    (C,), and the albedo that it gains by being clipped at 0, (C, cosines)."""
+    (C,), and the albedo that it gains by being clipped at 0, (C, cosines); the shape of each lobe whose integral
+    has an edge between directions, else None."""
 
     columns: Columns
     polynomial: Remainder
     clipped: Array
+    edged: Sequence[Shape | None]
 
     @property
     def rows(self) -> Array:
@@ -97,6 +101,20 @@ class SolvedSide:
     def places(self) -> list[int]:
         """The first rows of the remainder's scale, and of its energy."""
         return self._places([self.columns.scale, self.columns.rest])
+
+    @property
+    def weights(self) -> list[int]:
+        """The first rows of those of lobes."""
+        return self._places(self.columns.weights)
+
+    @property
+    def light(self) -> tuple[list[int], list[int]]:
+        """The first rows of energies, and those of all else that is in proportion to them."""
+        columns = self.columns
+        passes, through = columns.passes, [] if columns.passed is None else [columns.passed]
+        others = [passes.straight, passes.bounced, passes.rest] if passes else []
+        energies = self._places([*columns.energies, columns.rest, *through])
+        return energies, self._places([*columns.weights, columns.scale, *others])
 
     @property
     def chances(self) -> list[int]:
@@ -289,12 +307,26 @@ class Solver:
         )
         columns = folded.unfolded(columns)
         numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
-        return SolvedSide(columns, numbers, self._colours(clipped))
+        narrow = [_reflects_all(found) and np.min(tensor.roughness(phi)[:2]) < NARROW for tensor in shown]
+        edged = [shape if each else None for shape, each in zip(shapes, narrow)]
+        return SolvedSide(columns, numbers, self._colours(clipped), edged)
 
     def spread(self, side: SolvedSide) -> Array:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
-        energy there, too, and shares of samples sum up to 1."""
+        energy there, too, and lobes where integrals have edges; energies have the sum that is interpolated, and shares
+        of samples sum up to 1."""
         rows = self.grid.spread(side.rows, self.shape)
+        for shape, place, weight, roughness in zip(
+            side.edged, side.weights, side.columns.weights, side.columns.roughness
+        ):
+            if shape:
+                there = slice(place, place + self.colours)
+                rows[there] = self._between(shape, weight, roughness, rows[there])
+        energies, others = ([slice(k, k + self.colours) for k in places] for places in side.light)
+        whole = self.grid.spread(np.sum([side.rows[each] for each in energies], axis=0), self.shape)
+        share = ops.divide(whole, np.sum([rows[each] for each in energies], axis=0))
+        for each in (*energies, *others):
+            rows[each] *= np.where(share > 0, share, 1)
         left = self.grid.spread(side.columns.chance[None], self.shape)
         rows[side.chances] /= rows[side.chances].sum(axis=0) + left
         if self.model.form == "forward":
@@ -305,6 +337,19 @@ class Solver:
             scale, rest = (slice(k, k + self.colours) for k in side.places)
             rows[scale] = _scale(rows[rest], whole)
         return rows
+
+    def _between(self, shape: Shape, weight: Array, roughness: Sequence[Array], spread: Array) -> Array:
+        """Weights (C, prod(shape)) of a lobe with the light that is interpolated, instead of weights that are `spread`;
+        none is larger than at the nodes."""
+
+        def integral(numbers: Sequence[Array], wi: Direction) -> Array:
+            lobe = shape.lobe(1.0, self.kind(*numbers).roughness(ROOTS))
+            return own_medium.integrals(lobe, wi, BETWEEN[self.isotropic])[0]
+
+        light = self.grid.spread(weight * integral(roughness, self.grid.directions), self.shape)
+        there = [self.grid.spread(x[None], self.shape)[0] for x in roughness]
+        z = integral(there, directional_grid.directions(self.shape, None))
+        return np.where(z > FAINT, np.minimum(light / np.maximum(z, FAINT), weight.max(axis=-1, keepdims=True)), spread)
 
     def _colours(self, values: Array) -> Array:
         return np.broadcast_to(values, (self.colours, np.shape(values)[-1]))
@@ -383,6 +428,12 @@ def _cloudy(material: Material) -> set[int]:
 def sides(material: Material) -> list[Material]:
     """A material as it is seen from above and, where it transmits, from below."""
     return [material, material.reversed()] if material.transmits else [material]
+
+
+def _reflects_all(found: Sequence[Part]) -> bool:
+    """Whether an interface reflects all light from outside beyond an angle."""
+    glass = ((x.above, x.below) for x in interfaces(found) if x.k is None and x.below is not None)
+    return any(np.min(below / above) * np.mean(above) < 1 for above, below in glass)
 
 
 def geometry(model: Model) -> Model:
