@@ -74,7 +74,8 @@ def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | No
             "blur": not first or lobe.interfaces == 2,
             "index": fixed["eta"] or fixed["k"],
             "fixed": fixed["alpha"],
-            "model": True,
+            "unmet energy": True,
+            "unmet blur": True,
         }
         if not possible[refusal.constraint]:
             return f"a reason that cannot be: {refusal.constraint}"

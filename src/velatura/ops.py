@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -31,6 +32,11 @@ Value = Any  # a float, a NumPy array, a Dr.Jit array or a recorded symbol
 
 FIXED = 4  # wavelengths that stand for all light
 TINY = 1e-15  # whose square, in gradients of quotients, single precision still holds
+
+
+#: A position in two: the number of the node before it, at most a last one, and the rest
+Split = Callable[[Value, int], tuple[Value, Value]]
+Corners = Callable[[Sequence[int], Sequence[Value], Split], list[tuple[Value, Value]]]
 
 
 class Gridded(Protocol):
@@ -43,6 +49,39 @@ class Gridded(Protocol):
     def shape(self) -> tuple[int, ...]: ...
 
     def packets(self, dialect: Any) -> Any: ...
+
+
+def _box(shape: Sequence[int], coordinates: Sequence[Value], split: Split) -> list[tuple[Value, Value]]:
+    """The nodes around a point, by their places in a flat table, and their weights: of multilinear interpolation."""
+    corners: list[tuple[Value, Value]] = []
+    for x, nodes in zip(coordinates, shape):
+        cell, upper = split(clip(x, 0.0, 1.0) * (nodes - 1), nodes - 2)
+        ends = [(cell, 1 - upper), (cell + 1, upper)]
+        corners = [(i * nodes + k, w * v) for i, w in corners for k, v in ends] if corners else ends
+    return corners
+
+
+def _simplex(shape: Sequence[int], coordinates: Sequence[Value], split: Split) -> list[tuple[Value, Value]]:
+    """The nodes of the simplex that a point is in, as `_box`: each cell is cut into those that share its diagonal; from
+    its first node to its last they take the axes in the order of the point's coordinates within the cell."""
+    node: Value = 0
+    uppers: list[Value] = []
+    steps: list[Value] = []
+    for x, nodes in zip(coordinates, shape):
+        cell, upper = split(clip(x, 0.0, 1.0) * (nodes - 1), nodes - 2)
+        node, steps = node * nodes + cell, [step * nodes for step in steps]
+        step: Value = 0 * cell + 1
+        # Sorted, the greatest coordinate first
+        for k, (other, along) in enumerate(zip(uppers, steps)):
+            more = upper > other
+            uppers[k], upper = select(more, upper, other), select(more, other, upper)
+            steps[k], step = select(more, step, along), select(more, along, step)
+        uppers, steps = [*uppers, upper], [*steps, step]
+    corners = []
+    for step, (upper, following) in zip([0, *steps], pairwise([1, *uppers, 0])):
+        node = node + step
+        corners.append((node, upper - following))
+    return corners
 
 
 class Unrolled:
@@ -77,14 +116,14 @@ class _Numpy(Unrolled):
         return np.mean(x[:FIXED], axis=0) if np.ndim(x) else x
 
     @staticmethod
-    def interpolate(table: Any, coordinates: Sequence[Value]) -> list[Value]:
+    def interpolate(table: Any, coordinates: Sequence[Value], corners: Corners = _box) -> list[Value]:
         def split(position: Value, last: int) -> tuple[Value, Value]:
             cell = np.minimum(np.asarray(position).astype(int), last)
             return cell, position - cell.astype(np.result_type(position))
 
         channels = table.data.shape[-1]
         flat = table.data.reshape(-1, channels)
-        total = sum(np.asarray(w)[..., None] * flat[i] for i, w in _corners(table.data.shape, coordinates, split))
+        total = sum(np.asarray(w)[..., None] * flat[i] for i, w in corners(table.data.shape, coordinates, split))
         return [total[..., c] for c in range(channels)]
 
 
@@ -114,13 +153,20 @@ class _DrJit(Unrolled):
         self.select = dr.select
         self._dr = dr
 
-    # Of `dr.maximum`, a processor makes four instructions to pass NaN on, and one of this
+    # Of `dr.maximum`, a processor makes four instructions to pass NaN on, and one of this; where both are the same, the
+    # first one keeps its gradient
 
     def maximum(self, a: Value, b: Value) -> Value:
-        return self._dr.select(a > b, a, b)
+        return self._chosen(a >= b, a, b)
 
     def minimum(self, a: Value, b: Value) -> Value:
-        return self._dr.select(a < b, a, b)
+        return self._chosen(a <= b, a, b)
+
+    def _chosen(self, where: Value, a: Value, b: Value) -> Value:
+        found = self._dr.select(where, a, b)
+        # A choice may take a colour of Mitsuba's for an array
+        kind = type(a) if self._is_colour(a) else type(b)
+        return found if type(found) is kind or not self._is_colour(found) else kind(found)
 
     def fma(self, a: Value, b: Value, c: Value) -> Value:
         return self._dr.fma(a, b, c)
@@ -141,11 +187,12 @@ class _DrJit(Unrolled):
             return x
         return self._dr.mean(x[: len(x) // 2] if self._dr.size_v(x) < 0 else x)
 
-    def interpolate(self, table: Gridded, coordinates: Sequence[Value]) -> list[Value]:
+    def interpolate(self, table: Gridded, coordinates: Sequence[Value], corners: Corners = _box) -> list[Value]:
         colour = next((x for x in coordinates if self._is_colour(x)), None)
         if colour is not None:
             channels = [[x[c] if self._is_colour(x) else x for x in coordinates] for c in range(len(colour))]
-            return [type(colour)(list(values)) for values in zip(*(interpolate(table, *x) for x in channels))]
+            each = (_dialect(*x).interpolate(table, x, corners) for x in channels)
+            return [type(colour)(list(values)) for values in zip(*each)]
         dr, number = self._dr, next(type(x) for x in coordinates if not isinstance(x, float))
         dialect: Any = sys.modules[number.__module__]
 
@@ -153,29 +200,16 @@ class _DrJit(Unrolled):
             cell = dr.minimum(dialect.UInt32(position), last)
             return cell, position - number(cell)
 
-        corners, found = _corners(table.shape, [number(x) for x in coordinates], split), []
+        around, found = corners(table.shape, [number(x) for x in coordinates], split), []
         packets = table.packets(dialect)
         for begin, width in packets.parts:
             kind, shape = (number, None) if width == 1 else (dialect.ArrayXf, (width, 1))
             total: Value = 0.0
-            for node, weight in corners:
+            for node, weight in around:
                 index = node * (packets.stride // width) + begin // width
                 total = dr.fma(dr.gather(kind, packets.values, index, shape=shape), weight, total)
             found += [total] if width == 1 else list(total)
         return found[: packets.count]
-
-
-def _corners(
-    shape: Sequence[int], coordinates: Sequence[Value], split: Callable[[Value, int], tuple[Value, Value]]
-) -> list[tuple[Value, Value]]:
-    """The nodes around a point, by their places in a flat table, and their weights. `split` a position in two: the
-    number of the node before it, at most a last one, and the rest."""
-    corners: list[tuple[Value, Value]] = []
-    for x, nodes in zip(coordinates, shape):
-        cell, upper = split(clip(x, 0.0, 1.0) * (nodes - 1), nodes - 2)
-        ends = [(cell, 1 - upper), (cell + 1, upper)]
-        corners = [(i * nodes + k, w * v) for i, w in corners for k, v in ends] if corners else ends
-    return corners
 
 
 @cache
@@ -325,6 +359,12 @@ def channel(value: Value, k: int | None = None) -> Value:
 def interpolate(table: Gridded, *coordinates: Value) -> list[Value]:
     """Multilinear interpolation of a table at coordinates in [0, 1], one array per channel of the table."""
     return _dialect(*coordinates).interpolate(table, coordinates)
+
+
+def interpolate_in_simplices(table: Gridded, *coordinates: Value) -> list[Value]:
+    """Interpolation as `interpolate`, linear within each simplex of a cell: of n axes, it reads n + 1 nodes instead of
+    2**n. For tables with nodes so close together that products of coordinates within a cell do not count."""
+    return _dialect(*coordinates).interpolate(table, coordinates, _simplex)
 
 
 def each(function: Callable[..., Value], nodes: Sequence[float], *values: Value) -> list[Value]:

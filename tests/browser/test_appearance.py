@@ -215,6 +215,8 @@ def test_a_visit_from_blur_to_class_to_coat(visit: Open, served: Server) -> None
     assert page.state("layers.0.keys.eta") == pytest.approx(1.33)
     covered = lobes(page)
     assert len(covered.energy) == interfaces + 1
+    energy = f"{float(np.mean(covered.energy[0])):.3g}"
+    assert look.get_by_text("Its own lobe:").inner_text() == f"Its own lobe: energy {energy}, blur 0."
     assert covered.alpha[-1][0, 0] == pytest.approx(0.35, abs=1e-3)  # the roughness of solved lobes has small steps
     kept = page.picture()
 

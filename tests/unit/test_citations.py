@@ -60,7 +60,7 @@ PRINTED = {
         "Eq 8": ("k of a conductor", {"inverse/interface"}),
         "Eq 9": ("largest eta of a conductor", {"inverse/interface"}),
         "Eq 10": ("smallest eta of a conductor", {"inverse/interface"}),
-        "Eq 11": ("attenuated reflectance below one interface", {"inverse/interface"}),
+        "Eq 11": ("attenuated reflectance below one interface", {"inverse/interface", "figures/bati2021_09"}),
         "Eq 12": ("N1, first indices of a pair", {"inverse/equivalence"}),
         "Eq 13": ("optical depth between two interfaces", {"inverse/equivalence", "inverse/interface"}),
         "Eq 14": ("N2, second indices of a pair", {"inverse/equivalence"}),

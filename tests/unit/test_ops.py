@@ -35,6 +35,7 @@ FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "divide": ops.divide,
     "divide by 0": lambda x, y: ops.divide(0 * x, 0 * y),
     "interpolate": lambda x, y: ops.interpolate(GRID, x, y)[1],
+    "interpolate in simplices": lambda x, y: ops.interpolate_in_simplices(GRID, x, y)[1],
 }
 
 
@@ -126,19 +127,45 @@ def test_colour_meets_direction(llvm: Any, scalar: Any) -> None:
 # Interpolation
 
 
-@given(st.floats(-0.5, 1.5), st.floats(-0.5, 1.5))
-def test_interpolation_is_linear_between_nodes_and_constant_outside(x: float, y: float) -> None:
+@pytest.mark.parametrize("interpolate", [ops.interpolate, ops.interpolate_in_simplices])
+@given(x=st.floats(-0.5, 1.5), y=st.floats(-0.5, 1.5))
+def test_interpolation_is_linear_between_nodes_and_constant_outside(interpolate: Any, x: float, y: float) -> None:
     def plane(x: Any, y: Any) -> Any:
         return 3 * x - 2 * y + 1
 
     nodes = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 4), indexing="ij")
     table = Table(plane(*nodes)[..., None])
-    assert ops.interpolate(table, x, y)[0] == pytest.approx(plane(min(max(x, 0), 1), min(max(y, 0), 1)))
+    assert interpolate(table, x, y)[0] == pytest.approx(plane(min(max(x, 0), 1), min(max(y, 0), 1)))
 
 
-def test_interpolation_meets_the_nodes() -> None:
+@pytest.mark.parametrize("interpolate", [ops.interpolate, ops.interpolate_in_simplices])
+def test_interpolation_meets_the_nodes(interpolate: Any) -> None:
     for i, j in ((0, 0), (2, 1), (4, 3)):
-        np.testing.assert_allclose(ops.interpolate(GRID, i / 4, j / 3), GRID.data[i, j], rtol=1e-7)
+        np.testing.assert_allclose(interpolate(GRID, i / 4, j / 3), GRID.data[i, j], rtol=1e-7)
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3, 4])
+def test_interpolation_in_simplices_is_that_of_a_triangulation(axes: int, llvm: Any) -> None:
+    """In NumPy and Dr.Jit, with gradients: of a cell's simplices, by barycentric coordinates."""
+    import drjit as dr
+
+    rng = np.random.default_rng(axes)
+    table, points = Table(rng.random((2,) * axes + (3,)).astype(np.float32)), rng.random((axes, 40))
+    expected, slopes = [], []
+    for point in points.T:
+        order = np.argsort(-point)
+        nodes = np.vstack([np.zeros(axes, int), np.cumsum(np.eye(axes, dtype=int)[order], axis=0)])
+        values = np.array([table.data[tuple(node)][2] for node in nodes])
+        plane = np.linalg.solve(np.column_stack([nodes, np.ones(axes + 1)]), values)
+        expected.append(plane[:-1] @ point + plane[-1])
+        slopes.append(plane[:-1])
+    np.testing.assert_allclose(ops.interpolate_in_simplices(table, *points)[2], expected, rtol=1e-5)
+    at = [llvm.Float(x) for x in points]
+    dr.enable_grad(at)
+    found = ops.interpolate_in_simplices(table, *at)[2]
+    np.testing.assert_allclose(found.numpy(), expected, rtol=1e-5)
+    dr.backward(dr.sum(found))
+    np.testing.assert_allclose([x.grad.numpy() for x in at], np.transpose(slopes), atol=1e-5)
 
 
 @pytest.mark.parametrize("axes", [2, 3])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +17,6 @@ from velatura.model import Model
 EFFORT = ((12, 32), (24, 128))
 STEPS, HALVINGS = 8, 12  # by which a target that can be reached is looked for, and then approached
 FAR, LEAST = 4.0, 1e-4  # the logarithm by which quantities change at most; less energy or variance than that has none
-FURTHER = (0.0, 0.1, 0.4)  # beyond what a closed form can reach, as shares of the way there
 PAIRED, OTHER, FREED, REMADE = 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
 SURE = (0.02, 0.002, 2e-4)  # energies of lobes that are almost always possible
 ROUNDING = 1e-9  # by which lobes stay below what there is
@@ -34,10 +32,13 @@ REASONS = {
     "blur": "what lies above it blurs light more than that, or bounces it too often",
     "index": "a fixed index is outside its bounds, 1 to {eta_max:g} or k >= eta",
     "fixed": "a fixed roughness is not the one that gives that blur",
-    "model": "the model's own reading cannot be met",
+    "unmet energy": "no stack is found with that energy and all else as asked",
+    "unmet blur": "no stack is found with that blur and all else as asked",
 }
 #: What reflects too little: of a dielectric, of a conductor, of either where its index is fixed.
 TOO_LITTLE = ("energy", "bright", "absorption")
+#: What the nearest stack that is found misses most, where no bound is in the way.
+UNMET = ("unmet energy", "unmet blur")
 
 
 @dataclass(frozen=True)
@@ -69,11 +70,25 @@ class Infeasible(NoSolution):
 
 
 def infeasible(target: Target, model: Model) -> Infeasible:
-    """The error for a target without a stack, with the nearest targets that have one."""
-    if not model.recursion.closed_form:
-        from velatura.inverse import refined  # which drags, for reasons that stand here
+    """The error for a target without a stack, with the nearest targets that have one.
 
-        return refined.refused(target, model)
+    A model without a closed form is explained by the nearest one that has; its ways out are moved to where the model
+    itself has stacks.
+    """
+    if model.recursion.closed_form:
+        return _in_closed_form(target, model)
+    from velatura.inverse import refined  # which drags, for reasons that stand here
+
+    bound = refined.obstacle(target, model)
+    if bound is not None:
+        ways = refined.ways([Direction("lobes", "", 0.0, target)], target, model)
+        return Infeasible(bound.why(target), bound.lobe + 1, bound.reason, ways)
+    closed = _in_closed_form(target, model.adder)
+    return Infeasible(closed.why, closed.lobe, closed.constraint, refined.ways(closed.directions, target, model))
+
+
+def _in_closed_form(target: Target, model: Model) -> Infeasible:
+    """The same for a model in closed form."""
     search, found = Search(model), list[Direction]()
     total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
     if total > 1:
@@ -119,7 +134,7 @@ def why_not(target: Target, model: Model) -> tuple[int, str]:
             margins = np.array(np.broadcast_arrays(*(m for part in layers for m in part.margins.values())))
             best = margins[:, np.argmax(np.maximum(np.minimum(margins, 0), -1e9).sum(axis=0))]
             return n, _named(names[int(np.argmin(best))], lobe)
-    return len(target.lobes) - 1, "model"
+    return len(target.lobes) - 1, UNMET[0]
 
 
 def _named(constraint: str, lobe: TargetLobe) -> str:
@@ -153,12 +168,12 @@ class Way:
     def direction(self, x: float) -> Direction:
         """The target at x as a direction."""
         found = self.along(x)
-        return Direction(self.what, self.words(found), self.cost + _change(self.start, found), found)
+        return Direction(self.what, self.words(found), self.cost + distance(self.start, found), found)
 
 
 @dataclass(frozen=True)
 class Search:
-    """Targets that a model has a stack for, found by bisection: in closed form first, which is quicker.
+    """Targets that a model in closed form has a stack for, found by bisection.
 
     followed: partial stacks below the first lobes of targets that have these in common.
     """
@@ -166,20 +181,11 @@ class Search:
     model: Model
     followed: dict[tuple[TargetLobe, ...], stacks.Partial] = field(default_factory=dict)
 
-    @cached_property
-    def quick(self) -> Model:
-        """The model in closed form."""
-        return self.model if self.model.recursion.closed_form else self.model.in_closed_form
-
-    def possible(self, target: Target, model: Model) -> bool:
+    def possible(self, target: Target) -> bool:
         """Whether a target has a stack."""
-        if not model.recursion.closed_form:
-            from velatura.inverse import refined  # which drags, for reasons that stand here
-
-            return refined.search(target, model) is not None
         if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
             return False
-        paths, (spread, keep) = stacks.beginning(target, model), EFFORT[0]
+        paths, (spread, keep) = stacks.beginning(target, self.model), EFFORT[0]
         for n, lobe in enumerate(target.lobes):
             known = target.lobes[: n + 1]
             if known in self.followed:
@@ -194,13 +200,11 @@ class Search:
 
     def nearest(self, ways: Iterable[Way]) -> list[Direction]:
         """The first targets along ways that have a stack, of each description one; the nearest of them."""
-        ends = {way: self._approached(way, *ends, self.quick, HALVINGS) for way, ends in self._bracketed(ways)}
+        ends = {way: self._approached(way, *ends) for way, ends in self._bracketed(ways)}
         found: dict[str, Direction] = {}
-        for way in sorted(ends, key=lambda way: way.direction(ends[way]).change):
-            direction = self._met(way, ends[way]) if len(found) < SHOWN else None
-            if direction is not None:
-                found.setdefault(direction.words, direction)
-        return sorted(found.values(), key=lambda direction: direction.change)
+        for direction in sorted((way.direction(ends[way]) for way in ends), key=lambda direction: direction.change):
+            found.setdefault(direction.words, direction)
+        return list(found.values())[:SHOWN]
 
     def of_lobe(self, target: Target, n: int) -> list[Direction]:
         """The nearest ways out of a lobe that cannot be given below those above it, without the lobes below."""
@@ -213,14 +217,14 @@ class Search:
         """A direction of the first lobes together with those below, as a target has them; None if it has no stack."""
         rest = target.lobes[len(direction.target.lobes) :]
         whole = target.model_copy(update={"lobes": (*direction.target.lobes, *rest)})
-        return replace(direction, target=whole) if not rest or self.possible(whole, self.model) else None
+        return replace(direction, target=whole) if not rest or self.possible(whole) else None
 
     def completed(self, direction: Direction, target: Target, n: int) -> Direction | None:
         """A direction of the first n lobes together with those below, these changed, too, where they must be."""
         lobes = direction.target.lobes[:n]
         for k in range(n, len(target.lobes)):
             now = target.model_copy(update={"lobes": (*lobes, target.lobes[k])})
-            if not self.possible(now, self.model):
+            if not self.possible(now):
                 nearest = self.nearest([*_of_blur(now, k), *_as_dark_as_must_be(now, k)])
                 if not nearest:
                     return None
@@ -229,16 +233,9 @@ class Search:
             lobes = now.lobes
         return replace(direction, target=target.model_copy(update={"lobes": lobes}))
 
-    def _met(self, way: Way, end: float) -> Direction | None:
-        """The direction there, or just beyond where the model itself has none there."""
-        if self.quick is self.model:
-            return way.direction(end)
-        further = [end + share * max(end, 0.1) for share in (FURTHER if way.far else (0.0,))]
-        return next((way.direction(x) for x in further if self.possible(way.along(x), self.model)), None)
-
     def _bracketed(self, ways: Iterable[Way]) -> Iterator[tuple[Way, tuple[float, float]]]:
-        """Ways, the nearest first, and of each two points, of which only the further one has a stack in closed form;
-        as many as may be shown."""
+        """Ways, the nearest first, and of each two points, of which only the further one has a stack; as many as are
+        tried."""
         steps = []
         for way in ways:
             steps += [(way, (0.0, 0.0))] if way.inclusive else []
@@ -248,15 +245,15 @@ class Search:
         for way, ends in sorted(steps, key=lambda step: step[0].direction(step[1][1]).change):
             if len(found) == TRIED:
                 break
-            if way not in found and self.possible(way.along(ends[1]), self.quick):
+            if way not in found and self.possible(way.along(ends[1])):
                 found.add(way)
                 yield way, ends
 
-    def _approached(self, way: Way, start: float, end: float, model: Model, halvings: int) -> float:
+    def _approached(self, way: Way, start: float, end: float) -> float:
         """The first point that has a stack, between one that has none and one that has."""
-        for _ in range(halvings if start < end else 0):
+        for _ in range(HALVINGS if start < end else 0):
             middle = (start + end) / 2
-            start, end = (start, middle) if self.possible(way.along(middle), model) else (middle, end)
+            start, end = (start, middle) if self.possible(way.along(middle)) else (middle, end)
         return end
 
 
@@ -387,7 +384,7 @@ def _capped(target: Target) -> Iterator[Way]:
 
 def _to_sure(target: Target) -> Iterator[Way]:
     """Towards lobes that are almost always possible, dark and blurred more the deeper they lie; then nothing fixed."""
-    for kept in (target, _freed(target)):
+    for kept in (target, freed(target)):
         for dark in SURE:
             sure, s = kept, 0.0
             for n, lobe in enumerate(target.lobes):
@@ -407,7 +404,7 @@ def _to_sure(target: Target) -> Iterator[Way]:
             yield Way("lobes", target, along, _described, 1.0, OTHER)
 
 
-def _freed(target: Target) -> Target:
+def freed(target: Target) -> Target:
     for n in range(len(target.lobes)):
         target = target.with_lobe(n, fixed=Fixed())
     return target
@@ -429,7 +426,7 @@ def _with_energy(target: Target, n: int, colour: np.ndarray) -> Target:
     return target.with_lobe(n, energy=r if r == g == b else (r, g, b))
 
 
-def _change(one: Target, other: Target) -> float:
+def distance(one: Target, other: Target) -> float:
     """By which logarithms the energies and variances of two targets differ."""
     total = 0.0
     for a, b in zip(one.lobes, other.lobes):

@@ -9,25 +9,26 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.inverse import interface, requests, stacks
-from velatura.inverse.drag import Bound, DraggedStack, pinned, seen
-from velatura.inverse.explain import TOO_MUCH, Direction, Infeasible, digits, infeasible
+from velatura.inverse.drag import Bound, DraggedStack, pinned, plain, seen
+from velatura.inverse.explain import LEAST, Direction, digits, distance, freed
 from velatura.inverse.interface import ENERGY_MIN, Choice
 from velatura.inverse.partial_stack import Array
 from velatura.inverse.stacks import Solution
 from velatura.inverse.target import BLUR, Target
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
+from velatura.stack import Stack
 
 GREY = Bound(0, "colour", 1, 0.0)  # one index for all channels
 EFFORT = stacks.EFFORTS[:1]  # to find a stack near which the model is met
 STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
-INSIDE = (0.99, 0.9)  # shares of the way to a bound, of which the first that has a stack again is offered
+FURTHER = (0.1, 0.0)  # beyond what a closed form can reach, as shares of the way there
 SAID = 1e-3  # changes of quantities that are mentioned, as logarithms
 TRIES = 4  # stacks that are begun with, of all that are found
 SAME = 0.03  # logarithm by which models differ about the energy of an index
@@ -37,16 +38,16 @@ SMALL = 0.01  # variance that is added to that of a goal, for units in which it 
 
 def search(target: Target, model: Model) -> Solution | None:
     """The preferred stack of the model in closed form, moved to one whose lobes, read by the model, are the target."""
-    candidates = itertools.islice(_candidates(target, model.adder), TRIES)
+    candidates = itertools.islice(_candidates(target, model.adder, stacks.EFFORTS), TRIES)
     moves = (moved(found, target, model, giving=n == 0) for n, found in enumerate(candidates))
     return next((met for met in moves if isinstance(met, Solution)), None)
 
 
-def _candidates(target: Target, model: Model) -> Iterator[Solution]:
+def _candidates(target: Target, model: Model, efforts: Sequence[tuple[int, int]]) -> Iterator[Solution]:
     """Stacks with the lobes of a target, or of one from which it is approached: preferred ones, then ones from all
     over."""
     for n, start in enumerate(starts(target)):
-        paths = stacks.found(_as_fixed(start, model), model, EFFORT if n else stacks.EFFORTS)
+        paths = stacks.found(_as_fixed(start, model), model, EFFORT if n else efforts)
         if paths:
             order = np.argsort(paths.cost, kind="stable")
             some = np.unique(np.linspace(0, len(order) - 1, TRIES - 1, dtype=int))
@@ -70,26 +71,70 @@ def moved(found: Solution, target: Target, model: Model, giving: bool = True) ->
     return Solution(target, model, tuple(there.point.layers), there.now(target) if missed else None)
 
 
-def refused(target: Target, model: Model) -> Infeasible:
-    """The error for a target without a stack, with the nearest target on the way from what is found; where nothing is,
-    with those of the nearest model in closed form."""
-    total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
-    dragged = next(filter(None, (_dragged(found, target, model) for found in _candidates(target, model.adder))), None)
-    if dragged is None:
-        error = infeasible(target, model.adder)
-        nearest = sorted(error.directions, key=lambda way: way.change)[:TRIES]
-        ways = [way for way in nearest if search(way.target, model) is not None]
-        return Infeasible(error.why, error.lobe, error.constraint, ways)
-    possible = dragged.achromatic(target)
-    there, bound = dragged.towards(possible)
-    inside = (dragged.between(there.target, share) for share in INSIDE)
-    near = next((near for near in inside if search(near, model) is not None), None)
-    ways = [_way(target, near, model)] if near else []
-    if total > 1:
-        return Infeasible(TOO_MUCH.format(total=total), 0, "sum", ways)
-    if possible is not target or bound is None:
-        bound = GREY
-    return Infeasible(bound.why(target), bound.lobe + 1, bound.reason, ways)
+def obstacle(target: Target, model: Model) -> Bound | None:
+    """What keeps the model from lobes that the nearest one in closed form has a stack for; None if it has none."""
+    found = stacks.search(target, model.adder, EFFORT)
+    if found is None:
+        return None
+    there = moved(found, target, model)
+    return there if isinstance(there, Bound) else GREY
+
+
+def ways(offered: Sequence[Direction], target: Target, model: Model) -> list[Direction]:
+    """Ways out by the model in closed form that the model itself has a stack for; where it has none for any, the first
+    lobes that it reads of the stacks of these, and finds again. Of several lobes, which take longer, one way."""
+    met = list[Direction]()
+    for way in offered:
+        if _is_met(way.target, model):
+            met.append(way)
+        elif not met and (near := _near(target, way.target, model)) is not None:
+            met.append(_way(way, target, near, model))
+        if met and len(target.lobes) > 1:
+            break
+    return sorted(met, key=lambda way: way.change)
+
+
+def _is_met(target: Target, model: Model) -> bool:
+    """Whether the first stack that is found leads to one of the model."""
+    found = next(_candidates(target, model.adder, EFFORT), None)
+    return found is not None and isinstance(moved(found, target, model, giving=False), Solution)
+
+
+def _near(target: Target, way: Target, model: Model) -> Target | None:
+    """Lobes that the model reads of a stack with those of a way, or of a target just beyond, and finds again: where it
+    must, with the indices between interfaces of that stack, and nothing else fixed."""
+    asked = (_beyond(target, way, share) for share in FURTHER)
+    found = next(filter(None, (stacks.search(each, model.adder, EFFORT) for each in asked)), None)
+    if found is None:
+        return None
+    near = seen(found.stack, way, model)
+    kept = (near, _with_indices(near, found.stack), _with_indices(freed(near), found.stack))
+    return next((each for n, each in enumerate(kept) if each not in kept[:n] and _is_met(each, model)), None)
+
+
+def _with_indices(target: Target, stack: Stack) -> Target:
+    """A target whose pairs keep the indices between their interfaces that a stack has."""
+    first = 0
+    for k, lobe in enumerate(target.lobes):
+        if stacks.is_open(lobe):
+            eta = float(np.mean(plain(stack)[first].eta)), lobe.fixed.of("eta", 1)
+            target = target.with_lobe(k, fixed=lobe.fixed.model_copy(update={"eta": eta}))
+        first += lobe.interfaces
+    return target
+
+
+def _beyond(target: Target, way: Target, share: float) -> Target:
+    """A target beyond another one, as seen from a first one: by a share of how their energies and variances differ."""
+    found = way
+    for k, (asked, lobe) in enumerate(zip(target.lobes, way.lobes)):
+        one, two = (np.log(np.maximum(each.colour, LEAST)) for each in (asked, lobe))
+        if np.any(one != two):
+            step = two - one if np.ptp(two) else np.mean(two - one)
+            found = found.with_lobe(k, energy=tuple(np.exp(two + share * step).tolist()))
+        a, b = (max(float(BLUR.variance(each.roughness)), LEAST) for each in (asked, lobe))
+        if a != b:
+            found = found.with_variance(k, min(b * (b / a) ** share, float(BLUR.variance(1.0))))
+    return found
 
 
 def _dragged(found: Solution, target: Target, model: Model) -> DraggedStack | None:
@@ -100,19 +145,33 @@ def _dragged(found: Solution, target: Target, model: Model) -> DraggedStack | No
         return None
 
 
-def _way(target: Target, near: Target, model: Model) -> Direction:
-    """A nearest target, in words."""
-    words, changes = [], [0.0]
+def _way(way: Direction, target: Target, near: Target, model: Model) -> Direction:
+    """The way to a target near that of another way, in words."""
+    words: list[str] = []
     for k, (asked, lobe) in enumerate(zip(target.lobes, near.lobes), 1):
         energies = np.array([asked.colour, lobe.colour]) + ENERGY_MIN
         variances = np.array([MAPS[model.map].variance(np.array(each.axes[:2])) for each in (asked, lobe)]) + SMALL
         of_energy, of_variance = (float(np.abs(np.log(x[1] / x[0])).max()) for x in (energies, variances))
         blur = lobe.axes[:2] if lobe.brushed else lobe.roughness
-        words += [f"lobe {k} energy {digits(lobe.colour)}"] if of_energy > SAID else []
+        words += [f"lobe {k} interfaces {lobe.interfaces}"] if lobe.interfaces != asked.interfaces else []
+        words += [f"lobe {k} base {lobe.base}"] if lobe.base != asked.base else []
+        if lobe.fixed != asked.fixed:
+            pins = [f"{key} {_listed(entries)}" for key, entries in lobe.fixed if any(x is not None for x in entries)]
+            words.append(f"lobe {k} fixed {', '.join(pins)}" if pins else f"lobe {k} nothing fixed")
+        words += (
+            [f"lobe {k} energy {digits(lobe.colour if np.ptp(lobe.colour) else lobe.colour[0])}"]
+            if of_energy > SAID
+            else []
+        )
         turn = f" rotation {lobe.rotation:.4g}" if lobe.brushed else ""
         words += [f"lobe {k} alpha {digits(blur)}{turn}"] if of_variance > SAID else []
-        changes += [of_energy, of_variance]
-    return Direction("all lobes", ", ".join(words), max(changes), near)
+    moved = distance(target, near) - distance(target, way.target)
+    return Direction(way.what, ", ".join(words), way.change + moved, near)
+
+
+def _listed(entries: Sequence[float | tuple[float, ...] | None]) -> str:
+    """Fixed values of the interfaces of a lobe."""
+    return "[" + ", ".join("null" if entry is None else digits(entry) for entry in entries) + "]"
 
 
 def starts(wish: Target) -> Iterator[Target]:

@@ -20,7 +20,7 @@ Range = tuple[Sequence[Address], float, float]  # values that one texture gives,
 
 NODES_MAX = 9
 ALONE_MAX = 17  # of the only axis
-FINE = 4  # places of a table from one node to the next
+FINE = 3  # places of a table from one node to the next
 ROOTS = frozenset({"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k"})  # of which nodes are even in the root
 STEPS = {"rotation": 22.5}
 STEP = 0.1

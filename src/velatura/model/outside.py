@@ -52,7 +52,7 @@ def of_lobe(lobe: OwnMediumLobe, wi: Direction) -> Samples:
     """
     u1, u2 = _lattice(_azimuth(wi) - lobe.roughness.rotation)
     i = ggx.rotate(_columns(wi), lobe.roughness.rotation[:, None])
-    wider = np.sqrt(Index.of(lobe.n).ring2 + i[2] * i[2]) / np.maximum(i[2], COS_MIN)
+    wider = np.sqrt(np.maximum(Index.of(lobe.n).ring2 + i[2] * i[2], 0.0)) / np.maximum(i[2], COS_MIN)
     u, v = (np.clip(alpha[:, None] * wider, ALPHA_MIN, 1.0) for alpha in lobe.roughness[:2])
     h = ggx.sample_visible(i, u, v, u1, u2)
     density = ggx.masking(i, u, v) * ggx.ndf(h, u, v) / (4 * np.maximum(i[2], COS_MIN))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.ops import Value
+from velatura.sampling.packets import aligned
 
 Array = NDArray[np.floating]
 Around = Callable[[int, float], tuple[float, float]]
@@ -53,7 +54,7 @@ def differentiable(
     if number is None:
         return function([])
     if not given:
-        return [number(np.float32(flat)) for flat in function([])]
+        return [number(aligned(flat)) for flat in function([])]
     import drjit as dr
 
     def floats(values: Sequence[Any]) -> list[float]:
@@ -62,7 +63,7 @@ def differentiable(
     class Differences(dr.CustomOp):
         def eval(self, numbers: list[Any]) -> list[Any]:
             self.numbers = floats(numbers)
-            return [number(np.float32(flat)) for flat in function(self.numbers)]
+            return [number(aligned(flat)) for flat in function(self.numbers)]
 
         def slopes(self) -> Iterator[list[Array]]:
             """By variable, of all that the function returns."""

@@ -35,7 +35,8 @@ class Curves:
 
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
         """For a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
-        return ops.interpolate(self, *places(w, len(self.shape) - len(others)), *others)
+        interpolate = ops.interpolate_in_simplices if others else ops.interpolate
+        return interpolate(self, *places(w, len(self.shape) - len(others)), *others)
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ class Packed:
 
     def at(self, *coordinates: Value) -> list[Value]:
         """For coordinates from 0 to 1 on all axes, those of directions included."""
-        return self._placed(ops.interpolate(table, *coordinates) for table in self.tables)
+        return self._placed(ops.interpolate_in_simplices(table, *coordinates) for table in self.tables)
 
     def _placed(self, tables: Iterable[list[Value]]) -> list[Value]:
         read = [x for table in tables for x in table]

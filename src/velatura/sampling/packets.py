@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 WIDTH = 8  # values that are fetched at once, at most; a power of two
+ALIGNED = 16  # values between addresses that the widest instructions read from
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +39,18 @@ def packets(flat: Any, count: int, dialect: Any) -> Packets:
     if not isinstance(flat, np.ndarray):
         import drjit as dr
 
-        values = dr.gather(type(flat), flat, dialect.UInt32(places))
+        values = dr.gather(type(flat), flat, dialect.UInt32(aligned(places, np.uint32)))
         dr.eval(values)
         return Packets(values, stride, count)
-    # Dr.Jit reads arrays of NumPy where they lie; at addresses that are no multiples of a packet's size, value by value
-    held = np.empty(len(places) + WIDTH, np.float32)
-    begin = -(held.ctypes.data // held.itemsize) % WIDTH
-    held[begin : begin + len(places)] = flat[places]
-    return Packets(dialect.Float(held[begin : begin + len(places)]), stride, count)
+    return Packets(dialect.Float(aligned(flat[places])), stride, count)
+
+
+def aligned(flat: np.ndarray, dtype: Any = np.float32) -> np.ndarray:
+    """A copy, in single precision, at an address that any instruction reads from.
+
+    Dr.Jit reads arrays of NumPy where they lie; at other addresses value by value, and by another kernel.
+    """
+    held: np.ndarray = np.empty(len(flat) + ALIGNED, dtype)
+    begin = -(held.ctypes.data // held.itemsize) % ALIGNED
+    held[begin : begin + len(flat)] = flat
+    return held[begin : begin + len(flat)]

@@ -23,6 +23,7 @@ from velatura.inverse.drag.coordinates import (
     retinted,
 )
 from velatura.inverse.drag.newton import Compromise, Problem, Solution
+from velatura.inverse.explain import UNMET
 from velatura.inverse.interface import CONDUCTOR_MAX, ENERGY_MIN
 from velatura.inverse.partial_stack import Above, Array, Layers
 from velatura.inverse.target import Fixed, Target, TargetLobe, kind_of
@@ -227,7 +228,7 @@ class DraggedStack:
     def _met(self, problem: Problem, held: Sequence[int] = ()) -> Solution | Bound:
         """The stack that meets the goal; at a bound, kept coordinates change if they can."""
         found = problem.solve()
-        if isinstance(found, Solution) or found.reason == "model":
+        if isinstance(found, Solution) or found.reason in UNMET:
             return found
         for coordinate in self._giving(found, held):
             other = problem.solve(Compromise(found, coordinate))

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from velatura.inverse.drag.coordinates import SLACK, Bound, Point, Reading
+from velatura.inverse.explain import UNMET
 from velatura.inverse.partial_stack import Array
 
 ROUNDS = 8
@@ -42,16 +43,17 @@ class Solution:
 
 @dataclass
 class Nearest:
-    """The point (D,) of those tried that misses least, and what it misses at most."""
+    """The point (D,) of those tried that misses least, what it misses at most, and the number of that reading."""
 
     x: Array = field(default_factory=lambda: np.empty(0))
     missing: float = np.inf
+    worst: int = 0
 
     def keep(self, x: Array, missing: Array) -> None:
         """Keep a point if it is nearer."""
         most = float(np.max(np.abs(missing)))
         if most < self.missing:
-            self.x, self.missing = x, most
+            self.x, self.missing, self.worst = x, most, int(np.argmax(np.abs(missing)))
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class Problem:
                 missing, slopes = self._on_bound(compromise, missing, slopes, space.points(x, free), free)
             if not np.all(np.isfinite(slopes)) or not np.all(np.isfinite(missing)):
                 break
-            nearest.keep(x, missing)
+            nearest.keep(x, missing[: len(space.free)])
 
             # Give up where nothing gets nearer
             off = float(np.max(np.abs(missing)))
@@ -113,7 +115,7 @@ class Problem:
             blocked = {c: blocked.get(c, 0) + 1 for c in outside}
             if held := [c for c, times in blocked.items() if times > (1 if closed else PATIENCE)]:
                 return space.bound_at(min(held), full)
-        return space.broken(x, bound) or bound or self._in_the_way(x, missing)
+        return space.broken(x, bound) or bound or self._in_the_way(nearest)
 
     def _approach(self, nearest: Nearest) -> None:
         """Newton's method from the nearest point, with differences of the model itself."""
@@ -134,12 +136,18 @@ class Problem:
             if nearest.missing < ALMOST or nearest.missing == before:
                 break
 
-    def _in_the_way(self, x: Array, missing: Array) -> Bound:
+    def _in_the_way(self, nearest: Nearest) -> Bound:
         """The bound that stops a search that does not end: that of the coordinate whose reading misses most."""
-        space = self.start.space
-        worst = int(space.free[int(np.argmax(np.abs(missing[: len(space.free)])))])
-        on = [bound for bound in space.bounds if bound.coordinate == worst and abs(x[worst] - bound.at) <= SLACK]
-        return on[0] if on else replace(space.bounds[0], reason="model")
+        space, x = self.start.space, nearest.x
+        worst = int(space.free[nearest.worst])
+        on = [b for b in space.bounds if b.coordinate == worst and len(x) and abs(x[worst] - b.at) <= SLACK]
+        if on:
+            return on[0]
+        reading, energies = int(space.counted[nearest.worst]), 3 * space.lobes
+        if reading < energies:
+            return replace(space.bounds[0], lobe=reading // 3, reason=UNMET[0])
+        own = space.interfaces[(reading - energies) // space.entries]
+        return replace(space.bounds[0], lobe=own.lobe, reason=UNMET[1])
 
     @cached_property
     def way(self) -> Array:

@@ -43,6 +43,7 @@ export function mountAppearance(element, services) {
   let rough = null; // wish whose answer is approximate
   let chosen = 0;
   let coat = COAT;
+  let coatLobe = null; // of the last coat itself
   let coatSays = '';
   let frame = 0;
   let reading = 0; // questions about a material that are not answered yet
@@ -61,7 +62,7 @@ export function mountAppearance(element, services) {
   async function follow() {
     if (!element.getClientRects().length || now() === text) return paint();
     text = now();
-    [asked, coatSays] = [null, ''];
+    [asked, coatLobe, coatSays] = [null, null, ''];
     const key = text;
     reading++;
     try {
@@ -314,6 +315,13 @@ export function mountAppearance(element, services) {
         </label>
         <button type="button" @click=${putCoat}>Coat it</button>
       </div>
+      ${
+        coatLobe
+          ? html`<p class="says">
+              Its own lobe: energy ${shown(mean(coatLobe.energy))}, blur ${shown(mean(coatLobe.alpha))}.
+            </p>`
+          : nothing
+      }
       ${coatSays ? html`<p class="refused" role="alert">${coatSays}</p>` : nothing}
     </details>`;
   }
@@ -329,6 +337,7 @@ export function mountAppearance(element, services) {
       const answer = await call('coat', { ...question(), ...coat });
       if (before !== now()) return;
       if (answer.material) store.run(addCoat, answer.material);
+      coatLobe = answer.coat ?? null;
       const says = answer.error ? [answer.error] : answer.losses;
       coatSays = says.map((why) => `${capital(why)}.`).join(' ');
       paint();
