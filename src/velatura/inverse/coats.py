@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from velatura.inverse.descent import written
 from velatura.inverse.equivalence import dislike
 from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import DENSER, RARER, Choice, conductor_tint
-from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, join
+from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, Mask, join
+from velatura.inverse.roots import bisect
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import DEFAULT, Model, lobes, named, prepare, variance_kind
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
@@ -36,6 +38,7 @@ SMALL = 0.01  # energy or variance that is added to those of the goal, for units
 MISSED = 1e-5  # what may be missing
 KEPT, SEEN = ("energy", "alpha"), 1e-4  # of a lobe, and what is named if it is missed
 FOLLOWED, GRID, REFINED = 2, 16, 3  # those that the nearest lobe is sought for, steps on either side, and rounds
+HALVED = 10  # times, a step of the width
 LEAST, FARTHEST = 1e-3, 3.0  # by which its energy, as a logarithm, and its variance may differ
 
 Kept = tuple[tuple[Layer, ...], list[str]]  # layers below a coat, and what these cannot keep
@@ -255,20 +258,35 @@ def _nearest(paths: Partial, energy: Array, variance: Variance, choices: Sequenc
     own, s = np.maximum(energy, interface.ENERGY_MIN), float(np.mean(variance.matrix()[0])) + LEAST
     steps = np.geomspace(LEAST, FARTHEST, GRID)
     exponents, widths = np.r_[-steps[::-1], 0.0, steps], np.r_[0.0, steps]
-    best, near = np.inf, None
-    for _ in range(REFINED):
-        x, y, path = (each.ravel() for each in np.meshgrid(exponents, widths, np.arange(len(some.cost))))
+    count = len(some.cost)
+
+    def tried(x: Array, y: Array) -> tuple[Partial, Array]:
+        """Below all stacks, and by all choices: lobes of other energies and widths, and how far they are, (N,)."""
+        x, y, path = np.repeat(x, count), np.repeat(y, count), np.tile(np.arange(count), len(x))
         darker, brighter = own.max() * np.exp(np.minimum(x, 0)), own.min() * np.exp(np.maximum(x, 0))
         wished = np.where(x < 0, np.minimum(own, darker), np.maximum(own, brighter))
-        tried = _extended(some.take(path), wished, variance + type(variance).uniform(y), choices)
         change = np.sum(np.abs(np.log(wished / own)), axis=0) + np.log1p(y / s)
-        cost = np.where(tried.layers[-1].feasible, np.tile(change, len(choices)), np.inf)
-        n = int(np.argmin(cost))
-        if not cost[n] < best:
+        found = _extended(some.take(path), wished, variance + type(variance).uniform(y), choices)
+        return found, np.where(found.layers[-1].feasible, np.tile(change, len(choices)), np.inf)
+
+    def possible(x: Array, y: Array) -> Mask:
+        return np.asarray(np.isfinite(tried(x, y)[1]).reshape(len(choices), len(x), count).any(axis=(0, 2)))
+
+    best, near = np.inf, None
+    for _ in range(REFINED):
+        # Find the least width that is possible with each energy
+        x, y = (each.ravel() for each in np.meshgrid(exponents, widths, indexing="ij"))
+        ok = possible(x, y).reshape(len(exponents), len(widths))
+        first, x = np.argmax(ok, axis=1)[ok.any(axis=1)], exponents[ok.any(axis=1)]
+        if not len(x):
             break
-        best, near = cost[n], tried.take(np.array([n]))
-        # Look again between the neighbours of the best point
-        exponents, widths = (_about(axis, v[n % len(v)]) for axis, v in ((exponents, x), (widths, y)))
+        y = bisect(partial(possible, x), widths[first], widths[np.maximum(first - 1, 0)], HALVED)
+        found, cost = tried(x, y)
+        n = int(np.argmin(cost))
+        if cost[n] < best:
+            best, near = cost[n], found.take(np.array([n]))
+        # Look again between the neighbours of the best energy
+        exponents = _about(exponents, x[n // count % len(x)])
     return near
 
 
