@@ -7,11 +7,12 @@ stands beside: what the model itself misses.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from velatura import reference
 from velatura.figures import canvas
@@ -20,6 +21,9 @@ from velatura.inverse.figure_targets import FIGURES
 from velatura.model import named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
+from velatura.stack import Stack
+
+Array = NDArray[np.floating]
 
 TARGETS = ("15 a", "15 b", "15 c", "16", "17 blue over red", "17 red over blue")
 MODEL = "bati2021"
@@ -43,25 +47,32 @@ def compute(
     worst = np.zeros(2)
     for name in canvas.track(targets, progress):
         target = Target(FIGURES[name])
-        stack, first = invert_stack(target, model).stack, 0
-        read = stack_lobes(stack, 1.0, model=model)
-        many = named(model).reflectance == "fgd-multi"
-        true = reference.statistics(stack, 1.0, paths=paths, seed=seed, microsurface=many)
-        for n, lobe in enumerate(target.lobes, 1):
-            own = slice(first, first := first + lobe.interfaces)
-            row: dict[str, Any] = {"target": name, "lobe": n, "energy": {}, "alpha": {}}
-            row["energy"]["expected"], row["alpha"]["expected"] = list(lobe.colour), lobe.roughness
-            for who, found in (("obtained", read), ("walk", true)):
-                energies = np.array([energy[:, 0] for energy in found.energy[own]])
-                alphas = np.array([np.mean(alpha[:, 0]) for alpha in found.alpha[own]])
-                shows = energies.mean(axis=1) > VISIBLE
-                row["energy"][who] = energies.sum(axis=0).tolist()
-                row["alpha"][who] = float(np.average(alphas[shows], weights=energies.mean(axis=1)[shows]))
-            rows.append(row)
-            apart = np.abs(np.subtract(row["energy"]["obtained"], lobe.colour)).max()
-            variances = np.array([covariance[0, 0] for covariance in read.covariance[own]])
-            worst = np.maximum(worst, [apart, np.abs(variances - MAPS["belcour"].variance(lobe.roughness)).max()])
+        for row, apart in compared(target, invert_stack(target, model).stack, model, paths, seed):
+            rows.append({"target": name, **row})
+            worst = np.maximum(worst, apart)
     return {"rows": rows, "energy_error": float(worst[0]), "variance_error": float(worst[1])}
+
+
+def compared(
+    target: Target, stack: Stack, model: str, paths: int, seed: int = 0
+) -> Iterator[tuple[dict[str, Any], Array]]:
+    """Of every lobe of a target the row of `compute`, for a stack with it, and what energy and variance miss, (2,)."""
+    read, first = stack_lobes(stack, 1.0, model=model), 0
+    many = named(model).reflectance == "fgd-multi"
+    true = reference.statistics(stack, 1.0, paths=paths, seed=seed, microsurface=many)
+    for n, lobe in enumerate(target.lobes, 1):
+        own = slice(first, first := first + lobe.interfaces)
+        row: dict[str, Any] = {"lobe": n, "energy": {}, "alpha": {}}
+        row["energy"]["expected"], row["alpha"]["expected"] = list(lobe.colour), lobe.roughness
+        for who, found in (("obtained", read), ("walk", true)):
+            energies = np.array([energy[:, 0] for energy in found.energy[own]])
+            alphas = np.array([np.mean(alpha[:, 0]) for alpha in found.alpha[own]])
+            shows = energies.mean(axis=1) > VISIBLE
+            row["energy"][who] = energies.sum(axis=0).tolist()
+            row["alpha"][who] = float(np.average(alphas[shows], weights=energies.mean(axis=1)[shows]))
+        apart = np.abs(np.subtract(row["energy"]["obtained"], lobe.colour)).max()
+        variances = np.array([covariance[0, 0] for covariance in read.covariance[own]])
+        yield row, np.array([apart, np.abs(variances - MAPS["belcour"].variance(lobe.roughness)).max()])
 
 
 def draw(numbers: dict[str, Any], path: str | Path) -> None:
