@@ -28,6 +28,7 @@ DENSER, RARER = 1, -1
 SLACK = 1e-9  # by which a constraint may be broken: rounding of solutions
 NEGLIGIBLE = 1e-7  # the same for numerical solutions
 ENERGY_MIN = 1e-9  # of a lobe in a channel; less is taken for nothing
+FAINT = 1e-4  # energy of a lobe in a channel below which errors are seen against this
 CONDUCTOR_MIN = 3 - 2 * np.sqrt(2)  # a conductor (k >= eta) reflects more
 CONDUCTOR_MAX = 1 - 2.1e-3  # up to which indices of a metal lie within what a material may hold, with any tint
 ROUNDS, ENOUGH = 40, 1e-7  # of corrections where a model's own reading differs from the closed form
@@ -120,7 +121,8 @@ def solve(above: Above, energy: Array, variance: Variance, choice: Choice) -> Fo
         below, lobe = above.below(layers, reflectance)
         read = at_brightest(above, lobe.variance, bright)
         missing, apart = energy / np.maximum(lobe.energy, ops.TINY), variance + read * -1.0
-        off = np.maximum(np.max(np.abs(missing - 1), axis=0), _size(apart))
+        apart_e = np.abs(energy - lobe.energy) / np.maximum(lobe.energy, FAINT)
+        off = np.maximum(np.max(apart_e, axis=0), _size(apart))
         if not np.any(layers.feasible & (off > ENOUGH)):
             break
         before, want_e, want_s = (

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ROUNDS = 60
+ROUNDS, NARROW = 60, 1e-12  # of false position, and the width of a bracket that holds one number
 ZOOMS, PEAKS, BETWEEN = 6, 8, 4  # of a grid about its highest peaks, and points between these and their neighbours
 
 
@@ -17,6 +17,8 @@ def false_position(
     function: Callable[[Array], Array], low: Array, high: Array, f_low: Array, f_high: Array, tolerance: float = 1e-9
 ) -> Array:
     """Zeros of the functions, to `tolerance`, given their values at both ends of the brackets, all of one shape.
+
+    A bracket narrower than `NARROW` is its zero, regardless of how steep or discontinuous the function is there.
 
     False position, with the value at an end that stays halved (the Illinois rule), is quick where functions are almost
     straight. Without a change of sign the answer is the end whose value is nearer to 0.
@@ -31,7 +33,7 @@ def false_position(
         step = np.divide(f_b * (b - a), f_b - f_a, out=np.zeros_like(side), where=f_b != f_a)
         x = np.where(crosses, b - step, x)
         f = function(x)
-        if np.all(np.abs(np.where(crosses, f, 0.0)) < tolerance):
+        if np.all(~crosses | (np.abs(f) < tolerance) | (np.abs(b - a) < NARROW)):
             break
         left = (f < 0) == (f_a < 0)
         stays = np.where(left, 1.0, -1.0)
