@@ -218,10 +218,11 @@ class Binding:
         return any(image.varies for image in self.images.values())
 
     def update(self) -> None:
-        """Update the steering values, after any value has changed."""
+        """Update constants and steering values, after any value has changed."""
         import drjit as dr
 
         self.constants = {name: self._within_range(name, value) for name, value in self.parameters.items()}
+        dr.make_opaque(self.constants)  # a changed value needs no new kernel
         if self.mi.is_spectral:
             si = self._at_fixed_wavelengths(dr.zeros(self.mi.SurfaceInteraction3f))
             flat = [name for name, image in self.images.items() if image.colour and not image.varies]

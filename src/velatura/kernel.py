@@ -231,9 +231,15 @@ def _register_missing(mi: Any) -> None:
     for name, factory in _factories.items():
         if (name, mi.variant()) not in _registered:
             made: Any = factory(mi)
-            made.__del__ = lambda thing: exclusive.drop(thing)
+            made.__del__ = _released
             mi.register_bsdf(name, functools.partial(_built, made))
             _registered.add((name, mi.variant()))
+
+
+def _released(thing: Any) -> None:
+    """What is done with a plugin without references."""
+    if exclusive:  # None while Python ends
+        exclusive.drop(thing)
 
 
 def _built(made: type, properties: Any) -> Any:

@@ -455,3 +455,37 @@ def test_the_spectral_variant_loads_and_renders() -> None:
 def test_every_preset_renders(name: str) -> None:
     image = vt.render(name, scene="sphere", spp=1, size=(16, 16))
     assert np.isfinite(image).all() and image.min() >= 0
+
+
+ROUGH_PANE = vt.Stack([vt.Interface(eta=1.5, alpha=0.3), vt.Interface(eta=1.33, alpha=(0.1, 0.2))])
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"model": "velatura"},
+        {"model": "velatura", "form": "symmetric"},
+        {"model": "belcour2018"},
+        {"model": "weier2020"},
+        {"model": "reference"},
+    ],
+    ids=lambda given: " ".join(given.values()),
+)
+def test_a_material_that_many_directions_have_queried_can_be_rendered(given: dict[str, str]) -> None:
+    """Expected: a query of many directions, all of them active, leaves no array in the material. Dr.Jit refuses those
+    in a rendering, of any material that exists, in use or not."""
+    bsdf = vt.bsdf(ROUGH_PANE, **given)
+    si = dr.zeros(mi.SurfaceInteraction3f, 100)
+    si.wi = dr.repeat(mi.Vector3f(0.6, 0, 0.8), 100)
+    every = dr.full(mi.Bool, True, 100)
+    bs, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(0.3), mi.Point2f(0.2, 0.7), every)
+    dr.eval(weight, bsdf.eval_pdf(mi.BSDFContext(), si, bs.wo, every), bsdf.eval_diffuse_reflectance(si, every))
+    film = {"type": "hdrfilm", "width": 4, "height": 4}
+    scene = {"type": "scene", "light": {"type": "constant"}, "integrator": {"type": "path", "max_depth": 3}}
+    scene |= {
+        "sensor": {"type": "perspective", "film": film},
+        "sphere": {"type": "sphere", "bsdf": {"type": "diffuse"}},
+    }
+    assert np.isfinite(np.array(mi.render(mi.load_dict(scene), spp=1))).all()
+    scene["other"] = {"type": "sphere", "radius": 0.5, "bsdf": bsdf}
+    assert np.isfinite(np.array(mi.render(mi.load_dict(scene), spp=1))).all()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -121,12 +121,20 @@ def _spectrum(mi: Any, *channels: Any) -> Any:
     return mi.ArrayXf(list(channels) or [0.0] * (2 * len(mi.UnpolarizedSpectrum())))
 
 
+def _plain(value: Any) -> Any:
+    """All values in records, as lists: Dr.Jit passes named tuples over."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return [_plain(each) for each in vars(value).values()]
+    return [_plain(each) for each in value] if isinstance(value, tuple | list) else value
+
+
 def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before: Bodies | None) -> Bodies:
     """The material with the values that it has now, by what was made `before` of other ones where that holds them."""
     import drjit as dr
 
     def settled(value: Any) -> Any:
-        dr.make_opaque(value)
+        # Dr.Jit would widen a kept number that is not in memory to the directions of a query (drjit 1.5)
+        dr.make_opaque(_plain(value))
         return value
 
     # Scalar variants compute every direction anew
@@ -135,14 +143,12 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     context = Context(number=number, colour=mi.UnpolarizedSpectrum, settle=settled, progress=shown)
     if binding.uniform:
         body = model.recursion.body(binding.uniform_material(), model, variance, context)
-        dr.eval(body)
-        return Uniform(body)
+        return Uniform(settled(body))
     nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, solved_spectra.NODES).tolist()]
     places = np.array(spectral.places(nm))
     if not binding.varies and model.recursion.solves(binding.uniform_material()):
         solved = solved_spectra.solve(binding.at_wavelengths(nm), places, model, variance, context)
-        dr.eval(solved.sides)
-        return OverWavelengths(mi, binding, solved)
+        return OverWavelengths(mi, binding, settled(solved))
     if not binding.varies:
         model = model.recursion.unsolved(model)
     prepared = Prepared(binding, model, variance)
@@ -164,8 +170,5 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         si.wavelengths = wavelengths
         return prepared.lobed(si, True)
 
-    fixed = bsdf.body(binding.uniform_material(), model, variance, context)
-    dr.eval(fixed)
-    sampled = spectral.sample(mi, fixed, at_wavelengths)
-    dr.eval(sampled.above, sampled.below, sampled.means)
-    return Prepared(binding, model, variance, sampled)
+    fixed = settled(bsdf.body(binding.uniform_material(), model, variance, context))
+    return Prepared(binding, model, variance, settled(spectral.sample(mi, fixed, at_wavelengths)))

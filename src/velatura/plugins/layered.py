@@ -89,7 +89,6 @@ def make(mi: Any) -> type:
             """Compute the values that do not depend on direction, and the flags of the surface."""
             binding = self.binding
             binding.update()
-            dr.make_opaque(binding.constants)  # a changed value needs no new kernel
             seen = binding.looked_at()
             self.variance = variance_kind(binding.symbolic(seen))
             self.bodies = bodies.of(mi, binding, self.model, self.variance, before)
