@@ -675,6 +675,47 @@ def test_a_material_is_pinned_and_swapped(visit: Open) -> None:
     assert difference(page.picture()[:, :30], gold[:, :30]) < SAME
 
 
+def test_each_settled_material_is_a_picture_to_go_back_to(visit: Open) -> None:
+    """Expected: one for each state that was left alone, none twice; a click or a key goes back, and undo forth."""
+    page = visit()
+    strip = page.page.locator(".snapshot")
+    current = page.page.locator(".snapshot[aria-current=true]")
+
+    def kept(count: int, title: str) -> None:
+        page.settled()
+        page.page.wait_for_function("(count) => document.querySelectorAll('.snapshot').length === count", arg=count)
+        page.page.wait_for_function(
+            "(title) => document.querySelector('.snapshot[aria-current=true]')?.ariaLabel === title", arg=title
+        )
+
+    kept(1, "1 · Coated brushed gold")
+    open_preset(page, "Gold")
+    kept(2, "2 · Gold")
+    drag(slider(page, 0, "Roughness"), range(10, 100, 5))
+    kept(3, "3 · Gold")
+    changed = page.state("layers")
+    pictures = "[...document.querySelectorAll('.snapshot img')]"
+    assert (
+        page.page.evaluate(f"Promise.all({pictures}.map((img) => img.decode().then(() => img.naturalWidth)))")
+        == [144] * 3
+    )
+
+    strip.nth(1).click()
+    kept(3, "2 · Gold")
+    assert page.state("layers.0.keys.alpha") == 0.15
+    page.page.get_by_role("button", name="Undo: go back").click()
+    kept(3, "3 · Gold")
+    assert page.state("layers") == changed
+
+    current.focus()
+    page.page.keyboard.press("Home")
+    page.page.keyboard.press("Enter")
+    kept(3, "1 · Coated brushed gold")
+    page.page.reload()
+    page.ready()
+    kept(3, "1 · Coated brushed gold")
+
+
 def test_a_lost_graphics_device_is_reported_until_it_is_back(visit: Open) -> None:
     page = visit("CONTEXT_LOST_WEBGL", "does not belong", "context lost")
     before = page.picture()

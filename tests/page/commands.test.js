@@ -5,6 +5,7 @@ import { test } from 'node:test';
 
 import * as commands from '../../src/velatura/editor/page/state/commands.js';
 import { documentOf, layerName, pattern, variantOf } from '../../src/velatura/editor/page/state/material.js';
+import { lookOf } from '../../src/velatura/editor/page/state/snapshots.js';
 import { createStore } from '../../src/velatura/editor/page/state/store.js';
 
 const SESSION = { default_model: 'velatura' };
@@ -244,4 +245,17 @@ test('listeners follow every change until they stop', () => {
   stop();
   store.redo();
   assert.deepEqual(seen, ['Varnish', 'Lacquer']);
+});
+
+test('what is gone back to looks as it did, and keeps its layers that are off and its file', () => {
+  const begun = commands.saved(opened(), MATERIAL, 'gold.yaml', 1);
+  const off = commands.enableLayer(begun, begun.layers[0].id, false);
+  const other = commands.openMaterial(off, { layers: [{ interface: { conductor: 'Ag' } }] });
+  const { name, source, exterior, thin, layers, model, switches, document } = off;
+  const back = commands.goBack(other, { name, source, exterior, thin, layers, model, switches, document });
+  assert.equal(lookOf(back), lookOf(off));
+  assert.notEqual(lookOf(back), lookOf(begun));
+  assert.notEqual(lookOf(back), lookOf(other));
+  assert.deepEqual(back.layers, off.layers);
+  assert.equal(commands.placeOf(back).file, 'gold.yaml');
 });

@@ -10,6 +10,7 @@ import { createEdits } from './state/edits.js';
 import { enabled } from './state/material.js';
 import { createMessages } from './state/messages.js';
 import { follow } from './state/picture.js';
+import { createSnapshots } from './state/snapshots.js';
 import { createStore } from './state/store.js';
 import { followTruth } from './state/truth.js';
 import { mountAppearance } from './views/appearance.js';
@@ -18,6 +19,7 @@ import { mountInspector } from './views/inspector.js';
 import { createLayers } from './views/layers.js';
 import { createPage } from './views/page.js';
 import { createModel, createView } from './views/settings.js';
+import { createStrip } from './views/strip.js';
 import { createToolbar } from './views/toolbar.js';
 import { followTyping, isTyping } from './views/typing.js';
 
@@ -84,6 +86,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     onProblem: (error) =>
       error ? messages.complain('truth', `The truth: ${error.message}`) : messages.forgive('truth'),
   });
+  const snapshots = createSnapshots({ store, viewport, picture, storage, onChange: update });
   const isQuiet = () => picture.quiet && appearance.quiet && ahead.quiet;
 
   // The page follows both
@@ -105,6 +108,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   page = createPage({
     ...{ store, session, storage, edits, messages, canvas, focus, update, toolbar: toolbar.view },
     layers: createLayers({ store, session, edits, messages, choose, upload: files.upload, focus, update }),
+    strip: createStrip({ store, snapshots, focus }),
     view: createView({ store, session, edits, picture, choose, takeEnvironment: files.takeEnvironment }),
     model: createModel({ store, session }),
     onFace: () => appearance.follow(),
@@ -161,6 +165,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   const counting = window.setInterval(() => {
     showSamples(element, viewport, picture.stage);
     showDifference(element, viewport);
+    snapshots.look();
   }, COUNTED);
 
   return {

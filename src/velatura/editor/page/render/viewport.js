@@ -215,6 +215,18 @@ export class Viewport {
     return this.thumbnails.draw(shader, contents, { size, samples, exposure: this.settings.exposure, uniforms });
   }
 
+  /** The middle of the picture of slot "a", alone and as it is now, in a size: a data URL. */
+  snapshot(width, height) {
+    const copy = Object.assign(this.canvas.ownerDocument.createElement('canvas'), { width, height });
+    const { canvas } = this;
+    const scale = Math.max(width / canvas.width, height / canvas.height);
+    const [w, h] = [width / scale, height / scale];
+    this.screen.paint([this.slots.a], { ...this.settings, mode: 'single' });
+    copy.getContext('2d').drawImage(canvas, (canvas.width - w) / 2, (canvas.height - h) / 2, w, h, 0, 0, width, height);
+    this.paint(); // the canvas, in the same frame of the page
+    return copy.toDataURL('image/jpeg', 0.85);
+  }
+
   /** The uniforms of object, light and camera, for a picture of a size. */
   uniforms(size = this.canvas) {
     return this.stage.uniforms(this.camera, size, this.settings.rotation);

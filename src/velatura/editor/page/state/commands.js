@@ -70,6 +70,13 @@ export const setMaterial = titled('change the material', (state, material) => ({
   view: { ...state.view, lobe: null },
 }));
 
+/** Goes back to what a snapshot has kept. */
+export const goBack = titled('go back', (state, kept) => ({
+  ...state,
+  ...kept,
+  view: { ...state.view, lobe: null },
+}));
+
 export const rename = titled('rename', (state, name) => ({ ...state, name }));
 export const setExterior = titled('change the exterior', (state, exterior) => ({ ...state, exterior }));
 export const setThin = titled('change the thickness of the pane', (state, thin) => ({ ...state, thin }));

@@ -1,8 +1,10 @@
-// State that outlives a page: the history of this tab, the last material of any, the layout, and the files dropped on them.
+// State that outlives a page: the history of this tab, the last material of any, the layout, pictures of
+// earlier states, and the files dropped on them.
 
 const TAB = 'velatura.tab';
 const LAST = 'velatura.last';
 const LAYOUT = 'velatura.layout';
+const SNAPSHOTS = 'velatura.snapshots';
 const FORM = 1; // of what is stored; another one is not read
 
 /** Storage of the browser: a tab has its own history, and a new one begins with the last material of any. */
@@ -20,6 +22,8 @@ export function browserStorage({ sessionStorage, localStorage, indexedDB }) {
     },
     layout: () => read(localStorage, LAYOUT),
     keepLayout: (layout) => write(localStorage, LAYOUT, layout),
+    snapshots: () => read(sessionStorage, SNAPSHOTS) ?? [],
+    keepSnapshots: (list) => write(sessionStorage, SNAPSHOTS, list),
     put: (name, file) => inStore(indexedDB, 'readwrite', (store) => store.put(file, name)),
     get: (name) => inStore(indexedDB, 'readonly', (store) => store.get(name)),
   };
@@ -34,6 +38,8 @@ export function memoryStorage() {
     save() {},
     layout: () => null,
     keepLayout() {},
+    snapshots: () => [],
+    keepSnapshots() {},
     put: async (name, file) => void files.set(name, file),
     get: async (name) => files.get(name),
   };

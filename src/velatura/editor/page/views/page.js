@@ -9,7 +9,7 @@ import { splitter } from './splitter.js';
 /**
  * The whole page: `view()`, and `show(face)`, which turns the panel to the layers or to their appearance.
  *
- * @param {object} parts views `toolbar`, `layers`, `view` and `model` of what is in it, its `canvas`, and what it works on;
+ * @param {object} parts views `toolbar`, `layers`, `strip`, `view` and `model` of what is in it, its `canvas`, and what it works on;
  *   `onFace()` is called after the panel has turned
  */
 export function createPage({ store, session, storage, edits, messages, canvas, focus, update, onFace, ...parts }) {
@@ -36,6 +36,14 @@ export function createPage({ store, session, storage, edits, messages, canvas, f
         <span class="samples" aria-hidden="true"></span>
         ${bubbles(messages)}
       </div>
+      <details
+        class="history"
+        ?open=${layout.history}
+        @toggle=${({ target }) => target.open !== layout.history && arrange({ history: target.open })}
+      >
+        <summary>History</summary>
+        ${parts.strip()}
+      </details>
       ${
         layout.look
           ? splitter({
@@ -105,7 +113,7 @@ export function createPage({ store, session, storage, edits, messages, canvas, f
 }
 
 /** What is open, and the sizes in pixels that hands have given. */
-const LAYOUT = { look: false, view: false, model: false, lookHeight: null, panelWidth: null };
+const LAYOUT = { history: true, look: false, view: false, model: false, lookHeight: null, panelWidth: null };
 const [LOOK, PANEL] = [384, 352]; // where no hand has been
 const SMALLEST = 120;
 const NARROWEST = 280;
