@@ -286,6 +286,56 @@ def test_handles_move_by_pointer_and_by_keys(visit: Open) -> None:
     assert float(moved.energy[-1][0, 0]) == pytest.approx(float(start.energy[-1][0, 0]), rel=0.1)
 
 
+def test_a_brushed_lobe_is_dragged_by_its_axes_turned_and_made_round(visit: Open) -> None:
+    page = visit()
+    page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
+    open_material(page, "Coated brushed gold")
+    look = panel(page)
+    chosen(page, 2)
+    before, first = steps(page), lobes(page)
+    u, v = first.alpha[1][:, 0]
+
+    # One axis, by its grip
+    grip = look.locator(".grip").nth(1).locator("circle")
+    grip.scroll_into_view_if_needed()
+    box = grip.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + 24, y, steps=4)
+    page.page.mouse.up()
+    answered(page)
+    wider = lobes(page)
+    assert steps(page) == before + 1
+    assert wider.alpha[1][1, 0] > v + 0.05
+    assert wider.alpha[1][0, 0] == pytest.approx(u, abs=1e-3)
+    assert wider.energy[1] == pytest.approx(first.energy[1], abs=1e-3)
+
+    # How it is turned, by a number beyond half a turn
+    look.get_by_label("Rotation", exact=True).fill("200")
+    look.get_by_label("Rotation", exact=True).press("Enter")
+    answered(page)
+    turned = lobes(page)
+    assert np.degrees(turned.rotation[1][0]) % 180 == pytest.approx(20, abs=0.1)
+    assert turned.alpha[1] == pytest.approx(wider.alpha[1], abs=2e-3)
+    assert float(look.get_by_label("Rotation", exact=True).input_value()) == pytest.approx(200, abs=0.2)
+
+    # The same for both axes, and one for each again
+    look.get_by_role("button", name="Blur: the same for both axes").click()
+    answered(page)
+    again = lobes(page)
+    assert again.alpha[1][0, 0] == pytest.approx(again.alpha[1][1, 0], abs=1e-3)
+    assert look.locator(".grip").count() == 0
+    look.get_by_role("button", name="Blur: one for each axis").click()
+    look.get_by_label("Blur u", exact=True).fill("0.2")
+    look.get_by_label("Blur u", exact=True).press("Enter")
+    answered(page)
+    brushed = lobes(page)
+    assert brushed.alpha[1][0, 0] == pytest.approx(0.2, abs=1e-3)
+    assert brushed.alpha[1][1, 0] == pytest.approx(again.alpha[1][1, 0], abs=2e-3)
+    assert page.page.locator(".appearance .refused, .appearance .says").count() == 0
+
+
 def test_small_pictures_lead_to_members(visit: Open) -> None:
     page = visit()
     page.page.evaluate(

@@ -26,6 +26,7 @@ from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Diffuse, Interface, Stack, Varying
 
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
+UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is shown itself
 EFFORT = stacks.EFFORTS[:1]  # to find a stack that is not near
 HALVES = 7  # of the way to a wish that cannot be met
 SAVED = tuple(str(n) for n in range(15, 23))  # figures of Bati et al. 2021
@@ -70,7 +71,8 @@ def described(target: Target) -> Answer:
     """A target as a body holds it, all of its lobes' keys written out."""
     rows = []
     for lobe in target.lobes:
-        row = {"energy": list(lobe.colour), "alpha": lobe.roughness, "interfaces": lobe.interfaces, "base": lobe.base}
+        blur = {"alpha": list(lobe.axes[:2]) if lobe.brushed else lobe.roughness, "rotation": lobe.rotation}
+        row = {"energy": list(lobe.colour), **blur, "interfaces": lobe.interfaces, "base": lobe.base}
         rows.append({**row, "tint": lobe.tint, "fixed": lobe.fixed.to_dict()})
     return {**target.to_dict(), "lobes": rows}
 
@@ -83,7 +85,6 @@ def appearance(body: Body) -> Answer:
     stack, model = material_of(body), model_of(body)
     try:
         parts = plain(stack)
-        _check_round(stack)
     except InvalidInput as error:
         return _shown(stack, model, str(error))
 
@@ -93,7 +94,11 @@ def appearance(body: Body) -> Answer:
     counts: list[int] = body.get("interfaces") or _counts(each.variances)
     if sum(counts) != len(parts) or not set(counts) <= {1, 2}:
         raise InvalidInput(f"interfaces: must be 1 or 2 for each lobe, {len(parts)} in all, got {counts}")
-    target = seen(stack, _target(stack, parts, counts), model)
+    whole = DraggedStack.of(stack, _target(stack, parts, counts), model)
+    assert whole is not None
+    target, itself = whole.now(whole.target), whole.achromatic(whole.of_stack(stack))
+    if whole.missed(itself) > UNLIKE:
+        target = itself
     return {
         "target": described(target),
         "variances": [float(MAPS[model.map].variance(lobe.roughness)) for lobe in target.lobes],
@@ -101,13 +106,6 @@ def appearance(body: Body) -> Answer:
         "layers": _layers(stack, counts),
         "says": None,
     }
-
-
-def _check_round(stack: Stack) -> None:
-    """Raises `InvalidInput` where an interface is brushed."""
-    for n, layer in enumerate(stack.layers):
-        if isinstance(layer, Interface) and isinstance(layer.alpha, tuple):
-            raise InvalidInput(f"layer {n} (interface): is brushed; the panel shows round lobes")
 
 
 def haze(target: Target, model: Model) -> list[Answer]:
@@ -135,9 +133,10 @@ def _counts(variances: np.ndarray) -> list[int]:
 
 def _target(stack: Stack, parts: list[Any], counts: list[int]) -> Target:
     """A target of the form of a material, its energies and blurs not yet read."""
-    lobes, n, eta = [], 0, stack.exterior
+    lobes, n, eta, axis = [], 0, stack.exterior, 0.0
     for count in counts:
         own = parts[n : n + count]
+        axis = next((r.rotation for r in (part.roughness for part in reversed(own)) if r.alpha_u != r.alpha_v), axis)
         tau = np.broadcast_to(own[0].tau, (3, 1))[:, 0]
         pinned = bool(np.any(tau)) and (count == 2 or n == 0)
         fixed = {"tau": [tuple(tau.tolist()), *[None] * (count - 1)]} if pinned else {}
@@ -145,7 +144,8 @@ def _target(stack: Stack, parts: list[Any], counts: list[int]) -> Target:
         if own[-1].kind == "conductor":
             above = own[0].eta if count == 2 else eta
             tint = _tint(own[-1], above)
-        lobes.append({"energy": 0.0, "interfaces": count, "base": own[-1].kind, "tint": tint, "fixed": fixed})
+        form = {"interfaces": count, "base": own[-1].kind, "tint": tint, "fixed": fixed}
+        lobes.append({"energy": 0.0, "rotation": float(np.degrees(axis)), **form})
         n, eta = n + count, own[-1].eta
     most = max([4.0, *(float(np.max(part.eta)) for part in parts if part.kind == "dielectric")])
     return Target(lobes, name=stack.name, exterior=stack.exterior, eta_max=most)
@@ -268,7 +268,7 @@ def _further(wish: Target, found: DraggedStack) -> DraggedStack:
     for key in ("alpha", "energy"):
         part = found.now(wish)
         for k, lobe in enumerate(wish.lobes):
-            part = part.with_lobe(k, **({"alpha": lobe.roughness} if key == "alpha" else {"energy": lobe.colour}))
+            part = part.with_roughness(k, lobe.axes) if key == "alpha" else part.with_lobe(k, energy=lobe.colour)
         found, _ = found.towards(part)
     return found
 

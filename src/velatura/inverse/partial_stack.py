@@ -86,7 +86,7 @@ class Layers(Batch):
         """
         absorbs = np.where(np.asarray(self.tau) < CLEAR, 0.0, self.tau)
         tau, eta, kappa = (_plain(value, n) for value in (absorbs, self.eta, self.kappa))
-        u, v, rotation = (_plain(value, n) for value in with_axes_named(self.roughness, axis))
+        u, v, rotation = (_plain(value, n) for value in named_as(self.roughness, axis))
         media: list[Layer] = [] if np.max(tau) == 0 else [Medium(sigma_a=tau)]
         brushed = abs(u - v) > ROUND
         alpha = (u, v) if brushed else u if u == v else (u + v) / 2
@@ -186,6 +186,12 @@ def variance_of(roughness: Roughness, f: RoughnessMap, kind: type[Variance]) -> 
         xx, _, yy = Covariance.of(roughness, f).matrix()
         return PerAxis(xx, yy)
     return kind.of(roughness, f)
+
+
+def named_as(roughness: Roughness, axis: float) -> Roughness:
+    """The same roughness with the axis first, of both and their directions, that is nearest to a given one."""
+    u, v, rotation = with_axes_named(roughness, axis)
+    return Roughness(u, v, rotation + np.pi * np.round((axis - rotation) / np.pi))
 
 
 #: Records in which `take` and `join` look for arrays.

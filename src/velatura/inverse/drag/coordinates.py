@@ -27,10 +27,9 @@ from velatura.inverse.interface import (
     conductor_tint,
     least,
 )
-from velatura.inverse.partial_stack import NORMAL, Array, Layers, read_whole, variance_of, whole
+from velatura.inverse.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
 from velatura.inverse.target import Target
 from velatura.model import Model, lobes, prepare
-from velatura.model.lobe_statistics import with_axes_named
 from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
@@ -141,7 +140,7 @@ class Space:
     def _roughness(self, entries: Array, axis: float) -> Roughness:
         """The roughness of a variance, smooth where that is next to nothing, the axis first that is nearer to one."""
         f = MAPS[self.model.map]
-        u, v, rotation = with_axes_named(self.kind(*entries).roughness(f), axis)
+        u, v, rotation = named_as(self.kind(*entries).roughness(f), axis)
         smooth = f.roughness(SMOOTH)
         return Roughness(np.where(u < smooth, 0.0, u), np.where(v < smooth, 0.0, v), rotation + 0.0 * u)
 
@@ -151,15 +150,15 @@ class Space:
             return np.stack([self._solved(point[:, None]) for point in x.T], axis=-1)
         material = whole(self.layers(x), self.exterior)
         reflected, _ = lobes(prepare(material, self.model, self.kind), NORMAL)
-        return self._sorted(x, [(lobe.energy, lobe.roughness) for lobe in reflected])
+        return self.sorted(x, [(lobe.energy, lobe.roughness) for lobe in reflected])
 
     def _solved(self, x: Array) -> Array:
         """The same of one point (D, 1), by a model that reads one material at a time, (3 K + V I,)."""
         found = read_whole(self.layers(x), self.exterior, self.model)
         roughnesses = [Roughness(alpha[0], alpha[1], rotation) for alpha, rotation in zip(found.alpha, found.rotation)]
-        return self._sorted(x, list(zip(found.energy, roughnesses)))[:, 0]
+        return self.sorted(x, list(zip(found.energy, roughnesses)))[:, 0]
 
-    def _sorted(self, x: Array, reflected: Sequence[tuple[Value, Roughness]]) -> Array:
+    def sorted(self, x: Array, reflected: Sequence[tuple[Value, Roughness]]) -> Array:
         """Energies and roughnesses of interfaces as they are read."""
         energy = np.zeros((3 * self.lobes, x.shape[1]))
         variance = np.empty((len(self.interfaces), self.entries, x.shape[1]))
@@ -398,7 +397,7 @@ class Reader:
         tint = conductor_tint(ratio, kappa)
         tint = retinted(tint, float(np.mean(tint)), self.target.lobes[k].tint)
         low, why = (ENERGY_MIN, "upper") if values["absorbs"] else (float(CONDUCTOR_MIN), "metal")
-        reflectances = np.maximum(reflectance[:, 0], CONDUCTOR_MIN).tolist()
+        reflectances = np.maximum(reflectance[:, 0], low).tolist()
         span = self._colour(k, reflectances, why, low, float(CONDUCTOR_MAX))
         depth = self._coordinate(k, 1.0, "absorption", 0.0, 1.0) if values["absorbs"] else None
         values["tint"] = np.broadcast_to(tint, (3, 1))

@@ -25,15 +25,18 @@ from velatura.inverse.drag.coordinates import (
 from velatura.inverse.drag.newton import Compromise, Problem, Solution
 from velatura.inverse.explain import UNMET
 from velatura.inverse.interface import CONDUCTOR_MAX, ENERGY_MIN
-from velatura.inverse.partial_stack import Above, Array, Layers
+from velatura.inverse.partial_stack import Above, Array, Layers, named_as
 from velatura.inverse.target import Fixed, Target, TargetLobe, kind_of
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
+from velatura.model.stack_lobes import stack_lobes
+from velatura.model.variance import Roughness
 from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
 FAR = 0.1  # share of a wish that is a long way
+SCALED = (0.1, 10.0)  # how far lobes that are known may be from what a model in closed form reads
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,8 @@ class DraggedStack:
     def known(self, lobes: Target) -> DraggedStack:
         """The same stack, its lobes known: what the model reads is scaled to be those."""
         read, wanted = self.point.reading.value, self._wanted(lobes)
-        factors = np.where(read > ENERGY_MIN, wanted / np.maximum(read, ENERGY_MIN), 1.0)
+        factors = wanted / np.where(np.abs(read) > ENERGY_MIN, read, np.inf)
+        factors = np.where(factors > 0, np.clip(factors, *SCALED), 1.0)
         return dataclasses.replace(self, point=Point(dataclasses.replace(self.space, factors=factors), self.point.x))
 
     # What it is, and what the model reads ----------------------------------------------------------------------------
@@ -143,6 +147,13 @@ class DraggedStack:
         """The present lobes, in the form of a target."""
         return self._target_of(self.point.reading.value, wish)
 
+    def of_stack(self, stack: Stack) -> Target:
+        """The lobes of a stack of this form itself, also where bounds keep it from being a point."""
+        found = stack_lobes(stack, 1.0, model=self.model)
+        roughnesses = [Roughness(alpha[0], alpha[1], rotation) for alpha, rotation in zip(found.alpha, found.rotation)]
+        reading = self.space.sorted(self.point.x[:, None], list(zip(found.energy, roughnesses)))[:, 0]
+        return self._target_of(reading, self.target)
+
     def between(self, wish: Target, t: float) -> Target:
         """A target between the present lobes and the wished ones, in energies and variances."""
         now = self.point.reading.value
@@ -170,8 +181,9 @@ class DraggedStack:
         variances = reading[3 * count :].reshape(len(self.interfaces), -1)
         for k in range(count):
             s = np.mean([variances[n] for n, own in enumerate(self.interfaces) if own.lobe == k], axis=0)
+            roughness = named_as(kind(*s).roughness(MAPS[self.model.map]), form.lobes[k].axes.rotation)
             form = form.with_lobe(k, energy=tuple(reading[3 * k : 3 * k + 3].tolist()))
-            form = form.with_roughness(k, kind(*s).roughness(MAPS[self.model.map]))
+            form = form.with_roughness(k, roughness)
         return form
 
     def _wanted(self, wish: Target) -> Array:

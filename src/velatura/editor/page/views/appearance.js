@@ -6,11 +6,11 @@ import { addCoat, setAppearance, setView } from '../state/commands.js';
 import { documentOf } from '../state/material.js';
 import './appearance.css';
 import { createClass } from './appearance/class.js';
-import { handles } from './appearance/handles.js';
-import { about, changed, hue, withMean } from './appearance/looks.js';
+import { described, handles } from './appearance/handles.js';
+import { about, axesOf, blurOf, changed, hue, withBlur, withMean } from './appearance/looks.js';
 import { asker, oneAtATime } from './appearance/questions.js';
 import { colourRow, hex } from './colour.js';
-import { capital, menu, number } from './controls.js';
+import { capital, dial, iconButton, menu, number } from './controls.js';
 import { mean, shown } from './plots/scale.js';
 import { line } from './settings.js';
 
@@ -42,6 +42,7 @@ export function mountAppearance(element, services) {
   let held = false;
   let rough = null; // wish whose answer is approximate
   let chosen = 0;
+  let unlocked = null; // the lobe whose axes are shown though they are alike
   let coat = COAT;
   let coatLobe = null; // of the last coat itself
   let coatSays = '';
@@ -167,7 +168,7 @@ export function mountAppearance(element, services) {
 
   function choose(index) {
     if (index === chosen) return;
-    chosen = index;
+    [chosen, unlocked] = [index, null];
     classes.follow();
     paint();
   }
@@ -205,11 +206,12 @@ export function mountAppearance(element, services) {
       chosen,
       fixed: Boolean(read.says),
       onChoose: choose,
-      onMove(index, { blur, energy }) {
-        const { energy: old } = underHand().lobes[index];
+      onMove(index, { blur, energy, axis }) {
+        const old = underHand().lobes[index];
+        const alpha = axis === undefined ? () => withBlur(old, blur) : () => old.alpha.with(axis, blur);
         wish(index, {
-          ...(blur !== undefined && { alpha: rounded(blur) }),
-          ...(energy !== undefined && { energy: withMean(old, energy).map(rounded) }),
+          ...(blur !== undefined && { alpha: roundedBlur(alpha()) }),
+          ...(energy !== undefined && { energy: withMean(old.energy, energy).map(rounded) }),
         });
       },
       onLetGo: letGo,
@@ -229,7 +231,7 @@ export function mountAppearance(element, services) {
       <span class="swatch" style="background:${hex(hue(lobe))}"></span>
       <b>${index + 1}</b>
       <span>energy ${shown(mean(lobe.energy))}</span>
-      <span>blur ${shown(lobe.alpha)}</span>
+      <span title=${described(lobe)}>blur ${Array.isArray(lobe.alpha) ? lobe.alpha.map(brief).join(', ') : shown(lobe.alpha)}</span>
       <span class="faint">${lobe.interfaces > 1 ? `${lobe.interfaces} × ` : ''}${lobe.base}</span>
     </button>
   </li>`;
@@ -264,7 +266,7 @@ export function mountAppearance(element, services) {
     return html`
       ${line('Colour', colourRow({ label: 'Energy', value: lobe.energy, spec: SHARE, edit: edit('energy') }))}
       ${line('Energy', number({ ...share('Energy', mean(lobe.energy)), edit: energy, span: null, decades: ENERGIES }))}
-      ${line('Blur', number({ ...share('Blur', lobe.alpha), edit: edit('alpha') }))}
+      ${blur(lobe, index, edit)}
       ${line(
         'Made by',
         html`<div class="made">
@@ -286,6 +288,34 @@ export function mountAppearance(element, services) {
           : nothing
       }
     `;
+  }
+
+  /** One blur while locked, else one for each axis, and how these are turned. */
+  function blur(lobe, index, edit) {
+    const locked = !Array.isArray(lobe.alpha) && unlocked !== index;
+    const lock = iconButton({
+      label: locked ? 'Blur: one for each axis' : 'Blur: the same for both axes',
+      icon: locked ? 'locked' : 'unlocked',
+      pressed: locked,
+      name: 'lock',
+      act() {
+        unlocked = locked ? index : null;
+        if (Array.isArray(lobe.alpha)) once(index, { alpha: rounded(blurOf(lobe)), rotation: 0 });
+        paint();
+      },
+    });
+    const row = (name, control) => html`<div class="parameter">
+      <span class="name">${name}</span><span class="extras">${lock}</span>
+      <div class="control">${control}</div>
+    </div>`;
+    if (locked) return row('Blur', number({ ...share('Blur', lobe.alpha), edit: edit('alpha') }));
+    const axes = axesOf(lobe);
+    const axis = (value, place) => html`<div class="axis">
+      <span class="tag">${'uv'[place]}</span>
+      ${number({ ...share(`Blur ${'uv'[place]}`, value), edit: edit('alpha', (next) => axes.with(place, next)) })}
+    </div>`;
+    const turn = { label: 'Rotation', value: Math.round(100 * lobe.rotation) / 100, edit: edit('rotation') };
+    return [row('Blur', axes.map(axis)), axes[0] === axes[1] ? nothing : line('Rotation', dial(turn))];
   }
 
   const theClass = () => html`<details class="part" open>
@@ -376,6 +406,7 @@ export function mountAppearance(element, services) {
 }
 
 const rounded = (value) => Number(value.toPrecision(4));
+const roundedBlur = (alpha) => (Array.isArray(alpha) ? alpha.map(rounded) : rounded(alpha));
 const brief = (value) => Number(value.toPrecision(2));
 
 /** A number from 0 to 1 as a control shows it. */
@@ -388,9 +419,9 @@ const share = (label, value) => ({
 /** What was asked of a lobe that it has not got. */
 function difference(wish, got) {
   const parts = [
-    ['blur', wish.alpha, got.alpha],
-    ['energy', mean(wish.energy), mean(got.energy)],
-  ].filter(([, a, b]) => shown(a) !== shown(b));
+    ['blur', described(wish), described(got)],
+    ['energy', shown(mean(wish.energy)), shown(mean(got.energy))],
+  ].filter(([, a, b]) => a !== b);
   if (!parts.length) return 'another colour';
-  return parts.map(([name, a, b]) => `${name} ${shown(a)}, got ${shown(b)}`).join('; ');
+  return parts.map(([name, a, b]) => `${name} ${a}, got ${b}`).join('; ');
 }

@@ -3,10 +3,12 @@
 import { nothing, svg, html } from 'lit-html';
 import { hex } from '../colour.js';
 import { mean, shown } from '../plots/scale.js';
-import { DARKEST, hue } from './looks.js';
+import { DARKEST, axesOf, blurOf, hue } from './looks.js';
 
 const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [330, 190, 50, 14, 12, 34];
 const RADIUS = 9;
+const FLAT = 0.6; // least height of the handle of a brushed lobe, in its width
+const GRIP = 4.5; // radius of the handles of its axes
 const ZERO = LEFT + RADIUS + 3; // where there is no blur
 const BLURS = [0, 0.01, 0.1, 0.2, 0.4, 0.7, 1];
 const ENERGIES = [0.001, 0.01, 0.1, 1];
@@ -29,7 +31,8 @@ const energyAt = (y) => within(DARKEST, 10 ** ((-DECADES * (y - TOP)) / (HEIGHT 
  * @param {number} plot.chosen
  * @param {boolean} plot.fixed nothing can be dragged
  * @param {function(number)} plot.onChoose
- * @param {function(number, {blur: ?number, energy: ?number})} plot.onMove
+ * @param {function(number, {blur: ?number, energy: ?number, axis: ?number})} plot.onMove `axis`: whose blur it is, where
+ *   not that of both
  * @param {function} plot.onLetGo
  */
 export function handles({ lobes, asked, hand, chosen, fixed, onChoose, onMove, onLetGo }) {
@@ -46,27 +49,73 @@ export function handles({ lobes, asked, hand, chosen, fixed, onChoose, onMove, o
     <text text-anchor="middle" x=${(LEFT + WIDTH - RIGHT) / 2} y=${HEIGHT - 4}>blur (alpha)</text>
     <text text-anchor="middle" transform="translate(9 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)">energy</text>
     ${asked ? lobes.map((lobe, index) => ghost(lobe, asked[index])) : nothing}
+    ${lobes.map((lobe, index) => (Array.isArray(lobe.alpha) ? brushed(lobe, index, { fixed, onChoose, onMove, onLetGo }) : nothing))}
     ${lobes.map((lobe, index) =>
       handle(lobe, index, { from: hand[index], chosen: index === chosen, fixed, onChoose, onMove, onLetGo }),
     )}
   </svg>`;
 }
 
+/** A lobe's blur in words: of both axes and their direction where they differ. */
+export function described(lobe) {
+  const [u, v] = axesOf(lobe).map(shown);
+  return u === v ? u : `${u}, ${v} at ${Math.round(lobe.rotation)}°`;
+}
+
+/** Where a pointer is on the plot. */
+function placeOf({ clientX, clientY, currentTarget }) {
+  const box = currentTarget.ownerSVGElement.getBoundingClientRect();
+  return [clientX - box.left, clientY - box.top].map((pixels) => (pixels * WIDTH) / box.width);
+}
+
+/** A handle: round, or wider across where its lobe is. */
+function body(lobe, colour) {
+  const [u, v] = axesOf(lobe);
+  if (u === v) return svg`<circle r=${RADIUS} fill=${colour} />`;
+  const most = Math.max(u, v);
+  const [across, along] = [u, v].map((alpha) => RADIUS * Math.max(FLAT, alpha / most) * Math.sqrt(1 / FLAT));
+  return svg`<ellipse rx=${across} ry=${along} transform="rotate(${-lobe.rotation})" fill=${colour} />`;
+}
+
+/** The blurs of a brushed lobe's axes, joined, each to be dragged along. */
+function brushed(lobe, index, { fixed, onChoose, onMove, onLetGo }) {
+  const y = up(mean(lobe.energy));
+  const grips = lobe.alpha.map((alpha, axis) => {
+    const drag = (event) => !fixed && event.buttons && onMove(index, { blur: blurAt(placeOf(event)[0]), axis });
+    const begin = (event) => {
+      event.currentTarget.setPointerCapture(event.pointerId);
+      onChoose(index);
+    };
+    return svg`<g
+      class="grip"
+      transform="translate(${across(alpha)} ${y})"
+      @pointerdown=${begin}
+      @pointermove=${drag}
+      @lostpointercapture=${onLetGo}
+    >
+      <circle r=${GRIP} />
+      <text text-anchor="middle" y="-7">${'uv'[axis]}</text>
+    </g>`;
+  });
+  const [u, v] = lobe.alpha.map(across);
+  return svg`<line class="brush" x1=${u} x2=${v} y1=${y} y2=${y} />${grips}`;
+}
+
 /** Where a lobe was asked to be, joined to where it is. */
 function ghost(lobe, wish) {
-  const [x, y, u, v] = [across(lobe.alpha), up(mean(lobe.energy)), across(wish.alpha), up(mean(wish.energy))];
+  const [x, y, u, v] = [across(blurOf(lobe)), up(mean(lobe.energy)), across(blurOf(wish)), up(mean(wish.energy))];
   if (Math.hypot(x - u, y - v) < 2) return nothing;
   return svg`<line class="ghost" x1=${x} y1=${y} x2=${u} y2=${v} />
     <circle class="ghost" cx=${u} cy=${v} r=${RADIUS} />`;
 }
 
 function handle(lobe, index, { from, chosen, fixed, onChoose, onMove, onLetGo }) {
-  const [blur, energy] = [lobe.alpha, mean(lobe.energy)];
+  const [blur, energy] = [blurOf(lobe), mean(lobe.energy)];
   const colour = hue(lobe);
   const press = (event) => {
     const moves = {
-      ArrowLeft: { blur: within(0, from.alpha - STEP.blur, 1) },
-      ArrowRight: { blur: within(0, from.alpha + STEP.blur, 1) },
+      ArrowLeft: { blur: within(0, blurOf(from) - STEP.blur, 1) },
+      ArrowRight: { blur: within(0, blurOf(from) + STEP.blur, 1) },
       ArrowUp: { energy: within(DARKEST, mean(from.energy) * STEP.energy, 1) },
       ArrowDown: { energy: within(DARKEST, mean(from.energy) / STEP.energy, 1) },
     };
@@ -77,12 +126,8 @@ function handle(lobe, index, { from, chosen, fixed, onChoose, onMove, onLetGo })
   };
   const drag = (event) => {
     if (fixed || !event.buttons) return;
-    const box = event.currentTarget.ownerSVGElement.getBoundingClientRect();
-    const scale = WIDTH / box.width;
-    onMove(index, {
-      blur: blurAt((event.clientX - box.left) * scale),
-      energy: energyAt((event.clientY - box.top) * scale),
-    });
+    const [x, y] = placeOf(event);
+    onMove(index, { blur: blurAt(x), energy: energyAt(y) });
   };
   const begin = (event) => {
     event.currentTarget.setPointerCapture(event.pointerId);
@@ -98,14 +143,14 @@ function handle(lobe, index, { from, chosen, fixed, onChoose, onMove, onLetGo })
     aria-valuemin="0"
     aria-valuemax="1"
     aria-valuenow=${blur}
-    aria-valuetext="blur ${shown(blur)}, energy ${shown(energy)}"
+    aria-valuetext="blur ${described(lobe)}, energy ${shown(energy)}"
     @focus=${() => onChoose(index)}
     @pointerdown=${begin}
     @pointermove=${drag}
     @lostpointercapture=${onLetGo}
     @keydown=${press}
   >
-    <circle r=${RADIUS} fill=${hex(colour)} />
+    ${body(lobe, hex(colour))}
     <text text-anchor="middle" y="4" fill=${mean(colour) > 0.35 ? '#000' : '#fff'}>${index + 1}</text>
   </g>`;
 }

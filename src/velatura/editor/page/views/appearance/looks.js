@@ -18,6 +18,19 @@ export function withMean(energy, wanted) {
   return scaled.map((channel) => channel / most);
 }
 
+/** Roughness along both axes of a lobe. */
+export const axesOf = ({ alpha }) => (Array.isArray(alpha) ? alpha : [alpha, alpha]);
+
+/** One roughness for both axes of a lobe. */
+export const blurOf = (lobe) => Math.hypot(...axesOf(lobe)) * Math.SQRT1_2;
+
+/** A lobe's roughness where that of both axes together is another one, as far as none exceeds 1. */
+export function withBlur(lobe, wanted) {
+  if (!Array.isArray(lobe.alpha)) return wanted;
+  const scale = Math.min(wanted / blurOf(lobe), 1 / Math.max(...lobe.alpha));
+  return lobe.alpha.map((alpha) => alpha * scale);
+}
+
 /** The target with changes of one lobe; what was fixed of it holds no more where its interfaces are others. */
 export function changed(target, index, changes) {
   const other = 'interfaces' in changes || 'base' in changes;
