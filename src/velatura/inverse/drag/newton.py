@@ -13,6 +13,7 @@ from velatura.inverse.partial_stack import Array
 
 ROUNDS = 8
 ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
+SLOW_ALMOST = 1e-6  # the same by Broyden's method, whose rounds gain less
 SLOW_ROUNDS, PATIENCE = 16, 3  # for models that are slow: of Broyden's method, and of these at a bound
 # Of lobes with axes, whose readings wind: what those rounds may miss where differences of the model itself follow,
 # rounds with these, shares of a step that are tried, and what may be missing in the end
@@ -67,17 +68,19 @@ class Problem:
         """The stack that meets the goal; the violated bound if there is none."""
         nearest = Nearest()
         found = self._searched(compromise, nearest)
-        if isinstance(found, Bound) and compromise is None and self.start.space.winds:
-            self._approach(nearest)
-            if nearest.missing < WINDING and not self.start.space.broken(nearest.x, None):
-                return Solution(Point(self.start.space, nearest.x), 1.0)
+        space = self.start.space
+        if isinstance(found, Bound) and compromise is None and not space.model.recursion.closed_form:
+            if space.winds:
+                self._approach(nearest)
+            if nearest.missing < (WINDING if space.winds else ALMOST) and not space.broken(nearest.x, None):
+                return Solution(Point(space, nearest.x), 1.0)
         return found
 
     def _searched(self, compromise: Compromise | None, nearest: Nearest) -> Solution | Bound:
         """The same by Newton's method with the slopes of `Space.reading`; also keeps the nearest point."""
         space, bound = self.start.space, compromise.bound if compromise else None
         closed = space.model.recursion.closed_form
-        enough = ENOUGH if bound and closed else ALMOST
+        enough = ENOUGH if bound and closed else ALMOST if closed or space.winds else SLOW_ALMOST
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, dict[int, int]()
         before, missing = None, self._missing(self.start.reading, part)
