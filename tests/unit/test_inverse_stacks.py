@@ -521,6 +521,40 @@ def test_a_lobe_that_a_coat_blurs_loses_no_more_energy_than_a_mirror(model: str)
 # All of a class, and narrow ones -------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("model", ["bati2021", "velatura"])
+@pytest.mark.parametrize(
+    "lobe",
+    [
+        {"energy": 0.04},
+        {"energy": (0.5, 0.3, 0.4), "alpha": 0.1, "base": "conductor"},
+        {"energy": (0.08, 0.05, 0.05), "alpha": 0.1, "interfaces": 2, "fixed": {"eta": [1.3, None]}},
+    ],
+    ids=["dielectric", "conductor", "pair"],
+)
+def test_a_member_with_a_medium_above_the_stack_is_found_where_that_is_fixed(lobe: dict[str, Any], model: str) -> None:
+    """By itself `invert_stack` puts no medium there."""
+    alone = invert_stack([lobe], model)
+    assert isinstance(alone.stack.layers[0], Interface)
+    members, tau = alone.in_closed_form.classes[0], (0.05, 0.03, 0.04)
+    several = members.interfaces == 2
+    eta = alone.layers[0].eta[0] if several else None
+    if members.choice.kind == "dielectric" and not several:
+        drawn = members.member(1.6)
+        tau = tuple(np.ravel(drawn[0].tau).tolist())
+    else:
+        drawn = members.member(eta, tau_0=tau)
+    assert all(part.feasible.all() for part in drawn)
+    fixed = lobe.get("fixed", {}) | {"tau": [tau, *([None] if several else [])]}
+    found = invert_stack([lobe | {"fixed": fixed}], model)
+    above = found.stack.layers[0]
+    assert isinstance(above, Medium)
+    np.testing.assert_allclose(np.broadcast_to(above.sigma_a, 3), tau)
+    assert max(read(found.target, found.stack, named(model))) < 1e-5
+    if model == "bati2021":
+        for part, own in zip(found.layers, drawn):
+            np.testing.assert_allclose(part.eta, own.eta, rtol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "model", "count"),
     [

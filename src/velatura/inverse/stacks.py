@@ -167,7 +167,8 @@ def alternatives(
 ) -> list[Solution]:
     """Stacks that all have the lobes of a target: the one of `invert_stack`, then others drawn at random.
 
-    They are drawn over all free coordinates of all lobes: indices, optical depths and tints.
+    They are drawn over all free coordinates of all lobes: indices, optical depths and tints. So a medium may absorb
+    above the whole stack, where `invert_stack` has one only if it is fixed.
 
     Fewer than `count` where the target leaves nothing open.
 
