@@ -101,6 +101,9 @@ class Unrolled:
     def fma(self, a: Value, b: Value, c: Value) -> Value:
         return a * b + c
 
+    def root(self, x: Value, least: float | None) -> Value:
+        return sqrt(x if least is None else maximum(x, least))
+
 
 class _Numpy(Unrolled):
     exp, log, power, sin, cos = np.exp, np.log, np.power, np.sin, np.cos
@@ -157,10 +160,10 @@ class _DrJit(Unrolled):
     # first one keeps its gradient
 
     def maximum(self, a: Value, b: Value) -> Value:
-        return self._chosen(a >= b, a, b)
+        return self._chosen(b > a, b, a)
 
     def minimum(self, a: Value, b: Value) -> Value:
-        return self._chosen(a <= b, a, b)
+        return self._chosen(b < a, b, a)
 
     def _chosen(self, where: Value, a: Value, b: Value) -> Value:
         found = self._dr.select(where, a, b)
@@ -172,7 +175,10 @@ class _DrJit(Unrolled):
         return self._dr.fma(a, b, c)
 
     def sqrt(self, x: Value) -> Value:
-        return self._dr.safe_sqrt(x) if self._dr.grad_enabled(x) else self._dr.sqrt(self.maximum(x, 0.0))
+        return self._dr.safe_sqrt(x) if self._dr.grad_enabled(x) else self.root(x, 0.0)
+
+    def root(self, x: Value, least: float | None) -> Value:
+        return self._dr.sqrt(x if least is None else self.maximum(x, least))
 
     def _is_colour(self, x: Value) -> bool:
         return self._dr.is_array_v(x) and (self._dr.depth_v(x) > 1 or not self._dr.is_jit_v(x))
@@ -220,13 +226,21 @@ def _drjit() -> _DrJit:
 _FLOAT, _NUMPY = _Float(), _Numpy()
 
 
+@cache
+def _of_type(kind: type) -> Any:
+    if issubclass(kind, (np.ndarray, np.generic)):
+        return _NUMPY
+    return _FLOAT if issubclass(kind, (float, int)) else getattr(kind, "dialect", None) or _drjit()
+
+
 def _dialect(*args: Value) -> Any:
     found: Any = _FLOAT
     for x in args:
-        if isinstance(x, (np.ndarray, np.generic)):
-            found = _NUMPY
-        elif not isinstance(x, (float, int)):
-            return getattr(type(x), "dialect", None) or _drjit()
+        dialect = _of_type(x.__class__)
+        if dialect is _NUMPY:
+            found = dialect
+        elif dialect is not _FLOAT:
+            return dialect
     return found
 
 
@@ -286,9 +300,9 @@ class Named:
             names(**vars(self))
 
 
-def sqrt(x: Value) -> Value:
-    """Square root of max(x, 0)."""
-    return _dialect(x).sqrt(x)
+def sqrt(x: Value, least: float | None = 0.0) -> Value:
+    """Square root of max(x, least); None for an x that is known to be positive."""
+    return _dialect(x).sqrt(x) if least == 0.0 else _dialect(x).root(x, least)
 
 
 def exp(x: Value) -> Value:

@@ -1,12 +1,12 @@
 """A reflected lobe in its own medium: GGX above the interface that reflects it, refracted out.
 
 Snell's law leaves the tangential momentum p = n sin(theta) of light alone. So light from wi that leaves along wo meets
-interface k, in a medium of index n, from i = (p_i / n, c(p_i)) towards o = (p_o / n, c(p_o)), c(p) = sqrt(1 - p^2/n^2),
-and leaves with
+interface k, in a medium of index n, with the momentum i = (p_i, c(p_i)) and goes on with o = (p_o, c(p_o)), of length n
+both, c(p) = sqrt(n^2 - p^2), and leaves with
 
-    f |cos_o| = weight D(h) V(i) V(o) / 4 F(i.h) (1 - F_1(cos_o)) cos_o / n^2,    h halfway between i and o,
+    f |cos_o| = weight D(h) V(i) V(o) / 4 F(i.h / n) (1 - F_1(cos_o)) cos_o,    h halfway between i and o,
 
-where V(w) = G1(w) / w_z is finite at grazing directions, and 1 / (n^2 c(p_o)) cos_o is the solid angle inside over that
+where V(w) = G1(w) / w_z is finite at grazing directions, and cos_o / (n c(p_o)) is the solid angle inside over that
 outside. The shift of the peak, the cut of the cone, the stretch across the plane and the fall-off at grazing directions
 follow; turning the axes turns the lobe. Indices are relative to the medium outside, where that of the first lobe is 1.
 """
@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,14 +27,15 @@ from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.sampling import low_discrepancy
 
-COS_MIN = 1e-3  # inside; what refraction does not reach meets the interface at this one
+COS_MIN = 1e-3  # times the index inside; what refraction does not reach meets the interface at this one
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
 BLOCK = 1 << 16  # normals at a time, which a processor's cache holds
 
 Reflectance = Callable[[Value], Value]
 
 
-class Index(NamedTuple):
+@dataclass(frozen=True)
+class Index:
     """An index n relative to the medium outside, and what lobes take of it: its inverse, and the radius of the ring of
     momenta beyond those that can leave, from 1 to n, in squares and as it is."""
 
@@ -80,29 +80,30 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     p = _in_frame(lobe, wo)
     cos_o = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
     # Reflect in the medium
-    o, reached = (p[0], p[1], ops.maximum(cos_o, COS_MIN)), True
+    z2 = n.ring2 + wo[2] * wo[2]
+    o = p[0], p[1], ops.maximum(cos_o, COS_MIN) if n.is_outside else ops.sqrt(z2, COS_MIN * COS_MIN)
+    squares, area = (alpha_u * alpha_u, alpha_v * alpha_v), alpha_u * alpha_v
+    m = _squares((i[0] + o[0], i[1] + o[1], i[2] + o[2]))
+    shown, facing = _shown(o, squares), _facing(m, squares)
+    ops.names(i=i, o=o, m=m, area=area, shown=shown, facing=facing)
+    seen = cos_o * (1 / pi) * (area * area * area) / (_shown(i, squares) * shown * o[2])
     if not n.is_outside:
-        o, reached = _out(p[0], p[1], n.inverse)
-    m = i[0] + o[0], i[1] + o[1], i[2] + o[2]
-    ops.names(i=i, o=o, m=m)
-    seen = 0.5 * cos_o * (n.inverse * n.inverse) / _shown(i, alpha_u, alpha_v)
-    density = ops.select(reached, seen * _facing(m, alpha_u, alpha_v), 0.0)
-    light = 2 * density / _shown(o, alpha_u, alpha_v)
+        seen = ops.select(z2 > 0, seen, 0.0)
+    light = seen * o[2] * facing
     if lobe.facets:
         # The cosine of half the angle between i and o
-        light = light * lobe.facets(ops.minimum(0.5 * ops.sqrt(ggx.dot(m, m)), 1.0))
+        light = light * lobe.facets(ops.sqrt(m[0] + m[1] + m[2], None) * (0.5 * n.inverse))
     if lobe.leaving:
         light = light * lobe.leaving(cos_o)
-    pdf = density / o[2]
+    density = 0.5 * facing
     # Add what falls outside the cone, and is spread over it
     if not n.is_outside:
         p2 = ops.maximum(wo[0] * wo[0] + wo[1] * wo[1], ops.TINY)
-        cos_far = n.ring * n.inverse * p2
-        stretch = ops.sqrt((1 - cos_far * cos_far) * (1 / p2))
-        m = i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + cos_far
-        ops.names(p2=p2, cos_far=cos_far, stretch=stretch, m_far=m)
-        pdf = pdf + seen * _facing(m, alpha_u, alpha_v) * (2 * n.n * n.ring)
-    return lobe.weight * light, pdf
+        stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
+        m = _squares((i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2))
+        ops.names(p2=p2, stretch=stretch, m_far=m)
+        density = density + n.ring * o[2] * _facing(m, squares)
+    return lobe.weight * light, seen * shown * density
 
 
 def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
@@ -116,14 +117,12 @@ def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Directio
     o = ggx.reflect(i, ggx.sample_visible(i, alpha_u, alpha_v, u1, u2))
     if n.is_outside:
         return _out_of_frame(lobe, o)
-    x, y = n.n * o[0], n.n * o[1]
-    p2 = x * x + y * y
-    spread = ops.divide(n.n * n.n - p2, ops.maximum(n.ring2, 0.0))
-    r2 = ops.select(p2 > 1, ops.sqrt(ops.minimum(spread, 1.0)), p2)
+    p2 = o[0] * o[0] + o[1] * o[1]
+    r2 = ops.select(p2 > 1, ops.minimum(ops.divide(ops.absolute(o[2]), n.ring), 1.0), p2)
     scale = ops.select(p2 > 1, ops.sqrt(r2 / ops.maximum(p2, 1.0)), 1.0)
     z = ops.sqrt(1 - r2)
-    ops.names(o=o, x=x, y=y, p2=p2, r2=r2, scale=scale, z=z)
-    return _out_of_frame(lobe, (scale * x, scale * y, ops.select(o[2] > 0, z, -z)))
+    ops.names(o=o, p2=p2, r2=r2, scale=scale, z=z)
+    return _out_of_frame(lobe, (scale * o[0], scale * o[1], ops.select(o[2] > 0, z, -z)))
 
 
 def either(where: Value, a: OwnMediumLobe, b: OwnMediumLobe) -> OwnMediumLobe:
@@ -161,11 +160,11 @@ def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value,
     u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     o = ggx.reflect(i, h)
-    p2 = n.n * n.n * (o[0] * o[0] + o[1] * o[1])
+    p2 = o[0] * o[0] + o[1] * o[1]
     value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
     # Of reflectances, colours are the leading axis, and light the last one
     if lobe.facets:
-        value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h), 0.0, 1.0))
+        value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0))
     if lobe.leaving:
         value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
     return np.mean(value, axis=-1, dtype=float), np.max(value, axis=-1)
@@ -183,39 +182,34 @@ def _flat(reflectance: Reflectance, cosine: Value) -> Value:
 
 
 def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Index, Direction]:
-    """Roughnesses, the index, and wi refracted into the medium, in the frame of the lobe."""
+    """Roughnesses, the index, and the momentum of light from wi in the medium, in the frame of the lobe."""
     alpha_u, alpha_v = ops.maximum(lobe.roughness.alpha_u, ALPHA_MIN), ops.maximum(lobe.roughness.alpha_v, ALPHA_MIN)
     x, y, z = _in_frame(lobe, wi)
     n, z = Index.of(lobe.n), ops.maximum(z, 0.0)
     if n.is_outside:
         return alpha_u, alpha_v, n, (x, y, ops.maximum(z, COS_MIN))
-    radius = ops.sqrt(ops.maximum(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY))
-    scale = ops.minimum(n.inverse, (1 - 0.5 * COS_MIN * COS_MIN) / radius)
-    cosine = ops.sqrt(ops.maximum((n.ring2 + z * z) * (n.inverse * n.inverse), COS_MIN * COS_MIN))
-    ops.names(scale=scale, cosine=cosine)
-    return alpha_u, alpha_v, n, (scale * x, scale * y, cosine)
+    inverse = 1 / ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY)
+    scale = ops.minimum(n.n * ((1 - 0.5 * COS_MIN * COS_MIN) * inverse), 1.0)
+    height = ops.sqrt(n.ring2 + z * z, COS_MIN * COS_MIN)
+    ops.names(scale=scale, height=height)
+    return alpha_u, alpha_v, n, (scale * x, scale * y, height)
 
 
-def _out(x: Value, y: Value, inverse: Value) -> tuple[Direction, Value]:
-    """The direction inside with a momentum, and whether it exists; `inverse` is that of the index."""
-    x, y = inverse * x, inverse * y
-    cos2 = 1 - x * x - y * y
-    return (x, y, ops.sqrt(ops.maximum(cos2, COS_MIN * COS_MIN))), cos2 > 0
+def _squares(w: Direction) -> Direction:
+    return w[0] * w[0], w[1] * w[1], w[2] * w[2]
 
 
-def _shown(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:
-    """2 w_z over Smith's G1(w), which does not vanish at grazing directions."""
-    x, y = alpha_u * w[0], alpha_v * w[1]
-    return w[2] + ops.sqrt(ggx.dot((x, y, w[2]), (x, y, w[2])))
+def _shown(w: Direction, squares: tuple[Value, Value]) -> Value:
+    """2 w_z over Smith's G1(w), which does not vanish at grazing directions, by squares of roughnesses."""
+    return w[2] + ops.sqrt(ggx.dot(_squares(w), (*squares, 1.0)), None)
 
 
-def _facing(m: Direction, alpha_u: Value, alpha_v: Value) -> Value:
-    """GGX's density D of normals along a vector, of any length, by one division."""
-    area = alpha_u * alpha_v
-    s = alpha_v * m[0], alpha_u * m[1], area * m[2]
-    q = ggx.dot(m, m) * area / ggx.dot(s, s)
-    ops.names(area=area, q=q)
-    return q * q * area * (1 / pi)
+def _facing(m: Direction, squares: tuple[Value, Value]) -> Value:
+    """pi D / (alpha_u alpha_v)^3, of GGX's density D of normals along a vector of any length, by squares of both."""
+    u, v = squares
+    q = (m[0] + m[1] + m[2]) / ggx.dot((v, u, u * v), m)
+    ops.names(q=q)
+    return q * q
 
 
 def _in_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
@@ -234,4 +228,4 @@ def _chosen(where: Value, a: Value, b: Value) -> Value:
     """Of two indices."""
     if a is b:
         return a
-    return Index(*(ops.select(where, x, y) for x, y in zip(Index.of(a), Index.of(b))))
+    return Index(*(ops.select(where, x, y) for x, y in zip(*(vars(Index.of(n)).values() for n in (a, b)))))

@@ -34,8 +34,16 @@ FAINT = 1e-9  # energy of a part that is drawn even where it has none
 GRAZING = 1e-6  # cosine
 HEAVY = 2.9  # weight of a sample
 
+
+class _Roots(RoughnessMap):
+    """Needs no bounds."""
+
+    def roughness(self, variance: Value, across: Value | None = None) -> Value:
+        return variance * variance
+
+
 #: What is interpolated are roots of roughness, or matrices of them, so that axes may turn.
-ROOTS = RoughnessMap(lambda along, across: ops.sqrt(along), lambda along, across: along * along)
+ROOTS = _Roots(lambda along, across: ops.sqrt(along), lambda along, across: along * along)
 
 
 @dataclass(frozen=True)
@@ -208,16 +216,21 @@ class Seen:
     def part(self, k: int, i: Direction, o: Direction) -> tuple[Value, Value]:
         """f |cos theta_o| and density of a reflected part."""
         if k < len(self.lobes):
-            return own_medium.eval_pdf(self.lobes[k], self._in_plane(i), self._in_plane(o))
+            return own_medium.eval_pdf(self.lobes[k], self._along_plane(i), self._in_plane(o))
         return self.columns.scale * self.polynomial.value(i, o), self.samples.density(i, o)
 
     def out_of(self, lobe: OwnMediumLobe, i: Direction, u1: Value, u2: Value) -> Direction:
         """A direction drawn from a lobe."""
-        o = own_medium.sample(lobe, self._in_plane(i), u1, u2)
+        o = own_medium.sample(lobe, self._along_plane(i), u1, u2)
         return ggx.turned(o, self.plane[0], -self.plane[1]) if self.plane else o
 
     def _in_plane(self, w: Direction) -> Direction:
         return ggx.turned(w, *self.plane) if self.plane else w
+
+    def _along_plane(self, i: Direction) -> Direction:
+        """The direction that the plane is of."""
+        x, y, z = self._in_plane(i)
+        return x, 0.0 if self.plane else y, z
 
 
 @dataclass(frozen=True)

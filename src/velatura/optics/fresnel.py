@@ -16,7 +16,8 @@ def cos_transmitted(cos_theta: Value, eta: Value) -> Value:
 
 def dielectric(cos_theta: Value, eta: Value) -> Value:
     """Reflectance of a dielectric of relative index eta > 0 at cos_theta in [0, 1]; 1 under total reflection."""
-    return dielectric_between(cos_theta, cos_transmitted(cos_theta, eta), eta)
+    eta2 = eta * eta
+    return _dielectric(cos_theta, ops.sqrt(eta2 - 1 + cos_theta * cos_theta), eta2)
 
 
 def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
@@ -24,9 +25,15 @@ def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
 
     This lets all colour channels share one refracted direction; the reflectance is the same from either side.
     """
-    r_s = 1 - 2 * ops.divide(eta * cos_t, cos_theta + eta * cos_t)
-    r_p = 1 - 2 * ops.divide(cos_t, eta * cos_theta + cos_t)
-    ops.names(cos_t=cos_t, r_s=r_s, r_p=r_p)
+    return _dielectric(cos_theta, eta * cos_t, eta * eta)
+
+
+def _dielectric(cos_theta: Value, inside: Value, eta2: Value) -> Value:
+    """As `dielectric_between`, by eta cos_t inside and the square of eta; both polarisations by one division."""
+    s, p = cos_theta + inside, eta2 * cos_theta + inside
+    twice = ops.divide(2 * inside, s * p)
+    r_s, r_p = 1 - twice * p, 1 - twice * s
+    ops.names(inside=inside, r_s=r_s, r_p=r_p)
     return 0.5 * (r_s * r_s + r_p * r_p)
 
 
