@@ -716,6 +716,63 @@ def test_each_settled_material_is_a_picture_to_go_back_to(visit: Open) -> None:
     kept(3, "1 · Coated brushed gold")
 
 
+TILE = """(place) => {
+  const { canvas, viewport } = velatura, { width, height } = viewport.frame;
+  const copy = Object.assign(document.createElement('canvas'), { width, height }), context = copy.getContext('2d');
+  viewport.paint();
+  context.drawImage(canvas, place ? width - canvas.width : 0, 0);
+  return [...context.getImageData(0, 0, width, height).data];
+}"""
+
+
+def test_materials_are_side_by_side_in_one_view(visit: Open) -> None:
+    """Expected: a material beside itself is seen twice, and stays as it was while the open one changes; up to four, by
+    keys too, as they were before a reload; the last that is taken away leaves one picture."""
+    page = visit()
+    page.page.wait_for_selector("[aria-label='1 · Coated brushed gold']")
+    open_preset(page, "Gold")
+    page.page.wait_for_selector("[aria-label='2 · Gold']")
+    alone = page.picture()
+    page.page.get_by_label("Compare", exact=True).select_option("tiles")
+    tiles, all_drawn = page.page.locator(".tile"), "() => !document.querySelector('.picture').innerText.includes('…')"
+    page.page.wait_for_function(all_drawn)
+    assert tiles.all_inner_texts() == ["Gold", "Gold"]
+    twice = page.picture()
+    assert np.ptp(twice) > 100
+    assert difference(*(np.array(page.page.evaluate(TILE, place)) for place in (0, 1))) < SAME
+
+    open_preset(page, "Glossy plastic")
+    both = page.picture()
+    assert difference(both[:, 33:62], twice[:, 33:62]) < SAME
+    assert difference(both[:, 1:30], twice[:, 1:30]) > OTHER
+    page.page.wait_for_selector("[aria-label='3 · Glossy plastic']")
+    page.page.locator(".snapshot[aria-current=true]").focus()
+    page.page.keyboard.press("Home")
+    for _ in range(2):
+        page.page.keyboard.press("Tab")
+        page.page.keyboard.press("Enter")
+        page.settled()
+        page.page.keyboard.press("Shift+Tab")
+        page.page.keyboard.press("ArrowRight")
+    assert tiles.all_inner_texts() == ["Glossy plastic", "Gold", "1 · Coated brushed gold", "2 · Gold"]
+    assert page.page.get_by_role("button", name="3 · Glossy plastic, side by side").is_disabled()
+    four = page.picture()
+    page.page.reload()
+    page.ready()
+    page.page.wait_for_function(all_drawn)
+    assert difference(page.picture(), four) < SAME
+
+    for name in ("Take Gold away", "Take 1 · Coated brushed gold away", "Take 2 · Gold away"):
+        page.page.get_by_role("button", name=name).click()
+    assert page.state("view.mode") == "single"
+    open_preset(page, "Gold")
+    assert difference(page.picture(), alone) < SAME
+    page.page.keyboard.press("Control+z")
+    page.page.keyboard.press("Control+z")
+    assert tiles.all_inner_texts() == ["Glossy plastic", "2 · Gold"]
+    page.settled()
+
+
 def test_a_lost_graphics_device_is_reported_until_it_is_back(visit: Open) -> None:
     page = visit("CONTEXT_LOST_WEBGL", "does not belong", "context lost")
     before = page.picture()

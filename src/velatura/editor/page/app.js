@@ -106,9 +106,9 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     },
   });
   page = createPage({
-    ...{ store, session, storage, edits, messages, canvas, focus, update, toolbar: toolbar.view },
+    ...{ store, session, storage, edits, messages, picture, canvas, focus, update, toolbar: toolbar.view },
     layers: createLayers({ store, session, edits, messages, choose, upload: files.upload, focus, update }),
-    strip: createStrip({ store, snapshots, focus }),
+    strip: createStrip({ store, snapshots, focus, update }),
     view: createView({ store, session, edits, picture, choose, takeEnvironment: files.takeEnvironment }),
     model: createModel({ store, session }),
     onFace: () => appearance.follow(),

@@ -1,10 +1,12 @@
-// The canvas: one picture or two, each a preview, a sum of paths or in between; and the truth in the place of one.
+// The canvas: one picture or several, each a preview, a sum of paths or in between; and the truth in the place of one.
 
 import { blending, display, metering } from './glsl/display.glsl.js';
 
 const FIRST = 4; // samples from which on they are shown
 const PARTS = [16, 9]; // of a picture, in which differences are summed
 const TRUSTED = 16; // samples from which on the preview shows through no more
+
+const PLAIN = { split: 1, difference: false, corner: [0, 0] }; // one picture that fills its target
 
 /** Whether a slot has paths enough to be judged by them alone. */
 export const isTrusted = ({ samples }) => samples >= TRUSTED;
@@ -39,8 +41,18 @@ export class Screen {
   /** Draws the slots that are seen, by the settings of the view. */
   paint(slots, { mode, split, exposure }) {
     const [a, b] = this.#pictures(slots);
-    const shown = { exposure, split: mode === 'split' ? split : 1, difference: mode === 'difference' };
+    const shown = { ...PLAIN, exposure, split: mode === 'split' ? split : 1, difference: mode === 'difference' };
     this.#device.draw(this.#display, { picture_a: a, picture_b: b, ...shown }, null);
+  }
+
+  /** Draws slots side by side: `tiles` of {slot, corner}, in pictures of a size. */
+  paintTiles(tiles, { width, height }, { exposure }) {
+    this.#device.clear({ handle: null }, 0);
+    for (const { slot, corner } of tiles) {
+      const texture = this.#textureOf(slot), [x, y] = corner;
+      const shown = { ...PLAIN, exposure, corner, picture_a: texture, picture_b: texture };
+      this.#device.draw(this.#display, shown, null, { columns: [x, x + width], rows: [y, y + height] });
+    }
   }
 
   /** The mean absolute difference in luminance of the two slots that are seen. */
@@ -61,8 +73,7 @@ export class Screen {
 
   /** Draws one picture as the canvas would show it. */
   expose(texture, exposure, target) {
-    const shown = { exposure, split: 1, difference: false };
-    this.#device.draw(this.#display, { picture_a: texture, picture_b: texture, ...shown }, target);
+    this.#device.draw(this.#display, { ...PLAIN, exposure, picture_a: texture, picture_b: texture }, target);
   }
 
   #textureOf(slot) {

@@ -147,7 +147,7 @@ export class Slot {
   forget() {
     this.samples = 0;
     this.#surrounded = false;
-    this.device.clear(this.shades[0], 1);
+    if (this.shades) this.device.clear(this.shades[0], 1);
   }
 
   /** Traces the next sample, or a `band` of its rows. */

@@ -11,16 +11,19 @@ import { Screen, isTrusted } from './screen.js';
 import { Slot } from './slot.js';
 import { Stage } from './stage.js';
 import { Thumbnails, radianceOf } from './stills.js';
+import { tileCorner, tileSize } from './tiles.js';
 
 const REFRESH = 100; // milliseconds between two pictures while paths are added up
 const RETRY = 1000; // milliseconds until the next look after an error, and while something is missing
 const MOST_PIXELS = 1_000_000;
+const PAIR = ['a', 'b']; // the slots that are compared over the whole canvas
+const SLOTS = [...PAIR, 'c', 'd']; // those that are shown side by side
 const defaultFetch = (address) => fetch(address);
 
 export class Viewport {
   canvas;
   camera = { origin: [0, 2.6, 7.2], target: [0, 1, 0], fov: 19.5 };
-  settings = { rotation: 0, exposure: 0, mode: 'single', split: 0.5, lobe: null };
+  settings = { rotation: 0, exposure: 0, mode: 'single', split: 0.5, lobe: null, tiles: '' };
   schedule = new Schedule();
   sources = {}; // of object and light: {parts, environment, name}, from which a lost device gets them again
 
@@ -82,7 +85,7 @@ export class Viewport {
     if (this.sources.parts) this.#placeObject();
   }
 
-  /** A material in slot "a" or "b": the answer of call("shader"), and maybe another one of call("values"). */
+  /** A material in a slot, "a" to "d": the answer of call("shader"), and maybe another one of call("values"). */
   async setMaterial(slot, shader, contents = shader) {
     const known = this.slots[slot].shader?.key === shader.key;
     await this.slots[slot].setMaterial(shader, contents);
@@ -108,15 +111,19 @@ export class Viewport {
     this.#changed();
   }
 
-  /** Some of {rotation (degrees), exposure (stops), mode, split, lobe (its number, or null for all)}. */
+  /**
+   * Some of {rotation (degrees), exposure (stops), mode (single, split, difference or tiles), split, lobe (its number, or
+   * null for all), tiles (names of the slots beside "a", such as "bc")}.
+   */
   setView(view) {
-    const before = this.settings;
+    const before = this.settings, { width, height } = this.frame;
     if (Object.entries(view).every(([key, value]) => before[key] === value)) return;
     this.settings = { ...before, ...view };
-    const { rotation, mode, lobe } = this.settings;
+    const { rotation, mode, lobe, tiles } = this.settings, { frame } = this;
     if (lobe !== before.lobe) Object.values(this.slots).forEach((slot) => slot.setLobe(lobe));
+    if (frame.width !== width || frame.height !== height) this.#fit();
     if (rotation !== before.rotation) this.#moved();
-    else if (mode !== before.mode || lobe !== before.lobe) this.#changed();
+    else if (mode !== before.mode || lobe !== before.lobe || tiles !== before.tiles) this.#changed();
     else this.#show();
   }
 
@@ -165,6 +172,11 @@ export class Viewport {
   /** Whether the browser has taken the graphics device away; it comes back by itself. */
   get lost() {
     return this.device.gl.isContextLost();
+  }
+
+  /** The size of one picture in pixels: of the canvas, or of a part of it where several are side by side. */
+  get frame() {
+    return tileSize(this.#names().length, this.canvas);
   }
 
   get truth() {
@@ -218,17 +230,18 @@ export class Viewport {
   /** The middle of the picture of slot "a", alone and as it is now, in a size: a data URL. */
   snapshot(width, height) {
     const copy = Object.assign(this.canvas.ownerDocument.createElement('canvas'), { width, height });
-    const { canvas } = this;
-    const scale = Math.max(width / canvas.width, height / canvas.height);
+    const { frame, canvas } = this;
+    const scale = Math.max(width / frame.width, height / frame.height);
     const [w, h] = [width / scale, height / scale];
+    const [x, y] = [(frame.width - w) / 2, canvas.height - (frame.height + h) / 2]; // of the lower left corner
     this.screen.paint([this.slots.a], { ...this.settings, mode: 'single' });
-    copy.getContext('2d').drawImage(canvas, (canvas.width - w) / 2, (canvas.height - h) / 2, w, h, 0, 0, width, height);
+    copy.getContext('2d').drawImage(canvas, x, y, w, h, 0, 0, width, height);
     this.paint(); // the canvas, in the same frame of the page
     return copy.toDataURL('image/jpeg', 0.85);
   }
 
   /** The uniforms of object, light and camera, for a picture of a size. */
-  uniforms(size = this.canvas) {
+  uniforms(size = this.frame) {
     return this.stage.uniforms(this.camera, size, this.settings.rotation);
   }
 
@@ -247,7 +260,7 @@ export class Viewport {
     this.gbuffer = new GBuffer(device);
     this.stage = new Stage(device);
     this.screen = new Screen(device);
-    this.slots = { a: new Slot(device, this.loader), b: new Slot(device, this.loader) };
+    this.slots = Object.fromEntries(SLOTS.map((name) => [name, new Slot(device, this.loader)]));
     this.coming = null;
     this.thumbnails = new Thumbnails(device, this.loader, this.screen);
     this.ready = Promise.all([this.screen, this.gbuffer, this.slots.a].map((part) => part.compile()));
@@ -269,11 +282,11 @@ export class Viewport {
     if (sources.parts) this.#placeObject();
   }
 
-  /** Gives everything the size of the canvas. */
+  /** Gives everything the size of a picture. */
   #fit() {
-    const { width, height } = this.canvas;
+    const { width, height } = this.frame, names = this.#names();
     this.gbuffer.setSize(width, height);
-    for (const slot of Object.values(this.slots)) slot.setSize(width, height);
+    for (const name of names.length > 1 ? SLOTS : PAIR) this.slots[name].setSize(width, height);
     if (this.truth) this.setTruth(this.truth);
   }
 
@@ -290,9 +303,17 @@ export class Viewport {
     this.#moved();
   }
 
+  /** The slots that are side by side, by their names. */
+  #names() {
+    const { mode, tiles } = this.settings;
+    return mode === 'tiles' ? ['a', ...tiles] : ['a'];
+  }
+
+  /** The slots that are drawn; of those side by side, the first and all that have a material. */
   #seen() {
-    const { a, b } = this.slots;
-    return this.settings.mode === 'single' || this.truth ? [a] : [a, b];
+    const { a, b } = this.slots, { mode } = this.settings;
+    if (mode === 'tiles') return this.#names().map((name) => this.slots[name]).filter((slot) => slot === a || slot.shader);
+    return mode === 'single' || this.truth ? [a] : [a, b];
   }
 
   // Over time
@@ -355,7 +376,7 @@ export class Viewport {
 
   /** A slice of paths, in all slots that are seen. The device works on it while we wait for the one before. */
   async #trace() {
-    const uniforms = this.uniforms(), { height } = this.canvas, before = this.#slice;
+    const uniforms = this.uniforms(), { height } = this.frame, before = this.#slice;
     let rows = 0;
     for (let band; this.samples < this.budget.samples && (band = this.#bands.next(height, rows)); ) {
       for (const slot of this.#seen()) slot.trace(uniforms, band);
@@ -385,7 +406,11 @@ export class Viewport {
   }
 
   paint() {
-    if (this.screen.ready && this.stage.hasObject) this.screen.paint(this.#seen(), this.settings);
+    if (!this.screen.ready || !this.stage.hasObject) return;
+    const { settings, canvas } = this, seen = this.#seen(), names = this.#names();
+    if (names.length === 1) return this.screen.paint(seen, settings);
+    const all = names.map((name, place) => ({ slot: this.slots[name], corner: tileCorner(place, names.length, canvas) }));
+    this.screen.paintTiles(all.filter(({ slot }) => seen.includes(slot)), this.frame, settings);
   }
 
   // From outside

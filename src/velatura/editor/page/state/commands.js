@@ -16,7 +16,11 @@ const VIEW = {
   other: null,
   split: 0.5,
   lobe: null,
+  tiles: [],
 };
+
+/** Whether a view compares the material with one other, over the whole picture. */
+export const isPaired = ({ mode }) => mode === 'split' || mode === 'difference';
 
 /** The state that a material opens in. */
 export function initial(material, session, place = {}) {
@@ -69,6 +73,11 @@ export const setMaterial = titled('change the material', (state, material) => ({
   layers: layersOf(material),
   view: { ...state.view, lobe: null },
 }));
+
+const KEPT = ['name', 'source', 'exterior', 'thin', 'layers', 'model', 'switches', 'document'];
+
+/** What a snapshot keeps of a state. */
+export const keptOf = (state) => Object.fromEntries(KEPT.map((key) => [key, state[key]]));
 
 /** Goes back to what a snapshot has kept. */
 export const goBack = titled('go back', (state, kept) => ({
@@ -236,13 +245,33 @@ export const setView = titled('change the view', (state, changes) => ({
 export const pin = titled('pin the material', (state) => {
   const { name, model, switches, view } = state;
   const other = { material: documentOf(state), model, switches, title: `B: ${name || 'pinned'}` };
-  return { ...state, view: { ...view, mode: view.mode === 'single' ? 'split' : view.mode, other } };
+  return { ...state, view: { ...view, mode: isPaired(view) ? view.mode : 'split', other } };
 });
 
 /** The pinned material in the place of the open one, which is pinned. */
 export const swap = titled('swap A and B', (state) => {
   const { material, model, switches } = state.view.other;
   return { ...setMaterial(pin(state), material), model, switches };
+});
+
+const BESIDE = ['b', 'c', 'd']; // slots of the viewport
+
+/** The materials beside the open one: {slot, number (of the snapshot, or null), kept}. */
+export const besideOf = ({ view }) => (view.mode === 'tiles' ? (view.tiles ?? []) : []);
+
+export const hasRoomBeside = (state) => besideOf(state).length < BESIDE.length;
+
+/** Puts what a snapshot has kept beside the open material. */
+export const putBeside = titled('put side by side', (state, kept, number = null) => {
+  const tiles = besideOf(state);
+  const slot = BESIDE.find((name) => !tiles.some((tile) => tile.slot === name));
+  if (!slot) return state;
+  return { ...state, view: { ...state.view, mode: 'tiles', tiles: [...tiles, { slot, number, kept }] } };
+});
+
+export const takeAway = titled('take away', (state, slot) => {
+  const tiles = besideOf(state).filter((tile) => tile.slot !== slot);
+  return { ...state, view: { ...state.view, mode: tiles.length ? 'tiles' : 'single', tiles } };
 });
 
 export const setCamera = titled('move the camera', (state, camera) => ({ ...state, camera }));

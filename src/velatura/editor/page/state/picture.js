@@ -1,11 +1,12 @@
 // Keeps the pictures in step with the state: values go straight to the viewport, shapes over Python.
 
 import { Offline } from '../connection.js';
+import { isPaired } from './commands.js';
 import { documentOf, flat, layersOf, pattern } from './material.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
 
-/** One material in the viewport: the state's own (`a`), or that of the other model (`b`). */
+/** One material in the viewport: the state's own (`a`), that of the other model (`b`), or one beside it (`b` to `d`). */
 class Slot {
   shader = null; // what the viewport draws now
   given = null; // and the state whose values it has
@@ -161,7 +162,7 @@ function otherOf(state, session) {
  */
 export function follow({ store, viewport, call, session, files, onProblem, onBaked, onShader }) {
   const part = { viewport, call, session, onShader, onProblem, onBaked };
-  const slots = { a: new Slot('a', part), b: new Slot('b', part) };
+  const slots = Object.fromEntries(Object.keys(viewport.slots).map((name) => [name, new Slot(name, part)]));
   const shown = {};
   let home = null; // the camera that the object's own view asks for
 
@@ -179,14 +180,16 @@ export function follow({ store, viewport, call, session, files, onProblem, onBak
   }
 
   function update(state) {
-    const { object, environment, rotation, exposure, mode, split, lobe, other } = state.view;
+    const { object, environment, rotation, exposure, mode, split, lobe, other, tiles = [] } = state.view;
     slots.a.follow(state);
-    if (mode !== 'single' && !other?.truth) slots.b.follow(otherOf(state, session));
+    if (isPaired(state.view) && !other?.truth) slots.b.follow(otherOf(state, session));
+    if (mode === 'tiles') for (const { slot, kept } of tiles) slots[slot].follow({ ...state, ...kept });
     viewport.setView({
       rotation,
       exposure,
       mode,
       split,
+      tiles: tiles.map(({ slot }) => slot).join(''),
       lobe: lobe < slots.a.shader?.shown.length ? lobe : null,
     });
     once('object', object, async (name) => {
@@ -206,7 +209,7 @@ export function follow({ store, viewport, call, session, files, onProblem, onBak
     drawn: (slot) => slots[slot].drawn,
     given: (slot) => slots[slot].given,
     get stage() {
-      return slots.a.stage ?? slots.b.stage;
+      return Object.values(slots).find(({ stage }) => stage)?.stage ?? null;
     },
     get quiet() {
       return Object.values(slots).every((slot) => slot.quiet);

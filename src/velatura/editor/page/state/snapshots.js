@@ -1,14 +1,12 @@
 // The history of the material in pictures: each state that was left alone for a while, to return to.
 
+import { keptOf } from './commands.js';
 import { enabled } from './material.js';
 
 const MOST = 40;
 const SIZE = [144, 108]; // pixels of a picture
 const RESTED = 300; // milliseconds that a preview must have been there
 const CLEAR = 16; // samples from which on a picture is not taken again
-
-/** What a snapshot keeps of a state. */
-const KEPT = ['name', 'source', 'exterior', 'thin', 'layers', 'model', 'switches', 'document'];
 
 /** What decides about the picture of a material, as text. */
 export function lookOf(state) {
@@ -18,7 +16,7 @@ export function lookOf(state) {
 
 /**
  * Follows a store: `{look, list, current}`. `look()`, called now and then, takes the picture of a state that has settled;
- * `list` holds `{number, look, state, picture, samples}`, the latest last, `picture` as an address; `current()` is the one
+ * `list` holds `{number, look, kept, picture, samples}`, the latest last, `picture` as an address; `current()` is the one
  * that is open, if any.
  */
 export function createSnapshots({ store, viewport, picture, storage, onChange }) {
@@ -58,9 +56,8 @@ export function createSnapshots({ store, viewport, picture, storage, onChange })
       if (found) {
         list = list.map((snapshot) => (snapshot === found ? { ...snapshot, ...taken } : snapshot));
       } else {
-        const state = Object.fromEntries(KEPT.map((key) => [key, store.get()[key]]));
         const number = (list.at(-1)?.number ?? 0) + 1;
-        list = [...list, { number, look: look(), state, ...taken }].slice(-MOST);
+        list = [...list, { number, look: look(), kept: keptOf(store.get()), ...taken }].slice(-MOST);
       }
       storage.keepSnapshots(list);
       onChange();

@@ -1,6 +1,7 @@
 // The truth on the right of a split picture: Python's random walk, a few samples at a time, until there are enough.
 
 import { decode } from '../arrays.js';
+import { isPaired } from './commands.js';
 import { documentOf } from './material.js';
 
 const PAUSE = 600; // milliseconds without a change, after which it is asked for
@@ -60,8 +61,8 @@ export function followTruth({ store, viewport, call, onProblem }) {
 
 /** What Python is asked, or null while the view does not ask for the truth. */
 function questionOf(state, { canvas, camera }) {
-  const { object, environment, rotation, mode, other } = state.view;
-  if (mode === 'single' || !other?.truth) return null;
+  const { object, environment, rotation, other } = state.view;
+  if (!isPaired(state.view) || !other?.truth) return null;
   const scale = Math.min(1, LONGEST / Math.max(canvas.width, canvas.height));
   const size = [canvas.width, canvas.height].map((length) => Math.max(1, Math.round(length * scale)));
   return { material: documentOf(state), object, environment, rotation, camera: state.camera ?? camera, size };

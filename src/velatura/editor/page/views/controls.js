@@ -132,13 +132,14 @@ export function flag({ label, value, choose, title = '' }) {
 }
 
 /** A button that is a drawing; `pressed` makes it a switch. */
-export function iconButton({ label, icon, act, pressed = null, disabled = false, name = '' }) {
+export function iconButton({ label, icon, act, pressed = null, disabled = false, name = '', tabindex = 0 }) {
   return html`<button
     type="button"
     class="small ${name}"
     title=${label}
     aria-label=${label}
     aria-pressed=${pressed ?? nothing}
+    tabindex=${tabindex || nothing}
     ?disabled=${disabled}
     @click=${act}
   >

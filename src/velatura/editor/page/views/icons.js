@@ -12,6 +12,7 @@ export const icons = {
   grip: path('M3 5h10M3 8h10M3 11h10'),
   duplicate: path('M5.5 5.5h8v8h-8zM10.5 5.5v-3h-8v8h3'),
   remove: path('M4 4l8 8M12 4l-8 8'),
+  beside: path('M2.5 3h11v10h-11zM8 3v10'),
   plus: path('M8 3v10M3 8h10'),
   locked: path('M4 7.5h8v6H4zM5.5 7.5v-2a2.5 2.5 0 0 1 5 0v2'),
   unlocked: path('M4 7.5h8v6H4zM5.5 7.5v-3a2.5 2.5 0 0 1 4.7-1.2'),

@@ -2,7 +2,7 @@
 
 import { html, nothing, render } from 'lit-html';
 import { Slices, radians } from '../render/slices.js';
-import { setView } from '../state/commands.js';
+import { isPaired, setView } from '../state/commands.js';
 import { enabled, layerName } from '../state/material.js';
 import './inspector.css';
 import { chart, valueAt } from './plots/chart.js';
@@ -37,7 +37,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
   let stale = true;
   let frame = requestAnimationFrame(follow);
   const validations = createValidations(call, paint);
-  const stops = [store.subscribe(paint), onLobes((name) => (changed[name] = true))];
+  const stops = [store.subscribe(paint), onLobes((name) => name in changed && (changed[name] = true))];
 
   const set = (changes) => {
     const aimed = ['angle', 'azimuth', 'below'].some((key) => key in changes);
@@ -55,7 +55,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
       cursor,
       onCursor: setCursor,
     });
-  const isCompared = () => store.get().view.mode !== 'single' && !store.get().view.other?.truth;
+  const isCompared = () => isPaired(store.get().view) && !store.get().view.other?.truth;
   const showAlone = (k) => store.run(setView, { lobe: store.get().view.lobe === k ? null : k });
 
   /** Draws changes, in every frame in which it is visible. */

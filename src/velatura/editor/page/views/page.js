@@ -1,10 +1,15 @@
 // The whole page: toolbar, picture and inspector, and the panel beside them.
 
 import { html, nothing } from 'lit-html';
+import { repeat } from 'lit-html/directives/repeat.js';
 import { styleMap } from 'lit-html/directives/style-map.js';
 import { LARGEST_DIFFERENCE } from '../render/glsl/display.glsl.js';
-import { setView } from '../state/commands.js';
+import { tiling } from '../render/tiles.js';
+import { besideOf, setView, takeAway } from '../state/commands.js';
+import { lookOf } from '../state/snapshots.js';
+import { iconButton } from './controls.js';
 import { splitter } from './splitter.js';
+import { titleOf } from './strip.js';
 
 /**
  * The whole page: `view()`, and `show(face)`, which turns the panel to the layers or to their appearance.
@@ -12,7 +17,7 @@ import { splitter } from './splitter.js';
  * @param {object} parts views `toolbar`, `layers`, `strip`, `view` and `model` of what is in it, its `canvas`, and what it works on;
  *   `onFace()` is called after the panel has turned
  */
-export function createPage({ store, session, storage, edits, messages, canvas, focus, update, onFace, ...parts }) {
+export function createPage({ store, session, storage, edits, messages, picture, canvas, focus, update, onFace, ...parts }) {
   let face = 'layers'; // of the panel
   const layout = { ...LAYOUT, ...storage.layout() };
 
@@ -32,7 +37,7 @@ export function createPage({ store, session, storage, edits, messages, canvas, f
     ${parts.toolbar()}
     <main class="stage" style=${styleMap({ '--look': pixels(layout.lookHeight) })}>
       <div class="picture">
-        ${canvas} ${compared({ store, session, edits })}
+        ${canvas} ${compared({ store, session, edits, picture })}
         <span class="samples" aria-hidden="true"></span>
         ${bubbles(messages)}
       </div>
@@ -170,15 +175,32 @@ function bubbles(messages) {
   </div>`;
 }
 
-/** What is compared, by name: two models on either side of a line, or the scale of their difference. */
-function compared({ store, session, edits }) {
+/** What is compared, by name: materials side by side, two on either side of a line, or the scale of their difference. */
+function compared({ store, session, edits, picture }) {
   const { view, model } = store.get();
+  if (view.mode === 'tiles') return sideBySide(store, picture);
   const titleOf = (name) => session.models.find((known) => known.name === name).title;
   const a = view.other?.material ? 'A' : titleOf(model);
   const b = view.other?.title ?? titleOf(view.other?.model ?? session.default_model);
   if (view.mode === 'split')
     return html`${divider({ view, edits })}<span class="side left">${a}</span><span class="side right">${b}</span>`;
   return view.mode === 'difference' ? scale({ a, b }) : nothing;
+}
+
+/** Names of the materials side by side, each with three dots until it is drawn. */
+function sideBySide(store, picture) {
+  const all = [{ kept: store.get() }, ...besideOf(store.get())], [columns, rows] = tiling(all.length);
+  const isDrawn = ({ slot, kept }) => picture.given(slot) && lookOf(picture.given(slot)) === lookOf(kept);
+  const name = (tile, place) => html`<span
+    class="tile"
+    style=${styleMap({ left: `${(100 * (place % columns)) / columns}%`, top: `${(100 * Math.floor(place / columns)) / rows}%` })}
+    >${titleOf(tile)}${tile.slot && !isDrawn(tile) ? ' \u2026' : nothing}${
+      tile.slot
+        ? iconButton({ label: `Take ${titleOf(tile)} away`, icon: 'remove', act: () => store.run(takeAway, tile.slot) })
+        : nothing
+    }</span
+  >`;
+  return repeat(all, ({ slot }) => slot, name);
 }
 
 function scale({ a, b }) {

@@ -2,7 +2,18 @@
 
 import { html, nothing } from 'lit-html';
 import { partsOf } from '../render/slices.js';
-import { pin, setCamera, setModel, setSwitch, setView, swap } from '../state/commands.js';
+import {
+  hasRoomBeside,
+  isPaired,
+  keptOf,
+  pin,
+  putBeside,
+  setCamera,
+  setModel,
+  setSwitch,
+  setView,
+  swap,
+} from '../state/commands.js';
 import { enabled, layerName } from '../state/material.js';
 import { capital, dial, menu, number } from './controls.js';
 
@@ -10,6 +21,7 @@ const MODES = [
   ['single', 'One model'],
   ['split', 'Split screen'],
   ['difference', 'Difference'],
+  ['tiles', 'Side by side'],
 ];
 /** What is beside the models to compare with: slow, so that it comes a few samples at a time. */
 const TRUTH = { name: 'truth', title: 'Truth (random walk)' };
@@ -91,8 +103,11 @@ function model({ store, session }) {
   const { switches: choices, defaults } = session.models.find(({ name }) => name === model);
   const models = session.models.map(({ name, title }) => [name, title]);
   const other = view.other?.model ?? session.models.find(({ name }) => name !== model).name;
-  const chooseMode = (mode) =>
-    store.run(setView, { mode, ...(mode !== 'single' && { other: view.other ?? { model: other } }) });
+  const beside = () => store.run(putBeside, keptOf(store.get()));
+  const chooseMode = (mode) => {
+    if (mode === 'tiles' && !view.tiles?.length) return beside();
+    return store.run(setView, { mode, ...(isPaired({ mode }) && { other: view.other ?? { model: other } }) });
+  };
   const pinned = view.other?.material ? [['', view.other.title]] : [];
   const chooseOther = (name) =>
     name && store.run(setView, { other: name === TRUTH.name ? { truth: true, title: TRUTH.title } : { model: name } });
@@ -107,12 +122,20 @@ function model({ store, session }) {
   return html`
     ${choice('Model', model, models, (name) => store.run(setModel, name))}
     ${choice('Compare', view.mode, MODES, chooseMode)}
-    ${view.mode === 'single' ? nothing : choice('With', compared, others, chooseOther)}
+    ${isPaired(view) ? choice('With', compared, others, chooseOther) : nothing}
     <div class="actions">
       <button type="button" title="To compare what it becomes with what it is" @click=${() => store.run(pin)}>
         Pin as B
       </button>
       <button type="button" ?disabled=${!pinned.length} @click=${() => store.run(swap)}>Swap A and B</button>
+      <button
+        type="button"
+        title="Keeps the material, as it is now, beside what it becomes; others are put there from the history"
+        ?disabled=${!hasRoomBeside(store.get())}
+        @click=${beside}
+      >
+        Put beside
+      </button>
     </div>
     <details class="switches">
       <summary>Switches</summary>

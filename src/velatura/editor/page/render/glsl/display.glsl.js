@@ -11,10 +11,11 @@ uniform highp sampler2D picture_b;
 uniform float exposure; // stops
 uniform float split; // left of it a is shown, right of it b
 uniform bool difference;
+uniform vec2 corner; // of the pictures on the target, the lower left one
 out vec4 colour;
 
 vec3 radiance(sampler2D picture) {
-  vec4 sum = texelFetch(picture, ivec2(gl_FragCoord.xy), 0);
+  vec4 sum = texelFetch(picture, ivec2(gl_FragCoord.xy - corner), 0);
   return exp2(exposure) * sum.rgb / max(sum.a, 1e-6);
 }
 
@@ -33,7 +34,7 @@ void main() {
     colour = vec4(mix(vec3(0.97), end, min(abs(x), 1.0)), 1.0);
     return;
   }
-  bool left = gl_FragCoord.x < split * float(textureSize(picture_a, 0).x);
+  bool left = gl_FragCoord.x - corner.x < split * float(textureSize(picture_a, 0).x);
   colour = vec4(tone_mapped(left ? radiance(picture_a) : radiance(picture_b)), 1.0);
 }
 `;
