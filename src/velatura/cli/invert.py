@@ -204,7 +204,8 @@ def _table(solution: Solution) -> Table:
     from rich.text import Text
 
     title = f"{solution.target.name or 'stack'} ({solution.model.name})"
-    table = Table("lobe", "", title=Text(title), title_justify="left")
+    table = Table("lobe", title=Text(title), title_justify="left")
+    table.add_column("", no_wrap=True)
     brushed = any(lobe.brushed for lobe in solution.target.lobes)
     for column in ("tau above", "eta", "k", "alpha", *(["rotation"] if brushed else [])):
         table.add_column(column, justify="right")

@@ -95,9 +95,11 @@ def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None
         for channel, colour in enumerate(colours):
             eta, kappa = _conductor(members, tint, channel)
             axes.plot(eta, kappa, color=colour, label=CHANNELS[channel] if len(colours) > 1 else "all channels")
-            if channel == 0:
-                axes.text(eta[0], kappa[0], "tint 0", fontsize="small", ha="right", va="bottom")
-                axes.text(eta[-1], kappa[-1], "tint 1", fontsize="small", ha="right", va="bottom")
+            if channel == 0:  # where no other curve is: below and beyond the ends
+                for end, label, offset, side in ((0, "tint 0", (0, -6), "top"), (-1, "tint 1", (6, 0), "center")):
+                    align = "left" if end else "center"
+                    place = {"xytext": offset, "textcoords": "offset points", "ha": align, "va": side}
+                    axes.annotate(label, (eta[end], kappa[end]), fontsize="small", **place)
             if half:
                 axes.plot(*_conductor(members.held(**half), tint, channel), color=colour, linewidth=1, linestyle="--")
         axes.margins(0.12)
