@@ -104,7 +104,7 @@ def test_light_of_the_pane_leaves_within_the_cone_of_its_rarest_medium() -> None
     sine = np.array([0.2, 0.74, 0.76, 0.99])
     wi, o = at(0.5, 4), (sine, 0 * sine, np.sqrt(1 - sine * sine))
     value, density = bounced.eval_pdf_rest(bounced.rest(passage, wi), bounced.seen_below(passage, wi), o)
-    assert ((value[0] > 0) == [True, True, False, False]).all() and ((density > 0) == (value[0] > 0)).all()
+    assert ((value > 0) == [True, True, False, False]).all() and ((density > 0) == (value > 0)).all()
 
 
 def test_grazing_light_and_light_beyond_the_critical_angle_is_finite() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -148,8 +149,9 @@ def test_drjit_agrees_with_numpy() -> None:
     material = Material.of(stack)
     kind = variance_kind(material)
     ours, theirs = (straight_through.passage(m, kind) for m in (material, Material.of(stack, value_of)))
-    of = parts_of(ours, 0.6, *energies)
-    of_theirs = Parts(*(mi.Color3f(*map(float, x.ravel())) if len(x) == 3 else mi.Float(x) for x in vars(of).values()))
+    of = replace(parts_of(ours, 0.6, *energies), even=0.9, grazing=0.5, once=0.8, twice=0.2)
+    each = (np.ravel(x) for x in vars(of).values())
+    of_theirs = Parts(*(mi.Color3f(*map(float, x)) if len(x) == 3 else mi.Float(x) for x in each))
     wi_theirs, u_theirs = (tuple(mi.Float(x) for x in w) for w in (wi, u))
     wo = passed.sample(ours, of, wi, *u)
     found = np.array(passed.sample(theirs, of_theirs, wi_theirs, *u_theirs))

@@ -7,9 +7,10 @@ as seen at a reflection, 2 m c; a share `BOUNCES` of both faces of the last slab
 scattered light, of optical depth x = tau_s / c, the width of N = x / (1 - exp(-x)) scatterings of asymmetry g^N in all,
 whose median angle theta follows from a fit, as that of a mirror with facets of alpha = tan(theta / 2).
 
-Scattering that is wider than GGX can be is diffuse: even over all momenta that can leave. What facets met often add
-is even below the last rough interface, but for a tilt to the side that light goes to. All that is seen here is in the
-frame of the outside below: directions are turned up, indices relative to it.
+Of light that bounces the lobe has the share 1 / (1 + a_u a_v / `WIDE`^2). The rest of it, scattering that is wider than
+GGX can be, and what facets met often add are diffuse: a polynomial over all momenta that can leave, by direction, which
+is fitted to the light at the nodes (`remainder.passing`). All that is seen here is in the frame of the outside below:
+directions are turned up, indices relative to it.
 """
 
 from __future__ import annotations
@@ -25,24 +26,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import own_medium
+from velatura.model import own_medium, remainder
 from velatura.model.own_medium import OwnMediumLobe
+from velatura.model.remainder import EVEN, Samples
 from velatura.model.straight_through import EXPONENT, WIDTHS, Crossed, Passage, Slab, entered, is_none
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.ggx import Direction
-from velatura.sampling import low_discrepancy
 
 BOUNCES = 0.3  # of the two faces of the slab that light bounces in
 COS_MIN = 0.22  # at which slabs are crossed, for widths
 ALPHA_MAX = 1.5
 DIFFUSE = 0.75  # roughness of scattering that is diffuse
-TILTED = 1.0  # tilt of the light of repeated facets
 FAR = 1e3  # index
 THIN = 1e-4  # optical depth of scattering that no light meets twice
 NO_LOBE = 1e-6  # asymmetry
-NODES = 48
+GRAZING = 1e-4  # cosine
+WIDE = 0.05  # roughness of bounced light of which a lobe holds half
+TILT_MAX = 0.8  # of samples of diffuse light
 
 Array = NDArray[np.floating]
 
@@ -50,14 +52,23 @@ Array = NDArray[np.floating]
 @dataclass(frozen=True)
 class Rest:
     """Light that is scattered: a lobe, None without one, with a diffuse share of `diffuse` over momenta up to `bound`,
-    relative to the index below, of which the smooth interfaces below let `leaving` pass; by `tilt`, more of it leaves
-    on the side that light goes to."""
+    relative to the index below, by the `numbers` of `remainder.passing`."""
 
     lobe: OwnMediumLobe | None
     diffuse: Value
-    tilt: Value
     bound: Value
-    leaving: Callable[[Value], Value]
+    numbers: Sequence[Value]
+
+    @property
+    def samples(self) -> Samples:
+        """How diffuse light is sampled."""
+        even, _, grazing, once, twice = self.numbers
+        return Samples((even + grazing, 0.0, 0.0), (1.0, 0.0, 0.0), once, twice)
+
+    def within(self, o: Direction) -> Direction:
+        """A direction below as one of all that diffuse light has."""
+        x, y = o[0] / self.bound, o[1] / self.bound
+        return x, y, ops.sqrt(1 - x * x - y * y)
 
 
 def bounced(passage: Passage, wi: Direction) -> OwnMediumLobe | None:
@@ -68,20 +79,29 @@ def bounced(passage: Passage, wi: Direction) -> OwnMediumLobe | None:
     return _lobe(passage, entered(passage, wi), passage.under, faces * BOUNCES)
 
 
-def rest(passage: Passage, wi: Direction) -> Rest:
-    """The light from wi, above, that is scattered by media, or often by facets."""
-    n, under = passage.indices, passage.scattered
-    lowest = reduce(ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(n, (*under, 1.0))))
-    bound, leaving = lowest / n[-1], _leaving(passage, under)
-    tilt = TILTED * passage.clear
+def share(lobe: OwnMediumLobe | None) -> Value:
+    """Of the light that bounces, what its lobe holds; the wider that is, the less."""
+    if lobe is None:
+        return 0.0
+    return 1 / (1 + lobe.roughness.alpha_u * lobe.roughness.alpha_v / (WIDE * WIDE))
+
+
+def bound(passage: Passage) -> Value:
+    """Greatest momentum of scattered light that leaves."""
+    return reduce(ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(passage.indices, (*passage.scattered, 1.0))))
+
+
+def rest(passage: Passage, wi: Direction, numbers: Sequence[Value] = EVEN) -> Rest:
+    """The light from wi, above, that is scattered by media, or often by facets; diffuse light has `numbers`."""
+    reached = bound(passage) / passage.indices[-1]
     if not passage.is_cloudy:
-        return Rest(None, 1.0, tilt, bound, leaving)
+        return Rest(None, 1.0, reached, numbers)
     i = entered(passage, wi)
     scattering = [(slab, cosine) for slab, cosine in zip(passage.slabs, i.bounded) if not is_none(slab.scattering)]
     alpha = _turned(scattering)
     diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
     width = type(passage.crossings[0].width).uniform(WIDTHS.variance(alpha))
-    return Rest(_lobe(passage, i, under, width), diffuse, tilt, bound, leaving)
+    return Rest(_lobe(passage, i, passage.scattered, width), diffuse, reached, numbers)
 
 
 def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
@@ -148,11 +168,10 @@ def seen_below(passage: Passage, wi: Direction) -> Direction:
 
 def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value]:
     """f |cos theta_o|, a colour, and the density of `sample_rest`, in the frame of `seen_below`."""
-    cos_o = ops.maximum(o[2], 0.0)
-    even = cos_o / (pi * found.bound * found.bound) * _tilted(found, i, o)
-    reached = o[0] * o[0] + o[1] * o[1] < found.bound * found.bound
-    density = ops.select(reached, found.diffuse * even, 0.0)
-    value = density * found.leaving(cos_o)
+    within = found.within(o)
+    even = found.diffuse * ops.maximum(o[2], 0.0) / (found.bound * found.bound)
+    value = ops.select(within[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, within), 0.0)
+    density = even / ops.maximum(within[2], GRAZING) * found.samples.density(i, within) * (1 + _tilt(found, i, within))
     if found.lobe:
         also, density_of_lobe = own_medium.eval_pdf(found.lobe, i, o)
         value, density = (1 - found.diffuse) * also + value, (1 - found.diffuse) * density_of_lobe + density
@@ -161,11 +180,10 @@ def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value
 
 def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
     """A direction, in the frame of `seen_below`, from uniform numbers."""
-    r, phi = found.bound * ops.sqrt(u1), 2 * pi * u2
-    even = r * ops.cos(phi), r * ops.sin(phi), ops.sqrt(1 - r * r)
-    if not is_none(found.tilt):
-        side = ops.select(2 * u < _tilted(found, i, even), 1.0, -1.0)
-        even = side * even[0], side * even[1], even[2]
+    even = found.samples.sample(i, u1, u2)
+    side = found.bound * ops.select(2 * u < 1 + _tilt(found, i, even), 1.0, -1.0)
+    x, y = side * even[0], side * even[1]
+    even = x, y, ops.sqrt(1 - x * x - y * y)
     if not found.lobe:
         return even
     other = own_medium.sample(found.lobe, i, u1, u2)
@@ -173,17 +191,22 @@ def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Di
     return x, y, z
 
 
-def _tilted(found: Rest, i: Direction, o: Direction) -> Value:
-    """Density of diffuse light over its mean: 1 plus a part that is odd."""
-    return 1 - found.tilt * (i[0] * o[0] + i[1] * o[1]) / found.bound
+def _tilt(found: Rest, i: Direction, o: Direction) -> Value:
+    """By how much more diffuse light is sampled than on the opposite side, over both."""
+    return ops.clip(found.numbers[3] * -(i[0] * o[0] + i[1] * o[1]), -TILT_MAX, TILT_MAX)
+
+
+def diffuse(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
+    """Density of diffuse light over its mean."""
+    even, cosine, grazing, once, twice = numbers
+    s = -1 * (i[0] * o[0] + i[1] * o[1])
+    both = (i[0] * i[0] + i[1] * i[1]) * (o[0] * o[0] + o[1] * o[1])
+    mean = even + cosine * o[2] + grazing * remainder.grazing(o[2])
+    return ops.maximum(mean + once * s + twice * (2 * s * s - both), 0.0)
 
 
 def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
     """Energy (3, N) of `eval_pdf_rest` from directions (N,) each."""
-    x, weight = low_discrepancy.gauss(NODES)
-    # Even over p^2; nodes crowd at grazing directions
-    r2 = (np.asarray(found.bound)[..., None] ** 2) * (1 - x * x)
-    diffuse = np.sum(found.leaving(np.sqrt(1 - r2)) * (2 * weight * x), axis=-1)[..., None]
     if not found.lobe:
-        return np.asarray(diffuse + np.zeros((1, len(i[2]))))
-    return np.asarray((1 - found.diffuse) * own_medium.integral(found.lobe, i) + found.diffuse * diffuse)
+        return np.ones((1, len(i[2])))
+    return np.asarray((1 - found.diffuse) * own_medium.integral(found.lobe, i) + found.diffuse)

@@ -1,8 +1,8 @@
 """All light that passes a stack: straight through, bounced inside, and scattered; each part with its own energy.
 
 Once for a direction, `parts` has the energies over the integrals of the lobes, and the probabilities of sampling them.
-A share `OF_BOUNCED` of the light of repeated facets is added to light that bounces, the rest to scattered light. So is
-the energy that a lobe lacks if it would have to be drawn more than `MOST` times as bright.
+Light that bounces is in a lobe as far as that is narrow. All else is scattered light, and so is the energy that a lobe
+lacks if it would have to be drawn more than `MOST` times as bright.
 
 A sample of light that goes straight through is that of a rough dielectric: it may be reflected. So nothing else has to
 be sampled of a single interface whose facets are met once; elsewhere reflected lobes are sampled by their energies.
@@ -10,6 +10,7 @@ be sampled of a single interface whose facets are met once; elsewhere reflected 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,11 +18,11 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import bounced, own_medium, straight_through
+from velatura.model.remainder import EVEN
 from velatura.model.straight_through import Passage
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
-OF_BOUNCED = 0.25
 MOST = 2.0  # energy over integral
 LEAST = 0.05  # share of samples of what passes that are scattered, for what all others miss
 
@@ -45,6 +46,16 @@ class Parts(ops.Named):
     of_straight: Value
     of_bounced: Value
     of_rest: Value
+    even: Value = EVEN[0]
+    cosine: Value = EVEN[1]
+    grazing: Value = EVEN[2]
+    once: Value = EVEN[3]
+    twice: Value = EVEN[4]
+
+    @property
+    def numbers(self) -> list[Value]:
+        """Those of diffuse light."""
+        return [self.even, self.cosine, self.grazing, self.once, self.twice]
 
     @property
     def share(self) -> Value:
@@ -60,15 +71,16 @@ def parts(
     passed: Array,
     reflected: Array,
     facets: Array | None = None,
+    numbers: Sequence[Array] = (),
+    peak: Array | float = 1.0,
 ) -> Parts:
     """In NumPy, for directions wi above, (N,) each, and energies (C, N): of light that passes straight through and
     after bounces, where it meets facets once and is not scattered; of all that passes; and of what is reflected, but
-    for the `facets` of a single interface: samples of these are those of a rough dielectric."""
+    for the `facets` of a single interface: samples of these are those of a rough dielectric. Diffuse light has the
+    `numbers` of `remainder.passing`, and samples of a weight up to `peak`."""
     i, lobe, found = bounced.seen_below(passage, wi), bounced.bounced(passage, wi), bounced.rest(passage, wi)
     straight = np.clip(straight, 0, passed)  # waves over the azimuth may lie below 0
-    bounces = np.clip(bounces, 0, passed - straight)
-    if found.lobe is None:
-        bounces = bounces + OF_BOUNCED * (passed - straight - bounces)
+    bounces = np.clip(bounced.share(lobe) * bounces, 0, passed - straight)
     # Divide energies by integrals, and hand over what they lack
     of_straight, passes = straight_through.integrals(passage, wi)
     of_bounced = own_medium.integral(lobe, i) if lobe else np.zeros_like(of_straight)
@@ -86,9 +98,10 @@ def parts(
     if facets is not None:
         drawn = straightly + ops.mean(facets)
     total = np.maximum(drawn + bouncing + scattered + back, ops.TINY)
-    bouncing, scattered = light(bouncing, total, weight_bounced), light(scattered, total, weight_rest)
+    bouncing, scattered = light(bouncing, total, weight_bounced), light(scattered, total, weight_rest * peak)
     total = np.maximum(drawn + bouncing + scattered + back, ops.TINY)
-    return Parts(weight_straight, weight_bounced, weight_rest, drawn / total, bouncing / total, scattered / total)
+    shares = drawn / total, bouncing / total, scattered / total
+    return Parts(weight_straight, weight_bounced, weight_rest, *shares, *numbers)
 
 
 def light(share: Array, total: Array, heaviest: Array) -> Array:
@@ -103,7 +116,7 @@ def eval_pdf(passage: Passage, of: Parts, wi: Direction, wo: Direction) -> tuple
     value, density = straight_through.eval_pdf(passage, wi, wo)
     value, density = of.straight * value, of.of_straight * density
     lobe = bounced.bounced(passage, wi)
-    also = [(of.rest, of.of_rest, bounced.eval_pdf_rest(bounced.rest(passage, wi), i, o))]
+    also = [(of.rest, of.of_rest, bounced.eval_pdf_rest(bounced.rest(passage, wi, of.numbers), i, o))]
     if lobe:
         also.append((of.bounced, of.of_bounced, own_medium.eval_pdf(lobe, i, o)))
     passes = (wi[2] > 0) & (wo[2] < 0)
@@ -124,7 +137,7 @@ def sample(passage: Passage, of: Parts, wi: Direction, u: Value, u1: Value, u2: 
     if lobe:
         wo = _chosen(u < probability, wo, _down(own_medium.sample(lobe, i, u1, u2)))
     again = ops.clip(ops.divide(u - begin, 1 - begin), 0.0, BELOW_ONE)
-    scattered = _down(bounced.sample_rest(bounced.rest(passage, wi), i, again, u1, u2))
+    scattered = _down(bounced.sample_rest(bounced.rest(passage, wi, of.numbers), i, again, u1, u2))
     return _chosen(u < begin, wo, scattered)
 
 

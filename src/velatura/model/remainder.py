@@ -28,6 +28,7 @@ Array = NDArray[np.floating]
 
 MOMENTS = (1.0, 2 / 3, 1 / 15)  # means of u over the projected disc
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # a and b, of C_ab
+EVEN = (1.0, 0.0, 0.0, 0.0, 0.0)  # numbers of light that passes evenly
 EXACT = 3.0  # weight of the energy of a direction beside that of nodes
 DARK = 1e-6  # albedo
 KEPT = 16  # sets of nodes whose deposits are kept
@@ -55,7 +56,7 @@ class Remainder(ops.Named):
     def unclipped(self, wi: Direction, wo: Direction) -> Value:
         """pi f(wi, wo), a colour, of directions above; negative in places."""
         z_i, z_o = wi[2], wo[2]
-        w_i, w_o = _grazing(z_i), _grazing(z_o)
+        w_i, w_o = grazing(z_i), grazing(z_o)
         s = -1 * (wi[0] * wo[0] + wi[1] * wo[1])
         twice = 2 * s * s - (1 - z_i * z_i) * (1 - z_o * z_o)
         once = self.c_01 * (z_i + z_o) + self.c_02 * (w_i + w_o)
@@ -85,7 +86,7 @@ class Remainder(ops.Named):
 
     def _at(self, z: Value) -> tuple[Value, Value, Value]:
         """Coefficients of u at the other cosine."""
-        w = _grazing(z)
+        w = grazing(z)
         return (
             self.c_00 + z * self.c_01 + w * self.c_02,
             self.c_01 + z * self.c_11 + w * self.c_12,
@@ -122,7 +123,7 @@ class Samples:
         """Share of samples by the root of the cosine: by how bright the horizon is, on the side of the mirror
         direction, beside the mean of all directions."""
         z, p2 = wi[2], 1 - wi[2] * wi[2]
-        w = _grazing(z)
+        w = grazing(z)
         horizon, everywhere = (c[0] + z * c[1] + w * c[2] for c in (self.horizon, self.everywhere))
         horizon = horizon + self.b * ops.sqrt(p2) + self.a * p2
         return ops.clip(BRIGHT * (ops.divide(horizon, everywhere) - 1), 0.0, 1.0)
@@ -137,7 +138,7 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
         cosines: of the directions, (M,).
         albedos: of the stack for these, (C, M); errors count relative to them.
     """
-    outside, even, deposits, once, twice = _of_nodes(nodes)
+    outside, even, deposits, once, twice = _of_nodes(nodes, 1.0)
     sine = np.sqrt(1 - cosines * cosines)[:, None]
     u = _basis(cosines)[..., None]
     # Columns (M, N) of each mode, and what their energies are (M,)
@@ -159,23 +160,43 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
     return Remainder(*np.stack(numbers, axis=-1))
 
 
+def passing(nodes: Nodes, measures: Array, n: float, sines: Array) -> Array:
+    """Numbers (5, M) of the light that passes, by direction: of its mean by u, and the tilts B and A, over its energy.
+
+    Args:
+        measures: (modes, N, M) as of `fit`; it leaves with momenta up to n.
+        sines: of the directions below, (M,).
+    """
+    leaves, even, deposits, once, twice = _of_nodes(nodes, n)
+    energy = measures[0].sum(axis=0)
+    mean, *others = measures[:, leaves] / np.maximum(energy, DARK)
+    rows = np.concatenate([even * np.array(deposits), EXACT * np.reshape(MOMENTS, (-1, 1))], axis=1).T
+    target = np.concatenate([even[:, None] * mean, np.full((1, len(sines)), EXACT)])
+    numbers = [*np.linalg.lstsq(rows, target, rcond=None)[0]]
+    for mode, deposit, sine in zip(others, (once, twice), (sines, sines * sines)):
+        numbers.append(2 / sine * ((even * even * deposit) @ mode) / np.sum((even * deposit) ** 2))
+    numbers += [0 * sines] * (5 - len(numbers))
+    return np.where(energy > DARK, numbers, np.reshape(EVEN, (-1, 1)))
+
+
 @functools.lru_cache(KEPT)
-def _of_nodes(nodes: Nodes) -> tuple[NDArray[np.integer], Array, list[Array], Array, Array]:
-    """Numbers of the nodes that leave, weights of their errors, and there, by function of u, deposits of all modes."""
-    outside = np.flatnonzero(nodes.p <= 1 + 1e-9)
-    even = 1 / np.sqrt(np.maximum(nodes.weights(1.0)[outside], 1 / QUADRATURE))
-    mean, once, twice = ([_deposited(nodes, m, a)[outside] for a in range(3 if m == 0 else 1)] for m in range(3))
-    return outside, even, mean, once[0], twice[0]
+def _of_nodes(nodes: Nodes, n: float) -> tuple[NDArray[np.integer], Array, list[Array], Array, Array]:
+    """Numbers of the nodes of light that leaves into an index n, weights of their errors, and there, by function of u,
+    deposits of all modes."""
+    leaves = np.flatnonzero(nodes.p <= n * (1 + 1e-9))
+    even = 1 / np.sqrt(np.maximum(nodes.weights(n)[leaves] / (n * n), 1 / QUADRATURE))
+    mean, once, twice = ([_deposited(nodes, m, a, n)[leaves] for a in range(3 if m == 0 else 1)] for m in range(3))
+    return leaves, even, mean, once[0], twice[0]
 
 
 def _rows(columns: Sequence[Array], weight: Array) -> Array:
     return np.stack([(weight * column).ravel() for column in columns], axis=-1)
 
 
-def _deposited(nodes: Nodes, mode: int, a: int) -> Array:
-    """Integral over p^2 in [0, 1] of p^mode u_a, shared among the nodes, (N,)."""
+def _deposited(nodes: Nodes, mode: int, a: int, n: float) -> Array:
+    """Integral over p^2 in [0, 1] of p^mode u_a, of momenta n p, shared among the nodes, (N,)."""
     p = np.sqrt((np.arange(QUADRATURE) + 0.5) / QUADRATURE)
-    index, shares, beyond = nodes.shares(p)
+    index, shares, beyond = nodes.shares(n * p)
     if mode % 2:
         shares = np.where(beyond, -shares, shares)
     function = p**mode * _basis(np.sqrt(1 - p * p))[a] / QUADRATURE
@@ -183,9 +204,9 @@ def _deposited(nodes: Nodes, mode: int, a: int) -> Array:
 
 
 def _basis(z: Array) -> Array:
-    return np.stack([np.ones_like(z), z, _grazing(z)])
+    return np.stack([np.ones_like(z), z, grazing(z)])
 
 
-def _grazing(z: Value) -> Value:
+def grazing(z: Value) -> Value:
     squared = (1 - z) * (1 - z)
     return squared * squared

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import exchange, own_medium, passed, remainder, straight_through, widths
+from velatura.model import bounced, exchange, own_medium, passed, remainder, straight_through, widths
+from velatura.model.bounced import Rest
 from velatura.model.context import Context, channels
 from velatura.model.models import Model
 from velatura.model.own_medium import Index
@@ -22,7 +23,7 @@ from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved_grid import COS_MIN, Folded, Grid
 from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import Made, Part, interfaces, parts
-from velatura.model.transport.energies import INCIDENCES, SAMPLES, energies, media_of
+from velatura.model.transport.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
 from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.model.widths import Tensor
@@ -251,7 +252,7 @@ class Solver:
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
         polynomial = Remainder(*(x[:, None] for x in vars(polynomial).values()))
         lobes, veils = solved.lobes[..., :count], solved.veils[..., :count]
-        rest, straight, bounced, through = (
+        rest, straight, bounces, through = (
             x[:, :count] for x in (solved.rest, solved.straight, solved.bounced, solved.passed)
         )
 
@@ -289,11 +290,12 @@ class Solver:
         total, left, passes = sum(shares), np.ones(count), None
         passage = self.passage(_slim(material), layout)
         if passage:
-            passes = passed.parts(passage, wi, straight, bounced, through, np.array([total]), facets)
+            *diffuse, peak = folded.around(_passing(passage, solved, folded.at_cosines[2]))
+            passes = passed.parts(passage, wi, straight, bounces, through, np.array([total]), facets, diffuse, peak)
             passes = _evenly(passes, least)
             left = np.maximum(1 - passes.share, 0)
-            straight, bounced, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
-            passes = replace(passes, straight=straight, bounced=bounced, rest=scattered)
+            straight, bounces, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
+            passes = replace(passes, straight=straight, bounced=bounces, rest=scattered)
         columns = Columns(
             [self._colours(weight) for weight in weights],
             [tuple(np.broadcast_to(x, count) for x in self._roughness(tensor)) for tensor in shown],
@@ -469,6 +471,27 @@ def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
     wo = numbers.sample((x, y, z), *low_discrepancy.square(EVENLY))
     values, share = numbers.unclipped((x, y, z), wo), wo[2] / (np.pi * numbers.density((x, y, z), wo))
     return (np.maximum(-values, 0) * share).mean(axis=-1), np.maximum(values * share, 0).max(axis=-1)
+
+
+def _passing(passage: Passage, solved: Energies, cosines: Array) -> Array:
+    """Numbers of light from directions wi that passes neither straight nor after bounces, and the largest weight of its
+    samples, (6, M)."""
+    wi = _of_cosines(INCIDENCES)
+    light = np.mean(solved.around - bounced.share(bounced.bounced(passage, wi)) * solved.again, axis=0)
+    sines = bounced.seen_below(passage, wi)[0]
+    at_incidences = remainder.passing(solved.nodes, light, float(ops.mean(bounced.bound(passage))), sines)
+    numbers = np.array([np.interp(cosines, INCIDENCES, each) for each in at_incidences])
+    o = low_discrepancy.fibonacci(EVENLY)
+    radius, phi = np.sqrt(o[0]), 2 * np.pi * o[1]
+    i = bounced.seen_below(passage, _of_cosines(cosines[:, None]))
+    evenly = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - o[0])
+    numbers = numbers / bounced.diffuse([*numbers[..., None]], i, evenly).mean(axis=-1)
+    value, density = bounced.eval_pdf_rest(Rest(None, 1.0, 1.0, [*numbers[..., None]]), i, evenly)
+    return np.concatenate([numbers, np.max(value / density, axis=-1)[None]])
+
+
+def _of_cosines(cosine: Array) -> Direction:
+    return np.sqrt(1 - cosine * cosine), 0 * cosine, cosine
 
 
 def _scale(energy: Array, albedo: Array) -> Array:

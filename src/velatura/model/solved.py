@@ -138,7 +138,7 @@ class Side:
         scale, rest = colour(), colour()
         passes, through, chance = None, None, 1 - sum(chances)
         if self.passage:
-            passes = Parts(colour(), colour(), colour(), *(number() for _ in range(3)))
+            passes = Parts(colour(), colour(), colour(), *(number() for _ in range(len(fields(Parts)) - 3)))
             through, chance = colour(), chance - passes.share
         return Columns(weights, roughness, chances, found, scale, ops.maximum(chance, 0.0), rest, passes, through)
 
@@ -210,7 +210,7 @@ class Seen:
         if passes is not None:
             scale = ops.divide(through / total, passes.share)
             chances = (scale * x for x in (passes.of_straight, passes.of_bounced, passes.of_rest))
-            passes = Parts(passes.straight, passes.bounced, passes.rest, *chances)
+            passes = replace(passes, **dict(zip(("of_straight", "of_bounced", "of_rest"), chances)))
         return Drawn(wanted, asked.transmission, [share / total for share in shares], passes)
 
     def part(self, k: int, i: Direction, o: Direction) -> tuple[Value, Value]:

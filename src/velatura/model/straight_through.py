@@ -102,7 +102,6 @@ class Passage:
 
     Of interfaces, `faces` are 1 for the last two that make a step of the index, or for the only one, else 0; `under`
     are 1 from the last of them on; `scattered` are 1 below the last medium that scatters, or the last rough interface.
-    `clear` is 1 where no medium scatters, else 0.
     """
 
     crossings: tuple[Crossing, ...]
@@ -110,7 +109,6 @@ class Passage:
     faces: tuple[Value, ...]
     under: tuple[Value, ...]
     scattered: tuple[Value, ...]
-    clear: Value
     bounces: bool
     is_cloudy: bool
 
@@ -152,9 +150,7 @@ def passage(
     last = min(scattering[-1], count - 1) if scattering else 1 + (count - 1 if rough is None else rough)
     scattered = tuple(float(k >= last) for k in range(count))
     is_cloudy = bool(scattering)
-    return Passage(
-        tuple(crossings), tuple(slabs), faces, under, scattered, float(not is_cloudy), bool(others), is_cloudy
-    )
+    return Passage(tuple(crossings), tuple(slabs), faces, under, scattered, bool(others), is_cloudy)
 
 
 def is_none(x: Value) -> bool:

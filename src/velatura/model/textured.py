@@ -163,7 +163,7 @@ def _bounded(found: Columns, summed: bool) -> Columns:
     total = sum(chances) + chance + sum(passes)
     if of:
         weights = (ops.maximum(x, 0.0) for x in (of.straight, of.bounced, of.rest))
-        of = Parts(*weights, *(x / total for x in passes))
+        of = Parts(*weights, *(x / total for x in passes), *of.numbers)
     return replace(
         found,
         weights=[ops.maximum(x, 0.0) for x in found.weights],

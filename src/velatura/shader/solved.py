@@ -209,15 +209,15 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
 
 
 def _flags(passage: Passage) -> list[Value]:
-    """Which interfaces shape the light that passes, and whether media leave it clear."""
-    return [*passage.faces, *passage.under, *passage.scattered, passage.clear]
+    """Which interfaces shape the light that passes."""
+    return [*passage.faces, *passage.under, *passage.scattered]
 
 
 def _any(passage: Passage, flags: Iterator[Value]) -> Passage:
     """A passage of any layout."""
     faces, under, scattered = (tuple(next(flags) for _ in passage.crossings) for _ in range(3))
     bounces = len(passage.crossings) > 1
-    return replace(passage, faces=faces, under=under, scattered=scattered, clear=next(flags), bounces=bounces)
+    return replace(passage, faces=faces, under=under, scattered=scattered, bounces=bounces)
 
 
 def _beams(sides: int, model: Model) -> list[Value]:

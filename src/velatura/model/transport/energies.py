@@ -62,6 +62,8 @@ class Energies:
             once and media do not scatter; and all of it.
         remainder: what is reflected in no lobe for beams of the cosines at which it is asked for, by mode of azimuth at
             the `nodes`, (C, MODES, N, I).
+        around: likewise what passes not straight through, and `again` of that what facets that are met once reflect
+            inside, without scattering media.
     """
 
     lobes: Array
@@ -71,6 +73,8 @@ class Energies:
     bounced: Array
     passed: Array
     remainder: Array
+    around: Array
+    again: Array
     nodes: Nodes
 
 
@@ -138,9 +142,13 @@ def energies(
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
     count = np.size(cos_theta)
     if brushed and len(incidences):
-        remainder = _of_isotropic(material, rest[:, count:], often, forward, made, incidences, samples, like)
+        by_node = _of_isotropic(material, rest[:, count:], often, forward, made, incidences, samples, like)
     else:
-        remainder = (total.columns - _sum(of_lobes(kept)).columns)[..., count:]
+        lights = (
+            total.columns - _sum(of_lobes(kept)).columns,
+            *(x.passed.columns - sharp.straight.columns for x in (full, sharp)),
+        )
+        by_node = tuple(light[..., count:] for light in lights)
     straight = sharp.energy(sharp.straight)
     return Energies(
         lobes=lobes[..., :count],
@@ -149,7 +157,9 @@ def energies(
         straight=straight[:, :count],
         bounced=np.maximum(sharp.energy(sharp.passed) - straight, 0)[:, :count],
         passed=np.maximum(full.energy(full.passed), 0)[:, :count],
-        remainder=remainder,
+        remainder=by_node[0],
+        around=by_node[1],
+        again=by_node[2],
         nodes=nodes,
     )
 
@@ -190,16 +200,17 @@ def _of_isotropic(
     made: Made,
     incidences: Array,
     *numbers: Any,
-) -> Array:
-    """The remainder of brushed interfaces, by mode and node: that of isotropic ones of the mean roughness, with the
-    energy that it has on average over azimuths.
+) -> tuple[Array, ...]:
+    """Light of brushed interfaces, by mode and node: that of isotropic ones of the mean roughness, the remainder with
+    the energy that it has on average over azimuths.
     """
     stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
     found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, *numbers)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
     # Columns that cancel out are rounding
     size = np.abs(found.remainder[:, 0]).sum(axis=1)
-    return found.remainder * (mean / np.maximum(np.maximum(found.rest, CANCELS * size), TINY))[:, None, None]
+    scale = (mean / np.maximum(np.maximum(found.rest, CANCELS * size), TINY))[:, None, None]
+    return found.remainder * scale, found.around, found.again
 
 
 def _isotropic(each: LayerValues) -> LayerValues:

@@ -32,6 +32,8 @@ GRAZING = 1e-4  # least cosine of light that meets an interface
 ALPHA_MIN = 1e-3
 BLOCK = 1 << 15  # samples at a time
 DIGITS = 9  # of lengths of momentum that are alike
+SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
+OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
 
@@ -214,17 +216,17 @@ def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
         once, first = (Layer(r, nothing, nothing, nothing) for r in above.r)
         if not above.blocked:
             return once, once
-        return once, replace(first, r=first.r + _again(above.blocked[0], above.blocked[0], setting))
+        return once, replace(first, r=first.r + _again(above.blocked[0], above.blocked[0], facets, setting))
     below = _Side.of(facets.reversed(), setting.dark)
     once, first = (Layer(*each) for each in zip(above.r, above.t, below.r, below.t))
     if not (above.blocked and below.blocked):
         return once, once
     (to_r, to_t), (back_to_r, back_to_t) = above.blocked, below.blocked
     return once, Layer(
-        first.r + _again(to_r, to_r, setting),
-        first.t + _again(to_t, back_to_t, setting),
-        first.r_below + _again(back_to_r, back_to_r, setting),
-        first.t_below + _again(back_to_t, to_t, setting),
+        first.r + _again(to_r, to_r, facets, setting),
+        first.t + _again(to_t, back_to_t, facets, setting),
+        first.r_below + _again(back_to_r, back_to_r, facets, setting),
+        first.t_below + _again(back_to_t, to_t, facets, setting),
     )
 
 
@@ -239,12 +241,14 @@ class _Blocked:
     """Shares of light that meets further facets, and in the end is reflected, or passes.
 
     Those of light from the nodes as functionals (C, modes, N), those of beams (C, M); `emitted` is light of one unit
-    that leaves in such directions, by reciprocity those in which light is blocked.
+    that leaves in such directions, by reciprocity those in which light is blocked. `sines` are those of the nodes, and
+    of beams.
     """
 
     nodes: Array
     beams: Array
     emitted: Array
+    sines: tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -321,20 +325,29 @@ class _Side:
         if setting.often is None:
             return cls(r, t, None)
         # Of nodes about the index of a medium some may have less than none
-        weights = np.maximum(basis.nodes.weights(float(ops.mean(facets.above))), 0)
+        n = float(ops.mean(facets.above))
+        weights = np.maximum(basis.nodes.weights(n), 0)
         blocked = []
+        sines = np.minimum(basis.nodes.p / n, 1), np.minimum(setting.p / n, 1)
         shares = [_again_shares(facets, setting, q, met) for q, met in ((p, at_nodes), (setting.p, of_beams))]
         for nodes, beams in zip(*shares):
             rows = basis.rows(nodes, turn)
             emitted = rows * weights
-            blocked.append(_Blocked(rows, beams, emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)))
+            emitted = emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)
+            blocked.append(_Blocked(rows, beams, emitted, sines))
         return cls(r, t, (blocked[0], blocked[1]))
 
 
-def _again(taken: _Blocked, there: _Blocked, setting: Setting) -> Operator:
-    """Light that is blocked at first, and leaves in the directions in which light is blocked `there`."""
-    outer = setting.basis.outer
-    return Operator.of(outer(there.emitted, taken.nodes), outer(there.emitted, taken.beams))
+def _again(taken: _Blocked, there: _Blocked, facets: Facets, setting: Setting) -> Operator:
+    """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
+    turn it, the more of it goes on as it came."""
+    turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (OPAQUE if facets.opaque else facets.step)
+    swing = SWING * float(np.exp(-SWING * turn))
+    nodes, beams = (
+        setting.basis.swung(setting.basis.outer(there.emitted, light), swing, there.sines[0], sines)
+        for light, sines in zip((taken.nodes, taken.beams), taken.sines)
+    )
+    return Operator.of(nodes, beams)
 
 
 def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> tuple[Array, Array]:

@@ -73,6 +73,11 @@ class Basis(ABC):
     def outer(self, emitted: Array, taken: Array) -> Array:
         """Matrices that emit as (C, modes, N) what (C, modes, N) takes, or columns for what (C, M) takes of beams."""
 
+    def swung(self, light: Array, swing: float, there: Array, here: Array) -> Array:
+        """Even light (C, families, n, sources) that goes on in the direction that it came in, by the sines `there` (N,)
+        and `here` (sources,): with 1 + swing (s cos(phi) + s^2 cos(2 phi)), s being their product."""
+        return light
+
     @abstractmethod
     def diagonal(self, values: Array) -> Array:
         """Matrices that scale light at the nodes by (C, N)."""
@@ -118,6 +123,11 @@ class Relative(Basis):
         found = np.zeros((len(emitted), self.count, self.nodes.count, taken.shape[-1]))
         found[:, 0] = emitted[:, 0, :, None] * taken.reshape(len(taken), 1, -1)
         return found
+
+    def swung(self, light: Array, swing: float, there: Array, here: Array) -> Array:
+        both = np.multiply.outer(there, here)
+        waves = [0.5 * swing * both**m * light[:, 0] for m in range(1, self.count)]
+        return np.stack([light[:, 0], *waves], axis=1)
 
     def diagonal(self, values: Array) -> Array:
         return values[:, None, :, None] * np.eye(self.nodes.count)
