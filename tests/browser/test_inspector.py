@@ -265,6 +265,49 @@ def test_validations_answer_their_sliders(visit: Look) -> None:
     assert "two bounces 0.300" in said.inner_text()
 
 
+def test_validations_of_brushed_interfaces_follow_the_material(visit: Look) -> None:
+    """Coated gold, brushed at the bottom: its numbers are taken, until they are changed by hand; the grid of pairs is
+    filled cell by cell, half walk, half model."""
+    tab(visit, "Validations")
+    page = visit.page
+    said = page.locator(".inspector .says")
+    choice = page.locator(".inspector .choice select")
+    said.wait_for()
+    choice.first.select_option(label="Anisotropic fetch")
+    slider = page.locator(".inspector input[name=alpha_v]")
+    until(visit, lambda: slider.input_value() == "0.3")
+    assert choice.nth(1).input_value() == "2"
+    page.evaluate(
+        """() => {
+          const { store } = velatura;
+          store.run((state) => ({ ...state, layers: state.layers.map((layer) =>
+            layer.id === 3 ? { ...layer, keys: { ...layer.keys, alpha: [0.1, 0.5] } } : layer) }));
+        }"""
+    )
+    until(visit, lambda: slider.input_value() == "0.5")
+    choice.nth(1).select_option("0")
+    until(visit, lambda: slider.input_value() == "0.05")
+    slider.fill("0.4")
+    until(visit, lambda: "stretched" in said.inner_text() and "0.4" in page.locator("output").all_inner_texts())
+
+    choice.first.select_option(label="Anisotropic lobe")
+    page.locator(".inspector .disc .truth").wait_for()
+    for name, value in (("alpha_u", "0.1"), ("alpha_v", "0.4"), ("angle", "70")):
+        page.locator(f".inspector input[name={name}]").fill(value)
+    until(visit, lambda: "turned by 6." in said.inner_text() or "turned by -6." in said.inner_text())
+
+    choice.first.select_option(label="Roughness pairs")
+    first = page.get_by_role("button", name="Alpha 0.02, 0.02: difference")
+    first.wait_for()
+    first.click()
+    until(visit, lambda: "Alpha 0.02, 0.02: Root mean square difference 0." in said.inner_text())
+    halves = page.evaluate(
+        """() => [0, 32].map((x) => document.querySelector('.roughnesses canvas').getContext('2d')
+          .getImageData(x, 0, 32, 64).data.reduce((a, b) => a + b, 0))"""
+    )
+    assert min(halves) > 32 * 64 * 256
+
+
 @pytest.mark.parametrize(("scheme", "width"), [("light", 380), ("dark", 1280)])
 def test_it_is_usable_in_a_narrow_window_and_in_the_dark(
     served: editor.Server, opened: Any, tmp_path: Path, scheme: str, width: int

@@ -176,6 +176,7 @@ KEYS: dict[str, Parameter] = {
     "switches": Fields("of the model"),
     "coarse": Flag("directions"),
     "lobe": Whole("which lobe of the target", high=LOBES - 1),
+    "layer": Whole("which layer of the material", high=LAYERS - 1),
     "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
     "point": Several("of a class", most=3),
     "map": Words("of a class"),

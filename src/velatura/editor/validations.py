@@ -1,4 +1,4 @@
-"""The model's assumptions beside the reference: the interactive validations of Belcour 2018's supplement, as numbers.
+"""The model's assumptions beside the reference: the interactive validations of the papers' supplements, as numbers.
 
 Each answers sliders with curves: those of kind `truth` are counted from random walks or evenly spread samples, with
 standard errors, those of kind `model` are the approximations of the recursion. Lobes are shown as densities across
@@ -8,14 +8,15 @@ that plane.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.editor.brushed_validations import PAGES, numbers_of
 from velatura.editor.messages import Answer, Body, Verb
+from velatura.editor.validation_page import Slider, Validation, alpha_slider, answer_of, axis_of, curve_of, in_words
 from velatura.errors import InvalidInput
 from velatura.stack import Interface, Medium, Stack
 from velatura.stack.schema import show, unknown
@@ -28,41 +29,24 @@ BINS = 64  # across the disc
 SMOOTH = 1e-3  # samples a roughness of 0
 
 
-@dataclass(frozen=True)
-class Slider:
-    """A number that may be chosen, and its meaning."""
-
-    doc: str
-    low: float
-    high: float
-    default: float
-
-
-@dataclass(frozen=True)
-class Validation:
-    """A page: its subject, its sliders by name, and the function that answers them."""
-
-    title: str
-    doc: str
-    sliders: Mapping[str, Slider]
-    answer: Callable[..., dict[str, Any]]
-
-
 def listed(body: Body) -> Answer:
-    """All `validations`: `name`, `title`, `doc`, and `sliders` by name, each with `doc`, `low`, `high`, `default`."""
-    return {
-        "validations": [
-            {"name": name, "title": v.title, "doc": v.doc, "sliders": {key: asdict(s) for key, s in v.sliders.items()}}
-            for name, v in VALIDATIONS.items()
-        ]
-    }
+    """All `validations`: `name`, `title`, `doc`, `of` (`Validation`), and `sliders` by name, each with `doc`, `low`,
+    `high`, `default`."""
+    return {"validations": [{"name": name, **_listed(page)} for name, page in VALIDATIONS.items()]}
+
+
+def _listed(page: Validation) -> Answer:
+    sliders = {key: asdict(slider) for key, slider in page.sliders.items()}
+    return {"title": page.title, "doc": page.doc, "of": page.of, "sliders": sliders}
 
 
 def validation(body: Body) -> Answer:
     """The answer of the validation `name` to `parameters`, those left out at their defaults.
 
-    `curves` of `label`, `kind` (truth or model), `x`, `y` and, where they are counted, standard `error`; `axes` x and y
-    with `label`, `low`, `high` (None: fitted); `says`, the numbers in words.
+    Where a page may take them from an interface, those of `layer` of `material` are the defaults, within the ranges of
+    the sliders. The answer has the `parameters` that it is of, and `curves` of `label`, `kind` (truth or model), `x`,
+    `y` and, where they are counted, standard `error`; `axes` x and y with `label`, `low`, `high` (None: fitted);
+    `says`, the numbers in words.
 
     Raises:
         InvalidInput: an unknown validation or parameter, or a parameter outside its range.
@@ -73,6 +57,10 @@ def validation(body: Body) -> Answer:
         raise InvalidInput(f"name: {unknown('validation', name, VALIDATIONS)}")
     chosen = VALIDATIONS[str(name)]
     values = {key: slider.default for key, slider in chosen.sliders.items()}
+    if chosen.of == "interface" and body.get("layer") is not None:
+        taken = {key: value for key, value in numbers_of(body).items() if key in values}
+        ranges = {key: (chosen.sliders[key].low, chosen.sliders[key].high) for key in taken}
+        values |= {key: min(max(value, ranges[key][0]), ranges[key][1]) for key, value in taken.items()}
     for key, value in given.items():
         if key not in values:
             raise InvalidInput(f"{name}: {unknown('parameter', key, values)}")
@@ -80,10 +68,11 @@ def validation(body: Body) -> Answer:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
             raise InvalidInput(f"{name}: {key}: must be a number in {low:g} to {high:g}, got {show(value)}")
         values[key] = float(value)
-    return chosen.answer(**values)
+    found = chosen.answer(**values, body=body) if chosen.of == "pairs" else chosen.answer(**values)
+    return {**found, "parameters": values}
 
 
-# The five pages
+# The five pages of Belcour 2018
 
 
 def reflection(alpha_1: float, alpha_2: float, angle: float) -> dict[str, Any]:
@@ -103,7 +92,7 @@ def reflection(alpha_1: float, alpha_2: float, angle: float) -> dict[str, Any]:
         f = MAPS[name]
         alphas[name] = float(f.roughness(np.float64(f.variance(alpha_1) + f.variance(alpha_2))))
         curves.append(_shape(f"one of {name}'s map", _lobe(sine, alphas[name]), "model"))
-    return _answer(curves, _ACROSS, f"Equivalent alpha: {_listed(alphas)}.")
+    return answer_of(curves, _ACROSS, f"Equivalent alpha: {in_words(alphas)}.")
 
 
 def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
@@ -123,7 +112,7 @@ def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
         assert lobe is not None
         alphas[label] = float(lobe.alpha[0, 0])
         curves.append(_shape(label, _lobe(refracted, alphas[label]), "model"))
-    return _answer(curves, _ACROSS, f"Equivalent alpha of the transmitted lobe: {_listed(alphas)}.")
+    return answer_of(curves, _ACROSS, f"Equivalent alpha of the transmitted lobe: {in_words(alphas)}.")
 
 
 def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
@@ -143,8 +132,8 @@ def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
         energies[model], alphas[model] = float(found.energy[0][0, 0]), float(found.alpha[0][0, 0])
         lobe = _lobe(sine, alphas[model])
         curves.append(_density(model, lobe, _total(lobe) / energies[model], "model"))
-    says = f"Energy: {_listed(energies)}. Equivalent alpha: {_listed(alphas)}."
-    return _answer(curves, {**_ACROSS, "y": _axis("energy across the disc")}, says)
+    says = f"Energy: {in_words(energies)}. Equivalent alpha: {in_words(alphas)}."
+    return answer_of(curves, {**_ACROSS, "y": axis_of("energy across the disc")}, says)
 
 
 def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
@@ -164,8 +153,11 @@ def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
         assert lobe is not None
         energies[label] = float(lobe.energy[0, 0])
         curves.append(_within(label, sine, _lobe(sine, float(lobe.alpha[0, 0])), "model"))
-    axes = {"x": _axis("turned by less than (\N{DEGREE SIGN})", 0, 90), "y": _axis("share of what comes through", 0, 1)}
-    return _answer(curves, axes, f"Energy that comes through: {_listed(energies)}.")
+    axes = {
+        "x": axis_of("turned by less than (\N{DEGREE SIGN})", 0, 90),
+        "y": axis_of("share of what comes through", 0, 1),
+    }
+    return answer_of(curves, axes, f"Energy that comes through: {in_words(energies)}.")
 
 
 def decoupling(eta: float, alpha: float) -> dict[str, Any]:
@@ -188,11 +180,11 @@ def decoupling(eta: float, alpha: float) -> dict[str, Any]:
     share = {"off": np.ones_like(inside)}
     for form in ("published", "clean"):
         share[form] = np.asarray(tables.tir(tables.load(), form, np.float64(1 / eta), inside, np.float64(alpha)))
-    curves = [_curve("integral", "truth", angles, leaves)]
-    curves += [_curve(f"tir={form}", "model", angles, straight * kept) for form, kept in share.items()]
+    curves = [curve_of("integral", "truth", angles, leaves)]
+    curves += [curve_of(f"tir={form}", "model", angles, straight * kept) for form, kept in share.items()]
     energies = {curve["label"]: curve["y"][0] for curve in curves}
-    axes = {"x": _axis("angle of incidence (\N{DEGREE SIGN})", 0, 90), "y": _axis("share that leaves", 0, 1)}
-    return _answer(curves, axes, f"At normal incidence: {_listed(energies)}.")
+    axes = {"x": axis_of("angle of incidence (\N{DEGREE SIGN})", 0, 90), "y": axis_of("share that leaves", 0, 1)}
+    return answer_of(curves, axes, f"At normal incidence: {in_words(energies)}.")
 
 
 def _compared(**switches: Any) -> dict[str, tuple[str, dict[str, Any]]]:
@@ -257,7 +249,7 @@ def _density(label: str, light: Light, whole: float, kind: str = "truth") -> dic
     scale = BINS / (2 * max(whole, 1e-9))
     counted, squared = (np.histogram(x, edges, weights=w)[0] for w in (weight, weight**2))
     error = scale * np.sqrt(squared) if kind == "truth" else None
-    return _curve(label, kind, (edges[1:] + edges[:-1]) / 2, scale * counted, error)
+    return curve_of(label, kind, (edges[1:] + edges[:-1]) / 2, scale * counted, error)
 
 
 def _within(label: str, sine: float, light: Light, kind: str = "truth") -> dict[str, Any]:
@@ -269,32 +261,11 @@ def _within(label: str, sine: float, light: Light, kind: str = "truth") -> dict[
     angles = np.arange(0, 91, 2.0)
     share = np.array([light[1][turned <= angle + 1e-2].sum() for angle in angles]) / max(_total(light), 1e-9)
     error = np.sqrt(np.maximum(share * (1 - share), 0) / max(len(turned), 1)) if kind == "truth" else None
-    return _curve(label, kind, angles, share, error)
+    return curve_of(label, kind, angles, share, error)
 
 
-def _curve(label: str, kind: str, x: Any, y: Any, error: Any = None) -> dict[str, Any]:
-    curve = {"label": label, "kind": kind, "x": np.asarray(x).tolist(), "y": np.asarray(y).tolist()}
-    return curve if error is None else {**curve, "error": error.tolist()}
-
-
-def _axis(label: str, low: float | None = 0.0, high: float | None = None) -> dict[str, Any]:
-    return {"label": label, "low": low, "high": high}
-
-
-def _answer(curves: list[dict[str, Any]], axes: dict[str, Any], says: str) -> dict[str, Any]:
-    return {"curves": curves, "axes": axes, "says": says}
-
-
-def _listed(numbers: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} {number:.3f}" for name, number in numbers.items())
-
-
-_ACROSS = {"x": _axis("sine of the outgoing angle", -1, 1), "y": _axis("density across the disc")}
+_ACROSS = {"x": axis_of("sine of the outgoing angle", -1, 1), "y": axis_of("density across the disc")}
 _ANGLE = Slider("angle of incidence, degrees", 0, 85, 30)
-
-
-def _alpha(doc: str, default: float) -> Slider:
-    return Slider(doc, 0, 0.9, default)
 
 
 VALIDATIONS: dict[str, Validation] = {
@@ -302,7 +273,11 @@ VALIDATIONS: dict[str, Validation] = {
         "Reflection",
         "Two rough mirrors face each other. Roughness does not add up, but the variances that a map makes of it should:"
         " one mirror of their sum, as a GGX lobe, stands for both. Smooth mirrors add nothing.",
-        {"alpha_1": _alpha("roughness of the first", 0.2), "alpha_2": _alpha("of the second", 0.3), "angle": _ANGLE},
+        {
+            "alpha_1": alpha_slider("roughness of the first", 0.2),
+            "alpha_2": alpha_slider("of the second", 0.3),
+            "angle": _ANGLE,
+        },
         reflection,
     ),
     "transmission": Validation(
@@ -310,14 +285,14 @@ VALIDATIONS: dict[str, Validation] = {
         "A rough interface spreads transmitted light less than reflected light. The model treats it as the "
         "reflection of the refracted direction by a roughness that is scaled, by the cosines at normal incidence or by "
         "the real ones.",
-        {"eta": Slider("relative index", 0.5, 3, 1.5), "alpha": _alpha("roughness", 0.3), "angle": _ANGLE},
+        {"eta": Slider("relative index", 0.5, 3, 1.5), "alpha": alpha_slider("roughness", 0.3), "angle": _ANGLE},
         transmission,
     ),
     "absorption": Validation(
         "Absorption",
         "Steep ways through a medium are shorter, so that absorption also moves and narrows a lobe. The model dims it "
         "as a whole, by the way of its mean direction.",
-        {"depth": Slider("optical depth", 0, 4, 0.5), "alpha": _alpha("roughness of the mirror below", 0.3)}
+        {"depth": Slider("optical depth", 0, 4, 0.5), "alpha": alpha_slider("roughness of the mirror below", 0.3)}
         | {"angle": _ANGLE},
         absorption,
     ),
@@ -334,9 +309,10 @@ VALIDATIONS: dict[str, Validation] = {
         "Of the light that a rough mirror scatters below a smooth coat, some is totally reflected. The model multiplies"
         " what leaves in the mean direction by one number from a table: published as the mean of 1 - F, which counts "
         "Fresnel twice, or clean, as the energy within the critical cone.",
-        {"eta": Slider("index of the coat", 1.05, 3, 1.5), "alpha": _alpha("roughness of the mirror", 0.3)},
+        {"eta": Slider("index of the coat", 1.05, 3, 1.5), "alpha": alpha_slider("roughness of the mirror", 0.3)},
         decoupling,
     ),
+    **PAGES,
 }
 
 #: What `service.VERBS` takes over.

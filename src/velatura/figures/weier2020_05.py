@@ -16,7 +16,7 @@ import numpy as np
 from velatura.api import lobes
 from velatura.figures import canvas
 from velatura.figures.bounces import Array, uniform
-from velatura.figures.disc import grid
+from velatura.figures.disc import Direction, grid
 from velatura.optics import fresnel, ggx
 from velatura.stack import Interface, Stack
 
@@ -37,12 +37,10 @@ def compute(side: int = 41, count: int = 4096, progress: Callable[[int, int], No
     x, y = (values.ravel() for values in grid(side))
     lit = x * x + y * y < 0.99
     x, y = x[lit], y[lit]
-    z = np.sqrt(1 - x * x - y * y)
-    albedo = {"truth": _averaged(x, y, z, count)}
+    wi = x, y, np.sqrt(1 - x * x - y * y)
+    albedo = {"truth": averaged(wi, ETA, ALPHA, count)}
     for name, (alpha, fetch) in canvas.track(list(COLUMNS.items()), progress):
-        stack = Stack([Interface(eta=ETA, alpha=alpha)])
-        modelled = lobes(stack, z, np.arctan2(y, x), model="weier2020", reflectance="split-sum", tir="off", fetch=fetch)
-        albedo[name] = modelled.energy[0][0]
+        albedo[name] = fetched(wi, ETA, alpha, fetch)
     error = {name: albedo[name] - albedo["truth"] for name in COLUMNS}
     return {
         "albedo": {name: _spread(values, lit, side) for name, values in albedo.items()},
@@ -50,13 +48,21 @@ def compute(side: int = 41, count: int = 4096, progress: Callable[[int, int], No
     }
 
 
-def _averaged(x: Array, y: Array, z: Array, count: int) -> Array:
-    """Schlick's Fresnel over visible normals, times the masking of what is reflected."""
+def fetched(wi: Direction, eta: float, alpha: Any, fetch: str) -> Array:
+    """Schlick's Fresnel averaged over an interface, as a model fetches it, for N directions (N,)."""
+    x, y, z = wi
+    choices = {"reflectance": "split-sum", "tir": "off", "fetch": fetch}
+    modelled = lobes(Stack([Interface(eta=eta, alpha=alpha)]), z, np.arctan2(y, x), model="weier2020", **choices)
+    return np.asarray(modelled.energy[0][0])
+
+
+def averaged(wi: Direction, eta: float, alpha: tuple[float, float], count: int) -> Array:
+    """The same by quadrature over `count` visible normals, times the masking of what is reflected."""
     u1, u2 = uniform(count)[:2, None]
-    u, v = (max(a, _SMOOTH) for a in ALPHA)
-    wi = x[:, None], y[:, None], z[:, None]
+    u, v = (max(a, _SMOOTH) for a in alpha)
+    wi = tuple(component[:, None] for component in wi)
     h = ggx.sample_visible(wi, u, v, u1, u2)
-    f = fresnel.schlick(np.minimum(ggx.dot(wi, h), 1), fresnel.normal_incidence(ETA))
+    f = fresnel.schlick(np.minimum(ggx.dot(wi, h), 1), fresnel.normal_incidence(eta))
     return np.asarray(np.mean(f * ggx.masking(ggx.reflect(wi, h), u, v), axis=1))
 
 

@@ -36,7 +36,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
   let problem = '';
   let stale = true;
   let frame = requestAnimationFrame(follow);
-  const validations = createValidations(call, paint);
+  const validations = createValidations({ call, store, session }, paint);
   const stops = [store.subscribe(paint), onLobes((name) => name in changed && (changed[name] = true))];
 
   const set = (changes) => {

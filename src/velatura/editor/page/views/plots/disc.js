@@ -13,7 +13,7 @@ export const SIZE = 192; // pixels of the picture
  * @param {object} plot
  * @param {string} plot.label
  * @param {Float32Array} plot.pixels of f cos, from the lower row on
- * @param {{k: number, dashed: boolean, points: number[][]}[]} plot.outlines
+ * @param {{k: number, look: ?string, dashed: boolean, points: number[][]}[]} plot.outlines `look`: not that of lobe k
  * @param {?number[]} plot.mark where the light comes from or goes on to
  * @param {?number[]} plot.cursor a point of the disc
  * @param {function(number[])} plot.onCursor
@@ -45,8 +45,8 @@ export function disc({ label, pixels, outlines, mark, cursor, onCursor }) {
     >
       <circle class="surface" r="1" />
       ${outlines.map(
-        ({ k, dashed, points }) =>
-          svg`<path class="line ${lookOf(k)} ${dashed ? 'dashed' : ''}" d="M${points.map(([x, y]) => `${x.toFixed(3)} ${(-y).toFixed(3)}`).join('L')}Z" />`,
+        ({ k, look = lookOf(k), dashed, points }) =>
+          svg`<path class="line ${look} ${dashed ? 'dashed' : ''}" d="M${points.map(([x, y]) => `${x.toFixed(3)} ${(-y).toFixed(3)}`).join('L')}Z" />`,
       )}
       ${mark && svg`<path class="mark" d="M${mark[0] - 0.04} ${-mark[1]}h.08m-.04-.04v.08" />`}
       ${cursor && svg`<circle class="cursor" cx=${cursor[0]} cy=${-cursor[1]} r="0.03" />`}
