@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Hashable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from velatura.stack import Address, Stack, Varying
 from velatura.stack.schema import unknown
 from velatura.tables import load
 
+if TYPE_CHECKING:  # it loads SciPy
+    from velatura.shader.solved import Tabulated
+
 #: Of an interface with a roughness for each axis, in the material that stands for all of its pattern.
 _STRETCHED = {"alpha_v": 0.2, "rotation": 30.0}
 
@@ -25,7 +28,8 @@ KEPT = 4  # shaders
 
 
 def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
-    """The code for a stack, its key, and the values that go in; equal keys mean equal code.
+    """The code for a stack, its key, and the values that go in; equal keys mean equal code. `closed_form` says that the
+    model would have the material solved, and that code does not.
 
     Args:
         stretched: whether any interface has a roughness for each axis, though the two may be equal now. Apart from that
@@ -54,8 +58,15 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         "transmitted": stack.transmits,
         "base": stack.base is not None,
         "thin": stack.thin,
+        "closed_form": bool(stack.interfaces) and model.adder is not model and _tabulated(made) is None,
         **_contents(stack, made),
     }
+
+
+def in_closed_form(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
+    """As `shading`, for all values, of what the model comes to without a solution."""
+    made = shading(stack, model.adder, stretched)
+    return {**made, "closed_form": bool(stack.interfaces) and model.adder is not model}
 
 
 def contents(stack: Stack, model: Model, stretched: bool, coarse: bool) -> dict[str, Any]:
@@ -66,10 +77,16 @@ def contents(stack: Stack, model: Model, stretched: bool, coarse: bool) -> dict[
 
 def _contents(stack: Stack, made: Shader, coarse: bool = False) -> dict[str, Any]:
     values = {address.name: _plain(address, value) for address, value in _free(stack, made)}
-    if made.baked is None or isinstance(made.baked, Bake):
+    tabulated = _tabulated(made)
+    if tabulated is None:
         return {"values": values, "solution": None}
-    found = made.baked.solve(stack, coarse, _lately(made.key))
+    found = tabulated.solve(stack, coarse, _lately(made.key))
     return {"values": values, "solution": {name: array(x) for name, x in vars(found).items()}}
+
+
+def _tabulated(made: Shader) -> Tabulated | None:
+    """Of a material that is solved."""
+    return None if isinstance(made.baked, Bake) else made.baked
 
 
 def _free(stack: Stack, made: Shader) -> list[tuple[Address, Any]]:

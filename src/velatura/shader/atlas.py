@@ -58,7 +58,7 @@ def texture(names: Collection[str]) -> np.ndarray:
     placed = layouts(names)
     filled = np.zeros((height(placed) * WIDTH, 4), np.float32)
     for layout in placed:
-        filled[layout.start : layout.end] = _texels(getattr(tables.load(), layout.name))
+        filled[layout.start : layout.end] = texels_of(layout.name)
     return filled.reshape(-1, WIDTH, 4)
 
 
@@ -68,8 +68,10 @@ def texels(name: str) -> int:
     return layout.texels
 
 
-def _texels(table: Table) -> np.ndarray:
-    """Nodes in order of their axes, channels filled up to whole texels; a single one is packed."""
+def texels_of(name: str) -> np.ndarray:
+    """The texels of a table, (count, 4): nodes in order of their axes, channels filled up to whole texels; a single one
+    is packed."""
+    table: Table = getattr(tables.load(), name)
     channels = table.data.shape[-1]
     flat = table.data.reshape(-1, channels)
     if channels == 1:

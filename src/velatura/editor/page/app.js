@@ -30,13 +30,14 @@ const COUNTED = 250; // milliseconds between two looks at the count of samples
  * Mounts an editor in an element.
  *
  * @param {HTMLElement} root
- * @param {{call: function, live: object, session: object, storage: object, fetch?: function, address?: string}}
+ * @param {{call: function, lacks?: function, live: object, session: object, storage: object, fetch?: function, address?: string}}
  *   services `session` is the answer of that call, `storage` of state/persist.js, `fetch` gets pictures by their
- *   addresses; `live` may be null where nothing can go offline; `address` is that of the page, where it has one.
+ *   addresses; `live` may be null where nothing can go offline; `lacks(name)` says why a verb or
+ *   another thing is not there, '' where it is; `address` is that of the page, where it has one.
  * @returns {object} `{store, session, live, viewport, canvas, element, shader, problems, quiet, drag, settle, openFile, openShared,
  *   destroy}`
  */
-export function mount(root, { call, live, session, storage, fetch, address = '' }) {
+export function mount(root, { call, lacks = nothingLacks, live, session, storage, fetch, address = '' }) {
   const document = root.ownerDocument, window = document.defaultView;
   const element = document.createElement('div');
   element.className = 'velatura';
@@ -69,7 +70,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   // The picture follows the state
 
   const picture = follow({
-    ...{ store, viewport, call, session, files },
+    ...{ store, viewport, call, lacks, session, files },
     onShader: update,
     onProblem(about, error) {
       if (!error) return messages.forgive(about);
@@ -80,7 +81,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     },
     onBaked: lobes.send,
   });
-  const ahead = lookAhead({ store, viewport, call, session, drawn: () => picture.drawn('a') });
+  const ahead = lookAhead({ store, viewport, call, lacks, session, drawn: () => picture.drawn('a') });
   const truth = followTruth({
     ...{ store, viewport, call },
     onProblem: (error) =>
@@ -92,7 +93,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   // The page follows both
 
   const toolbar = createToolbar({
-    ...{ store, session, call, live, address, files, messages, update, choose },
+    ...{ store, session, call, lacks, live, address, files, messages, update, choose },
     /** Opens a target that Python has answered, as a material that has it. */
     openTarget({ material, model, ...said }) {
       appearance.know(material, model, said);
@@ -106,16 +107,16 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     },
   });
   page = createPage({
-    ...{ store, session, storage, edits, messages, picture, canvas, focus, update, toolbar: toolbar.view },
-    layers: createLayers({ store, session, edits, messages, choose, upload: files.upload, focus, update }),
+    ...{ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
+    layers: createLayers({ store, session, lacks, edits, messages, choose, upload: files.upload, focus, update }),
     strip: createStrip({ store, snapshots, focus, update }),
     view: createView({ store, session, edits, picture, choose, takeEnvironment: files.takeEnvironment }),
-    model: createModel({ store, session }),
+    model: createModel({ store, session, lacks }),
     onFace: () => appearance.follow(),
   });
   update();
   const inspector = mountInspector(element.querySelector('.inspector-slot'), {
-    ...{ store, session, viewport, call, picture },
+    ...{ store, session, viewport, call, lacks, picture },
     onLobes: lobes.listen,
   });
   const appearance = mountAppearance(element.querySelector('.appearance-slot'), {
@@ -157,7 +158,7 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
   const away = 'The browser has taken the graphics device away: the picture follows when it is back.';
   canvas.addEventListener('webglcontextlost', () => messages.complain('device', away), { signal });
   canvas.addEventListener('webglcontextrestored', () => messages.forgive('device'), { signal });
-  root.addEventListener('keydown', (event) => onKey(event, { store, save: toolbar.saveAgain }), { signal });
+  root.addEventListener('keydown', (event) => onKey(event, { store, save: lacks('save') ? files.download : toolbar.saveAgain }), { signal });
   followTyping(element, { signal });
   element.addEventListener('input', () => messages.forgiveAll('passing'), { signal });
   root.addEventListener('dragover', (event) => event.preventDefault(), { signal });
@@ -196,6 +197,9 @@ export function mount(root, { call, live, session, storage, fetch, address = '' 
     },
   };
 }
+
+/** Why something is not there, where all is. */
+const nothingLacks = () => '';
 
 /** The material of the command line, or the last one of any tab, or the first preset. */
 function beginning(session, storage) {

@@ -9,10 +9,11 @@ const TYPES = {
 };
 
 /**
- * An array from {dtype, shape, data in base64}, flat; its shape beside it.
+ * An array from {dtype, shape, data in base64}, flat, or as it is from {array, shape}; its shape beside it.
  * @returns {{array: ArrayBufferView, shape: number[]}}
  */
-export function decode({ dtype, shape, data }) {
+export function decode({ dtype, shape, data, array = null }) {
+  if (array) return { array, shape };
   const type = TYPES[dtype];
   if (!type) throw new Error(`an array of ${dtype}, which is none of ${Object.keys(TYPES).join(', ')}`);
   return { array: new type(bytesOf(data).buffer), shape };

@@ -69,8 +69,8 @@ export function createFiles({ store, session, call, storage, messages, address, 
       messages.attempt('save', async () => files.save(file, (await call('open', { file })).version)),
     download: () =>
       messages.attempt('download', async () => {
-        const { text } = await call('write', { material: documentOf(store.get()) });
-        offer(new Blob([text], { type: 'application/yaml' }), files.nameOf('yaml'));
+        const { text, ending = 'yaml' } = await call('write', { material: documentOf(store.get()) });
+        offer(new Blob([text], { type: `application/${ending}` }), files.nameOf(ending));
       }),
     /** Hands what was written of the material to the browser, as a file with an ending. */
     give: (content, ending) => offer(new Blob([content]), files.nameOf(ending)),

@@ -1,16 +1,19 @@
-// The page's entry: connects to the server, mounts the editor, restores the last state.
+// The page's entry: connects to the server, or to the files beside the page; mounts the editor, restores the last state.
 
 import { mount } from './app.js';
 import { call, liveConnection } from './connection.js';
 import './editor.css';
+import { connectFiles } from './offline.js';
 import { browserStorage } from './state/persist.js';
 import { isShared } from './state/share.js';
 
 try {
-  const session = await call('session');
-  const live = liveConnection(`ws://${location.host}/api/live`);
+  const { answers } = document.documentElement.dataset; // where they lie in files
+  const client = answers ? await connectFiles(answers) : { call };
+  const session = await client.call('session');
+  const live = answers ? null : liveConnection(`ws://${location.host}/api/live`);
   window.velatura = mount(document.body, {
-    ...{ call, live, session, storage: browserStorage(window) },
+    ...{ ...client, live, session, storage: browserStorage(window) },
     address: location.origin + location.pathname,
   });
   openAddress();

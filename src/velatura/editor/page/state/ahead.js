@@ -1,4 +1,4 @@
-// Prepares possible next states while there is no input: one more layer of each kind.
+// Prepares possible next states while there is no input: one more layer of each kind, and other values of a solved one.
 
 import { addLayer } from './commands.js';
 import { documentOf, pattern } from './material.js';
@@ -6,7 +6,7 @@ import { documentOf, pattern } from './material.js';
 const PAUSE = 500; // milliseconds between two looks at whether there is time
 
 /** Follows a store: `{quiet, stop()}`; `drawn` returns the shape that the picture has. */
-export function lookAhead({ store, viewport, call, session, drawn }) {
+export function lookAhead({ store, viewport, call, lacks, session, drawn }) {
   const added = Object.entries(session.layers).map(([kind, { fresh }]) => [kind, fresh]);
   let ready = ''; // the shape that all is ready for
   let busy = false;
@@ -18,16 +18,17 @@ export function lookAhead({ store, viewport, call, session, drawn }) {
     if (shape !== ready && shape === drawn() && viewport.idle) {
       ready = shape;
       busy = true;
-      for (const layer of added) if (store.get() === state) await prepare(state, layer);
+      if (lacks('values')) await prepare(state, state, { coarse: true });
+      for (const layer of added) if (store.get() === state) await prepare(state, addLayer(state, ...layer));
       busy = false;
     }
     if (timer !== null) timer = setTimeout(look, PAUSE);
   }
 
-  async function prepare(state, layer) {
+  async function prepare(state, next, wishes) {
     const { model, switches } = state;
     try {
-      const shader = await call('shader', { material: documentOf(addLayer(state, ...layer)), model, switches });
+      const shader = await call('shader', { material: documentOf(next), model, switches, ...wishes });
       if (store.get() === state) await viewport.prepare(shader);
     } catch {
       // The reason is shown when the layer is added

@@ -54,8 +54,8 @@ class Slot {
     this.#wanted = { material, model, switches, shape };
     clearTimeout(this.#timer);
     this.#timer = null;
-    const { viewport, session } = this.#services, isSolved = Boolean(this.shader?.solution);
-    if (!known || (isSolved && !viewport.held)) return this.#ask();
+    const { viewport, session, lacks } = this.#services, isSolved = Boolean(this.shader?.solution);
+    if (!known || (isSolved && (!viewport.held || lacks('values')))) return this.#ask();
     this.#timer = setTimeout(() => {
       this.#timer = null;
       this.#ask();
@@ -160,8 +160,8 @@ function otherOf(state, session) {
  * Follows a store: `{shader(slot), drawn(slot), given(slot), stage, quiet, again(), stop()}`; `given` is the state that is
  * drawn, `stage` what takes time (`solving`, `compiling` or null), and `again` asks anew what could not be asked.
  */
-export function follow({ store, viewport, call, session, files, onProblem, onBaked, onShader }) {
-  const part = { viewport, call, session, onShader, onProblem, onBaked };
+export function follow({ store, viewport, call, lacks, session, files, onProblem, onBaked, onShader }) {
+  const part = { viewport, call, lacks, session, onShader, onProblem, onBaked };
   const slots = Object.fromEntries(Object.keys(viewport.slots).map((name) => [name, new Slot(name, part)]));
   const shown = {};
   let home = null; // the camera that the object's own view asks for

@@ -48,6 +48,7 @@ function known(view, session) {
 const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
 const isCamera = (camera) => isPoint(camera?.origin) && isPoint(camera.target) && Number.isFinite(camera.fov);
 
-async function through(stream, bytes) {
+/** Bytes after a stream that transforms them. */
+export async function through(stream, bytes) {
   return new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
 }

@@ -3,6 +3,7 @@
 import { html, nothing } from 'lit-html';
 import { live } from 'lit-html/directives/live.js';
 import { styleMap } from 'lit-html/directives/style-map.js';
+import { objection } from '../state/range.js';
 import { icons } from './icons.js';
 import { isTyping, release, text } from './typing.js';
 
@@ -45,17 +46,6 @@ export function spanOf({ low, high, strict }) {
   if (high - low > WIDE) return null;
   const margin = strict ? (high - low) / TICKS : 0;
   return [low + margin, high - margin];
-}
-
-/** What is wrong with a number, in words; empty where nothing is. */
-function objection(value, { low = null, high = null, strict = false }) {
-  if (!Number.isFinite(value)) return 'must be a number';
-  const outside = (low !== null && value < low) || (high !== null && value > high);
-  if (!outside && !(strict && (value === low || value === high))) return '';
-  const ends = strict ? ', both excluded' : '';
-  return high !== null
-    ? `must lie in ${low} to ${high}${ends}`
-    : `must be ${strict ? 'above' : 'at least'} ${low}`;
 }
 
 /** A field that takes a number within the range of `spec`, with steps by the arrow keys. */
@@ -113,11 +103,12 @@ export function number({ label, value, spec, edit, span = spanOf(spec), decades 
 // Choices --------------------------------------------------------------------------------------------
 
 /** A menu of `options`: values, or [value, title], or {group, options}. */
+/** A menu of names, of [name, title], or of [name, title, why it cannot be chosen]; `group` holds several. */
 export function menu({ label, value, options, choose }) {
   const option = (entry) => {
     if (entry.group) return html`<optgroup label=${entry.group}>${entry.options.map(option)}</optgroup>`;
-    const [key, title] = Array.isArray(entry) ? entry : [entry, entry];
-    return html`<option value=${key} .selected=${live(key === value)}>${title}</option>`;
+    const [key, title, lacks = ''] = Array.isArray(entry) ? entry : [entry, entry];
+    return html`<option value=${key} .selected=${live(key === value)} ?disabled=${lacks} title=${lacks}>${title}</option>`;
   };
   return html`<select aria-label=${label} @change=${({ target }) => choose(target.value)}>
     ${options.map(option)}
@@ -132,11 +123,11 @@ export function flag({ label, value, choose, title = '' }) {
 }
 
 /** A button that is a drawing; `pressed` makes it a switch. */
-export function iconButton({ label, icon, act, pressed = null, disabled = false, name = '', tabindex = 0 }) {
+export function iconButton({ label, icon, act, pressed = null, disabled = false, name = '', title = label, tabindex = 0 }) {
   return html`<button
     type="button"
     class="small ${name}"
-    title=${label}
+    title=${title}
     aria-label=${label}
     aria-pressed=${pressed ?? nothing}
     tabindex=${tabindex || nothing}

@@ -14,9 +14,9 @@ const TITLES = {
 };
 
 /** `view()`, and `show()`, which opens it. */
-export function createExports({ store, session, call, files, messages, update }) {
+export function createExports({ store, session, call, lacks, files, messages, update }) {
   const dialog = createRef();
-  const asked = { to: session.formats[0].name, fixed: false };
+  const asked = { to: session.formats.find(({ name }) => !lacks(name)).name, fixed: false };
   let made = null; // the answer of call("export")
 
   const show = () => {
@@ -40,12 +40,12 @@ export function createExports({ store, session, call, files, messages, update })
   function view() {
     const problem = messages.problems.find(({ about }) => about === 'export');
     const { fixed } = session.formats.find(({ name }) => name === asked.to);
-    const options = session.formats.map(({ name }) => [name, TITLES[name] ?? name]);
+    const options = session.formats.map(({ name }) => [name, TITLES[name] ?? name, lacks(name)]);
     return html`<dialog class="export" aria-label="Export" ${ref(dialog)}>
       <div class="head">
         ${menu({ label: 'Format', value: asked.to, options, choose: (to) => write({ to }) })}
         ${
-          fixed
+          fixed && !lacks('fixed')
             ? flag({
                 label: 'Fixed values',
                 value: asked.fixed,

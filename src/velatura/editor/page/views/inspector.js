@@ -25,10 +25,10 @@ const CHANNELS = ['red', 'green', 'blue'];
  * Shows the inspector in an element; it follows the store and what the viewport draws.
  *
  * @param {HTMLElement} element
- * @param {{store, session, viewport, call, picture, onLobes}} services `onLobes(f)` calls f(slot) after its lobes have changed
+ * @param {{store, session, viewport, call, lacks, picture, onLobes}} services `onLobes(f)` calls f(slot) after its lobes have changed
  * @returns {{destroy: function}}
  */
-export function mountInspector(element, { store, session, viewport, call, picture, onLobes }) {
+export function mountInspector(element, { store, session, viewport, call, lacks, picture, onLobes }) {
   let local = { tab: 'polar', angle: 45, azimuth: 0, below: false, logarithmic: true, cursors: {} };
   const slices = {}; // by slot
   const making = {}; // whether slices are on their way, by slot
@@ -111,6 +111,7 @@ export function mountInspector(element, { store, session, viewport, call, pictur
     stale = true;
   }
 
+  const lacksTab = (name) => (name === 'validations' ? lacks(name) : '');
   const page = () => html`<section class="inspector" aria-label="Look inside">
     <div class="tabs" role="tablist" @keydown=${step}>
       ${TABS.map(
@@ -120,6 +121,8 @@ export function mountInspector(element, { store, session, viewport, call, pictur
           aria-selected=${name === local.tab}
           aria-controls="inspected"
           tabindex=${name === local.tab ? 0 : -1}
+          ?disabled=${lacksTab(name)}
+          title=${lacksTab(name)}
           @click=${() => set({ tab: name })}
         >
           ${title}
@@ -135,8 +138,9 @@ export function mountInspector(element, { store, session, viewport, call, pictur
   function step(event) {
     const moves = { ArrowLeft: -1, ArrowRight: 1 };
     if (!(event.key in moves)) return;
-    const now = TABS.findIndex(({ name }) => name === local.tab);
-    const { name } = TABS[(now + moves[event.key] + TABS.length) % TABS.length];
+    const open = TABS.filter(({ name }) => !lacksTab(name));
+    const now = open.findIndex(({ name }) => name === local.tab);
+    const { name } = open[(now + moves[event.key] + open.length) % open.length];
     set({ tab: name });
     element.querySelector(`#inspect-${name}`).focus();
   }

@@ -17,7 +17,7 @@ import { titleOf } from './strip.js';
  * @param {object} parts views `toolbar`, `layers`, `strip`, `view` and `model` of what is in it, its `canvas`, and what it works on;
  *   `onFace()` is called after the panel has turned
  */
-export function createPage({ store, session, storage, edits, messages, picture, canvas, focus, update, onFace, ...parts }) {
+export function createPage({ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, onFace, ...parts }) {
   let face = 'layers'; // of the panel
   const layout = { ...LAYOUT, ...storage.layout() };
 
@@ -39,6 +39,7 @@ export function createPage({ store, session, storage, edits, messages, picture, 
       <div class="picture">
         ${canvas} ${compared({ store, session, edits, picture })}
         <span class="samples" aria-hidden="true"></span>
+        ${picture.shader('a')?.closed_form ? closedForm : nothing}
         ${bubbles(messages)}
       </div>
       <details
@@ -80,7 +81,7 @@ export function createPage({ store, session, storage, edits, messages, picture, 
       aria-label="Material and view"
       style=${styleMap({ '--panel': pixels(layout.panelWidth) })}
     >
-      ${faces({ face, show, focus })}
+      ${faces({ face, show, focus, lacks })}
       <div class="material">
       <div
         id="face-layers"
@@ -123,6 +124,9 @@ const [LOOK, PANEL] = [384, 352]; // where no hand has been
 const SMALLEST = 120;
 const NARROWEST = 280;
 
+const CLOSED_FORM =
+  'The model would be solved for this material by Python. The closed form is less exact: see the manual, Shaders.';
+
 const pixels = (size) => (size ? `${size}px` : '');
 
 const FACES = [
@@ -131,11 +135,13 @@ const FACES = [
 ];
 
 /** Two ways to the material: its layers, or what is seen of them. */
-function faces({ face, show, focus }) {
+function faces({ face, show, focus, lacks }) {
+  const lacksFace = (name) => (name === 'appearance' ? lacks(name) : '');
   const onKey = (event) => {
     if (event.key !== 'ArrowLeft' && event.key !== 'ArrowRight') return;
     event.preventDefault();
     const [other] = FACES.find(([name]) => name !== face);
+    if (lacksFace(other)) return;
     show(other);
     focus(`#tab-${other}`);
   };
@@ -148,6 +154,8 @@ function faces({ face, show, focus }) {
         aria-selected=${name === face}
         aria-controls="face-${name}"
         tabindex=${name === face ? 0 : -1}
+        ?disabled=${lacksFace(name)}
+        title=${lacksFace(name)}
         @click=${() => show(name)}
       >
         ${title}
@@ -155,6 +163,9 @@ function faces({ face, show, focus }) {
     )}
   </div>`;
 }
+
+/** What is drawn where a material is not solved. */
+const closedForm = html`<span class="form" title=${CLOSED_FORM}>closed form</span>`;
 
 const MESSAGES = 3; // at once
 

@@ -51,7 +51,7 @@ export function tintOf({ store, session, edits }, layer) {
 
 const standards = (schema) => Object.fromEntries(Object.entries(schema).map(([key, spec]) => [key, spec.default]));
 
-/** `services` are {session, edits, messages, choose, upload, spaces}; `spaces` holds the colours that are shown by hue. */
+/** `services` are {session, lacks, edits, messages, choose, upload, spaces}; `spaces` holds the colours that are shown by hue. */
 export function parameter(services, layer, key) {
   const { session, edits } = services;
   const spec = session.schema[layer.kind][key];
@@ -61,7 +61,7 @@ export function parameter(services, layer, key) {
   const edit = edits.of(`${layer.id}.${key}`, act, `layer.${layer.id}`, layer.id);
   const context = { services, layer, key, label, spec, value, edit, records: session.schema };
   const { control, extras } = FORMS[spec.kind](context);
-  const takes = spec.texturable ? textureTarget(context) : {};
+  const takes = spec.texturable && !services.lacks('texture') ? textureTarget(context) : {};
   return html`<div
     class="parameter"
     title=${explained(key, spec)}
@@ -181,15 +181,15 @@ function pair(context) {
 
 /** Rotation: an angle, a texture, or a field of directions. */
 function angle(context) {
-  const { label, value, spec, edit, records } = context;
+  const { label, value, spec, edit, records, services } = context;
   if (isTexture(value)) return textured(context);
   const straight = !isBrushing(value);
-  const kinds = ['straight', ...records.brushing.brushing.options];
+  const fields = records.brushing.brushing.options.map((kind) => [kind, kind, services.lacks('texture')]);
   const choose = (kind) => edit.set(kind === 'straight' ? 0 : { ...(straight ? {} : value), brushing: kind });
   const brushing = menu({
     label: `${label}, brushing`,
     value: straight ? 'straight' : value.brushing,
-    options: kinds,
+    options: ['straight', ...fields],
     choose,
   });
   const part = (key) => {
@@ -238,7 +238,9 @@ function textureButton({ services, label, edit, spec }) {
     const file = await services.choose('image/*,.exr,.hdr');
     if (file) putTexture(services, file, edit);
   };
-  return iconButton({ label: `${label}: take a texture`, icon: 'texture', act });
+  const lacks = services.lacks('texture');
+  const words = `${label}: take a texture`;
+  return iconButton({ label: words, icon: 'texture', act, disabled: Boolean(lacks), title: lacks || words });
 }
 
 function textureTarget({ services, edit }) {

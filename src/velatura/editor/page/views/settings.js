@@ -98,7 +98,7 @@ function lobes({ store, session, picture }) {
 /** A view of the model, and of what it is compared with. */
 export const createModel = (services) => () => model(services);
 
-function model({ store, session }) {
+function model({ store, session, lacks }) {
   const { model, switches, view } = store.get();
   const { switches: choices, defaults } = session.models.find(({ name }) => name === model);
   const models = session.models.map(({ name, title }) => [name, title]);
@@ -112,7 +112,7 @@ function model({ store, session }) {
   const chooseOther = (name) =>
     name && store.run(setView, { other: name === TRUTH.name ? { truth: true, title: TRUTH.title } : { model: name } });
   const compared = view.other?.truth ? TRUTH.name : pinned.length ? '' : other;
-  const others = [...pinned, ...models, [TRUTH.name, TRUTH.title]];
+  const others = [...pinned, ...models, [TRUTH.name, TRUTH.title, lacks('truth')]];
   const offered = Object.entries(choices).filter(([, options]) => options.length > 1);
   const selector = ([key, options]) => {
     const titles = options.map((option) => [option, option + (option === defaults[key] ? ' (default)' : '')]);
@@ -139,7 +139,7 @@ function model({ store, session }) {
     </div>
     <details class="switches">
       <summary>Switches</summary>
-      ${offered.map(selector)}
+      ${lacks('switches') || offered.map(selector)}
     </details>
   `;
 }

@@ -36,9 +36,11 @@ function toolbar(bar) {
       <h1 class="brand">Velatura</h1>
       <button type="button" @click=${bar.files.begin} title="A coat over a diffuse base">New</button>
       <button type="button" @click=${() => openDialog(bar)}>Open</button>
-      <button type="button" @click=${bar.saveAgain} title="Ctrl-S">Save</button>
-      <button type="button" @click=${bar.saveAs}>Save as</button>
-      <button type="button" @click=${bar.files.download} title="Download as YAML">Download</button>
+      <button type="button" ?disabled=${bar.lacks('save')} @click=${bar.saveAgain} title=${bar.lacks('save') || 'Ctrl-S'}>
+        Save
+      </button>
+      <button type="button" ?disabled=${bar.lacks('save')} @click=${bar.saveAs} title=${bar.lacks('save')}>Save as</button>
+      <button type="button" @click=${bar.files.download} title="Download as a file">Download</button>
       ${
         bar.address
           ? html`<button type="button" @click=${bar.files.share} title="Copy an address that opens this material">
@@ -72,9 +74,9 @@ async function openDialog(bar) {
   bar.sought = '';
   bar.update();
   bar.dialogs.open.value.showModal();
-  await bar.messages.attempt('list', async () => (bar.listed = (await bar.call('list', {})).files));
+  if (!bar.lacks('list')) await bar.messages.attempt('list', async () => (bar.listed = (await bar.call('list', {})).files));
   bar.update();
-  await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
+  if (!bar.lacks('targets')) await bar.messages.attempt('targets', async () => (bar.targets ??= (await bar.call('targets', {})).targets));
   bar.update();
 }
 
@@ -117,8 +119,8 @@ function openPanel(bar) {
       <button type="button" @click=${close}>Cancel</button>
     </div>
     ${groups.map((name) => some(name, byTitle(presets.filter(({ group }) => group === name))))}
-    ${some('Files of the folder', listed, html`<p>${bar.listed ? 'There are none.' : 'Reading the folder.'}</p>`)}
-    ${some('From the papers', targets, html`<p>On their way.</p>`)}
+    ${some('Files of the folder', listed, html`<p>${bar.lacks('list') || (bar.listed ? 'There are none.' : 'Reading the folder.')}</p>`)}
+    ${some('From the papers', targets, html`<p>${bar.lacks('targets') || 'On their way.'}</p>`)}
   </dialog>`;
 }
 

@@ -1,0 +1,259 @@
+"""The editor as a folder of files that any web server can host: the page, and the answers that it needs of Python.
+
+Answers are those of the verbs of `velatura.editor.service`, worked out once, each in a file: gzip, JSON inside. Shaders
+are those of all orders of a few layers, in closed form, whose values the page sets; presets lie there solved as well.
+The page finds them by `page/offline.js`.
+"""
+
+from __future__ import annotations
+
+import functools
+import gzip
+import itertools
+import json
+import multiprocessing
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from velatura import files
+from velatura.editor import bundle
+from velatura.editor.messages import Answer, array, document
+from velatura.editor.service import ENVIRONMENTS, VERBS
+from velatura.editor.shading import in_closed_form, pattern
+from velatura.errors import InvalidInput
+from velatura.model import MODELS, Model, named
+from velatura.scenes.objects import OBJECTS
+from velatura.shader import atlas, shader
+from velatura.stack import Stack, preset, presets
+from velatura.stack.layers import KINDS
+
+LAYERS = 4  # of a material, at most
+DATA = "data"  # the folder of answers
+SESSION = f"{DATA}/session.pack"  # by which a folder is known to be one of these
+WORTH = 80  # tasks of a process
+
+#: What the page is told in its text: where answers lie.
+_MARK = '<html lang="en">', f'<html lang="en" data-answers="{DATA}/">'
+
+
+class Made(NamedTuple):
+    """Contents of files, by their places in the folder, and the names of tables that shaders in them look up."""
+
+    contents: dict[str, bytes]
+    looked_up: frozenset[str] = frozenset()
+
+
+class Order(NamedTuple):
+    """Kinds of layers from the top, whether interfaces are brushed, and whether all is a thin pane."""
+
+    kinds: tuple[str, ...]
+    brushed: bool = False
+    thin: bool = False
+
+    @property
+    def name(self) -> str:
+        """In which the page asks for it."""
+        return "-".join([*self.kinds, *(["brushed"] if self.brushed else []), *(["thin"] if self.thin else [])])
+
+    @property
+    def stack(self) -> Stack:
+        """One with values. Raises InvalidInput where layers cannot lie in this order."""
+        return Stack.from_dict({"layers": [_EXAMPLES[kind] for kind in self.kinds], "thin": self.thin})
+
+    @classmethod
+    def of(cls, stack: Stack) -> Order:
+        brushed = any(isinstance(layer.alpha, tuple) for layer in stack.interfaces)
+        return cls(stack.kinds, brushed, stack.thin)
+
+
+_EXAMPLES: dict[str, Answer] = {
+    "dielectric": {"interface": {"eta": 1.5}},
+    "conductor": {"interface": {"eta": 1.5, "k": 1.0}},
+    "mirror": {"interface": {"conductor": "mirror"}},
+    "medium": {"medium": {}},
+    "diffuse": {"diffuse": {}},
+}
+
+
+def write(
+    folder: str | Path,
+    progress: Callable[[int, int], None] | None = None,
+    layers: int = LAYERS,
+    models: Sequence[Model] = MODELS,
+) -> dict[str, int]:
+    """Write the editor to a folder, which is made unless it is there.
+
+    Args:
+        folder: a new folder, an empty one, or one that was written by this function, which is replaced.
+        progress: called with (steps done, all steps) now and then.
+        layers: of a material, at most, unless it has the layers of a preset.
+        models: those that materials are shown by.
+
+    Returns:
+        The size of every file, in bytes, by its place in the folder.
+
+    Raises:
+        InvalidInput: the folder has other files in it, or cannot be written; nothing has been changed.
+        MissingTool: the page is missing.
+    """
+    page, place = bundle.require(), Path(folder)
+    _check(place)
+    existed = place.is_dir()
+    try:
+        place.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".velatura-", dir=place, ignore_cleanup_errors=True) as unfinished:
+            sizes = _write(page, Path(unfinished), progress, layers, models)
+            for made in sorted(Path(unfinished).iterdir()):
+                _replace(made, place / made.name)
+    except OSError as error:
+        raise InvalidInput(f"{place}: cannot be written: {files.reason(error)}") from None
+    finally:
+        if not existed and place.is_dir() and not any(place.iterdir()):
+            place.rmdir()
+    return sizes
+
+
+def _check(folder: Path) -> None:
+    """Raise InvalidInput where the page cannot go to a folder."""
+    if not folder.parent.is_dir():
+        raise InvalidInput(f"{folder}: there is no folder {folder.parent}")
+    if folder.exists() and not folder.is_dir():
+        raise InvalidInput(f"{folder}: is a file; name a new folder, or an empty one")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / SESSION).is_file():
+        raise InvalidInput(f"{folder}: holds other files; name a new folder, or an empty one")
+
+
+def _replace(made: Path, place: Path) -> None:
+    if place.is_dir():
+        shutil.rmtree(place)
+    os.replace(made, place)
+
+
+def _write(
+    page: Path, folder: Path, progress: Callable[[int, int], None] | None, layers: int, models: Sequence[Model]
+) -> dict[str, int]:
+    sizes: dict[str, int] = {}
+
+    def put(contents: Mapping[str, bytes]) -> None:
+        for name, data in contents.items():
+            target = folder / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+            sizes[name] = len(data)
+
+    # The page
+    for path in sorted(page.rglob("*")):
+        if path.is_file() and path.suffix != ".map" and not path.name.startswith("widget."):
+            put({path.relative_to(page).as_posix(): path.read_bytes()})
+    put({"index.html": (page / "index.html").read_text("utf-8").replace(*_MARK).encode()})
+
+    # Answers
+    refusals = _refusals(layers)
+    put(_common(refusals, models))
+    tasks = _tasks([order for order, refusal in refusals.items() if not refusal], models)
+    looked_up = set[str]()
+    for done, made in enumerate(_all_made(tasks), 1):
+        put(made.contents)
+        looked_up |= made.looked_up
+        if progress:
+            progress(done, len(tasks))
+    put(_tables(looked_up))
+    return sizes
+
+
+def _tasks(plain: Sequence[Order], models: Sequence[Model]) -> list[Callable[[], Made]]:
+    brushed = [order._replace(brushed=True) for order in plain if order.stack.interfaces]
+    solved = [model.name for model in models if model.adder is not model]
+    return [
+        *(functools.partial(_shader, model.name, order) for model in models for order in [*plain, *brushed]),
+        *(functools.partial(_solved, model, name) for model in solved for name in presets()),
+    ]
+
+
+def _all_made(tasks: Sequence[Callable[[], Made]]) -> Iterator[Made]:
+    """In as many processes as are worth their start."""
+    processes = min(os.cpu_count() or 1, len(tasks) // WORTH)
+    if processes < 2:
+        yield from map(_made, tasks)
+        return
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(_made, tasks, chunksize=8)
+
+
+def _made(task: Callable[[], Made]) -> Made:
+    return task()
+
+
+# Answers -------------------------------------------------------------------------------------------------------------
+
+
+def _common(refusals: Mapping[Order, str], models: Sequence[Model]) -> dict[str, bytes]:
+    """What does not depend on a material."""
+    begun = VERBS["session"]({})
+    names = [model.name for model in models]
+    environments = [{**each, "url": each["url"] and each["url"].lstrip("/")} for each in begun["environments"]]
+    offered = {
+        "models": [each for each in begun["models"] if each["name"] in names],
+        "environments": environments,
+        "orders": {order.name: refusal for order, refusal in refusals.items()},
+    }
+    objects = {f"{DATA}/object/{name}.pack": packed(VERBS["object"]({"name": name})) for name in OBJECTS}
+    lights = {f"{DATA}/environment/{name}.pack": packed(VERBS["environment"]({"name": name})) for name in ENVIRONMENTS}
+    return {SESSION: packed({**begun, **offered}), **objects, **lights}
+
+
+def _refusals(layers: int) -> dict[Order, str]:
+    """Every order of so many layers, or of a preset, and why they cannot lie in it; empty where they can."""
+    words = [word for count in range(1, layers + 1) for word in itertools.product(KINDS, repeat=count)]
+    every = [order for word in words for order in (Order(word), Order(word, thin=True))]
+    own = (Order.of(preset(name))._replace(brushed=False) for name in presets())
+    return {order: _refusal(order) for order in dict.fromkeys([*every, *own])}
+
+
+def _refusal(order: Order) -> str:
+    try:
+        _ = order.stack
+    except InvalidInput as error:
+        return str(error)
+    return ""
+
+
+def _shader(model: str, order: Order) -> Made:
+    """The shaders of an order of layers in closed form: that which the page draws, and that which it exports."""
+    chosen, stack = named(model), order.stack
+    drawn = in_closed_form(stack, chosen, order.brushed)
+    written = shader(pattern(stack, order.brushed), chosen.adder)
+    exported = {"text": written.text, "tables": ",".join(written.looked_up) or None}
+    names = [*written.looked_up, *(drawn["tables"] or "").split(","), *(drawn["baked"] or {}).get("tables", [])]
+    made = {"shader": drawn, "glsl": exported}
+    return Made(
+        {f"{DATA}/{verb}/{model}/{order.name}.pack": packed(answer) for verb, answer in made.items()},
+        frozenset(filter(None, names)),
+    )
+
+
+def _solved(model: str, name: str) -> Made:
+    """A preset as it is solved."""
+    answer = VERBS["shader"]({"material": document(preset(name)), "model": model})
+    return Made({f"{DATA}/solved/{model}/{name}.pack": packed(answer)})
+
+
+def _tables(names: Iterable[str]) -> dict[str, bytes]:
+    """Tables, and their texels as they lie one after another in a texture."""
+    known = {f"{DATA}/table/{name}.pack": packed(VERBS["table"]({"name": name})) for name in names}
+    return known | {f"{DATA}/texels/{name}.pack": packed({"texels": array(atlas.texels_of(name))}) for name in names}
+
+
+def packed(answer: Any) -> bytes:
+    """An answer as a file holds it."""
+    return gzip.compress(json.dumps(answer, allow_nan=False, separators=(",", ":")).encode(), mtime=0)
+
+
+def unpacked(data: bytes) -> Any:
+    """The answer in a file."""
+    return json.loads(gzip.decompress(data))

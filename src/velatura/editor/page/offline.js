@@ -1,0 +1,134 @@
+// The page without a server: answers that Python has worked out once (velatura/editor/offline.py), and what the page
+// itself can say. It knows the same verbs as connection.js; what it lacks needs Python.
+
+import { decode } from './arrays.js';
+import { Offline, Refused } from './connection.js';
+import { Recent } from './recent.js';
+import { check } from './state/check.js';
+import { flat, layersOf, variantOf } from './state/material.js';
+import { contentsOf } from './state/picture.js';
+import { through } from './state/share.js';
+
+const KEPT = 64; // answers
+const WIDTH = 1024; // texels in a line of tables
+const KINDS = { metal: 'conductor', custom: 'conductor' }; // where Python's names differ from those of variants
+const OFFERED = new Set(['glsl']); // what is there besides verbs
+const PYTHON = 'Needs Python: velatura edit';
+
+/** A client of the files in a folder: `call(verb, body)`, and `lacks(name)`, why a verb or another thing is not there, or ''. */
+export async function connectFiles(folder) {
+  const kept = new Recent(KEPT);
+  const load = (name) => kept.once(name, () => unpacked(`${folder}${name}.pack`));
+  const session = await load('session');
+  const { orders } = session;
+
+  /** The name of a material's order of layers. Raises Refused where there is no material of that order. */
+  function orderOf(material) {
+    const { layers, thin } = read(material);
+    const kinds = layers.map((layer) => KINDS[variantOf(layer)] ?? variantOf(layer));
+    const pane = thin ? ['thin'] : [];
+    const refusal = orders[[...kinds, ...pane].join('-')] ?? 'So many layers need Python: velatura edit.';
+    if (refusal) throw refused(refusal);
+    const brushed = layers.some(({ keys }) => Array.isArray(keys.alpha)) ? ['brushed'] : [];
+    return [...kinds, ...brushed, ...pane].join('-');
+  }
+
+  /** A document as the state has it. Raises Refused where it is no material. */
+  function read(material) {
+    try {
+      check(material, session);
+    } catch ({ message }) {
+      throw refused(message);
+    }
+    return { exterior: 1, thin: false, ...material, layers: layersOf(material) };
+  }
+
+  /** The preset of a model that is solved, as it was solved; else the shader in closed form, as it is for `coarse`. */
+  async function shader({ material, model, switches = {}, coarse = false }) {
+    if (Object.keys(switches).length) throw refused('Switches of a model need Python: velatura edit.');
+    const found = await load(`shader/${model}/${orderOf(material)}`);
+    const preset = session.presets.find((known) => isSame(known.material, material));
+    if (found.closed_form && preset && !coarse) return load(`solved/${model}/${preset.name}`);
+    return { ...found, values: contentsOf(found, read(material), session).values };
+  }
+
+  /** Tables one after another, in the lines of a texture. */
+  async function tables({ key }) {
+    const parts = await Promise.all(key.split(',').map((name) => load(`texels/${name}`)));
+    const texels = parts.map((part) => decode(part.texels).array);
+    const height = Math.ceil(texels.reduce((sum, { length }) => sum + length, 0) / (4 * WIDTH));
+    const array = new Float32Array(4 * WIDTH * height);
+    let begin = 0;
+    for (const each of texels) {
+      array.set(each, begin);
+      begin += each.length;
+    }
+    return { texture: { array, shape: [height, WIDTH, 4] } };
+  }
+
+  /** The shader in closed form, with the values of the material in the place of those that it was printed with. */
+  async function written({ material, model, to }) {
+    const { text, tables: key } = await load(`${to}/${model}/${orderOf(material)}`);
+    const values = flat(read(material), session);
+    const put = (line, begin, place) => `${begin}${literal(values[place.replace('.', '_')], line.includes('vec3'))};`;
+    const beside = key && { '.tables.bin': (await tables({ key })).texture };
+    return { text: text.replace(/^( *m\.([\w.]+) = ).*;$/gm, put), ending: `.${to}`, beside: beside ?? {} };
+  }
+
+  const file = (verb) => ({ name }) => load(`${verb}/${name}`);
+  const answers = {
+    session: async () => session,
+    shader,
+    tables,
+    table: file('table'),
+    object: file('object'),
+    environment: file('environment'),
+    async read({ text, file = 'the text' }) {
+      const material = parsed(text, file);
+      orderOf(material);
+      return { material };
+    },
+    write: async ({ material }) => ({ text: `${JSON.stringify(material, null, 2)}\n`, ending: 'json' }),
+    export: written,
+  };
+  return {
+    async call(verb, body = {}) {
+      if (!answers[verb]) throw refused(PYTHON);
+      return answers[verb](body);
+    },
+    lacks: (name) => (answers[name] || OFFERED.has(name) ? '' : PYTHON),
+  };
+}
+
+const refused = (message) => new Refused(message, 422);
+
+/** What is in a file of an answer. */
+async function unpacked(address) {
+  const response = await fetch(address).catch(() => {
+    throw new Offline();
+  });
+  if (!response.ok) throw new Error(`${address}: not found`);
+  const bytes = await through(new DecompressionStream('gzip'), await response.arrayBuffer());
+  return JSON.parse(new TextDecoder().decode(bytes));
+}
+
+function parsed(text, file) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    throw refused(`${file}: is not JSON, and YAML needs Python: velatura edit`);
+  }
+}
+
+/** Whether two documents are one material, but for its name. */
+function isSame(a, b) {
+  const what = ({ layers, exterior = 1, thin = false }) => JSON.stringify([layers, exterior, thin]);
+  return what(a) === what(b);
+}
+
+/** A number, or a colour, as GLSL has it. */
+function literal(value, wide) {
+  const number = (x) => (/[.e]/.test(x) ? String(x) : `${x}.0`);
+  if (!wide) return number(value);
+  return `vec3(${[value].flat().map(number).join(', ')})`;
+}

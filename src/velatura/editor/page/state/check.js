@@ -1,0 +1,38 @@
+// Whether a document is a material, by the parameters that the session declares.
+
+import { objection } from './range.js';
+
+const SEVERAL = { pair: 2, colour: 3, index: 3 }; // numbers that a parameter may have
+
+/** Raises Error in one line where a document holds what no material has, or what needs Python. */
+export function check(material, { schema, names }) {
+  const { layers, ...whole } = Object(material);
+  if (!Array.isArray(layers) || !layers.length) throw new Error('layers: must hold at least one layer');
+  checkKeys('', whole, schema.material, names);
+  layers.forEach((entry, index) => {
+    const [[kind, keys] = [], ...others] = Object.entries(Object(entry));
+    if (others.length || !Object.hasOwn(schema, kind) || kind === 'material')
+      throw new Error(`layer ${index}: must be one of interface, medium, diffuse with its keys`);
+    checkKeys(`layer ${index} (${kind}): `, keys ?? {}, schema[kind], names);
+  });
+}
+
+function checkKeys(where, keys, declared, names) {
+  for (const [key, value] of Object.entries(keys)) {
+    if (!Object.hasOwn(declared, key)) throw new Error(`${where}${key}: is not a key here`);
+    const wrong = refusal(value, declared[key], names);
+    if (wrong) throw new Error(`${where}${key}: ${wrong}`);
+  }
+}
+
+function refusal(value, spec, names) {
+  const { kind, options } = spec;
+  if (kind === 'flag') return typeof value === 'boolean' ? '' : 'must be true or false';
+  if (kind === 'text') return typeof value === 'string' ? '' : 'must be text';
+  if (kind === 'choice') return options.includes(value) ? '' : `must be one of ${options.join(', ')}`;
+  if (value !== null && typeof value === 'object' && !Array.isArray(value)) return 'textures and spectra need Python';
+  if (kind === 'index' && typeof value === 'string')
+    return value in names.dielectrics || value in names.conductors ? '' : `${value} is not a known name`;
+  if (Array.isArray(value) && value.length !== SEVERAL[kind]) return `must not be ${value.length} numbers`;
+  return [value].flat().map((number) => objection(number, spec)).find(Boolean) ?? '';
+}

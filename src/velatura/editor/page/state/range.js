@@ -1,0 +1,12 @@
+// The range of a number.
+
+/** What is wrong with a number, in words; empty where nothing is. */
+export function objection(value, { low = null, high = null, strict = false }) {
+  if (!Number.isFinite(value)) return 'must be a number';
+  const outside = (low !== null && value < low) || (high !== null && value > high);
+  if (!outside && !(strict && (value === low || value === high))) return '';
+  const ends = strict ? ', both excluded' : '';
+  return high !== null
+    ? `must lie in ${low} to ${high}${ends}`
+    : `must be ${strict ? 'above' : 'at least'} ${low}`;
+}

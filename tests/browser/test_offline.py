@@ -1,0 +1,200 @@
+"""The folder that `velatura edit --static` writes, on a web server of files alone, beside `velatura edit`.
+
+Rationale: without Python, materials are drawn of answers that were worked out before, and only a browser shows whether
+they are found, and are those of the server. The browser reaches no other address. Pictures are previews, which are the
+same every time; a picture by another model differs by more than the bound.
+"""
+
+from __future__ import annotations
+
+import gzip
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import chromium
+import numpy as np
+import pytest
+from editor import Server, Visit, require_fresh_page
+from hosted import hosted
+
+import velatura as vt
+from velatura.editor import offline
+from velatura.model import named
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
+
+Open = Callable[..., Visit]
+SAME = 0.01  # root mean square of differences, white being 1
+MODELS = [named("belcour2018"), named("velatura")]
+LAYERS = 2  # more take longer to write
+FIRST_LOAD = 6e6  # bytes, compressed
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    require_fresh_page()
+    place = tmp_path_factory.mktemp("site")
+    offline.write(place, layers=LAYERS, models=MODELS)
+    return place
+
+
+@pytest.fixture(scope="module")
+def address(folder: Path) -> Iterator[str]:
+    with hosted(folder) as found:
+        yield found
+
+
+@pytest.fixture
+def requests() -> list[str]:
+    """All that pages have asked the network for."""
+    return []
+
+
+@pytest.fixture
+def visit(opened: Any, address: str, served: Server, requests: list[str]) -> Iterator[Open]:
+    """Opens the folder's page, or the server's, in a browser without a past; no console may complain."""
+    context = opened.new_context(viewport={"width": 900, "height": 600})
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    allowed = address, served.address
+    context.route("**/*", lambda route: route.continue_() if route.request.url.startswith(allowed) else route.abort())
+    visits: list[Visit] = []
+
+    def begin(place: str = "") -> Visit:
+        page = context.new_page()
+        page.on("request", lambda request: requests.append(request.url))
+        visits.append(Visit(page, place or address))
+        return visits[-1]
+
+    yield begin
+    context.close()
+    assert [text for found in visits for text in found.complaints] == []
+    assert [url for url in requests if not url.startswith((*allowed, "data:", "ws://127.0.0.1"))] == []
+
+
+def open_preset(page: Visit, title: str) -> None:
+    page.page.get_by_role("button", name="Open", exact=True).click()
+    page.page.get_by_role("button", name=title, exact=True).click()
+    page.settled()
+
+
+def choose_model(page: Visit, title: str) -> None:
+    page.page.get_by_label("Model", exact=True).select_option(title)
+    page.settled()
+
+
+def roughen(page: Visit, layer: int, ticks: int) -> None:
+    """Drag the roughness of a layer."""
+    page.page.locator(".layer").nth(layer).get_by_label("Roughness, slider", exact=True).fill(str(ticks))
+    page.settled()
+
+
+def link(page: Visit) -> str:
+    """The part of an address that opens what is shown."""
+    page.page.get_by_role("button", name="Share").click()
+    page.page.get_by_text("The address is on the clipboard").wait_for()
+    return "#" + page.page.evaluate("navigator.clipboard.readText()").partition("#")[2]
+
+
+def distance(a: Visit, b: Visit) -> float:
+    return float(np.sqrt(np.mean(np.square(a.picture() - b.picture())))) / 255
+
+
+def test_presets_are_those_of_the_server(visit: Open, served: Server) -> None:
+    """Expected: one picture, of an opaque brushed stack, of a pane and of a base; any model."""
+    here, there = visit(), visit(served.entrance)
+    for title in ("Coated brushed gold", "Frosted glass pane", "Red enamel"):
+        for page in (here, there):
+            open_preset(page, title)
+        assert distance(here, there) < SAME
+    before = here.picture()
+    assert not here.page.locator(".form").count()
+    for page in (here, there):
+        choose_model(page, "belcour2018")
+    assert distance(here, there) < SAME
+    assert np.sqrt(np.mean(np.square(here.picture() - before))) / 255 > SAME
+
+
+def test_a_value_dragged_and_a_layer_added_make_the_servers_picture(visit: Open, served: Server) -> None:
+    """Expected: by a model that needs no solution, the picture of the server, which opens the link of each step."""
+    here = visit()
+    open_preset(here, "Gold")
+    choose_model(here, "belcour2018")
+    roughen(here, 0, 80)
+    assert here.state("layers.0.keys.alpha") == 0.4
+    dragged = visit(served.entrance + link(here))
+    assert distance(here, dragged) < SAME
+    here.page.get_by_role("button", name="Interface", exact=True).click()
+    here.settled()
+    added = visit(served.entrance + link(here))
+    assert added.state("layers.length") == 2
+    assert distance(here, added) < SAME
+    assert not here.page.locator(".form").count()
+
+
+def test_a_solved_model_says_that_changes_are_drawn_in_closed_form(visit: Open) -> None:
+    here = visit()
+    open_preset(here, "Gold")
+    solved = here.picture()
+    roughen(here, 0, 80)
+    assert here.page.locator(".form").inner_text() == "closed form"
+    here.page.get_by_role("button", name="Undo: change a value").click()
+    here.settled()
+    here.page.wait_for_function("() => !velatura.shader().closed_form")
+    assert np.abs(here.picture() - solved).max() < 1
+
+
+def test_a_link_is_shared_and_opened(visit: Open, address: str) -> None:
+    here = visit()
+    open_preset(here, "Gold")
+    roughen(here, 0, 60)
+    there = visit(address + link(here))
+    there.page.get_by_text("from the address").wait_for()
+    assert there.state("layers.0.keys.alpha") == here.state("layers.0.keys.alpha") == 0.3
+    assert distance(here, there) < SAME
+
+
+def test_the_first_load_is_small(visit: Open, folder: Path, address: str, requests: list[str]) -> None:
+    """Expected: all that is asked for until page and neighbouring states are ready, each file by its size in gzip."""
+    here = visit()
+    here.page.wait_for_timeout(1500)
+    here.settled()
+    names = {url.removeprefix(address).partition("?")[0] or "index.html" for url in requests if url.startswith(address)}
+    sizes = {name: len(gzip.compress((folder / name).read_bytes())) for name in names}
+    assert {"index.html", "editor.js", "data/session.pack"} < sizes.keys()
+    assert sum(sizes.values()) < FIRST_LOAD
+
+
+def test_what_needs_python_is_grey_and_says_why(visit: Open) -> None:
+    here = visit()
+    page = here.page
+    for role, name in (("button", "Save"), ("button", "Save as"), ("tab", "Appearance"), ("tab", "Validations")):
+        found = page.get_by_role(role, name=name, exact=True)
+        assert found.is_disabled()
+        assert "Python" in found.get_attribute("title")
+    assert page.get_by_role("button", name="Roughness: take a texture").first.is_disabled()
+    page.get_by_label("Compare", exact=True).select_option("split")
+    truth = page.get_by_label("With", exact=True).locator("option[value=truth]")
+    assert truth.get_attribute("disabled") is not None
+    page.get_by_role("button", name="Open", exact=True).click()
+    assert page.locator("dialog.open").get_by_text("Needs Python").count() == 2
+    page.get_by_role("button", name="Cancel").click()
+    # A third layer has not been written
+    open_preset(here, "Coated rough metal")
+    page.get_by_role("button", name="Interface", exact=True).click()
+    page.get_by_text("So many layers need Python").wait_for()
+
+
+def test_the_shader_that_is_exported_is_that_of_python(visit: Open) -> None:
+    here = visit()
+    open_preset(here, "Glossy plastic")
+    choose_model(here, "belcour2018")
+    roughen(here, 0, 80)
+    here.page.get_by_role("button", name="Export", exact=True).click()
+    text = here.page.locator("dialog.export textarea").input_value()
+    wanted = vt.export(vt.preset("glossy-plastic").replace(layer0_alpha=0.4), "glsl", "belcour2018").text
+    number = re.compile(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?")
+    assert number.sub("#", text.partition("\n")[2]) == number.sub("#", wanted.partition("\n")[2])
+    found, expected = ([float(x) for x in number.findall(each)] for each in (text, wanted))
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
