@@ -48,7 +48,7 @@ class Exclusive(contextlib.ContextDecorator):
     A rendering queries all objects of a kind, those of other threads included. So none may be created while it runs,
     nor destroyed, which happens where the last reference ends: in any thread, or in the traceback of a kept error.
     Hence the references of a failure are cleared before the lock is released, and a BSDF of ours that another thread
-    releases is kept until the lock is free.
+    releases, or that the rendering itself is the last to hold, is kept until the lock is free.
     """
 
     def __init__(self) -> None:
@@ -75,8 +75,11 @@ class Exclusive(contextlib.ContextDecorator):
 
     def drop(self, thing: Any) -> None:
         """Keep an object without references, unless this thread may destroy it now. Never waits."""
+        import drjit as dr
+
         alone = self._owner is None and threading.active_count() == 1
-        if not alone and self._owner != threading.get_ident():
+        allowed = alone or self._owner == threading.get_ident()
+        if not allowed or dr.flag(dr.JitFlag.SymbolicScope):  # which is set while Dr.Jit queries all BSDFs
             self._dropped.append(thing)
 
 
@@ -238,7 +241,7 @@ def _register_missing(mi: Any) -> None:
 
 def _released(thing: Any) -> None:
     """What is done with a plugin without references."""
-    if exclusive:  # None while Python ends
+    if exclusive and not sys.is_finalizing():  # both names are None at the very end of Python
         exclusive.drop(thing)
 
 

@@ -122,3 +122,22 @@ assert not vt.kernel.exclusive._dropped
 del material
 """
     assert output_of(program) == (0, "", "")
+
+
+def test_what_a_rendering_is_the_last_to_hold_outlives_it() -> None:
+    """Expected: a BSDF whose last reference ends while Dr.Jit records, and may query it next, goes with the lock."""
+    program = """
+import drjit as dr, velatura as vt
+mi = vt.kernel.mitsuba()
+materials = [vt.bsdf("bare-gold")]
+
+def step(i):
+    materials.clear()
+    return (i + 1,)
+
+with vt.kernel.exclusive:
+    dr.while_loop((mi.UInt32(0),), lambda i: i < 3, step)
+    assert len(vt.kernel.exclusive._dropped) == 1
+assert not vt.kernel.exclusive._dropped
+"""
+    assert output_of(program) == (0, "", "")
