@@ -7,6 +7,7 @@ the browser itself notes there that a server is away, or has refused, which the 
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -16,6 +17,7 @@ import chromium
 import numpy as np
 import pytest
 from editor import Server, Visit
+from matplotlib.image import imsave
 
 import velatura as vt
 
@@ -193,6 +195,101 @@ def test_red_paint_is_built_from_nothing_without_a_message(visit: Open) -> None:
     assert layers.nth(1).get_by_label("Colour twice through, hexadecimal").input_value() == "#ffc060"
 
 
+def test_the_tasks_of_an_artist_take_few_steps_and_no_message(visit: Open, served: Server) -> None:
+    """Expected: each within so many clicks, keys, drops and fields; the page says nothing wrong at any step."""
+    page = visit(viewport={"width": 900, "height": 600}, permissions=["clipboard-read", "clipboard-write"])
+    layers, button = page.page.locator(".layer"), lambda name: page.page.get_by_role("button", name=name, exact=True)
+    said_wrong: list[str] = []
+    steps = 0
+
+    def step(control: Any, act: str = "click", *given: Any) -> None:
+        nonlocal steps
+        steps += 1
+        getattr(control, act)(*given)
+        if act == "fill":
+            control.press("Enter")
+        page.page.wait_for_timeout(50)
+        said_wrong.extend(each["text"] for each in page.page.evaluate("velatura.problems"))
+
+    def done(task: str, most: int, *expected: tuple[str, Any]) -> None:
+        nonlocal steps
+        page.settled()
+        said_wrong.extend(f"{task}: {each['text']}" for each in page.page.evaluate("velatura.problems"))
+        assert steps <= most, task
+        assert [page.state(path) for path, _ in expected] == [value for _, value in expected], task
+        steps = 0
+
+    def kinds() -> list[str]:
+        return [layer["kind"] for layer in page.state("layers")]
+
+    step(button("Open"))
+    step(button("Gold"))
+    done("a preset", 2, ("name", "Gold"))
+
+    step(button("Interface"))
+    step(button("Interface"))
+    step(button("Medium"))
+    step(page.page.get_by_label("Colour twice through, hexadecimal"), "fill", "#a02818")
+    step(page.page.get_by_label("Metal", exact=True), "select_option", "Al")
+    done("car paint of two coats", 8, ("layers.3.keys.conductor", "Al"))
+    assert kinds() == ["interface", "interface", "medium", "interface"]
+
+    step(layers.nth(0).get_by_label("Roughness", exact=True), "fill", "0.2")
+    done("a roughness", 2, ("layers.0.keys.alpha", 0.2))
+    step(layers.nth(3).get_by_label("Roughness: one for each axis"))
+    step(layers.nth(3).get_by_label("Roughness v", exact=True), "fill", "0.4")
+    done("a roughness for each axis", 2, ("layers.3.keys.alpha", [0.15, 0.4]))
+    step(layers.nth(3).get_by_label("Rotation", exact=True), "fill", "45")
+    done("a rotation", 2, ("layers.3.keys.rotation", 45))
+    step(page.page.get_by_label("Undo: change a value"))
+    done("undo", 2, ("layers.3.keys.alpha", [0.15, 0.4]))
+    step(layers.nth(1).locator(".grip"), "press", "ArrowUp")
+    done("another order", 2, ("layers.1.keys.alpha", 0.2))
+    step(layers.nth(0).get_by_role("button", name="Duplicate"))
+    done("a duplicate", 2)
+    assert len(kinds()) == 5
+    step(layers.nth(0).get_by_role("checkbox"), "uncheck")
+    done("a layer turned off", 2, ("layers.0.enabled", False))
+
+    step(page.page.get_by_label("Object", exact=True), "select_option", "sphere")
+    step(page.page.get_by_label("Light", exact=True), "select_option", "sky")
+    step(page.page.get_by_label("Exposure, in stops", exact=True), "fill", "0.5")
+    done("object, light and exposure", 3, ("view.object", "sphere"), ("view.environment", "sky"))
+
+    step(button("Save as"))
+    step(page.page.get_by_label("File name"), "fill", "paint.yaml")
+    done("a saved file", 3)
+    assert vt.load(served.folder / "paint.yaml").kinds[-1] == "conductor"
+    step(button("Share"))
+    done("an address", 3)
+    assert "#m=" in page.page.evaluate("navigator.clipboard.readText()")
+
+    for mode in ("split", "difference"):
+        step(page.page.get_by_label("Compare", exact=True), "select_option", mode)
+        step(page.page.get_by_label("With", exact=True), "select_option", "belcour2018")
+        done(mode, 3, ("view.mode", mode))
+    page.page.get_by_label("Compare", exact=True).select_option("single")
+
+    step(button("Open"))
+    step(button("paint.yaml"))
+    done("the file again", 3, ("name", "Gold"))
+    step(button("Open"))
+    step(button("Gold"))
+    step(layers.nth(0).get_by_label("Kind of layer"), "select_option", "dielectric")
+    step(layers.nth(0).get_by_label("Roughness", exact=True), "fill", "0.3")
+    step(page.page.get_by_label("Add a layer at place 1"))
+    step(page.page.locator("[data-kind=interface]"))
+    done("frosted glass", 8, ("layers.0.keys.alpha", 0.3), ("layers.1.keys.eta", 1))
+
+    spots = io.BytesIO()
+    imsave(spots, np.random.default_rng(3).random((8, 8, 3)), format="png")
+    drop(page, "[aria-label='Roughness, slider']", "spots.png", spots.getvalue())
+    page.page.wait_for_function("() => velatura.store.get().layers[0].keys.alpha.texture")
+    done("a texture", 1, ("layers.0.keys.alpha", {"texture": "spots.png"}))
+    (served.folder / "spots.png").unlink()
+    assert said_wrong == []
+
+
 def test_a_colour_dragged_by_hue_returns_to_where_it_began(visit: Open) -> None:
     """Expected: through black and grey, which have no hue, in 100 events and back."""
     page = visit()
@@ -221,6 +318,29 @@ def test_a_material_is_found_by_its_picture_or_its_name(visit: Open) -> None:
     page.page.locator("dialog.open li button").click()
     assert page.page.title() == f"{vt.preset('red-enamel').name} - Velatura"
     page.settled()
+
+
+def test_metals_are_found_by_their_names(visit: Open) -> None:
+    """Expected: in groups by what they are, each once, in the order of the alphabet."""
+    page = visit()
+    open_preset(page, "Gold")
+    menu = page.page.get_by_label("Metal", exact=True)
+    groups = menu.evaluate(
+        "(menu) => [...menu.children].map(({ label, children }) => [label, [...children].map((o) => o.text)])"
+    )
+    assert [name for name, _ in groups] == [
+        "Noble metals",
+        "Industrial metals",
+        "Ceramics and oxides",
+        "Other conductors",
+    ]
+    titles = [title for _, group in groups for title in group]
+    assert len(set(titles)) == len(titles) > 40
+    assert all(group == sorted(group) for _, group in groups)
+    menu.focus()
+    page.page.keyboard.type("silv")
+    page.settled()
+    assert page.state("layers.0.keys.conductor") == "Ag"
 
 
 def test_reloading_loses_nothing(visit: Open) -> None:
@@ -356,6 +476,70 @@ def test_names_that_arrive_late_move_none_under_the_hand(visit: Open) -> None:
     entry.click()
     assert page.state("name") == "Coated brushed aluminium"
     page.settled()
+
+
+def test_none_of_500_typed_numbers_is_lost_though_the_server_is_slow(visit: Open) -> None:
+    """Expected: each, typed letter by letter into one field after another, is shown and taken, the last ones drawn."""
+    page = visit(script=SLOW)
+    open_preset(page, "Paint under old varnish")
+    lost = page.page.evaluate(
+        """async (count) => {
+          const frame = () => new Promise(requestAnimationFrame), lost = [];
+          const fieldOf = (name) => document.querySelector(`[aria-label="Albedo, ${name}"]`);
+          const fields = ['red', 'green', 'blue'].map(fieldOf);
+          for (let k = 0; k < count; k++) {
+            const field = fields[k % 3], number = (0.1 + (k * 0.6180339) % 0.8).toFixed(4);
+            field.focus();
+            field.value = '';
+            for (const letter of number) {
+              field.value += letter;
+              field.dispatchEvent(new InputEvent('input', { bubbles: true, data: letter }));
+              if (letter === '.') await frame();
+            }
+            if (field.value !== number) lost.push(`${number} became ${field.value}`);
+            field.dispatchEvent(new Event('change', { bubbles: true }));
+            const taken = velatura.store.get().layers.at(-1).keys.albedo[k % 3];
+            if (taken !== Number(number)) lost.push(`${number} was taken for ${taken}`);
+          }
+          return lost;
+        }""",
+        500,
+    )
+    assert lost == []
+    typed = [float(f"{0.1 + k * 0.6180339 % 0.8:.4f}") for k in (498, 499, 497)]
+    assert page.state("layers").pop()["keys"]["albedo"] == typed
+    drawn = page.picture()
+    page.page.reload()
+    page.ready()
+    assert difference(page.picture(), drawn) < SAME
+
+
+PICK = """async (swatch) => {
+  const start = swatch.value, channels = [1, 3, 5].map((at) => parseInt(start.slice(at, at + 2), 16));
+  const byte = (x) => Math.round(Math.max(0, Math.min(255, x))).toString(16).padStart(2, '0');
+  for (let k = 1; k <= 100; k++) {
+    const away = 60 * Math.sin((k / 100) * Math.PI), by = [-away, away, -2 * away];
+    swatch.value = k === 100 ? start : `#${channels.map((c, i) => byte(c + by[i])).join('')}`;
+    swatch.dispatchEvent(new Event('input', { bubbles: true }));
+    await new Promise(requestAnimationFrame);
+  }
+  swatch.dispatchEvent(new Event('change', { bubbles: true }));
+}"""
+
+
+def test_a_picked_colour_returns_to_where_it_began_though_the_server_is_slow(visit: Open) -> None:
+    """Expected: after 100 colours of the browser's picker, the last of which is the first, all is as before; each drag
+    is one step."""
+    page = visit(script=SLOW)
+    open_preset(page, "Coated brushed gold")
+    picture = page.picture()
+    steps = len(page.page.evaluate("velatura.store.history().past"))
+    for label in ("Absorption", "Colour twice through"):
+        page.page.locator(".layer").nth(1).get_by_label(f"{label}, swatch").evaluate(PICK)
+        assert page.state("layers.1.keys.sigma_a") == [0.1, 0.5, 2]
+        page.settled()
+    assert len(page.page.evaluate("velatura.store.history().past")) == steps + 2
+    assert difference(page.picture(), picture) < SAME
 
 
 @pytest.mark.parametrize("pause", [0, 110])

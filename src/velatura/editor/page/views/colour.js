@@ -66,17 +66,24 @@ const relative = (rgb, whole) => ({
   worth: (light) => (whole === null ? light.map(rounded) : withLargest(light, whole)),
 });
 
-/** A colour to be picked. */
+const begun = new WeakMap(); // by swatch that is in use: its colour before, which a pick of 8 bits does not hold
+
+/** A colour to be picked; one that is picked as it was before is as it was before. */
 function swatch({ label, rgb, whole = null, edit }) {
   const { seen, worth } = relative(rgb, whole);
-  const picked = ({ target }) => target.value !== seen && edit.move(worth(ofHex(target.value)));
+  const picked = ({ target }) => {
+    if (!begun.has(target)) begun.set(target, { seen, rgb });
+    const before = begun.get(target);
+    if (target.value !== seen) edit.move(target.value === before.seen ? before.rgb : worth(ofHex(target.value)));
+  };
+  const settle = ({ target }) => begun.delete(target) && edit.settle();
   return html`<input
     type="color"
     aria-label=${`${label}, swatch`}
     title=${whole === null ? 'Pick a colour' : `Pick a colour; the largest channel stays ${shown(whole)}`}
     .value=${text(seen)}
     @input=${picked}
-    @change=${edit.settle}
+    @change=${settle}
   />`;
 }
 

@@ -5,6 +5,7 @@ import { axes, enabled, indices, isOpaque, variantOf } from '../state/material.j
 import { setValue } from '../state/commands.js';
 import { channelsOf, colour, tint } from './colour.js';
 import { dial, iconButton, menu, number, numberField, texture } from './controls.js';
+import { chosen, dielectrics, metals } from './names.js';
 
 const NAMES = {
   eta: 'Index',
@@ -87,8 +88,9 @@ const FORMS = {
   index,
   pair,
   angle,
-  choice: ({ label, value, spec, edit }) => {
-    const options = [...new Set([value, ...spec.options])].filter((name) => name !== 'mirror').sort();
+  choice: ({ services, label, value, edit }) => {
+    const groups = metals(services.session.names);
+    const options = [...chosen(value, groups), ...groups];
     return { control: menu({ label, value, options, choose: edit.set }), extras: nothing };
   },
 };
@@ -125,21 +127,14 @@ function index(context) {
   const { services, layer, key, label, value, edit } = context;
   if (isTexture(value)) return textured(context);
   if (isSpectrum(value)) return measured(context);
-  const { dielectrics, conductors } = services.session.names;
-  const opaque = variantOf(layer) === 'custom';
-  const group = (title, names) => {
-    const known = Object.keys(names);
-    return { group: title, options: known };
-  };
+  const { names } = services.session;
   const named = typeof value === 'string';
-  const known = named && (value in dielectrics || value in conductors);
-  const options = [
-    ['', 'custom'],
-    ...(named && !known ? [value] : []),
-    ...(key === 'eta' ? [group('Dielectrics', dielectrics)] : []),
-    ...(opaque ? [group('Metals', conductors)] : []),
+  const groups = [
+    ...(variantOf(layer) === 'custom' ? metals(names) : []),
+    ...(key === 'eta' ? dielectrics(names) : []),
   ];
-  const choose = (name) => edit.set(name || plainIndex(indices(value, key, services.session.names)));
+  const options = [['', 'By number'], ...chosen(named && value, groups), ...groups];
+  const choose = (name) => edit.set(name || plainIndex(indices(value, key, names)));
   const menuOf = menu({ label: `${label}, by name`, value: named ? value : '', options, choose });
   const numbers = named ? { control: nothing, extras: textureButton(context) } : simple(context, colour);
   return { control: html`${menuOf}${numbers.control}`, extras: numbers.extras };
