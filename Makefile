@@ -34,6 +34,7 @@ mutants: .venv/ready-mutants ## change formulas, and list the changes that no te
 
 docs: .venv/ready-docs ## build the manual into site/
 	$(BIN)/mkdocs build --strict --quiet
+	$(BIN)/velatura edit --static site/try
 	@echo "The manual is $(CURDIR)/site/index.html"
 
 # One file for each figure that the manual takes numbers from: made when it is missing or older than the figure's module.

@@ -91,6 +91,13 @@ def test_the_first_page_lists_all_pages() -> None:
     assert pages - {"index.md"} <= linked
 
 
+def test_the_editor_in_the_manual_is_where_the_build_writes_it() -> None:
+    """Expected: the pages of the manual are folders, side by side with that of the editor."""
+    page, makefile = (ROOT / "docs" / "editor.md").read_text(), (ROOT / "Makefile").read_text()
+    assert 'src="../try/"' in page
+    assert "velatura edit --static site/try\n" in makefile
+
+
 def test_the_files_that_contributing_names_exist() -> None:
     """Expected: each path in its table is in the package or in the root, the folder of a new one too, and each
     `NAME` of a file stands in that file.
