@@ -336,6 +336,42 @@ def test_a_brushed_lobe_is_dragged_by_its_axes_turned_and_made_round(visit: Open
     assert page.page.locator(".appearance .refused, .appearance .says").count() == 0
 
 
+def test_scattering_media_and_mirrors_are_dragged_and_say_what_cannot_be(visit: Open) -> None:
+    page = visit()
+    page.page.evaluate("void (velatura.viewport.thumbnail = () => new Promise(() => {}))")
+    open_material(page, "Metallic car paint")
+    look = panel(page)
+    chosen(page, 2)
+    medium = page.state("layers.1.keys")
+    look.get_by_label("Blur", exact=True).fill("0.5")
+    look.get_by_label("Blur", exact=True).press("Enter")
+    answered(page)
+    assert lobes(page).alpha[-1][0, 0] == pytest.approx(0.5, abs=1e-3)
+    for key in ("sigma_s", "g"):
+        assert page.state(f"layers.1.keys.{key}") == pytest.approx(medium[key])
+    assert look.get_by_label("Number of interfaces").is_disabled()
+    assert look.get_by_text("A medium that scatters stays where it is.").is_visible()
+    assert look.get_by_label("Energy", exact=True).is_enabled()
+
+    open_material(page, "Crossed brushing")
+    chosen(page, 2)
+    look.get_by_label("Energy", exact=True).fill("0.5")
+    look.get_by_label("Energy", exact=True).press("Enter")
+    answered(page)
+    assert lobes(page).energy[-1] == pytest.approx(0.5, abs=1e-3)
+    assert [layer["kind"] for layer in page.state("layers")] == ["interface", "medium", "interface"]
+    assert look.get_by_text("Nothing is free of a mirror but its roughness.").is_visible()
+
+    page.page.get_by_role("tab", name="Layers").click()
+    for name in ("dielectric", "medium"):
+        page.page.get_by_role("button", name=f"Remove {name}").first.click()
+    look = panel(page)
+    page.page.wait_for_function("() => document.querySelectorAll('.appearance .lobe').length === 1")
+    assert look.get_by_label("Energy", exact=True).is_disabled()
+    assert look.get_by_text("Nothing above this mirror absorbs, so that it reflects all light.").is_visible()
+    assert look.get_by_role("button", name="Blur: the same for both axes").is_enabled()
+
+
 def test_small_pictures_lead_to_members(visit: Open) -> None:
     page = visit()
     page.page.evaluate(

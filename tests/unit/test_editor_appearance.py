@@ -237,6 +237,94 @@ def test_a_conductor_that_is_darker_than_any_metal_is_read_as_it_is(model: str) 
     check_physical(answer["material"])
 
 
+def media_of(material: dict[str, Any]) -> list[Medium]:
+    return [layer for layer in Stack.from_dict(material).layers if isinstance(layer, Medium)]
+
+
+SCATTERING = {
+    "layers": [
+        {"interface": {"eta": 1.5, "alpha": 0.05}},
+        {"medium": {"depth": 0.5, "sigma_a": [0.1, 0.2, 0.3], "sigma_s": [0.4, 0.6, 0.8], "g": 0.9}},
+        {"interface": {"conductor": "Cu", "alpha": 0.2}},
+    ]
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_medium_that_scatters_stays_while_lobes_around_it_are_dragged(model: str) -> None:
+    answer = appearance.appearance({"material": SCATTERING, "model": model})
+    assert answer["says"] is None and deviation(SCATTERING, answer["target"], model) < EXACT
+    assert all(held == {"interfaces": "a medium that scatters stays where it is"} for held in answer["held"])
+    state = {"material": SCATTERING, "target": answer["target"]}
+    for lobe, changes in ((0, {"energy": [0.05] * 3}), (1, {"energy": [0.3, 0.2, 0.1]}), (1, {"alpha": 0.5})):
+        wish = copy.deepcopy(state["target"])
+        wish["lobes"][lobe] |= changes
+        state = appearance.invert({**state, "target": wish, "model": model})
+        assert state["snapped"] is None and state["held"] == answer["held"]
+        assert deviation(state["material"], wish, model) < EXACT
+        (medium,) = media_of(state["material"])
+        assert (medium.depth, medium.g) == (0.5, 0.9) and medium.sigma_s == pytest.approx((0.4, 0.6, 0.8))
+        assert medium.sigma_a == pytest.approx((0.1, 0.2, 0.3))
+    body = {"target": state["target"], "material": state["material"], "model": model, "lobe": 1}
+    assert class_maps.class_(body)["kind"] == "conductor"
+    found = class_maps.member({**body, "point": [0.9]})
+    assert deviation(found["material"], state["target"], model) < EXACT
+    wish = copy.deepcopy(state["target"])
+    wish["lobes"][1]["interfaces"] = 2
+    assert appearance.invert({**state, "target": wish, "model": model}) == {
+        "feasible": False,
+        "why": "a medium that scatters stays where it is, and the interfaces around it",
+    }
+
+
+def test_a_medium_that_scatters_below_all_interfaces_holds_nothing() -> None:
+    first, medium, _ = SCATTERING["layers"]
+    paint = {"layers": [first, medium, {"diffuse": {"albedo": 0.5}}]}
+    assert appearance.appearance({"material": paint, "model": "bati2021"})["held"] == [{}]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_mirror_takes_its_colour_from_what_absorbs_above_it(model: str) -> None:
+    mirror = {"interface": {"conductor": "mirror", "alpha": 0.2}}
+    coated = {"layers": [{"interface": {"eta": 1.5, "alpha": 0.05}}, mirror]}
+    answer = appearance.appearance({"material": coated, "model": model})
+    assert [lobe["base"] for lobe in answer["target"]["lobes"]] == ["dielectric", "mirror"]
+    assert answer["held"] == [{}, {}] and deviation(coated, answer["target"], model) < EXACT
+    wish = copy.deepcopy(answer["target"])
+    wish["lobes"][1] |= {"energy": [0.6, 0.4, 0.2], "alpha": 0.3}
+    found = appearance.invert({"material": coated, "target": wish, "model": model})
+    assert found["snapped"] is None and deviation(found["material"], wish, model) < EXACT
+    assert Stack.from_dict(found["material"]).interfaces[-1].conductor == "mirror"
+    assert np.all(np.diff(media_of(found["material"])[0].sigma_a) > 0)
+    fresh = appearance.invert({"target": wish, "model": model})
+    assert fresh["snapped"] is None and deviation(fresh["material"], wish, model) < EXACT
+    wish["lobes"][1]["energy"] = [1.2] * 3
+    brighter = appearance.invert({"material": coated, "target": wish, "model": model})
+    assert brighter["snapped"].startswith("lobe 2: ") and max(brighter["target"]["lobes"][1]["energy"]) < 1
+    assert class_maps.class_({"material": coated, "target": answer["target"], "model": model, "lobe": 1})["point"] == []
+
+    alone = {"layers": [mirror]}
+    answer = appearance.appearance({"material": alone, "model": model})
+    assert answer["held"][0]["energy"] == "nothing above this mirror absorbs, so that it reflects all light"
+    wish = copy.deepcopy(answer["target"])
+    wish["lobes"][0] |= {"energy": [0.5] * 3, "alpha": 0.4}
+    found = appearance.invert({"material": alone, "target": wish, "model": model})
+    assert found["snapped"] == f"lobe 1: {answer['held'][0]['energy']}"
+    assert found["target"]["lobes"][0]["alpha"] == pytest.approx(0.4, abs=EXACT)
+    assert Stack.from_dict(found["material"]).interfaces[-1].conductor == "mirror"
+
+
+def test_a_pair_over_a_mirror_has_a_line_of_members() -> None:
+    lobes = [{"energy": [0.5, 0.4, 0.3], "alpha": 0.2, "interfaces": 2, "base": "mirror"}]
+    state = appearance.invert({"target": {"lobes": lobes}, "model": "bati2021"})
+    body = {"target": state["target"], "material": state["material"], "model": "bati2021", "lobe": 0}
+    card = class_maps.class_(body)
+    assert card["kind"] == "pair over a mirror" and array(card["feasible"]).sum() > 3
+    found = class_maps.member({**body, "point": [1.3]})
+    assert Stack.from_dict(found["material"]).interfaces[0].eta == pytest.approx(1.3)
+    assert deviation(found["material"], {"lobes": state["target"]["lobes"]}, "bati2021") < EXACT
+
+
 def test_what_is_kept_stays_under_small_drags() -> None:
     """The index between a pair does not move, and the rest moves by little."""
     state = appearance.invert({"target": saved("bati2021-15-c")["target"], "model": "bati2021"})

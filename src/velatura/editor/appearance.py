@@ -28,6 +28,7 @@ from velatura.stack import Diffuse, Interface, Stack, Varying
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is shown itself
 EFFORT = stacks.EFFORTS[:1]  # to find a stack that is not near
+ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
 HALVES = 7  # of the way to a wish that cannot be met
 SAVED = tuple(str(n) for n in range(15, 23))  # figures of Bati et al. 2021
 SAVED_MODEL = "bati2021"
@@ -91,7 +92,7 @@ def appearance(body: Body) -> Answer:
     # Share the interfaces out among lobes
     each = DraggedStack.of(stack, _target(stack, parts, [1] * len(parts)), model)
     assert each is not None
-    counts: list[int] = body.get("interfaces") or _counts(each.variances)
+    counts: list[int] = body.get("interfaces") or _counts(each.variances, parts)
     if sum(counts) != len(parts) or not set(counts) <= {1, 2}:
         raise InvalidInput(f"interfaces: must be 1 or 2 for each lobe, {len(parts)} in all, got {counts}")
     whole = DraggedStack.of(stack, _target(stack, parts, counts), model)
@@ -104,8 +105,19 @@ def appearance(body: Body) -> Answer:
         "variances": [float(MAPS[model.map].variance(lobe.roughness)) for lobe in target.lobes],
         "haze": haze(target, model),
         "layers": _layers(stack, counts),
+        "held": _held_back(target, whole.scatters),
         "says": None,
     }
+
+
+def _held_back(target: Target, scatters: bool) -> list[Answer]:
+    """Of every lobe what cannot be asked for, `energy` or `interfaces`, each with the reason."""
+    found: list[Answer] = [
+        {"interfaces": "a medium that scatters stays where it is"} if scatters else {} for _ in target.lobes
+    ]
+    if target.lobes[0].base == "mirror" and target.lobes[0].interfaces == 1:
+        found[0]["energy"] = REASONS["mirror"]
+    return found
 
 
 def haze(target: Target, model: Model) -> list[Answer]:
@@ -118,12 +130,13 @@ def haze(target: Target, model: Model) -> list[Answer]:
     return found
 
 
-def _counts(variances: np.ndarray) -> list[int]:
-    """Interfaces of every lobe: two neighbours that blur alike are one."""
+def _counts(variances: np.ndarray, parts: list[Any]) -> list[int]:
+    """Interfaces of every lobe: two neighbours that blur alike are one, unless light is scattered between them."""
     counts: list[int] = []
     previous = None
-    for s in variances:
-        if previous is not None and np.abs(s - previous).max() <= ALIKE and counts[-1] == 1:
+    for s, part in zip(variances, parts):
+        alike = previous is not None and np.abs(s - previous).max() <= ALIKE
+        if alike and counts[-1] == 1 and part.scatters is None:
             counts[-1] = 2
         else:
             counts.append(1)
@@ -173,13 +186,14 @@ def _shown(stack: Stack, model: Model, says: str) -> Answer:
     try:
         read = stack_lobes(stack, 1.0, model=model)
     except InvalidInput:
-        return {"target": None, "variances": [], "haze": [], "layers": [], "says": says}
+        return {"target": None, "variances": [], "haze": [], "layers": [], "held": [], "says": says}
     energies = [np.clip(energy[:, 0], 0, None).tolist() for energy in read.energy]
     alphas = [float(np.sqrt(np.prod(np.reshape(alpha, (-1, 2)).mean(axis=0)))) for alpha in read.alpha]
     bases = ["conductor" if layer.opaque else "dielectric" for layer in stack.interfaces]
     lobes = [{"energy": e, "alpha": min(a, 1.0), "base": base} for e, a, base in zip(energies, alphas, bases)]
     target = Target(lobes) if lobes else None
     return {
+        "held": [{} for _ in lobes],
         "target": described(target) if target else None,
         "variances": [float(MAPS[model.map].variance(a)) for a in alphas],
         "haze": haze(target, model) if target else [],
@@ -200,6 +214,8 @@ def invert(body: Body) -> Answer:
     model, material = reader_of(body, wish), body.get("material")
     near = dragged(body, wish) if material else None
     if near is None:
+        if material and any(part.scatters for part in plain(Stack.from_dict(material))):
+            return {"feasible": False, "why": "a medium that scatters stays where it is, and the interfaces around it"}
         return _fresh(wish, model)
     possible = near.achromatic(wish)
     found, bound = near.towards(possible)
@@ -211,8 +227,9 @@ def invert(body: Body) -> Answer:
             found, bound = _approached(possible, near) if near.far(possible) else (found, bound)
             found = _further(possible, found)
     says = bound.why(wish) if bound else None
-    if says is None and possible is not wish:
-        says = f"lobe 1: {REASONS['colour']}"
+    asked, given = (np.array(target.lobes[0].colour) for target in (wish, possible))
+    if says is None and np.max(np.abs(asked - given)) > ROUNDED * np.max(given):
+        says = f"lobe 1: {REASONS['mirror' if wish.lobes[0].base == 'mirror' else 'colour']}"
     return answered(found, says)
 
 
@@ -220,16 +237,17 @@ def answered(found: DraggedStack, snapped: str | None) -> Answer:
     """A stack as an answer: the requested one, or the nearest one, with the reason as `snapped`."""
     stack = _under(found)
     target = found.now(found.target) if found.rough else seen(stack, found.target, found.model)
-    return _answer(stack, target, found.model, snapped) | ({"rough": True} if found.rough else {})
+    return _answer(stack, target, found.model, snapped, found.scatters) | ({"rough": True} if found.rough else {})
 
 
-def _answer(stack: Stack, target: Target, model: Model, snapped: str | None) -> Answer:
+def _answer(stack: Stack, target: Target, model: Model, snapped: str | None, scatters: bool = False) -> Answer:
     """A stack, and the lobes of a target that the stack has."""
     return {
         "feasible": True,
         "material": document(stack),
         "target": described(target),
         "haze": haze(target, model),
+        "held": _held_back(target, scatters),
         "snapped": snapped,
     }
 
@@ -243,7 +261,9 @@ def _under(found: DraggedStack) -> Stack:
 
 
 def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
-    """A stack with the lobes, found independently of the present one."""
+    """A stack with the lobes, found independently of the present one; a medium that scatters would be lost."""
+    if near.scatters:
+        return None
     found = stacks.search(wish, near.model.in_closed_form, EFFORT)
     fresh = DraggedStack.of(found.stack, wish, near.model) if found else None
     if fresh is None:

@@ -42,12 +42,14 @@ def class_(body: Body) -> Answer:
     members = free.held(tau_0=near.depths_of(lobe)[0]) if wanted.interfaces == 2 else free
     axis = np.geomspace(1.0, target.eta_max, size)
     answer: Answer = {"member": near.point_of(lobe), "point": near.point_of(lobe), "depths": _depths(near, lobe, free)}
+    if not answer["point"]:
+        return answer | {"kind": "mirror", "axes": [], "feasible": None, "absorption": None, "outlines": []}
     if wanted.interfaces == 2 and wanted.base == "dielectric":
         return answer | {"kind": "dielectric pair"} | _pair(members, axis)
     conductor = _conductor(near, place + wanted.interfaces - 1) if wanted.base == "conductor" else None
     if wanted.interfaces == 1 and conductor:
         return answer | conductor
-    kind = "pair over a conductor" if conductor else "dielectric"
+    kind = f"pair over a {wanted.base}" if wanted.interfaces == 2 else "dielectric"
     answer |= {"kind": kind, "conductor": conductor}
     if not conductor:
         return answer | _line(members, axis)
@@ -78,7 +80,7 @@ def member(body: Body) -> Answer:
     high = [target.eta_max] * (len(here) - tints) + [1.0] * tints
     low = [1.0] * (len(here) - tints) + [0.0] * tints
     goal = np.clip(point, low, high).tolist()
-    if lobe == 0 and len(goal) == 1 and not tints:
+    if lobe == 0 and wanted.interfaces == 1 and not tints:
         # Nothing but what absorbs above it makes another first interface reflect the same
         (part,) = _members(near, lobe).member(goal[0])
         depths[0], goal = np.maximum(np.broadcast_to(part.tau, (3, 1))[:, 0], 0.0), here
@@ -172,9 +174,9 @@ def _zeros(axis: Array, depth: Array) -> list[list[list[float]]]:
 
 def _line(members: EquivalenceClass, axis: Array) -> Answer:
     """The one free index."""
-    (part,) = members.member(axis)
-    feasible = np.broadcast_to(part.feasible, axis.shape)
-    absorption = np.where(feasible, np.mean(np.atleast_2d(part.tau), axis=0), np.nan)
+    *_, last = parts = members.member(axis)
+    feasible = np.logical_and.reduce([np.broadcast_to(part.feasible, axis.shape) for part in parts])
+    absorption = np.where(feasible, np.mean(np.atleast_2d(last.tau), axis=0), np.nan)
     return {
         "axes": [_axis("eta 1", axis)],
         "feasible": array(feasible[None], "uint8"),

@@ -28,6 +28,7 @@ REASONS = {
     "upper": "its upper interface alone reflects more",
     "absorption": "the fixed index reflects too little",
     "colour": "what lies above it absorbs nothing, or what is fixed, and one index does not give that colour",
+    "mirror": "nothing above this mirror absorbs, so that it reflects all light",
     "metal": f"a conductor (k >= eta) reflects more, {CONDUCTOR_MIN:.3f} at least, and what lies above absorbs nothing",
     "blur": "what lies above it blurs light more than that, or bounces it too often",
     "index": "a fixed index is outside its bounds, 1 to {eta_max:g} or k >= eta",
@@ -143,7 +144,7 @@ def _named(constraint: str, lobe: TargetLobe) -> str:
         return constraint
     if lobe.fixed.of("eta", lobe.interfaces - 1) is not None:
         return "absorption"
-    return "bright" if lobe.base == "conductor" else "energy"
+    return "energy" if lobe.base == "dielectric" else "bright"
 
 
 # Ways out ------------------------------------------------------------------------------------------------------------
@@ -389,7 +390,7 @@ def _to_sure(target: Target) -> Iterator[Way]:
             sure, s = kept, 0.0
             for n, lobe in enumerate(target.lobes):
                 s = max(2.5 * s, float(BLUR.variance(lobe.roughness)), LEAST)
-                energy = 0.4 if lobe.base == "conductor" else dark
+                energy = dark if lobe.base == "dielectric" else 0.4
                 sure = _with_energy(sure, n, np.full(3, energy)).with_variance(n, s)
 
             def along(x: float, kept: Target = kept, sure: Target = sure) -> Target:

@@ -55,7 +55,7 @@ class Layers(Batch):
 
     eta, kappa: absolute indices below, (1, N) or (C, N), kappa None for a dielectric. roughness: GGX, each (N,).
     tau: optical depths at normal incidence of the media above, (C, N) or a number. margins: by name of a constraint,
-    (N,), negative where it is broken.
+    (N,), negative where it is broken. scatters: the medium above, if that scatters; it then absorbs as tau says.
     """
 
     kind: Kind
@@ -64,6 +64,14 @@ class Layers(Batch):
     roughness: Roughness
     tau: Value
     margins: dict[str, Array] = dataclasses.field(default_factory=dict)
+    scatters: MediumValues | None = None
+
+    @property
+    def medium(self) -> MediumValues:
+        """The medium above."""
+        if self.scatters is None:
+            return MediumValues(depth=1.0, sigma_a=self.tau, sigma_s=0.0, g=0.0)
+        return dataclasses.replace(self.scatters, sigma_a=self.tau / self.scatters.depth)
 
     @property
     def alpha(self) -> Value:
@@ -88,6 +96,10 @@ class Layers(Batch):
         tau, eta, kappa = (_plain(value, n) for value in (absorbs, self.eta, self.kappa))
         u, v, rotation = (_plain(value, n) for value in named_as(self.roughness, axis))
         media: list[Layer] = [] if np.max(tau) == 0 else [Medium(sigma_a=tau)]
+        if self.scatters is not None:
+            own = dataclasses.replace(self, tau=absorbs).medium
+            keys = {key: _plain(value, n) for key, value in vars(own).items()}
+            media = [Medium(**keys)]
         brushed = abs(u - v) > ROUND
         alpha = (u, v) if brushed else u if u == v else (u + v) / 2
         index = {"conductor": "mirror"} if self.kind == "mirror" else {"eta": eta, "k": kappa}
@@ -164,12 +176,21 @@ class Above(Batch):
         passed = {"r_i0": state.r_i0 * t * t, "t_0i": state.t_0i * t, "t_i0": state.t_i0 * t, "a_i0": a_i0}
         return dataclasses.replace(self, state=dataclasses.replace(state, **passed))
 
+    def scattered(self, layers: Layers) -> Above:
+        """The stacks with the medium above some interfaces, as far as that scatters."""
+        if layers.scatters is None:
+            return self
+        medium = dataclasses.replace(layers.scatters, sigma_a=0.0)
+        prepared = prepare(Material((medium,), self.eta), self.model, self.variance)
+        state, _ = adding.add(prepared, self.state, prepared.layers[0], NORMAL)
+        return dataclasses.replace(self, state=state)
+
     def below(self, layers: Layers, reflectance: Value | None = None) -> tuple[Above, adding.Lobe]:
         """The stacks with media and interfaces added below, and the lobes of these interfaces.
 
         `reflectance` is what `reflectance` has found of the interfaces, where that was asked.
         """
-        above = self.through(layers.tau)
+        above = self.through(layers.tau).scattered(layers)
         prepared = above.prepared(layers, reflectance)
         state, lobe = adding.add(prepared, above.state, prepared.layers[-1], NORMAL)
         assert lobe is not None
@@ -202,8 +223,8 @@ def whole(path: Sequence[Layers], exterior: Value) -> Material:
     """Whole stacks of interfaces and the media above them."""
     layers: list[LayerValues] = []
     for part in path:
-        if np.any(part.tau):
-            layers.append(MediumValues(depth=1.0, sigma_a=part.tau, sigma_s=0.0, g=0.0))
+        if np.any(part.tau) or part.scatters is not None:
+            layers.append(part.medium)
         layers.append(_interface(part))
     return Material(tuple(layers), exterior)
 

@@ -99,7 +99,9 @@ class TargetLobe(Record):
         float, _number("turn of its first axis, anticlockwise seen from outside", low=-1e9, unit="degrees")
     ] = 0.0
     interfaces: Annotated[int, Count("interfaces that make the lobe", low=1, high=2)] = 1
-    base: Annotated[str, Choice("what its last interface is", options=("dielectric", "conductor"))] = "dielectric"
+    base: Annotated[str, Choice("what its last interface is", options=("dielectric", "conductor", "mirror"))] = (
+        "dielectric"
+    )
     tint: Annotated[
         float, _number("of a conductor: from the strongest edge tint (0) to the strongest extinction", high=1.0)
     ] = 0.5
@@ -124,8 +126,10 @@ class TargetLobe(Record):
             if entries and len(entries) != self.interfaces:
                 wanted = f"must hold an entry for each interface, {self.interfaces}, got {len(entries)}"
                 raise ValueError(f"fixed: {key}: {wanted}")
-        dielectrics = self.interfaces - (self.base == "conductor")
-        for n in range(dielectrics):
+        if self.base == "mirror" and self.fixed.of("eta", self.interfaces - 1) is not None:
+            raise ValueError("fixed: eta: a mirror has none")
+        dielectrics = self.interfaces - (self.base != "dielectric")
+        for n in range(self.interfaces if self.base == "mirror" else dielectrics):
             if self.fixed.of("k", n) is not None:
                 raise ValueError("fixed: k: only for the last interface of a lobe with base: conductor")
             if isinstance(self.fixed.of("eta", n), tuple):
@@ -189,8 +193,8 @@ class Target(Record):
         if not self.lobes:
             raise ValueError("lobes: must hold at least one lobe")
         for n, lobe in enumerate(self.lobes[:-1], 1):
-            if lobe.base == "conductor":
-                raise ValueError(f"lobe {n}: base: only the last lobe may have a conductor, nothing lies below it")
+            if lobe.base != "dielectric":
+                raise ValueError(f"lobe {n}: base: only the last lobe may have a {lobe.base}, nothing lies below it")
         return self
 
     @property

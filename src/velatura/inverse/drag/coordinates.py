@@ -51,6 +51,7 @@ class InterfaceCoordinates:
     side: 1 denser, -1 rarer than what is above. tint: of a conductor, (3, 1). kept: optical depths (3, 1) of the medium
     above that its reflectances do not need. absorbs: whether that medium takes away what its reflectances need.
     axis: near that of its roughness that comes first, in radians.
+    scatters: the medium above, if that scatters; it stays, and absorbs as the coordinates say.
     variance, depth, reflectances, log_index: indices of the entries of the variance, of the factor on `kept` (None
     where that is pinned), of the reflectances by channel or the one of all (None where the index itself is a
     coordinate), and of the logarithm of the index.
@@ -67,6 +68,7 @@ class InterfaceCoordinates:
     depth: int | None = None
     reflectances: slice | None = None
     log_index: int | None = None
+    scatters: MediumValues | None = None
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,14 @@ class Space:
             elif own.kind == "conductor":
                 eta, kappa, absorbed = _conductor(own, x[own.reflectances])
                 eta, kappa, tau = eta * eta_1, kappa * eta_1, tau + absorbed
+            elif own.kind == "mirror":
+                eta = np.ones((1, x.shape[1]))
+                if own.reflectances is not None:
+                    tau = tau - 0.5 * np.log(np.maximum(x[own.reflectances], ENERGY_MIN))
             else:
                 eta, absorbed = _dielectric(own, x[own.reflectances])
                 eta, tau = eta * eta_1, tau + absorbed
-            found.append(Layers(own.kind, eta, kappa, roughness, tau))
+            found.append(Layers(own.kind, eta, kappa, roughness, tau, scatters=own.scatters))
             if own.kind == "dielectric":
                 eta_1 = eta
         return found
@@ -210,8 +216,8 @@ class Space:
         """The variance of the channel in which the lobe must reflect most, if every channel has its own."""
         if np.ndim(s) < 2 or len(s) == 1:
             return np.ravel(s) if np.ndim(s) > 1 else s
-        of_lobe = next(o.reflectances for o in self.interfaces if o.lobe == own.lobe and o.reflectances is not None)
-        brightest = np.argmax(np.round(x[of_lobe], 9), axis=0)
+        spans = [o.reflectances for o in self.interfaces if o.lobe == own.lobe and o.reflectances is not None]
+        brightest = np.argmax(np.round(x[spans[0]], 9), axis=0) if spans else np.zeros(x.shape[1], int)
         return np.take_along_axis(s, np.broadcast_to(brightest, (1, x.shape[1])), axis=0)[0]
 
     # Coordinates -----------------------------------------------------------------------------------------------------
@@ -358,9 +364,12 @@ class Reader:
             "absorbs": last and not first,
             "variance": self._blur(k, part.roughness),
             "axis": lobe.axes.rotation,
+            "scatters": part.scatters,
         }
         if not last:
             own = self._upper(k, float(np.mean(ratio)), values)
+        elif part.kind == "mirror":
+            own = self._mirror(k, values)
         elif part.kind == "dielectric":
             own = self._dielectric(k, float(np.mean(ratio)), values)
         else:
@@ -390,6 +399,14 @@ class Reader:
         for sign, at in ((1, 0.0), (-1, float(np.log(self.target.eta_max)))):
             self.bounds.append(Bound(k, "energy", sign, at, interface=len(self.interfaces)))
         return InterfaceCoordinates(**values, depth=depth, reflectances=span)
+
+    def _mirror(self, k: int, values: dict[str, Any]) -> InterfaceCoordinates:
+        """A mirror: what absorbs above it makes its colour, and nothing does above one on top."""
+        if not values["absorbs"]:
+            return InterfaceCoordinates(**values)
+        span = self._colour(k, np.exp(-2 * values["kept"][:, 0]).tolist(), "upper", ENERGY_MIN, 1.0)
+        values["kept"] = np.zeros((3, 1))
+        return InterfaceCoordinates(**values, reflectances=span)
 
     def _conductor(self, k: int, ratio: Array, kappa: Array, values: dict[str, Any]) -> InterfaceCoordinates:
         """The last interface of a lobe, a conductor: all that absorbs is kept."""
@@ -449,23 +466,22 @@ def plain(stack: Stack) -> list[Layers]:
         raise InvalidInput("thin: a pane ends in the index outside; a target has no such last index")
     found: list[Layers] = []
     tau: Array | float = 0.0
+    scatters: MediumValues | None = None
     base = len(stack.layers) - 1 if stack.base else None
     material = Material.of(stack, lambda at, value: value if at.layer == base else number(at, value))
     for n, layer in enumerate(material.layers[:base]):
-        where = f"layer {n} ({layer.kind})"
         if isinstance(layer, MediumValues):
-            if np.any(layer.sigma_s > 0):
-                raise InvalidInput(f"{where}: scatters light; the media of a target only absorb")
             tau = np.broadcast_to(layer.sigma_a * layer.depth, (3, 1))
+            scatters = layer if np.any(layer.sigma_s * layer.depth > 0) else None
             continue
         if not isinstance(layer, InterfaceValues):
-            raise InvalidInput(f"{where}: a target has interfaces and media only")
-        if layer.kind == "mirror":
-            raise InvalidInput(f"{where}: reflects all light at any index; a target has a conductor there")
-        eta = layer.eta if layer.kind == "conductor" else np.full((1, 1), np.mean(layer.eta))
+            raise InvalidInput(f"layer {n} ({layer.kind}): a target has interfaces and media only")
+        eta = layer.eta
+        if layer.kind != "conductor":
+            eta = np.full((1, 1), 1.0 if layer.kind == "mirror" else np.mean(layer.eta))
         roughness = Roughness(layer.alpha_u, layer.alpha_v, np.radians(layer.rotation))
-        found.append(Layers(layer.kind, eta, layer.k, roughness, tau))
-        tau = 0.0
+        found.append(Layers(layer.kind, eta, layer.k, roughness, tau, scatters=scatters))
+        tau, scatters = 0.0, None
     if not found:
         raise InvalidInput("layers: no interface; without one there is no lobe")
     return found

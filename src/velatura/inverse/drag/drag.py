@@ -36,7 +36,6 @@ from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
 FAR = 0.1  # share of a wish that is a long way
-SCALED = (0.1, 10.0)  # how far lobes that are known may be from what a model in closed form reads
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class DraggedStack:
         """The same stack, its lobes known: what the model reads is scaled to be those."""
         read, wanted = self.point.reading.value, self._wanted(lobes)
         factors = wanted / np.where(np.abs(read) > ENERGY_MIN, read, np.inf)
-        factors = np.where(factors > 0, np.clip(factors, *SCALED), 1.0)
+        factors = np.where(factors > 0, factors, 1.0)
         return dataclasses.replace(self, point=Point(dataclasses.replace(self.space, factors=factors), self.point.x))
 
     # What it is, and what the model reads ----------------------------------------------------------------------------
@@ -137,6 +136,11 @@ class DraggedStack:
     def interfaces(self) -> tuple[InterfaceCoordinates, ...]:
         """The interfaces from the top."""
         return self.space.interfaces
+
+    @property
+    def scatters(self) -> bool:
+        """Whether a medium scatters, which stays where it is."""
+        return any(own.scatters is not None for own in self.interfaces)
 
     @property
     def variances(self) -> Array:
@@ -169,11 +173,11 @@ class DraggedStack:
         return float(self.indices(n - 1)[0][0, 0]) if n else self.space.exterior
 
     def above(self, n: int) -> Above:
-        """The layers above the n-th interface."""
+        """The layers above the n-th interface, and what scatters there."""
         above = Above.nothing(self.model, self.space.exterior, self.space.kind)
         for part in self.point.layers[:n]:
             above, _ = above.below(part)
-        return above
+        return above.scattered(self.point.layers[n])
 
     def _target_of(self, reading: Array, form: Target) -> Target:
         """The target of a form with lobes as they are read."""
@@ -222,12 +226,14 @@ class DraggedStack:
         return float(np.max(np.abs(self._problem(self._wanted(wish)).way))) > FAR
 
     def achromatic(self, wish: Target) -> Target:
-        """A wish, its first lobe without the colours that need absorption where nothing may absorb."""
+        """A wish, its first lobe without what needs absorption where nothing may absorb: colours, a mirror's energy."""
         first = self.interfaces[0]
-        if first.reflectances is None or first.absorbs or first.kind != "dielectric":
+        if first.absorbs or first.log_index is not None or first.kind == "conductor":
             return wish
-        passes = np.exp(-2 * np.broadcast_to(first.kept, (3, 1))[:, 0])
-        own = np.array(wish.lobes[0].colour)
+        now, own = self.point.reading.value[:3], np.array(wish.lobes[0].colour)
+        if first.kind == "mirror":
+            return wish if np.max(np.abs(now - own)) < SLACK else wish.with_lobe(0, energy=tuple(now.tolist()))
+        passes = now if np.min(now) > ENERGY_MIN else np.exp(-2 * np.broadcast_to(first.kept, (3, 1))[:, 0])
         possible = passes * np.mean(own / passes)
         return wish if np.max(np.abs(possible - own)) < SLACK else wish.with_lobe(0, energy=tuple(possible.tolist()))
 
@@ -300,7 +306,7 @@ class DraggedStack:
         """The point of the member in the class of a lobe."""
         point = []
         for own, part in zip(self.interfaces, self.point.layers):
-            if own.lobe == k:
+            if own.lobe == k and own.kind != "mirror":
                 point.append(float(part.eta[0, 0]) if own.kind == "dielectric" else float(np.mean(own.tint)))
         return point
 
@@ -349,7 +355,7 @@ class DraggedStack:
             for below in interfaces[places[n] :]:
                 if below.reflectances is not None:
                     u = x[below.reflectances]
-                    most = CONDUCTOR_MAX if below.kind == "conductor" else REFLECTANCE_MAX
+                    most = {"conductor": CONDUCTOR_MAX, "mirror": 1.0}.get(below.kind, REFLECTANCE_MAX)
                     x[below.reflectances] = np.minimum(u * (darker if len(u) == 3 else np.mean(darker)), most)
             if n == 0 and (len(places) == 2 or k == 0):
                 target = with_depth(target, k, depth)
@@ -366,7 +372,7 @@ class DraggedStack:
         held: list[int] = []
         eta_1 = self.space.exterior
         for n, (own, part) in enumerate(zip(interfaces, self.point.layers)):
-            if own.lobe == k:
+            if own.lobe == k and own.kind != "mirror":
                 wanted = float(point[len(held)])
                 if own.log_index is not None:
                     x[own.log_index] = np.log(wanted)

@@ -21,6 +21,7 @@ const COAT = { eta: 1.5, alpha: 0, keep: true };
 const BASES = [
   ['dielectric', 'Dielectric'],
   ['conductor', 'Conductor'],
+  ['mirror', 'Mirror'],
 ];
 
 /**
@@ -106,10 +107,10 @@ export function mountAppearance(element, services) {
     }
   }, () => held || comeToRest());
 
-  function accept({ material, target, haze, snapped, why }, command) {
+  function accept({ material, target, haze, held: holds, snapped, why }, command) {
     refused = snapped || why ? about(snapped ?? why) : null;
     if (!material) return paint();
-    read = { target, haze, snapped, says: null };
+    read = { target, haze, held: holds, snapped, says: null };
     text = textOf(material, store.get());
     known.set(text, read);
     edits.drag('appearance', command, material);
@@ -211,7 +212,7 @@ export function mountAppearance(element, services) {
         const alpha = axis === undefined ? () => withBlur(old, blur) : () => old.alpha.with(axis, blur);
         wish(index, {
           ...(blur !== undefined && { alpha: roundedBlur(alpha()) }),
-          ...(energy !== undefined && { energy: withMean(old.energy, energy).map(rounded) }),
+          ...(energy !== undefined && !holdsOf(index).energy && { energy: withMean(old.energy, energy).map(rounded) }),
         });
       },
       onLetGo: letGo,
@@ -225,6 +226,13 @@ export function mountAppearance(element, services) {
       ${controls(underHand().lobes[chosen], chosen)}
     </fieldset>
   `;
+
+  /** Why a lobe's energy, or its number and kind of interfaces, cannot be asked for. */
+  const holdsOf = (index) => read.held?.[index] ?? {};
+
+  /** Controls, or where these ask for what cannot be, the reason below them. */
+  const unless = (why, controls) =>
+    why ? html`<fieldset class="held" disabled>${controls}</fieldset><p class="faint">${capital(why)}.</p>` : controls;
 
   const row = (lobe, index) => html`<li>
     <button type="button" class="lobe" aria-pressed=${index === chosen} @click=${() => choose(index)}>
@@ -263,25 +271,27 @@ export function mountAppearance(element, services) {
       refuse: (words) => messages.complain('appearance', words, { passing: true }),
     });
     const energy = edit('energy', (value) => withMean(lobe.energy, Math.max(value, 1e-6)).map(rounded));
+    const colours = [
+      line('Colour', colourRow({ label: 'Energy', value: lobe.energy, spec: SHARE, edit: edit('energy') })),
+      line('Energy', number({ ...share('Energy', mean(lobe.energy)), edit: energy, span: null, decades: ENERGIES })),
+    ];
+    const made = line(
+      'Made by',
+      html`<div class="made">
+        ${menu({
+          label: 'Number of interfaces',
+          value: String(lobe.interfaces),
+          options: [
+            ['1', '1 interface'],
+            ['2', '2 interfaces'],
+          ],
+          choose: (count) => once(index, { interfaces: Number(count) }),
+        })}
+        ${menu({ label: 'Kind of base', value: lobe.base, options: BASES, choose: (base) => once(index, { base }) })}
+      </div>`,
+    );
     return html`
-      ${line('Colour', colourRow({ label: 'Energy', value: lobe.energy, spec: SHARE, edit: edit('energy') }))}
-      ${line('Energy', number({ ...share('Energy', mean(lobe.energy)), edit: energy, span: null, decades: ENERGIES }))}
-      ${blur(lobe, index, edit)}
-      ${line(
-        'Made by',
-        html`<div class="made">
-          ${menu({
-            label: 'Number of interfaces',
-            value: String(lobe.interfaces),
-            options: [
-              ['1', '1 interface'],
-              ['2', '2 interfaces'],
-            ],
-            choose: (count) => once(index, { interfaces: Number(count) }),
-          })}
-          ${menu({ label: 'Kind of base', value: lobe.base, options: BASES, choose: (base) => once(index, { base }) })}
-        </div>`,
-      )}
+      ${unless(holdsOf(index).energy, colours)} ${blur(lobe, index, edit)} ${unless(holdsOf(index).interfaces, made)}
       ${
         lobe.base === 'conductor'
           ? line('Tint', number({ ...share('Tint', lobe.tint), edit: edit('tint') }))

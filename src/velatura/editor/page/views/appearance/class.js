@@ -23,6 +23,7 @@ const KINDS = {
   conductor: 'Conductors',
   'dielectric pair': 'Pairs of dielectric interfaces',
   'pair over a conductor': 'Dielectrics over a conductor',
+  'pair over a mirror': 'Dielectrics over a mirror',
 };
 
 const CHANNELS = ['red', 'green', 'blue'];
@@ -128,6 +129,7 @@ export function createClass(services, panel) {
   function view() {
     if (problem) return html`<p class="problem">${problem}</p>`;
     if (!card) return html`<p class="faint">The map is on its way.</p>`;
+    if (card.kind === 'mirror') return html`<p class="faint">Nothing is free of a mirror but its roughness.</p>`;
     if (alone(card) && !Object.keys(card.depths).length)
       return html`<p class="faint">
         Only one index does it: ${card.member.map(shown).join(' + ')}${card.kind === 'conductor' ? 'i' : ''}. With two

@@ -4,6 +4,7 @@ const COUNT = 5;
 
 /** The members to be shown: {place} on the map, or {tint}; none where there is nothing to choose. */
 export function pathOf(card) {
+  if (card.kind === 'mirror') return [];
   if (card.kind === 'conductor') return tints();
   const found = [...across(card)];
   if (found.length > 1) return found.map((place) => ({ place }));
