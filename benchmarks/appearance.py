@@ -3,8 +3,9 @@
     python benchmarks/appearance.py [--model velatura] [--drags 60]
 
 Of every figure of Bati et al. 2021 that the panel opens: random drags of its lobes, the map of each lobe's class, and
-drags of its member; and a visit from a preset over blur and class to a coat. Times are of the processor, of one call,
-without JSON and the way to the page.
+drags of its member; and a visit from a preset over blur and class to a coat. As on the page, the lobes that the
+material has are given while something is dragged, so that the answer may be approximate; and not where the hand rests.
+Times are of the processor, of one call, without JSON and the way to the page. The bound is that of drags.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ import velatura as vt
 from velatura.editor import appearance, class_maps
 from velatura.editor.messages import document
 
-BOUND = 20e-3  # seconds of a call, at the median
+BOUND = 20e-3  # seconds of a call while something is dragged, at the median
+HELD = ("invert", "member", "snapped")  # calls while something is dragged
 
 
 def timed(call: Callable[[Any], Any], body: Any, into: list[float]) -> Any:
@@ -36,7 +38,7 @@ def timed(call: Callable[[Any], Any], body: Any, into: list[float]) -> Any:
 
 def visit(state: dict[str, Any], model: str, drags: int, rng: np.random.Generator) -> dict[str, list[float]]:
     """Seconds of the calls of one visit, by verb; of drags that end short of the wish apart."""
-    times: dict[str, list[float]] = {"appearance": [], "invert": [], "snapped": [], "class": [], "member": []}
+    times: dict[str, list[float]] = {verb: [] for verb in ("appearance", *HELD, "rest", "class")}
     here = appearance.invert({"target": state["target"], "model": model})
     timed(appearance.appearance, {"material": here["material"], "model": model}, times["appearance"])
     for _ in range(drags):
@@ -47,21 +49,25 @@ def visit(state: dict[str, Any], model: str, drags: int, rng: np.random.Generato
         else:
             lobe["alpha"] = min(lobe["alpha"] * factor, 1.0)
         seconds: list[float] = []
-        here = timed(appearance.invert, {"target": wish, "material": here["material"], "model": model}, seconds)
+        body = {"target": wish, "material": here["material"], "model": model}
+        here = timed(appearance.invert, body | {"read": here["target"]}, seconds)
         times["snapped" if here["snapped"] else "invert"] += seconds
+    here = timed(appearance.invert, {"target": wish, "material": here["material"], "model": model}, times["rest"])
     for k in range(len(here["target"]["lobes"])):
         body = {"target": here["target"], "lobe": k, "model": model}
         card = timed(class_maps.class_, {**body, "material": here["material"]}, times["class"])
         for _ in range(max(drags // 10, 1)):
             point = [x * float(np.exp(0.01 * rng.normal())) for x in card["member"]]
-            body |= {"target": here["target"], "material": here["material"], "point": point}
+            body |= {"target": here["target"], "material": here["material"], "point": point, "read": here["target"]}
             here = timed(class_maps.member, body, times["member"])
+        del body["read"]
+        here = timed(class_maps.member, body, times["rest"])
     return times
 
 
 def session(model: str, drags: int) -> dict[str, list[float]]:
     """Seconds of a visit of the panel, by verb: blur, another form, a walk through the class, a coat."""
-    times: dict[str, list[float]] = {"appearance": [], "invert": [], "form": [], "class": [], "member": [], "coat": []}
+    times: dict[str, list[float]] = {verb: [] for verb in ("appearance", *HELD, "rest", "form", "class", "coat")}
     body: dict[str, Any] = {"material": document(vt.preset("coated-rough-metal")), "model": model}
     here = timed(appearance.appearance, body, times["appearance"])
 
@@ -69,8 +75,10 @@ def session(model: str, drags: int) -> dict[str, list[float]]:
     for alpha in np.linspace(0.46, 0.35, drags):
         body["target"] = copy.deepcopy(here["target"])
         body["target"]["lobes"][1]["alpha"] = float(alpha)
-        here = timed(appearance.invert, body, times["invert"])
+        here = timed(appearance.invert, body | {"read": here["target"]}, times["invert"])
         body["material"] = here["material"]
+    here = timed(appearance.invert, body, times["rest"])
+    body["material"] = here["material"]
 
     # Make the coat of two interfaces, and walk through their class
     body["target"] = copy.deepcopy(here["target"])
@@ -80,8 +88,10 @@ def session(model: str, drags: int) -> dict[str, list[float]]:
     start = timed(class_maps.class_, {**body, "size": 64}, times["class"])["member"]
     for t in np.linspace(0, 1, drags):
         body["point"] = [(1 - t) * a + t * b for a, b in zip(start, (1.2, 2.36))]
-        here = timed(class_maps.member, body, times["member"])
+        here = timed(class_maps.member, body | {"read": here["target"]}, times["member"])
         body |= {"target": here["target"], "material": here["material"]}
+    here = timed(class_maps.member, body, times["rest"])
+    body |= {"target": here["target"], "material": here["material"]}
 
     # Coat it
     timed(appearance.coated, {**body, "eta": 1.33, "alpha": 0.0, "keep": True}, times["coat"])
@@ -108,13 +118,13 @@ def main() -> int:
 
 
 def report(title: str, every: dict[str, list[float]]) -> float:
-    """Print how long calls took, by verb; the median of all."""
+    """Print how long calls took, by verb; the median of those while something is dragged."""
     for verb, seconds in every.items():
         if seconds:
             typical, most = 1e3 * np.median(seconds), 1e3 * np.percentile(seconds, 95)
             print(f"{title}, {verb}: {len(seconds)} calls, median {typical:.1f} ms, 95 % below {most:.1f} ms")
-    median = float(np.median([s for seconds in every.values() for s in seconds]))
-    print(f"{title}: median of all {1e3 * median:.1f} ms (bound {1e3 * BOUND:g})")
+    median = float(np.median([s for verb in HELD for s in every[verb]]))
+    print(f"{title}: median while dragged {1e3 * median:.1f} ms (bound {1e3 * BOUND:g})")
     return median
 
 
