@@ -380,6 +380,21 @@ def test_what_is_answered_is_what_the_stack_has_whatever_was_asked_before(model:
         assert appearance.invert(question) == answer
 
 
+def test_the_lobes_that_are_reported_are_read_from_the_returned_stack() -> None:
+    """Of `velatura`, whose solutions have a tolerance: to rounding, where a wish is met, and where it is not."""
+    state = appearance.invert({"target": saved("bati2021-19-b")["target"], "model": "velatura"})
+    wish = copy.deepcopy(state["target"])
+    wish["lobes"][1]["alpha"] *= 1.1
+    body = {"material": state["material"], "model": "velatura"}
+    met = appearance.invert({**body, "target": wish})
+    wish["lobes"][1]["energy"] = [0.95, 0.95, 0.9]
+    snapped = appearance.invert({**body, "target": wish})
+    assert met["snapped"] is None and snapped["snapped"] is not None
+    moved = class_maps.member({**body, "target": state["target"], "lobe": 1, "point": [0.3]})
+    for answer in (state, met, snapped, moved):
+        assert deviation(answer["material"], answer["target"], "velatura") < 1e-12
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_member_of_a_lobe_without_energy_is_found() -> None:
     """Below an interface that reflects nothing, since both indices are the same, another index may be taken."""
