@@ -45,6 +45,7 @@ CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of it
 DEPTH_MAX = 10.0  # of a medium
 AS_WELL, EXACT = 1.05, 1e-6  # of the smallest error, and beside it: other stacks fit as well
 LIKELY, DRAWN = 0.95, 4000  # the probability of an interval, and the points that it is taken from
+SHARED = 1.25  # by which it is wider, for errors of the model that all angles share, as walked stacks ask for
 FIRST, DARK = 10.0, 1e-3  # weight of energies beside all else, and energies that have no hue
 LEAST = 1e-4  # error that a table is taken to have: no model is known better
 FEW = 4  # angles of incidence; where there are fewer, directions have as many groups at each
@@ -278,8 +279,8 @@ class End:
         """Of the coordinates, (free, free), by leaving out one group of directions after the other.
 
         So it holds the errors of the model, which are alike within a group, as well as noise: a jackknife, linearised
-        (Bell & McCaffrey 2002), as wide as Student's distribution asks of so few. A coordinate that the table does not
-        determine is as uncertain as its bounds leave it.
+        (Bell & McCaffrey 2002), as wide as Student's distribution asks of so few, and wider by SHARED. A coordinate
+        that the table does not determine is as uncertain as its bounds leave it.
         """
         from scipy.stats import norm, t
 
@@ -294,7 +295,7 @@ class End:
             return np.asarray(noise)
         wider = (t.ppf((1 + LIKELY) / 2, few) / norm.ppf((1 + LIKELY) / 2)) ** 2
         alike = np.transpose(moved) @ np.array(moved) * few / (few + 1)
-        return np.asarray(wider * alike + noise)
+        return np.asarray(SHARED**2 * (wider * alike + noise))
 
 
 @dataclass(frozen=True)
