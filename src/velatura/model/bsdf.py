@@ -68,6 +68,9 @@ class Body(Protocol):
     @property
     def balanced(self) -> bool: ...
 
+    def lit(self, wi: Direction) -> Body:
+        """The same for light from wi alone, which is looked up once."""
+
     def albedo(self, wi: Direction) -> Value: ...
 
     def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ...) -> tuple[Value, Value]: ...
@@ -106,6 +109,9 @@ class Lobed:
     def diffuse(self) -> bool:
         """Whether a diffuse base is the last reflected part."""
         return self.above.base is not None
+
+    def lit(self, wi: Direction) -> Lobed:
+        return self
 
     def albedo(self, wi: Direction) -> Value:
         """Energy of all parts, a colour."""

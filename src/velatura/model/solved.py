@@ -255,12 +255,14 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Solved:
-    """A material as a BSDF: a uniform one, or one with the values of a point."""
+    """A material as a BSDF: a uniform one, or one with the values of a point; `known` is what light sees from the only
+    direction that is asked for, None for any."""
 
     above: Side
     below: Side | None
     eta: Value
     symmetric: bool
+    known: tuple[Seen, Value] | None = None
 
     diffuse = True  # the remainder comes after the lobes
 
@@ -268,8 +270,13 @@ class Solved:
     def balanced(self) -> bool:
         return self.symmetric
 
+    def lit(self, wi: Direction) -> Solved:
+        return replace(self, known=self.seen(wi))
+
     def seen(self, wi: Direction) -> tuple[Seen, Value]:
         """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
+        if self.known:
+            return self.known
         if self.below is None:
             return self.above.seen(wi), 1.0
         turned = upright(wi, wi)
@@ -292,7 +299,7 @@ class Solved:
     def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
         """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
         of, eta = self.seen(wi)
-        back = self.seen(wo)[0] if self.symmetric else None
+        back = replace(self, known=None).seen(wo)[0] if self.symmetric else None
         return eval_pdf(of, back, eta, wi, wo, asked)
 
     def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ALL) -> tuple[Direction, Value]:

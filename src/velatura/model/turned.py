@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from velatura.model.bsdf import Asked, Body
 from velatura.model.solved import ALL
@@ -25,6 +25,9 @@ class Turned:
     @property
     def balanced(self) -> bool:
         return self.body.balanced
+
+    def lit(self, wi: Direction) -> Turned:
+        return replace(self, body=self.body.lit(self._inside(wi)))
 
     def albedo(self, wi: Direction) -> Value:
         return self.body.albedo(self._inside(wi))

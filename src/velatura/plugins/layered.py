@@ -121,6 +121,7 @@ def make(mi: Any) -> type:
                 bs.wo = mi.Vector3f(*drawn)
                 part = smooth.component(wi, drawn, sample1, asked, smooth=True)
             else:
+                body = body.lit(wi)
                 drawn, bs.eta = body.sample(wi, sample1, sample2.x, sample2.y, asked)
                 bs.wo = mi.Vector3f(*drawn)
                 value, bs.pdf = body.eval_pdf(wi, drawn, asked)
