@@ -974,6 +974,7 @@ def test_a_lost_graphics_device_is_reported_until_it_is_back(visit: Open) -> Non
 
 def test_everything_is_reached_by_keys_and_has_a_name(visit: Open) -> None:
     page = visit()
+    page.page.wait_for_selector(".snapshot")
     reached = []
     for _ in range(120):
         page.page.keyboard.press("Tab")
@@ -991,6 +992,8 @@ def test_everything_is_reached_by_keys_and_has_a_name(visit: Open) -> None:
         assert found[2] != "none", f"the focus on {found} is not seen"
         reached.append(found[1])
     for name in ["Open", "Save", "Roughness", "Roughness, slider", "Rotation, dial", "Move Au: arrow keys", "Model"]:
+        assert name in reached
+    for name in ["History", "1 · Coated brushed gold", "1 · Coated brushed gold, side by side", "Put beside"]:
         assert name in reached
 
     # Change a value and add a layer without a mouse
@@ -1078,6 +1081,8 @@ def test_axe_finds_nothing_serious(visit: Open, scheme: str) -> None:
     look("layers")
     page.page.get_by_label("Compare", exact=True).select_option("difference")
     look("difference")
+    page.page.get_by_label("Compare", exact=True).select_option("tiles")
+    look("side by side")
     page.page.get_by_label("Compare", exact=True).select_option("split")
     for tab in ("Disc", "Energy", "Blur", "Validations"):
         page.page.get_by_role("tab", name=tab, exact=True).click()

@@ -62,7 +62,7 @@ export function mountAppearance(element, services) {
 
   /** Reads the material anew where it is another one. */
   async function follow() {
-    if (!element.getClientRects().length || now() === text) return paint();
+    if (!element.checkVisibility() || now() === text) return paint();
     text = now();
     [asked, coatLobe, coatSays] = [null, null, ''];
     const key = text;

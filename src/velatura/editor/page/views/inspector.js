@@ -61,7 +61,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
   /** Draws changes, in every frame in which it is visible. */
   function follow() {
     frame = requestAnimationFrame(follow);
-    if (!element.getClientRects().length) return;
+    if (!element.checkVisibility()) return;
     if (local.tab !== 'validations') slice();
     if (stale) render(page(), element);
     stale = false;

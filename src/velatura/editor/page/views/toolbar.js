@@ -157,9 +157,11 @@ function savePanel(bar) {
     }.yaml`;
   return html`<dialog class="save" aria-label="Save as" ${ref(bar.dialogs.save)}>
     <form @submit=${submit}>
+      <h2>Save as</h2>
       <label
         >File name <input name="file" type="text" required spellcheck="false" .value=${suggested}
       /></label>
+      <p>In the folder that the editor was started in; the ending is .yaml or .json.</p>
       <div class="actions">
         <button type="submit">Save</button>
         <button type="button" @click=${close}>Cancel</button>
