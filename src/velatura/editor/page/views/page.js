@@ -125,7 +125,7 @@ const SMALLEST = 120;
 const NARROWEST = 280;
 
 const CLOSED_FORM =
-  'The model would be solved for this material by Python. The closed form is less exact: see the manual, Shaders.';
+  'The model is not solved here, but added up in closed form. Over the presets the two pictures differ by 0.03 in the median (root mean square, white being 1), and by more where media scatter.';
 
 const pixels = (size) => (size ? `${size}px` : '');
 
