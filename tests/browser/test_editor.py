@@ -929,6 +929,22 @@ def test_materials_are_side_by_side_in_one_view(visit: Open) -> None:
     both = page.picture()
     assert difference(both[:, 33:62], twice[:, 33:62]) < SAME
     assert difference(both[:, 1:30], twice[:, 1:30]) > OTHER
+    drawn = page.page.evaluate_handle(
+        """() => {
+          const { gbuffer, slots } = velatura.viewport, { drawObject } = gbuffer, drawn = { a: 0, b: 0 };
+          gbuffer.drawObject = (...given) => {
+            for (const name of Object.keys(drawn)) if (given[2] === slots[name].preview) drawn[name]++;
+            return drawObject.apply(gbuffer, given);
+          };
+          return drawn;
+        }"""
+    )
+    drag(slider(page, 0, "Roughness"), range(10, 60, 5))
+    page.settled()
+    assert drawn.json_value()["a"] > 2
+    assert drawn.json_value()["b"] == 0
+    page.page.keyboard.press("Control+z")
+    page.settled()
     page.page.wait_for_selector("[aria-label='3 · Glossy plastic']")
     page.page.locator(".snapshot[aria-current=true]").focus()
     page.page.keyboard.press("Home")

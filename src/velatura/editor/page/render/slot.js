@@ -29,6 +29,7 @@ export class Slot {
   #outdated = true; // whether the bake is of other values
   #coarse = false; // whether it is a coarse one
   #surrounded = false; // whether the preview has what is around the object
+  #drawn = null; // whether the preview of the present contents is `coarse` or `fine`; null where it is of others
   #sums = null; // two targets: light added up, and a spare one
 
   /** `loader` provides the data that a shader names, like that of loader.js. */
@@ -85,10 +86,12 @@ export class Slot {
     const decoded = ([name, x]) => [name, decode(x).array];
     this.#solved = solution && Object.fromEntries(Object.entries(solution).map(decoded));
     this.#outdated = true;
+    this.#drawn = null;
   }
 
   setLobe(lobe) {
     this.lobe = lobe;
+    this.#drawn = null;
   }
 
   /** All that the code of the material reads; lobes are worked out anew where values have changed, maybe `coarse`. */
@@ -128,10 +131,16 @@ export class Slot {
     this.device.draw(this.#learning, { ...uniforms, seen_normal: normals }, shade);
     this.shades.reverse();
     this.#surrounded = false;
+    this.#drawn = null;
   }
 
-  /** Draws the preview of the contents of a G-buffer; all around the object stays as it is until the view changes. */
+  /**
+   * Draws the preview of the contents of a G-buffer; all around the object stays as it is until the view changes, and the
+   * object while nothing of it does.
+   */
   drawPreview(gbuffer, uniforms, coarse) {
+    if (this.#drawn === 'fine' || (this.#drawn && coarse)) return;
+    this.#drawn = coarse ? 'coarse' : 'fine';
     const shade = this.shades[0].textures[0];
     if (!this.#surrounded) gbuffer.drawSurroundings({ ...uniforms, shade }, this.preview);
     this.#surrounded = true;
@@ -147,6 +156,7 @@ export class Slot {
   forget() {
     this.samples = 0;
     this.#surrounded = false;
+    this.#drawn = null;
     if (this.shades) this.device.clear(this.shades[0], 1);
   }
 
