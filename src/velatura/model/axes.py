@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, ClassVar
 
@@ -18,9 +18,9 @@ from velatura.stack import Address, Material
 Array = NDArray[np.floating]
 Range = tuple[Sequence[Address], float, float]  # values that one texture gives, its least and its greatest
 
-NODES_MAX = 9
-ALONE_MAX = 17  # of the only axis
-FINE = 3  # places of a table from one node to the next
+NODES_MAX = {1: 17, 2: 9, 3: 8}  # by the number of axes of a table
+COARSE = 5  # nodes of an axis in a table that another one resolves
+FINE = {1: 3, 2: 3, 3: 2}  # likewise, places of a table from one node to the next
 ROOTS = frozenset({"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k"})  # of which nodes are even in the root
 STEPS = {"rotation": 22.5}
 STEP = 0.1
@@ -42,10 +42,11 @@ class Axis:
     low: float
     high: float
     count: int
+    fine: int = FINE[2]
 
     @classmethod
-    def of(cls, given: Range, alone: bool) -> Axis:
-        """The axis of a texture; `alone` where it is the only one."""
+    def of(cls, given: Range, together: int) -> Axis:
+        """The axis of a texture, in a table of so many axes."""
         addresses, *ends = given
         first = addresses[0]
         if first.key == "rotation":
@@ -53,18 +54,27 @@ class Axis:
         least, most = (_coordinate(first, end) for end in first.declared.within)
         low, high = (_coordinate(first, end) for end in ends)
         step = STEPS.get(first.key, STEP)
-        while high - low > step * ((ALONE_MAX if alone else NODES_MAX) - 2):
+        while high - low > step * (NODES_MAX[together] - 2):
             step *= 2
         begin, end = np.floor(low / step + 1e-6) * step, np.ceil(high / step - 1e-6) * step
         end = max(end, begin + step)
         if end > most:
             begin, end = min(begin, most - step), most
         begin = max(begin, least)
-        return cls(tuple(addresses), float(begin), float(end), max(2, round((end - begin) / step) + 1))
+        return cls(tuple(addresses), float(begin), float(end), max(2, round((end - begin) / step) + 1), FINE[together])
 
     @property
     def middle(self) -> float:
-        return self.values[self.count // 2]
+        return float(self._values(np.array(0.5 * (self.low + self.high))))
+
+    @property
+    def middle_node(self) -> int:
+        """Number of the node in the middle, of an odd number of nodes."""
+        return self.count // 2
+
+    def with_middle(self, most: int) -> Axis:
+        """With as many nodes at most, an odd number of them."""
+        return replace(self, count=min(self.count | 1, most), fine=FINE[2])
 
     def covers(self, other: Axis | Wavelengths) -> bool:
         return (
@@ -77,12 +87,15 @@ class Axis:
     @property
     def values(self) -> list[float]:
         """At the nodes."""
-        nodes = np.linspace(self.low, self.high, self.count)
-        return (nodes**2 if self.addresses[0].key in ROOTS else nodes).tolist()
+        found: list[float] = self._values(np.linspace(self.low, self.high, self.count)).tolist()
+        return found
+
+    def _values(self, coordinates: Array) -> Array:
+        return coordinates**2 if self.addresses[0].key in ROOTS else coordinates
 
     @property
     def places(self) -> int:
-        return FINE * (self.count - 1) + 1
+        return self.fine * (self.count - 1) + 1
 
     def at(self, material: Material) -> Value:
         """The place of a material's value, from 0 to 1."""
@@ -116,10 +129,14 @@ class Wavelengths:
     places: ClassVar[int] = 64
     values: ClassVar[list[None]] = [None]
     middle: ClassVar[int] = ops.FIXED // 2
+    middle_node = middle
 
     @property
     def count(self) -> int:
         return len(self.nodes)
+
+    def with_middle(self, most: int) -> Wavelengths:
+        return self
 
     def covers(self, other: Axis | Wavelengths) -> bool:
         return self == other

@@ -1,9 +1,10 @@
 """Materials whose values come from textures: solved for some of those values, and interpolated between.
 
-Each texture is an axis. Columns over direction are solved at all nodes of two axes together, splines refine them, and a
-renderer interpolates linearly; so do gradients. A third texture, or a second one where interfaces are brushed, changes
-columns as it does at the middle of the others: it scales those that are nowhere negative, and adds to others. A texture
-of the rotation that all brushed interfaces share turns directions, and is no axis.
+Each texture is an axis. Columns over direction are solved at all nodes of three axes together (two where wavelength is
+one of them), splines refine them, and a renderer interpolates linearly; so do gradients. Of further textures every pair
+has a table, of what it changes beyond those before, with all others at their middle: it scales columns that are nowhere
+negative, and adds to others. Where interfaces are brushed each texture has a table of its own. A texture of the
+rotation that all brushed interfaces share turns directions, and is no axis.
 
 Of a texture of colours, each channel has its own coordinate, and solves are of grey values.
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
+from itertools import combinations, product
 from math import pi
 from typing import Protocol
 
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import axes, solution
-from velatura.model.axes import Axis, Range, Wavelengths
+from velatura.model.axes import COARSE, NODES_MAX, Axis, Range, Wavelengths
 from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
@@ -46,8 +47,8 @@ SAMPLES = 377  # for the factors of the symmetric form, at each direction
 SHAPES = {True: (96,), False: (48, 33)}  # places over direction
 FAINTEST = 1e-4  # columns that are scaled from less than that are scaled by less
 MOST = 8.0  # times
+TOGETHER = 3  # axes of one table at most
 OF_PASSED = 0.05  # share of what passes by which each part of it is sampled at least, where terms are summed
-TOGETHER = {True: 2, False: 1}  # axes of one table
 
 
 class Textured(Protocol):
@@ -108,6 +109,7 @@ class Tables:
     """A material by some terms, of which further ones scale or add; `fixed` are the values that it was solved for,
     beside those of textures."""
 
+    axes: tuple[Axis | Wavelengths, ...]
     terms: tuple[Term, ...]
     adds: tuple[Array, ...]
     layouts: list[Layout]
@@ -133,8 +135,7 @@ class Tables:
 
     def holds(self, solver: Solver, wanted: Sequence[Axis | Wavelengths], fixed: bytes) -> bool:
         """Whether it is what would be solved, for values of textures in these ranges."""
-        known = [axis for term in self.terms for axis in term.axes]
-        covered = len(known) == len(wanted) and all(a.covers(b) for a, b in zip(known, wanted))
+        covered = len(self.axes) == len(wanted) and all(a.covers(b) for a, b in zip(self.axes, wanted))
         return covered and fixed == self.fixed and solver.variance is self.solver.variance
 
 
@@ -216,7 +217,9 @@ def _tabulated(
     if not ranges:
         return Same(solution.solve(material, model, variance, context))
     isotropic = variance is Isotropic
-    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, alone=len(ranges) == 1) for x in ranges]
+    spectral = any(isinstance(x, Wavelengths) for x in ranges)
+    together = min(len(ranges), TOGETHER if isotropic and not spectral else 2)
+    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together) for x in ranges]
     material = material.solid()
     start = axes.placed(solution.plain(material), spanned, [axis.middle for axis in spanned])
     solver = Solver.of(model, variance, context)
@@ -227,8 +230,7 @@ def _tabulated(
     given = Variables.of(material)
     if isinstance(before, Tables) and not given.given and before.holds(solver, spanned, fixed):
         return before
-    size = TOGETHER[isotropic]
-    groups = [tuple(spanned[k : k + size]) for k in range(0, len(spanned), size)]
+    groups = _groups(spanned, together if isotropic else 1)
     ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
     layouts = solver.layouts([start, *(axes.placed(start, spanned, values) for values in ends)])
 
@@ -255,18 +257,17 @@ def _tabulated(
 
     def tables(numbers: list[float]) -> list[Array]:
         made, found = given.replaced(start, numbers), []
-        by_group = [solved(made, group) for group in groups]
-        at_middle = solved(made, ()) if len(groups) > 1 else by_group[0]
+        by_group = [solved(made, group) for group, _ in groups]
         if not adds:
             every = zip(*by_group)
             adds.extend(np.min([x.min(axis=(0, 2)) for x, _ in of_side], axis=0) < 0 for of_side in every)
-        for k, (group, of_group) in enumerate(zip(groups, by_group)):
-            both = zip(of_group, at_middle, adds)
-            for side, ((columns, polynomials), (middle, polynomial), add) in enumerate(both):
+        for k, ((group, known), of_group) in enumerate(zip(groups, by_group)):
+            for side, ((columns, polynomials), add) in enumerate(zip(of_group, adds)):
                 if k:
-                    scaled = np.clip((columns + FAINTEST) / (middle + FAINTEST), 0, MOST)
-                    columns = np.where(add[:, None], columns - middle, scaled)
-                    polynomials = polynomials - polynomial
+                    by = _beyond(np.log(np.maximum(columns, 0) + FAINTEST), group, known)
+                    scaled = np.exp(np.minimum(by, np.log(MOST)))
+                    columns = np.where(add[:, None], _beyond(columns, group, known), scaled)
+                    polynomials = _beyond(polynomials, group, known)
                 if (k, side) not in packings:
                     packings[k, side] = tuple(
                         Packing.of(values.swapaxes(0, 1), each, shared=not given.given)
@@ -279,7 +280,7 @@ def _tabulated(
 
     flat = iter(differences.differentiable(tables, given.given, given.around, context.number))
     terms = []
-    for k, group in enumerate(groups):
+    for k, (group, _) in enumerate(groups):
         places = tuple(axis.places for axis in group)
         made = [
             packing.curves(
@@ -290,7 +291,30 @@ def _tabulated(
         ]
         terms.append(Term(group, tuple(made[::2]), tuple(made[1::2])))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)
-    return Tables(tuple(terms), tuple(adds), layouts, solver, point, fixed)
+    return Tables(tuple(spanned), tuple(terms), tuple(adds), layouts, solver, point, fixed)
+
+
+Group = tuple[Axis | Wavelengths, ...]
+
+
+def _groups(spanned: Sequence[Axis | Wavelengths], together: int) -> list[tuple[Group, Sequence[int]]]:
+    """The axes of all tables, some together in the first one, and those at whose middle others have the columns."""
+    groups: list[tuple[Group, Sequence[int]]] = [(tuple(spanned[:together]), ())]
+    others = [axis.with_middle(NODES_MAX[2]) for axis in spanned[together:]]
+    if together == 1:
+        return [*groups, *(((axis,), (0,)) for axis in others)]
+    first, *coarse = (axis.with_middle(COARSE) for axis in spanned)
+    groups += [((first, axis), (1,)) for axis in others]
+    pairs = [(coarse[i], coarse[k]) for i, k in combinations(range(len(coarse)), 2) if k + 1 >= together]
+    return [*groups, *((pair, (0, 1)) for pair in pairs)]
+
+
+def _beyond(values: Array, group: Group, known: Sequence[int]) -> Array:
+    """Values at the nodes of a group, (nodes, ...), less those at the middle of the axes of these numbers."""
+    found = values.reshape(*(axis.count for axis in group), *values.shape[1:])
+    for k in known:
+        found = found - found.take([group[k].middle_node], k)
+    return found.reshape(values.shape)
 
 
 def _of_channels(solver: Solver, side: SolvedSide, colours: int, wavelengths: int) -> tuple[list[Array], list[Array]]:
