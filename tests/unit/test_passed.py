@@ -14,6 +14,7 @@ from velatura import kernel
 from velatura.model import passed, straight_through
 from velatura.model.passed import Parts
 from velatura.model.prepare import variance_kind
+from velatura.model.sharing import Wanted
 from velatura.model.straight_through import Passage
 from velatura.optics import fresnel, ggx
 from velatura.shader import symbol
@@ -52,7 +53,8 @@ def at(cos_theta: float, count: int = 1) -> Direction:
 
 
 def parts_of(passage: Passage, cos_theta: float, *energies: float) -> Parts:
-    return passed.parts(passage, at(cos_theta), *(np.full((3, 1), energy) for energy in energies))
+    straight, bounced, passing, back = (np.full((3, 1), energy) for energy in energies)
+    return passed.parts(passage, at(cos_theta), straight, bounced, passing, Wanted.of(back, back, back))[0]
 
 
 @pytest.mark.parametrize("cos_theta", [0.9, 0.5])
@@ -100,8 +102,9 @@ def test_a_rough_dielectric_is_sampled_as_mitsuba_samples_it(stack: vt.Stack) ->
     glass = {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha, "int_ior": eta, "ext_ior": 1.0}
     theirs = mi.load_dict(glass)
     for cos_theta in (0.9, 0.3):
-        straight, _ = straight_through.integrals(passage, at(cos_theta))
-        of = passed.parts(passage, at(cos_theta), straight, 0 * straight, straight, 0 * straight)
+        straight, *_ = straight_through.integrals(passage, at(cos_theta))
+        nothing = Wanted.of(0 * straight, 0 * straight, 0 * straight)
+        of, _ = passed.parts(passage, at(cos_theta), straight, 0 * straight, straight, nothing)
         np.testing.assert_allclose(of.share, 1)
         wi, u = at(cos_theta, count), rng.random((3, count))
         wo = passed.sample(passage, of, wi, *u)
@@ -125,7 +128,7 @@ def test_what_a_lobe_cannot_carry_goes_with_the_others() -> None:
     """Deep beyond the critical angle of a slab no single facet lets light out; all the energy passes nevertheless."""
     stack = vt.Stack([vt.Interface(eta=1.2, alpha=0.3), vt.Interface(eta=1.0, alpha=0.3)], exterior=1.5)
     passage = passage_of(stack)
-    energy, _ = straight_through.integrals(passage, at(0.5))
+    energy, *_ = straight_through.integrals(passage, at(0.5))
     assert energy.max() < 0.03
     of = parts_of(passage, 0.5, 0.2, 0.0, 0.2, 0.8)
     assert np.all(of.straight <= passed.MOST) and np.all(of.bounced <= passed.MOST)

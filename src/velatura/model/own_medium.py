@@ -29,6 +29,7 @@ from velatura.sampling import low_discrepancy
 
 COS_MIN = 1e-3  # times the index inside; what refraction does not reach meets the interface at this one
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
+SPARSE = 3  # of so many normals one, for weights
 BLOCK = 1 << 16  # normals at a time, which a processor's cache holds
 
 Reflectance = Callable[[Value], Value]
@@ -99,8 +100,8 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     # Add what falls outside the cone, and is spread over it
     if not n.is_outside:
         p2 = ops.maximum(wo[0] * wo[0] + wo[1] * wo[1], ops.TINY)
-        stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
-        m = _squares((i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2))
+        far, stretch = _far(i, (p[0], p[1]), p2, n)
+        m = _squares(far)
         ops.names(p2=p2, stretch=stretch, m_far=m)
         density = density + n.ring * o[2] * _facing(m, squares)
     return lobe.weight * light, seen * shown * density
@@ -139,8 +140,8 @@ def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Valu
     return lobe.weight * integrals(lobe, wi, normals)[0]
 
 
-def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value]:
-    """Mean and largest weight of samples, as `integral`, for a weight of 1."""
+def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value, Value]:
+    """Mean of the weights of samples, and of their squares, and the largest one, as `integral`, for a weight of 1."""
     count, size = len(wi[2]), max(BLOCK // normals, 1)
     blocks = [
         _integrals(replace(lobe, n=_single(Index.of(lobe.n).n), roughness=Roughness(*roughness)), (x, y, z), normals)
@@ -148,11 +149,11 @@ def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tup
             [_single(value, slice(k, k + size)) for value in (*wi, *lobe.roughness)] for k in range(0, count, size)
         )
     ]
-    mean, largest = (np.concatenate(each, axis=-1) for each in zip(*blocks))
-    return mean, largest
+    mean, squares, largest = (np.concatenate(each, axis=-1) for each in zip(*blocks))
+    return mean, squares, largest
 
 
-def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value, Value]:
+def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value, Value, Value]:
     """For columns of directions (N, 1)."""
     u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
@@ -167,7 +168,16 @@ def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value,
         value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0))
     if lobe.leaving:
         value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
-    return np.mean(value, axis=-1, dtype=float), np.max(value, axis=-1)
+    few = value[..., ::SPARSE]
+    weights = few
+    if not n.is_outside:
+        # The light from outside the cone is spread over samples
+        x, y, z, p2 = (each[..., ::SPARSE] for each in (*o, p2))
+        squares = alpha_u * alpha_u, alpha_v * alpha_v
+        near = 0.5 * _facing(_squares((i[0] + x, i[1] + y, i[2] + z)), squares)
+        far = n.ring * z * _facing(_squares(_far(i, (x, y), ops.maximum(p2, ops.TINY), n)[0]), squares)
+        weights = few * near / (near + ops.maximum(far, 0.0))
+    return np.mean(value, axis=-1, dtype=float), np.mean(weights * few, axis=-1, dtype=float), np.max(weights, axis=-1)
 
 
 def _single(x: Value, part: slice = slice(None)) -> Value:
@@ -197,6 +207,12 @@ def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Index, Di
 
 def _squares(w: Direction) -> Direction:
     return w[0] * w[0], w[1] * w[1], w[2] * w[2]
+
+
+def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: Index) -> tuple[Direction, Value]:
+    """Along the normal of light from outside the cone that is spread to a momentum p inside, and what scales that."""
+    stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
+    return (i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2), stretch
 
 
 def _shown(w: Direction, squares: tuple[Value, Value]) -> Value:

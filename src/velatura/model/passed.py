@@ -17,18 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import bounced, own_medium, straight_through
+from velatura.model import bounced, own_medium, sharing, straight_through
 from velatura.model.remainder import EVEN
+from velatura.model.sharing import Wanted
 from velatura.model.straight_through import Passage
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
 MOST = 2.0  # energy over integral
 LEAST = 0.05  # share of samples of what passes that are scattered, for what all others miss
-
-LIGHT = 2.5  # weight of samples of a part, where it can be kept
-RARE = 3.0  # times as often as by its energy that a part is sampled at most
-
+UNLIKE = 1.5  # weight over its mean, of samples that go straight through, for which more are drawn
 PASSES_MIN = 0.05  # share of facets that let light pass, where samples are shared
 BELOW_ONE = 1 - 2**-24
 
@@ -69,20 +67,25 @@ def parts(
     straight: Array,
     bounces: Array,
     passed: Array,
-    reflected: Array,
-    facets: Array | None = None,
+    reflected: Wanted,
+    met: Sequence[int | None] = (),
+    facets: Wanted | None = None,
     numbers: Sequence[Array] = (),
     peak: Array | float = 1.0,
-) -> Parts:
+) -> tuple[Parts, Array]:
     """In NumPy, for directions wi above, (N,) each, and energies (C, N): of light that passes straight through and
-    after bounces, where it meets facets once and is not scattered; of all that passes; and of what is reflected, but
-    for the `facets` of a single interface: samples of these are those of a rough dielectric. Diffuse light has the
-    `numbers` of `remainder.passing`, and samples of a weight up to `peak`."""
+    after bounces, where it meets facets once and is not scattered; of all that passes.
+
+    What is `reflected` has the other samples, in shares (K, N). Those that do not pass the facets of an interface are
+    as those of its lobe: `met` numbers the interface of each part, None of those that are no lobe. The `facets` of a
+    single interface have no others. Diffuse light has the `numbers` of `remainder.passing`, and samples of a weight up
+    to `peak`.
+    """
     i, lobe, found = bounced.seen_below(passage, wi), bounced.bounced(passage, wi), bounced.rest(passage, wi)
     straight = np.clip(straight, 0, passed)  # waves over the azimuth may lie below 0
     bounces = np.clip(bounced.share(lobe) * bounces, 0, passed - straight)
     # Divide energies by integrals, and hand over what they lack
-    of_straight, passes = straight_through.integrals(passage, wi)
+    of_straight, squares, passes = straight_through.integrals(passage, wi)
     of_bounced = own_medium.integral(lobe, i) if lobe else np.zeros_like(of_straight)
     weight_straight = np.minimum(ops.divide(straight, of_straight), MOST)
     bounces = np.maximum(bounces + straight - weight_straight * of_straight, 0)
@@ -91,22 +94,24 @@ def parts(
     rest = np.maximum(passed - energies[0] - energies[1], 0)
     weight_rest = rest / bounced.integral_rest(found, i)
     # Share samples; of the facets that are drawn, some reflect
-    straightly, bouncing, scattered, back = (ops.mean(x) for x in (*energies, rest, reflected))
+    straightly, bouncing, scattered = energies[0], energies[1], rest
     if lobe:
         scattered = np.maximum(scattered, LEAST * (straightly + bouncing))
-    drawn = ops.divide(straightly, np.clip(passes, PASSES_MIN, 1.0))
+    mean = ops.divide(straightly, np.clip(passes, PASSES_MIN, 1.0))
+    usual = np.minimum(weight_straight * ops.divide(squares, of_straight), UNLIKE * mean)
+    drawn = Wanted.of(mean, usual, usual)
     if facets is not None:
-        drawn = straightly + ops.mean(facets)
-    total = np.maximum(drawn + bouncing + scattered + back, ops.TINY)
-    bouncing, scattered = light(bouncing, total, weight_bounced), light(scattered, total, weight_rest * peak)
-    total = np.maximum(drawn + bouncing + scattered + back, ops.TINY)
-    shares = drawn / total, bouncing / total, scattered / total
-    return Parts(weight_straight, weight_bounced, weight_rest, *shares, *numbers)
-
-
-def light(share: Array, total: Array, heaviest: Array) -> Array:
-    """A share of samples, raised where by itself it would give weights (C, N) above `LIGHT`; the rarest ones may be."""
-    return np.maximum(share, np.minimum(np.max(heaviest, axis=0) * total / LIGHT, RARE * share))
+        most = (np.maximum(x, y) for x, y in zip(drawn[1:], facets[1:]))
+        drawn = Wanted(ops.mean(straightly) + facets.energy, *most)
+    others = Wanted.of(bouncing, bouncing, weight_bounced), Wanted.of(scattered, rest, weight_rest * peak)
+    # Samples that do not pass the facets of an interface are among those of its lobe
+    total = sum(each.energy for each in (drawn, *others)) + reflected.energy.sum(axis=0)
+    odds = straight_through.chances(passage, wi)
+    for k, j in enumerate(met):
+        if j is not None:
+            reflected = reflected.spared(k, sharing.LIGHT * odds[j] * ops.divide(drawn.energy, total))
+    shares = sharing.shared(Wanted.together([drawn, *others, reflected]))
+    return Parts(weight_straight, weight_bounced, weight_rest, *shares[:3], *numbers), shares[3:]
 
 
 def eval_pdf(passage: Passage, of: Parts, wi: Direction, wo: Direction) -> tuple[Value, Value]:

@@ -26,8 +26,8 @@ COS_MIN = 1e-4  # keeps ways through media, and Snell's factors, finite at grazi
 class PreparedInterface(ops.Named):
     """An interface between media of indices eta_1 above and eta_2 below (colours; kappa None for a dielectric).
 
-    `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is the mean of
-    eta over the channels: one refracted direction for all colours. `reflectance` is its directional albedo, None where
+    `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is that of means
+    over the channels: one refracted direction for all colours. `reflectance` is its directional albedo, None where
     the model takes Fresnel at the mean direction; `leaving` the share of light going up from it that total internal
     reflection lets out, None where that is all.
     """
@@ -51,6 +51,12 @@ class PreparedInterface(ops.Named):
         if self.kappa is None:
             return fresnel.dielectric(cos_theta, self.eta)
         return fresnel.conductor(cos_theta, self.eta, self.kappa)
+
+    def reflect_together(self, cos_theta: Value) -> Value:
+        """As `reflect`, with the one refracted direction: all colours are totally reflected from the same angle on."""
+        if self.eta is None or self.kappa is not None:
+            return self.reflect(cos_theta)
+        return fresnel.dielectric_between(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
 
 
 @dataclass(frozen=True)
@@ -150,7 +156,7 @@ def _interface(
     s_r = variance.of(roughness, MAPS[averages.model.map])
     eta = layer.eta / eta_1 if layer.kind != "mirror" else None
     kappa = layer.k / eta_1 if layer.kind == "conductor" else None
-    n12 = ops.mean(eta) if layer.kind == "dielectric" else 1.0
+    n12 = ops.mean(layer.eta) / ops.mean(eta_1) if layer.kind == "dielectric" else 1.0
     reflectance, leaving = averages.reflectance(eta, kappa), averages.leaving(n_leaving)
     return PreparedInterface(eta, kappa, n12, roughness, s_r, reflectance, leaving)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import bounced, exchange, own_medium, passed, remainder, straight_through, widths
+from velatura.model import bounced, exchange, own_medium, passed, remainder, sharing, straight_through, widths
 from velatura.model.bounced import Rest
 from velatura.model.context import Context, channels
 from velatura.model.models import Model
@@ -19,6 +19,7 @@ from velatura.model.own_medium import Index
 from velatura.model.passed import Parts
 from velatura.model.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.remainder import Remainder
+from velatura.model.sharing import Wanted
 from velatura.model.solved import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved_grid import COS_MIN, Folded, Grid
 from velatura.model.straight_through import Passage
@@ -43,6 +44,7 @@ NARROW = 0.05  # roughness of lobes whose integrals have edges between direction
 EVENLY = 377  # directions over which the remainder is integrated
 DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
 BRIGHTEST = 4.0  # by how much it is scaled at most
+BRIGHTER = 1.5  # at most, where it takes light of lobes
 VEIL_MIN = 1e-3  # energy of veils that are drawn
 EVEN = 0.2  # share of samples of the symmetric form that the remainder has at least, and of those that pass
 
@@ -267,42 +269,48 @@ class Solver:
         ]
         apart = {each.interface for each in drawn if each.veil}
         lobes = np.array([lobes[k] + (0 if k in apart else veils[k]) for k in range(len(lobes))])
-        energy = [(veils if each.veil else lobes)[each.interface] for each in drawn]
-        weights, heaviest = [], []
-        for shape, tensor, e in zip(shapes, shown, energy):
+        clipped, largest_of_rest = _clipped(polynomial, folded.at_cosines)
+        whole = polynomial.albedo(cosine) + folded.around(clipped)
+        energy, weights, wanted = [], [], []
+        for shape, tensor, each in zip(shapes, shown, drawn):
             normals = self.normals or NORMALS[self.isotropic]
-            z, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, normals)
-            weights.append(np.where(z > FAINT, e / np.maximum(z, FAINT), 1.0))
-            heaviest.append(weights[-1] * largest)
-        clipped, largest = _clipped(polynomial, folded.at_cosines)
-        scale = _scale(rest, polynomial.albedo(cosine) + folded.around(clipped))
-        heaviest.append(scale * folded.around(largest))
+            z, squares, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, normals)
+            light = (veils if each.veil else lobes)[each.interface]
+            # The remainder takes what light it can, by which a lobe would be too bright
+            more = np.clip(light - passed.MOST * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
+            rest = rest + more
+            energy.append(light - more)
+            weights.append(np.where(z > FAINT, ops.divide(energy[-1], z), 1.0))
+            wanted.append(Wanted.of(energy[-1], weights[-1] * ops.divide(squares, z), weights[-1] * largest))
+        scale = _scale(rest, whole)
+        wanted.append(Wanted.of(rest + FAINT, rest, scale * folded.around(largest_of_rest)))
 
-        # Share samples by energies
-        shares, facets = [ops.mean(each) for each in energy], None
-        if material.transmits and len(drawn) == 1:
-            # What passes is sampled with the facets that reflect
-            shares, facets, heaviest[0] = [np.zeros(count)], energy[0], np.zeros_like(energy[0])
-        shares.append(ops.mean(rest) + FAINT)
+        # Share samples
         least = EVEN if self.model.form == "symmetric" else 0.0
-        shares[-1] = np.maximum(shares[-1], least * sum(shares))
-        shares = [passed.light(share, sum(shares), each) for share, each in zip(shares, heaviest)]
-        total, left, passes = sum(shares), np.ones(count), None
-        passage = self.passage(_slim(material), layout)
+        others = Wanted.together(wanted)
+        others.energy[-1] = np.maximum(others.energy[-1], least * others.energy.sum(axis=0))
+        passage, passes = self.passage(_slim(material), layout), None
         if passage:
+            facets = None
+            if len(drawn) == 1:
+                # What passes is sampled with the facets that reflect
+                facets = wanted[0]
+                others = Wanted(*(np.concatenate([0 * x[:1], x[1:]]) for x in others))
+            met = [*(None if each.veil else each.interface for each in drawn), None]
             *diffuse, peak = folded.around(_passing(passage, solved, folded.at_cosines[2]))
-            passes = passed.parts(passage, wi, straight, bounces, through, np.array([total]), facets, diffuse, peak)
+            passes, shares = passed.parts(passage, wi, straight, bounces, through, others, met, facets, diffuse, peak)
             passes = _evenly(passes, least)
-            left = np.maximum(1 - passes.share, 0)
             straight, bounces, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
             passes = replace(passes, straight=straight, bounced=bounces, rest=scattered)
+        else:
+            shares = sharing.shared(others)
         columns = Columns(
             [self._colours(weight) for weight in weights],
             [tuple(np.broadcast_to(x, count) for x in self._roughness(tensor)) for tensor in shown],
-            [left * share / total for share in shares[:-1]],
+            list(shares[:-1]),
             [self._colours(each) for each in energy],
             self._colours(scale),
-            left * shares[-1] / total,
+            shares[-1],
             self._colours(rest),
             passes,
             self._colours(through) if passes else None,

@@ -58,7 +58,7 @@ class Shape:
     first: PreparedInterface | None
 
     def lobe(self, weight: Value, roughness: Roughness) -> OwnMediumLobe:
-        reflect = self.facets.reflect if self.facets else None
+        reflect = self.facets.reflect_together if self.facets else None
         return OwnMediumLobe(weight, roughness, self.n, reflect, self._leaving if self.first else None)
 
     def _leaving(self, cosine: Value) -> Value:
@@ -66,7 +66,7 @@ class Shape:
         n = self.n_first
         if not n.is_outside:
             cosine = ops.sqrt((n.ring2 + cosine * cosine) * (n.inverse * n.inverse))
-        return 1 - self.first.reflect(cosine)
+        return 1 - self.first.reflect_together(cosine)
 
 
 @dataclass(frozen=True)
@@ -394,13 +394,21 @@ def exchanged(of: Seen, back: Seen, eta: Value, wi: Direction, wo: Direction) ->
 def _either(where: Value, a: Shape, b: Shape) -> Shape:
     """The shape a where a condition holds, else b."""
     assert a.facets and b.facets
-    facets = replace(a.facets, eta=ops.select(where, a.facets.eta, b.facets.eta))
+    facets = _of_either(where, a.facets, b.facets)
     if a.first is None and b.first is None:
         return Shape(a.interface, select(where, a.n, b.n), facets, a.n_first, None)
-    some = a.first or b.first
-    assert some
-    first = replace(some, eta=ops.select(where, a.first.eta if a.first else 1.0, b.first.eta if b.first else 1.0))
+    first = _of_either(where, a.first, b.first)
     return Shape(a.interface, select(where, a.n, b.n), facets, select(where, a.n_first, b.n_first), first)
+
+
+def _of_either(where: Value, a: PreparedInterface | None, b: PreparedInterface | None) -> PreparedInterface:
+    """The indices of either interface; None for one without a step."""
+    some = a or b
+    assert some
+    eta, n12 = (
+        ops.select(where, getattr(a, name) if a else 1.0, getattr(b, name) if b else 1.0) for name in ("eta", "n12")
+    )
+    return replace(some, eta=eta, n12=n12)
 
 
 def select(where: Value, a: Any, b: Any) -> Any:

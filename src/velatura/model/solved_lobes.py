@@ -13,6 +13,7 @@ from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_ax
 from velatura.model.models import Model
 from velatura.model.prepare import prepare, variance_kind
 from velatura.model.roughness_maps import MAPS
+from velatura.model.sharing import Wanted
 from velatura.model.solution import Layout, geometry, layout_of, shapes_of
 from velatura.model.solved import Shape
 from velatura.model.transport.adding import Part, parts
@@ -141,7 +142,8 @@ def _passed(
         wi = np.hypot(wi[0], wi[1]), 0 * wi[1], wi[2]  # alike in all planes
     passage = straight_through.passage(material, kind, layout.stepped, layout.rough, layout.cloudy)
     straight, bounced, all_ = (np.maximum(energy, DARK) for energy in (solved.straight, solved.bounced, solved.passed))
-    shares = passed.parts(passage, wi, straight, bounced, all_, np.zeros((1, len(phi))))
+    nothing = np.zeros((0, len(phi)))
+    shares, _ = passed.parts(passage, wi, straight, bounced, all_, Wanted(nothing, nothing, nothing))
     samples = outside.of_passed(passage, shares, wi)
     if kind is Isotropic:
         u, v, _ = outside.roughness(samples, 0 * phi)

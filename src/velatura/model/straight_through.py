@@ -270,6 +270,11 @@ def _drawn(passage: Passage, i: Crossed) -> tuple[list[_Component], list[Value]]
     return components, [share / total for share in shares]
 
 
+def chances(passage: Passage, wi: Direction) -> list[Value]:
+    """Share of samples of light from wi that meet facets of each interface, from the top."""
+    return _drawn(passage, entered(passage, wi))[1]
+
+
 def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, of light that passes straight through; the density of `sample` on both sides.
 
@@ -435,19 +440,22 @@ def _lowest2(indices: Sequence[Value]) -> Value:
 # The integral, in NumPy
 
 
-def integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int] = NODES) -> tuple[Array, Array]:
-    """Energy (3, N) that `eval_pdf` passes from directions wi, (N,) each, and the share (N,) of samples that pass.
+def integrals(
+    passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int] = NODES
+) -> tuple[Array, Array, Array]:
+    """Energy (3, N) that `eval_pdf` passes from directions wi, (N,) each, the mean square (3, N) of the weights of
+    samples, and the share (N,) of them that pass.
 
     By quadrature on rays of p_o from p_i, or from the point next to it that can leave, with nodes that crowd as the
     tails of GGX do; their numbers are those along a ray, and of rays.
     """
     size = max(BLOCK // (nodes[0] * nodes[1]), 1)
     blocks = [tuple(x[k : k + size] for x in wi) for k in range(0, len(wi[2]), size)]
-    energy, share = zip(*(_integrals(passage, (x, y, z), nodes) for x, y, z in blocks))
-    return np.concatenate(energy, axis=-1), np.concatenate(share)
+    energy, squares, share = zip(*(_integrals(passage, (x, y, z), nodes) for x, y, z in blocks))
+    return np.concatenate(energy, axis=-1), np.concatenate(squares, axis=-1), np.concatenate(share)
 
 
-def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int]) -> tuple[Array, Array]:
+def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int]) -> tuple[Array, Array, Array]:
     n = passage.indices
     i = entered(passage, wi)
     widths = [c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(passage.crossings, i.steps)]
@@ -485,7 +493,8 @@ def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[in
     value, density = _eval_pdf(_wider(passage), (i_x, i_y, i_z), (o_x, o_y, o_z), True)
     area = area.reshape(flat)
     value = value if np.ndim(value) > 2 else value[None]
-    return np.sum(value * area, axis=-1), np.sum(density * area, axis=-1)
+    squares = np.sum(value * area * ops.divide(value, density), axis=-1)
+    return np.sum(value * area, axis=-1), squares, np.sum(density * area, axis=-1)
 
 
 def _wider(values: Any) -> Any:

@@ -45,6 +45,7 @@ MODES = 3  # of the azimuth, of the remainder
 CANCELS = 0.3  # of columns of light: a sum that is less
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
 UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
+AGAIN = 1.0  # of light of repeated facets beside that of single ones, that has the shape of a lobe at most
 AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
 
 Straight = Callable[[float], float]  # share of scattered light that counts as going straight on, by asymmetry
@@ -122,7 +123,7 @@ def energies(
     # A lobe has all that media do not scatter where nothing above it refracts, and else a share of it
     whole = system(clear, True) if scatters and often else full
     shares = _undisturbed(everything)
-    more = [share * (whole.reflected[i] + -1.0 * sharp.reflected[i]) for i, share in shares.items()]
+    more = [_kept(share, whole.reflected[i], sharp.reflected[i], full) for i, share in shares.items()]
 
     # Sort what leaves
     total = _sum(full.reflected)
@@ -186,6 +187,14 @@ def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
             shares[i] = float(np.exp(-steps / UNDISTURBED))
             steps += part.step
     return shares
+
+
+def _kept(share: float, all_light: Operator, once: Operator, leaving: Leaving) -> Operator:
+    """A share of the light of an interface that meets its facets again: no more than a lobe takes."""
+    again = all_light + -1.0 * once
+    most = AGAIN * np.maximum(leaving.energy(once), 0) / np.maximum(leaving.energy(again), TINY)
+    kept = np.minimum(most, share)[:, None, None]
+    return replace(again, columns=kept * again.columns, beams=kept * again.beams)
 
 
 def _sum(lights: Sequence[Operator]) -> Operator:
