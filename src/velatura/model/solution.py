@@ -166,17 +166,25 @@ class Solver:
     made: Made = field(default_factory=dict)
 
     @classmethod
-    def of(cls, model: Model, variance: type[Variance], context: Context) -> Solver:
+    def of(cls, model: Model, variance: type[Variance], context: Context, material: Material | None = None) -> Solver:
+        """For a material of numbers, or None for those of tables."""
         assert context.colour is not None
         colours = RGB if context.colour is channels else len(context.colour())
-        return cls.over(colours, model, variance, context)
+        return cls.over(colours, model, variance, context, material)
 
     @classmethod
-    def over(cls, colours: int, model: Model, variance: type[Variance], context: Context) -> Solver:
-        """In a number of colours that is not that of the renderer's."""
+    def over(
+        cls,
+        colours: int,
+        model: Model,
+        variance: type[Variance],
+        context: Context,
+        material: Material | None = None,
+    ) -> Solver:
+        """As `of`, in a number of colours that is not that of the renderer's."""
         isotropic = variance is Isotropic
         shape = directional_grid.LINE if isotropic else directional_grid.PLANE
-        return cls(model, variance, Grid.of(isotropic), shape, colours, context.tables)
+        return cls(model, variance, Grid.of(isotropic, material), shape, colours, context.tables)
 
     @property
     def isotropic(self) -> bool:
@@ -376,8 +384,8 @@ class Solver:
 def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
     """The BSDF of a material with constants of a renderer; differentiable."""
     material = material.solid()
-    solver, given = Solver.of(model, variance, context), Variables.of(material)
-    start = plain(material)
+    start, given = plain(material), Variables.of(material)
+    solver = Solver.of(model, variance, context, start)
     layouts = solver.layouts([start])
 
     packings: list[Packing] = []

@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from velatura.model.mixture import ALPHA_MIN
 from velatura.model.passed import Parts
 from velatura.model.solved import Columns
 from velatura.sampling import directional_grid
-from velatura.stack import Material
+from velatura.stack import InterfaceValues, Material
 
 Array = NDArray[np.floating]
 
 COSINES = {True: 32, False: 20}  # where all interfaces are isotropic, and where some are brushed
-AZIMUTHS = 12  # in half a turn, where some are brushed
+AZIMUTHS = {False: 12, True: 24}  # in half a turn, where some are brushed, and where some sharply so
+SHARP = 8.0  # roughness across over that along, beyond which inner lobes turn within few degrees
 COS_MIN = 1e-3
 ALIKE = 1e-6  # steps between azimuths, by which axes may differ
 
@@ -31,10 +33,13 @@ class Grid:
 
     isotropic: bool
     cosines: int
+    azimuths: int
 
     @classmethod
-    def of(cls, isotropic: bool) -> Grid:
-        return cls(isotropic, COSINES[isotropic])
+    def of(cls, isotropic: bool, material: Material | None = None) -> Grid:
+        """For a material of numbers, or None for any of those of tables."""
+        sharp = material is not None and any(map(_is_sharp, material.interfaces))
+        return cls(isotropic, COSINES[isotropic], AZIMUTHS[sharp])
 
     @property
     def nodes(self) -> Array:
@@ -42,7 +47,7 @@ class Grid:
 
     @property
     def turns(self) -> int:
-        return 1 if self.isotropic else AZIMUTHS
+        return 1 if self.isotropic else self.azimuths
 
     @property
     def count(self) -> int:
@@ -172,3 +177,8 @@ class Folded:
             return c * c * xx - mixed + s * s * yy, across, s * s * xx + mixed + c * c * yy
 
         return replace(found, roughness=[turned(*matrix) for matrix in found.roughness])
+
+
+def _is_sharp(interface: InterfaceValues) -> bool:
+    u, v = (max(float(alpha), ALPHA_MIN) for alpha in (interface.alpha_u, interface.alpha_v))
+    return max(u, v) > SHARP * min(u, v)

@@ -99,7 +99,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     chosen = _chosen(plain(material), places)
     material, places = material.each(lambda _, value: _channels(value, chosen)), places[chosen]
     given, start = Variables.of(material), plain(material)
-    solver = Solver.over(len(places), model, variance, context)
+    solver = Solver.over(len(places), model, variance, context, start)
     layouts = solver.layouts([start])
     orders: list[Sequence[bool]] = []
 

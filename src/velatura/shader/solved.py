@@ -22,7 +22,6 @@ from velatura.model.passed import Parts
 from velatura.model.remainder import Remainder
 from velatura.model.solution import Layout, SolvedSide, Solver
 from velatura.model.solved import Columns, Side, Solved
-from velatura.model.solved_grid import Grid
 from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import Made
 from velatura.model.variance import Variance
@@ -160,7 +159,7 @@ class Tabulated:
         solver, material = replace(self.solver, made=made), _numbers(stack)
         if coarse:
             cosines, normals = COARSE
-            solver = replace(solver, grid=Grid(solver.isotropic, cosines), normals=normals)
+            solver = replace(solver, grid=replace(solver.grid, cosines=cosines), normals=normals)
         # All that its kind may draw, of its own shape
         own = [replace(own, lobes=kind.lobes) for own, kind in zip(solver.layouts([material]), self.layouts)]
         found = self.solution(solver, solver.solve(material, own), material, own)
@@ -189,7 +188,8 @@ class Tabulated:
 
 def tabulated(stack: Stack, material: Material, model: Model, variance: type[Variance], general: bool) -> Tabulated:
     """The recorded body of a stack; a `general` one is that of all values, and has weights of its parts."""
-    solver, plain = Solver.of(model, variance, Context()), _numbers(stack)
+    plain = _numbers(stack)
+    solver = Solver.of(model, variance, Context(), None if general else plain)
     layouts = solver.layouts([_eventful(plain) if general else plain])
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
