@@ -113,10 +113,15 @@ def test_every_preset_is_read_or_says_why_not(name: str) -> None:
         assert answer["says"].startswith(("layer ", "thin"))
 
 
-def test_lobes_that_are_only_shown_have_their_own_base() -> None:
+def test_lobes_have_their_own_base_also_where_they_are_only_shown() -> None:
     for name, bases in (("coated-gold", ["dielectric", "conductor"]), ("frosted-glass", ["dielectric"] * 2)):
         answer = appearance.appearance({"material": appearance.document(vt.preset(name))})
         assert [lobe["base"] for lobe in answer["target"]["lobes"]] == bases
+    brushed = {"interface": {"eta": 1, "alpha": [0.1, 0.3], "rotation": 30}}
+    pane = {"thin": True, "layers": [{"interface": {"eta": 1.5}}, brushed]}
+    answer = appearance.appearance({"material": pane, "model": "weier2020"})
+    assert answer["says"].startswith("thin: ") and answer["target"]["lobes"][1]["base"] == "dielectric"
+    assert deviation(pane, answer["target"], "weier2020") < EXACT
 
 
 def test_a_pair_of_one_blur_is_one_lobe() -> None:

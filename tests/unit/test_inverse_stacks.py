@@ -26,6 +26,7 @@ from velatura.inverse import (
     invert_stack,
     load_target,
     pair,
+    plots,
 )
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model import MODELS, Model, named
@@ -647,3 +648,25 @@ def test_narrow_targets_are_found() -> None:
         found = invert_stack(target, AVERAGED)
         assert max(read(target, found.stack, AVERAGED)) < 1e-6
         assert abs(np.log(float(np.mean(found.layers[-2].eta)) / eta)) < 2 * width + 1e-6
+
+
+# Mirrors -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("interfaces", [1, 2])
+def test_a_lobe_may_end_in_a_mirror_that_what_absorbs_above_it_colours(interfaces: int) -> None:
+    """The colour is that of the medium, the last interface the mirror; alternatives differ above it."""
+    first = [] if interfaces == 2 else [{"energy": 0.04, "alpha": 0.05}]
+    wanted = (0.5, 0.4, 0.3)
+    target = Target([*first, {"energy": wanted, "alpha": 0.2, "interfaces": interfaces, "base": "mirror"}])
+    found = vt.inverse.alternatives(target, 3, "weier2020")
+    assert len(found) == 3
+    for each in found:
+        read = vt.lobes(each.stack, 1.0, model="weier2020")
+        own = slice(-interfaces, None)
+        assert np.sum(read.energy[own], axis=0)[:, 0] == pytest.approx(wanted, abs=1e-6)
+        assert [float(alpha[0, 0]) for alpha in read.alpha[own]] == pytest.approx([0.2] * interfaces, abs=1e-6)
+        assert each.stack.interfaces[-1].conductor == "mirror"
+    assert plots.png(found[0].classes[-1]).startswith(b"\x89PNG")
+    with pytest.raises(InvalidInput, match="lobe 1: fixed: eta: a mirror has none"):
+        Target([{"energy": 1, "base": "mirror", "fixed": {"eta": [2]}}])

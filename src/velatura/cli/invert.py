@@ -213,7 +213,8 @@ def _table(solution: Solution) -> Table:
     for n, lobe in enumerate(solution.target.lobes, 1):
         for k in range(lobe.interfaces):
             part, written = next(layers)
-            values = part.tau, part.eta, part.kappa, written.alpha, *([written.rotation] if brushed else [])
+            eta = None if part.kind == "mirror" else part.eta
+            values = part.tau, eta, part.kappa, written.alpha, *([written.rotation] if brushed else [])
             cells = (_cell(x) for x in values)
             table.add_row(str(n) if k == 0 else "", part.kind, *cells)
         table.add_section()

@@ -23,6 +23,7 @@ from velatura.inverse.interface import conductor_tint
 from velatura.model import Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
+from velatura.model.variance import Roughness
 from velatura.stack import Diffuse, Interface, Stack, Varying
 
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
@@ -102,12 +103,16 @@ def appearance(body: Body) -> Answer:
         target = itself
     return {
         "target": described(target),
-        "variances": [float(MAPS[model.map].variance(lobe.roughness)) for lobe in target.lobes],
+        "variances": _variances(target, model),
         "haze": haze(target, model),
         "layers": _layers(stack, counts),
         "held": _held_back(target, whole.scatters),
         "says": None,
     }
+
+
+def _variances(target: Target, model: Model) -> list[float]:
+    return [float(MAPS[model.map].variance(lobe.roughness)) for lobe in target.lobes]
 
 
 def _held_back(target: Target, scatters: bool) -> list[Answer]:
@@ -183,21 +188,24 @@ def _layers(stack: Stack, counts: list[int]) -> list[list[int]]:
 
 def _shown(stack: Stack, model: Model, says: str) -> Answer:
     """The lobes of a material that is no target, one for each interface, as far as they are those of one point."""
+    nothing: Answer = {"target": None, "variances": [], "haze": [], "layers": [], "held": [], "says": says}
     try:
         read = stack_lobes(stack, 1.0, model=model)
     except InvalidInput:
-        return {"target": None, "variances": [], "haze": [], "layers": [], "held": [], "says": says}
+        return nothing
+    if not read.energy:
+        return nothing
     energies = [np.clip(energy[:, 0], 0, None).tolist() for energy in read.energy]
-    alphas = [float(np.sqrt(np.prod(np.reshape(alpha, (-1, 2)).mean(axis=0)))) for alpha in read.alpha]
     bases = ["conductor" if layer.opaque else "dielectric" for layer in stack.interfaces]
-    lobes = [{"energy": e, "alpha": min(a, 1.0), "base": base} for e, a, base in zip(energies, alphas, bases)]
-    target = Target(lobes) if lobes else None
+    target = Target([{"energy": energy, "base": base} for energy, base in zip(energies, bases)])
+    for k, (alpha, rotation) in enumerate(zip(read.alpha, read.rotation)):
+        target = target.with_roughness(k, Roughness(min(alpha[0, 0], 1.0), min(alpha[1, 0], 1.0), rotation))
     return {
-        "held": [{} for _ in lobes],
-        "target": described(target) if target else None,
-        "variances": [float(MAPS[model.map].variance(a)) for a in alphas],
-        "haze": haze(target, model) if target else [],
-        "layers": _layers(stack, [1] * len(lobes)),
+        "target": described(target),
+        "variances": _variances(target, model),
+        "haze": haze(target, model),
+        "layers": _layers(stack, [1] * len(energies)),
+        "held": [{} for _ in energies],
         "says": says,
     }
 

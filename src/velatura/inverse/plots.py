@@ -51,6 +51,10 @@ def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None
     over its index and what absorbs above it; of a conductor its eta and k over tint. Beside a chosen member, dashed is
     what is left below a medium that absorbs half of what one above may, and the other coordinates have their ranges.
     """
+    if members.choice.kind == "mirror" and not members.free:
+        axes.text(0.5, 0.5, "nothing is free of a mirror but its roughness", ha="center", va="center")
+        axes.set_axis_off()
+        return
     coordinates = {one.name: one for one in members.coordinates} if chosen else {}
     half = {name: np.array(one.high) / 2 for name, one in coordinates.items() if name == "tau_0"}
     drawn = {"eta_1", "eta_2", "tau_1"} if members.free else {"tint"}

@@ -186,7 +186,7 @@ def _more(
 ) -> Choice:
     """The choice of last interfaces below media that absorb more than the least, drawn at random."""
     count = len(paths.cost)
-    if choice.tau is not None:
+    if choice.tau is not None or choice.kind == "mirror":
         return choice
     if choice.kind == "dielectric":
         if choice.eta is not None:

@@ -94,7 +94,7 @@ function brushed(lobe, index, { fixed, onChoose, onMove, onLetGo }) {
       @lostpointercapture=${onLetGo}
     >
       <circle r=${GRIP} />
-      <text text-anchor="middle" y="-7">${'uv'[axis]}</text>
+      <text text-anchor="middle" y="15">${'uv'[axis]}</text>
     </g>`;
   });
   const [u, v] = lobe.alpha.map(across);
