@@ -4,7 +4,9 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import * as commands from '../../src/velatura/editor/page/state/commands.js';
+import { besideOf, keptOf, slotBeside } from '../../src/velatura/editor/page/state/compared.js';
 import { documentOf, layerName, pattern, variantOf } from '../../src/velatura/editor/page/state/material.js';
+import { tileCorner, tileSize } from '../../src/velatura/editor/page/render/tiles.js';
 import { lookOf } from '../../src/velatura/editor/page/state/snapshots.js';
 import { createStore } from '../../src/velatura/editor/page/state/store.js';
 
@@ -251,11 +253,37 @@ test('what is gone back to looks as it did, and keeps its layers that are off an
   const begun = commands.saved(opened(), MATERIAL, 'gold.yaml', 1);
   const off = commands.enableLayer(begun, begun.layers[0].id, false);
   const other = commands.openMaterial(off, { layers: [{ interface: { conductor: 'Ag' } }] });
-  const { name, source, exterior, thin, layers, model, switches, document } = off;
-  const back = commands.goBack(other, { name, source, exterior, thin, layers, model, switches, document });
+  const back = commands.goBack(other, keptOf(off));
   assert.equal(lookOf(back), lookOf(off));
   assert.notEqual(lookOf(back), lookOf(begun));
   assert.notEqual(lookOf(back), lookOf(other));
   assert.deepEqual(back.layers, off.layers);
   assert.equal(commands.placeOf(back).file, 'gold.yaml');
+});
+
+test('up to three materials are put beside the open one, and taken away', () => {
+  const names = (state) => besideOf(state).map(({ slot, number }) => `${slot}${number}`);
+  let state = opened();
+  for (const number of [1, 2, 3, 4]) state = commands.putBeside(state, keptOf(state), number);
+  assert.deepEqual(names(state), ['b1', 'c2', 'd3']);
+  assert.equal(slotBeside(state), undefined);
+  state = commands.takeAway(state, 'b');
+  assert.deepEqual(names(commands.putBeside(state, keptOf(state), 5)), ['c2', 'd3', 'b5']);
+  for (const slot of ['c', 'd']) state = commands.takeAway(state, slot);
+  assert.equal(state.view.mode, 'single');
+  assert.deepEqual(names(state), []);
+});
+
+test('pictures side by side lie within the canvas, and none over another', () => {
+  const canvas = { width: 101, height: 55 };
+  for (let count = 1; count <= 4; count++) {
+    const { width, height } = tileSize(count, canvas), seen = new Set();
+    for (let place = 0; place < count; place++) {
+      const [left, low] = tileCorner(place, count, canvas);
+      assert.ok(left >= 0 && low >= 0 && left + width <= canvas.width && low + height <= canvas.height);
+      for (let x = left; x < left + width; x++) for (let y = low; y < low + height; y++) seen.add(y * canvas.width + x);
+    }
+    assert.equal(seen.size, count * width * height);
+    assert.ok(seen.size > 0.9 * canvas.width * canvas.height || count === 3);
+  }
 });

@@ -1,5 +1,6 @@
 // Commands: pure functions from a state to the next, each with the title that undo shows.
 
+import { besideOf, isPaired, slotBeside } from './compared.js';
 import { documentOf, enabled, indices, isBase, isOpaque, layersOf, variantOf } from './material.js';
 
 const titled = (title, command) => Object.assign(command, { title });
@@ -18,9 +19,6 @@ const VIEW = {
   lobe: null,
   tiles: [],
 };
-
-/** Whether a view compares the material with one other, over the whole picture. */
-export const isPaired = ({ mode }) => mode === 'split' || mode === 'difference';
 
 /** The state that a material opens in. */
 export function initial(material, session, place = {}) {
@@ -73,11 +71,6 @@ export const setMaterial = titled('change the material', (state, material) => ({
   layers: layersOf(material),
   view: { ...state.view, lobe: null },
 }));
-
-const KEPT = ['name', 'source', 'exterior', 'thin', 'layers', 'model', 'switches', 'document'];
-
-/** What a snapshot keeps of a state. */
-export const keptOf = (state) => Object.fromEntries(KEPT.map((key) => [key, state[key]]));
 
 /** Goes back to what a snapshot has kept. */
 export const goBack = titled('go back', (state, kept) => ({
@@ -254,19 +247,12 @@ export const swap = titled('swap A and B', (state) => {
   return { ...setMaterial(pin(state), material), model, switches };
 });
 
-const BESIDE = ['b', 'c', 'd']; // slots of the viewport
-
-/** The materials beside the open one: {slot, number (of the snapshot, or null), kept}. */
-export const besideOf = ({ view }) => (view.mode === 'tiles' ? (view.tiles ?? []) : []);
-
-export const hasRoomBeside = (state) => besideOf(state).length < BESIDE.length;
-
 /** Puts what a snapshot has kept beside the open material. */
 export const putBeside = titled('put side by side', (state, kept, number = null) => {
-  const tiles = besideOf(state);
-  const slot = BESIDE.find((name) => !tiles.some((tile) => tile.slot === name));
+  const slot = slotBeside(state);
   if (!slot) return state;
-  return { ...state, view: { ...state.view, mode: 'tiles', tiles: [...tiles, { slot, number, kept }] } };
+  const tiles = [...besideOf(state), { slot, number, kept }];
+  return { ...state, view: { ...state.view, mode: 'tiles', tiles } };
 });
 
 export const takeAway = titled('take away', (state, slot) => {

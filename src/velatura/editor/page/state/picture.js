@@ -1,7 +1,7 @@
 // Keeps the pictures in step with the state: values go straight to the viewport, shapes over Python.
 
 import { Offline } from '../connection.js';
-import { isPaired } from './commands.js';
+import { isPaired } from './compared.js';
 import { documentOf, flat, layersOf, pattern } from './material.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed

@@ -1,6 +1,6 @@
 // The history of the material in pictures: each state that was left alone for a while, to return to.
 
-import { keptOf } from './commands.js';
+import { keptOf } from './compared.js';
 import { enabled } from './material.js';
 
 const MOST = 40;

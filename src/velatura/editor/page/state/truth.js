@@ -1,7 +1,7 @@
 // The truth on the right of a split picture: Python's random walk, a few samples at a time, until there are enough.
 
 import { decode } from '../arrays.js';
-import { isPaired } from './commands.js';
+import { isPaired } from './compared.js';
 import { documentOf } from './material.js';
 
 const PAUSE = 600; // milliseconds without a change, after which it is asked for

@@ -2,7 +2,8 @@
 
 import { html, nothing, render } from 'lit-html';
 import { Slices, radians } from '../render/slices.js';
-import { isPaired, setView } from '../state/commands.js';
+import { setView } from '../state/commands.js';
+import { isPaired } from '../state/compared.js';
 import { enabled, layerName } from '../state/material.js';
 import './inspector.css';
 import { chart, valueAt } from './plots/chart.js';

@@ -5,7 +5,8 @@ import { repeat } from 'lit-html/directives/repeat.js';
 import { styleMap } from 'lit-html/directives/style-map.js';
 import { LARGEST_DIFFERENCE } from '../render/glsl/display.glsl.js';
 import { tiling } from '../render/tiles.js';
-import { besideOf, setView, takeAway } from '../state/commands.js';
+import { setView, takeAway } from '../state/commands.js';
+import { besideOf } from '../state/compared.js';
 import { lookOf } from '../state/snapshots.js';
 import { iconButton } from './controls.js';
 import { splitter } from './splitter.js';
@@ -202,15 +203,22 @@ function compared({ store, session, edits, picture }) {
 function sideBySide(store, picture) {
   const all = [{ kept: store.get() }, ...besideOf(store.get())], [columns, rows] = tiling(all.length);
   const isDrawn = ({ slot, kept }) => picture.given(slot) && lookOf(picture.given(slot)) === lookOf(kept);
-  const name = (tile, place) => html`<span
+  const part = (share, parts) => `${(100 * share) / parts}%`;
+  const name = (tile, place) => html`<div
     class="tile"
-    style=${styleMap({ left: `${(100 * (place % columns)) / columns}%`, top: `${(100 * Math.floor(place / columns)) / rows}%` })}
-    >${titleOf(tile)}${tile.slot && !isDrawn(tile) ? ' \u2026' : nothing}${
+    style=${styleMap({
+      left: part(place % columns, columns),
+      top: part(Math.floor(place / columns), rows),
+      'max-width': `calc(${part(1, columns)} - 1.25rem)`,
+    })}
+  >
+    <span title=${titleOf(tile)}>${titleOf(tile)}${tile.slot && !isDrawn(tile) ? ' \u2026' : nothing}</span>
+    ${
       tile.slot
         ? iconButton({ label: `Take ${titleOf(tile)} away`, icon: 'remove', act: () => store.run(takeAway, tile.slot) })
         : nothing
-    }</span
-  >`;
+    }
+  </div>`;
   return repeat(all, ({ slot }) => slot, name);
 }
 

@@ -2,18 +2,8 @@
 
 import { html, nothing } from 'lit-html';
 import { partsOf } from '../render/slices.js';
-import {
-  hasRoomBeside,
-  isPaired,
-  keptOf,
-  pin,
-  putBeside,
-  setCamera,
-  setModel,
-  setSwitch,
-  setView,
-  swap,
-} from '../state/commands.js';
+import { pin, putBeside, setCamera, setModel, setSwitch, setView, swap } from '../state/commands.js';
+import { isPaired, keptOf, slotBeside } from '../state/compared.js';
 import { enabled, layerName } from '../state/material.js';
 import { capital, dial, menu, number } from './controls.js';
 
@@ -131,7 +121,7 @@ function model({ store, session, lacks }) {
       <button
         type="button"
         title="Keeps the material, as it is now, beside what it becomes; others are put there from the history"
-        ?disabled=${!hasRoomBeside(store.get())}
+        ?disabled=${!slotBeside(store.get())}
         @click=${beside}
       >
         Put beside

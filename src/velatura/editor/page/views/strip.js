@@ -2,7 +2,8 @@
 
 import { html } from 'lit-html';
 import { repeat } from 'lit-html/directives/repeat.js';
-import { besideOf, goBack, hasRoomBeside, putBeside, takeAway } from '../state/commands.js';
+import { goBack, putBeside, takeAway } from '../state/commands.js';
+import { besideOf, slotBeside } from '../state/compared.js';
 import { iconButton } from './controls.js';
 
 const KEYS = { ArrowLeft: -1, ArrowRight: 1, Home: -Infinity, End: Infinity };
@@ -51,7 +52,7 @@ export function createStrip({ store, snapshots, focus, update }) {
           label: `${title}, side by side`,
           icon: 'beside',
           pressed: Boolean(tile),
-          disabled: !tile && !hasRoomBeside(store.get()),
+          disabled: !tile && !slotBeside(store.get()),
           tabindex,
           act: () => (tile ? store.run(takeAway, tile.slot) : store.run(putBeside, kept, number)),
         })}
