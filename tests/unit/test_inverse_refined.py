@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,11 @@ import pytest
 from benchmarks import benchmark
 
 import velatura as vt
-from velatura.inverse import Infeasible, Target, alternatives, invert_stack, requests
-from velatura.inverse.drag import coordinates
+from velatura.errors import InvalidInput
+from velatura.inverse import Infeasible, Target, alternatives, invert_stack, requests, stacks
+from velatura.inverse.drag import DraggedStack, coordinates
+from velatura.inverse.drag.newton import Nearest, Problem
+from velatura.inverse.explain import REASONS
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.partial_stack import read_whole
 from velatura.model import named
@@ -74,6 +78,105 @@ def test_what_is_offered_in_place_of_a_refused_target_has_a_stack(lobes: list[An
     nearest = error.value.nearest
     assert nearest is not None
     assert missed(nearest, invert_stack(nearest, MODEL).stack) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("lobes", "stays"),
+    [
+        ([COAT, {"energy": (0.95, 0.75, 0.35), "alpha": 0.5, "base": "conductor"}], 0),
+        ([{**COAT, "alpha": 0.2}, {"energy": (0.2, 0.1, 0.1), "alpha": 0.02, "base": "conductor"}], 0),
+        ([{"energy": (0.1, 0.2, 0.1)}, METAL], 1),
+        ([{**COAT, "fixed": {"eta": [1.5]}}, {**METAL, "alpha": 0.0, "fixed": {"alpha": [0.1]}}], 0),
+    ],
+)
+def test_a_way_out_is_near_and_brings_the_stack_that_has_it(
+    lobes: list[Any], stays: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: the other lobe stays; as JSON it is solved by one reading, and what is fixed is kept."""
+    with pytest.raises(Infeasible) as error:
+        invert_stack(lobes, MODEL)
+    nearest = error.value.nearest
+    assert nearest is not None and nearest.start is not None
+    assert nearest.lobes[stays].colour == pytest.approx(Target(lobes).lobes[stays].colour, abs=1e-4)
+    assert nearest.lobes[stays].roughness == pytest.approx(Target(lobes).lobes[stays].roughness, abs=1e-4)
+    calls = []
+
+    def read(*args: Any) -> Any:
+        calls.append(args)
+        return read_whole(*args)
+
+    monkeypatch.setattr(coordinates, "read_whole", read)
+    found = invert_stack(json.loads(json.dumps(nearest.to_dict())), MODEL)
+    assert len(calls) == 1 and found.reached is None
+    assert missed(nearest, found.stack) < 1e-6
+    for layer, lobe in zip(found.stack.interfaces, nearest.lobes):
+        assert lobe.fixed.of("eta", 0) in (None, layer.eta)
+
+
+@pytest.mark.parametrize(
+    ("lobes", "reasons"),
+    [
+        ([{"energy": 0.357, "alpha": 0.1}], {"energy", "unmet energy"}),
+        ([{**COAT, "alpha": 0.3}, {"energy": 0.85, "alpha": 0.3, "base": "conductor"}], {"bright", "unmet energy"}),
+    ],
+)
+def test_a_refusal_by_the_model_itself_has_its_own_reason_and_way_out(lobes: list[Any], reasons: set[str]) -> None:
+    """Of lobes that the nearest model in closed form has a stack for. Expected: a little less energy, and no more."""
+    assert stacks.search(Target(lobes), MODEL.adder) is not None
+    with pytest.raises(Infeasible) as error:
+        invert_stack(lobes, MODEL)
+    assert error.value.constraint in reasons and error.value.lobe == len(lobes)
+    nearest, asked = error.value.nearest, lobes[-1]["energy"]
+    assert nearest is not None
+    assert 0.9 * asked < nearest.lobes[-1].colour[1] < asked
+    assert nearest.lobes[-1].roughness == pytest.approx(lobes[-1]["alpha"], abs=1e-4)
+    assert missed(nearest, invert_stack(nearest, MODEL).stack) < 1e-6
+
+
+def test_what_is_missed_most_is_the_reason_where_no_bound_is_in_the_way() -> None:
+    """Of a lobe and the next: energies come first, three each, then the variance of each interface."""
+    target = Target([COAT, METAL])
+    dragged = DraggedStack.of(invert_stack(target, "bati2021").stack, target, named("bati2021"))
+    assert dragged is not None
+    problem = Problem(dragged.point, dragged.point.reading.value)
+    counted = list(dragged.space.counted)
+    for at, reason in ((counted.index(3), "unmet energy"), (counted.index(7), "unmet blur")):
+        found = problem._in_the_way(Nearest(dragged.point.x, 1.0, at))
+        assert (found.lobe, found.reason) == (1, reason)
+        assert found.why(target) == f"lobe 2: {REASONS[reason]}"
+
+
+def test_random_refusals_have_ways_out() -> None:
+    """A slice of the benchmark: reasons that can be, and ways out that are solved when they are fed back."""
+    refusals = benchmark("refusals")
+    for target, refusal, _ in refusals.refused(4, seed=3, most=2):
+        assert refusals.wrong(target, refusal) is None
+
+
+def test_a_search_begins_with_a_given_stack() -> None:
+    """Expected: of all stacks that have a lobe the one that is given; another lobe is met near it."""
+    target = Target(FIGURES["15 b"])
+    other = alternatives(target, 3, MODEL)[2].stack
+    begun = target.model_copy(update={"start": other})
+    assert invert_stack(begun, MODEL).stack == other
+    brighter = begun.with_lobe(0, energy=(0.1, 0.09, 0.15))
+    near = invert_stack(brighter, MODEL).stack
+    assert missed(brighter, near) < 1e-6
+    assert near.interfaces[0].eta == pytest.approx(other.interfaces[0].eta, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("start", "line"),
+    [
+        (3, "start: must be a material, got 3"),
+        ({"layers": [{"interface": {"eta": -1}}]}, "start: layer 0 (interface): eta: must lie in"),
+        ({"layers": [{"interface": {"eta": 1.5}}] * 2}, "start: must have as many interfaces as the lobes, 1, got 2"),
+    ],
+)
+def test_what_no_search_can_begin_with(start: Any, line: str) -> None:
+    with pytest.raises(InvalidInput) as error:
+        invert_stack({"lobes": [COAT], "start": start}, MODEL)
+    assert str(error.value).startswith(line)
 
 
 def test_what_is_fixed_is_kept_and_the_rest_met() -> None:

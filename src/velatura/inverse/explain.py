@@ -15,12 +15,11 @@ from velatura.inverse.target import BLUR, Fixed, Target, TargetLobe
 from velatura.model import Model
 
 EFFORT = ((12, 32), (24, 128))
-STEPS, HALVINGS = 8, 12  # by which a target that can be reached is looked for, and then approached
+SHOWN = 3  # ways out, the nearest ones
 FAR, LEAST = 4.0, 1e-4  # the logarithm by which quantities change at most; less energy or variance than that has none
 PAIRED, OTHER, FREED, REMADE = 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
 SURE = (0.02, 0.002, 2e-4)  # energies of lobes that are almost always possible
 ROUNDING = 1e-9  # by which lobes stay below what there is
-TRIED, SHOWN = 5, 3  # ways out, the nearest ones
 TOO_MUCH = "energies sum to {total:.4g}, above 1"
 REASONS = {
     "energy": "no index up to {eta_max:g} reflects as much",
@@ -52,6 +51,24 @@ class Direction:
     target: Target
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How closely ways out are searched.
+
+    steps, halvings: by which a target that can be reached is looked for, and then approached. ways: that are
+    approached. channels: whether single channels are changed, too.
+    """
+
+    steps: int
+    halvings: int
+    ways: int
+    channels: bool
+
+
+CLOSELY = Pace(8, 12, 5, True)
+ROUGHLY = Pace(4, 1, 3, False)  # where another model moves on from what is found
+
+
 class Infeasible(NoSolution):
     """No stack gives the target.
 
@@ -80,17 +97,19 @@ def infeasible(target: Target, model: Model) -> Infeasible:
         return _in_closed_form(target, model)
     from velatura.inverse import refined  # which drags, for reasons that stand here
 
-    bound = refined.obstacle(target, model)
-    if bound is not None:
-        ways = refined.ways([Direction("lobes", "", 0.0, target)], target, model)
-        return Infeasible(bound.why(target), bound.lobe + 1, bound.reason, ways)
-    closed = _in_closed_form(target, model.adder)
+    met = refined.obstacle(target, model)
+    if met is not None:
+        bound, found = met
+        return Infeasible(
+            bound.why(target), bound.lobe + 1, bound.reason, refined.ways_from(found, target, bound, model)
+        )
+    closed = _in_closed_form(target, model.adder, ROUGHLY)
     return Infeasible(closed.why, closed.lobe, closed.constraint, refined.ways(closed.directions, target, model))
 
 
-def _in_closed_form(target: Target, model: Model) -> Infeasible:
+def _in_closed_form(target: Target, model: Model, pace: Pace = CLOSELY) -> Infeasible:
     """The same for a model in closed form."""
-    search, found = Search(model), list[Direction]()
+    search, found = Search(model, pace), list[Direction]()
     total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
     if total > 1:
         why, n, constraint = TOO_MUCH.format(total=total), -1, "sum"
@@ -180,6 +199,7 @@ class Search:
     """
 
     model: Model
+    pace: Pace = CLOSELY
     followed: dict[tuple[TargetLobe, ...], stacks.Partial] = field(default_factory=dict)
 
     def possible(self, target: Target) -> bool:
@@ -211,7 +231,7 @@ class Search:
         """The nearest ways out of a lobe that cannot be given below those above it, without the lobes below."""
         above = target.model_copy(update={"lobes": target.lobes[: n + 1]})
         last = n == len(target.lobes) - 1
-        own = [*_of_energy(above, n), *_of_blur(above, n), *_of_form(above, n, last)]
+        own = [*_of_energy(above, n, self.pace.channels), *_of_blur(above, n), *_of_form(above, n, last)]
         return self.nearest(own) or self.nearest(_of_others(above, n))
 
     def with_rest(self, direction: Direction, target: Target) -> Direction | None:
@@ -240,11 +260,11 @@ class Search:
         steps = []
         for way in ways:
             steps += [(way, (0.0, 0.0))] if way.inclusive else []
-            points = [way.far * (n / STEPS) ** 2 for n in range(STEPS + 1)] if way.far else []
+            points = [way.far * (n / self.pace.steps) ** 2 for n in range(self.pace.steps + 1)] if way.far else []
             steps += [(way, ends) for ends in pairwise(points)]
         found = set[Way]()
         for way, ends in sorted(steps, key=lambda step: step[0].direction(step[1][1]).change):
-            if len(found) == TRIED:
+            if len(found) == self.pace.ways:
                 break
             if way not in found and self.possible(way.along(ends[1])):
                 found.add(way)
@@ -252,13 +272,13 @@ class Search:
 
     def _approached(self, way: Way, start: float, end: float) -> float:
         """The first point that has a stack, between one that has none and one that has."""
-        for _ in range(HALVINGS if start < end else 0):
+        for _ in range(self.pace.halvings if start < end else 0):
             middle = (start + end) / 2
             start, end = (start, middle) if self.possible(way.along(middle)) else (middle, end)
         return end
 
 
-def _of_energy(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
+def _of_energy(target: Target, n: int, channels: bool = True) -> Iterator[Way]:
     """A lobe of other energy: all of it, one channel, the dark ones or the bright ones, or grey."""
     lobe, what = target.lobes[n], f"lobe {n + 1} energy"
     own = np.maximum(lobe.colour, LEAST)
@@ -267,13 +287,13 @@ def _of_energy(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
         def words(t: Target) -> str:
             return f"{name} {digits(t.lobes[n].energy)}"
 
-        return Way(name, target, lambda x: _with_energy(target, n, along(x)), words, far, cost, inclusive)
+        return Way(name, target, lambda x: _with_energy(target, n, along(x)), words, far, inclusive=inclusive)
 
     for sign in (-1, 1):
         yield way(what, lambda x, sign=sign: own * np.exp(sign * x))  # type: ignore[misc]
     if np.ptp(own) == 0:
         return
-    for channel, name in zip(np.eye(3), "rgb"):
+    for channel, name in zip(np.eye(3), "rgb" if channels else ""):
         for sign in (-1, 1):
             yield way(f"{what} {name}", lambda x, by=sign * channel: own * np.exp(by * x))  # type: ignore[misc]
     apart = float(np.log(own.max() / own.min()))

@@ -262,13 +262,16 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
         return above.eta * np.where(denser, ratio, 1 / ratio)[None]
 
     def excess(u: Array) -> Array:
-        return np.min(above.reflectance(layers(index(u))) / r, axis=0) - 1
+        # As a logarithm, which does not get steep where next to nothing is reflected
+        return np.min(np.log((above.reflectance(layers(index(u))) + FAINT) / (r + FAINT)), axis=0)
 
     ratio = np.mean(np.atleast_2d(np.where(denser, choice.eta_max, 1.0) / above.eta), axis=0)
     exists = np.where(denser, ratio >= 1, ratio <= 1)
     u_max = np.where(exists, ((ratio - 1) / (ratio + 1)) ** 2, 0.0)
     most = np.where(u_max > 0, excess(u_max), -1.0)
-    u = false_position(excess, np.zeros_like(u_max), u_max, np.full_like(u_max, -1.0), most)
+    u = false_position(
+        excess, np.zeros_like(u_max), u_max, np.min(np.log(FAINT / (r + FAINT)), axis=0) + 0.0 * u_max, most
+    )
     solved = np.where(most < 0, u_max, u)
     return layers(index(solved)).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))
 

@@ -16,21 +16,23 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.inverse import interface, requests, stacks
 from velatura.inverse.drag import Bound, DraggedStack, pinned, plain, seen
-from velatura.inverse.explain import LEAST, Direction, digits, distance, freed
+from velatura.inverse.explain import Direction, digits, distance
 from velatura.inverse.interface import ENERGY_MIN, Choice
-from velatura.inverse.partial_stack import Array
+from velatura.inverse.partial_stack import Array, Layers
 from velatura.inverse.stacks import Solution
 from velatura.inverse.target import BLUR, Target
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
+from velatura.model.variance import Isotropic
 from velatura.stack import Stack
 
 GREY = Bound(0, "colour", 1, 0.0)  # one index for all channels
 EFFORT = stacks.EFFORTS[:1]  # to find a stack near which the model is met
 STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
-FURTHER = (0.1, 0.0)  # beyond what a closed form can reach, as shares of the way there
-SAID = 1e-3  # changes of quantities that are mentioned, as logarithms
-TRIES = 4  # stacks that are begun with, of all that are found
+READINGS, LEAST_READINGS = 60, 5  # to find ways out, as interfaces that are read, and for one of these
+KEPT = 1e-6  # by which what is fixed may be missed
+SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
+TRIES, FEWER = 4, 2  # stacks that are begun with, of all that are found; where none has the lobes of the wish
 SAME = 0.03  # logarithm by which models differ about the energy of an index
 MISSED = 1e-4  # energy or variance that is mentioned
 SMALL = 0.01  # variance that is added to that of a goal, for units in which it is missed
@@ -38,20 +40,30 @@ SMALL = 0.01  # variance that is added to that of a goal, for units in which it 
 
 def search(target: Target, model: Model) -> Solution | None:
     """The preferred stack of the model in closed form, moved to one whose lobes, read by the model, are the target."""
-    candidates = itertools.islice(_candidates(target, model.adder, stacks.EFFORTS), TRIES)
-    moves = (moved(found, target, model, giving=n == 0) for n, found in enumerate(candidates))
+    own = _of(target, model.adder, stacks.EFFORTS)
+    if own is not None:
+        tried = itertools.islice(itertools.chain(own, _approaching(target, model.adder)), TRIES)
+        moves = (moved(found, target, model, giving=n == 0) for n, found in enumerate(tried))
+    else:
+        tried = itertools.islice(_approaching(target, model.adder), FEWER)
+        moves = (moved(found, target, model, giving=False) for found in tried)
     return next((met for met in moves if isinstance(met, Solution)), None)
 
 
-def _candidates(target: Target, model: Model, efforts: Sequence[tuple[int, int]]) -> Iterator[Solution]:
-    """Stacks with the lobes of a target, or of one from which it is approached: preferred ones, then ones from all
-    over."""
-    for n, start in enumerate(starts(target)):
-        paths = stacks.found(_as_fixed(start, model), model, EFFORT if n else efforts)
-        if paths:
-            order = np.argsort(paths.cost, kind="stable")
-            some = np.unique(np.linspace(0, len(order) - 1, TRIES - 1, dtype=int))
-            yield from stacks.solutions(start, model, paths, order[some].tolist())
+def _approaching(target: Target, model: Model) -> Iterator[Solution]:
+    """Stacks with the lobes of targets from which one is approached."""
+    for start in itertools.islice(starts(target), 1, None):
+        yield from _of(start, model, EFFORT) or ()
+
+
+def _of(start: Target, model: Model, efforts: Sequence[tuple[int, int]]) -> Iterator[Solution] | None:
+    """Stacks with the lobes of a start: preferred ones, then ones from all over. None if there are none."""
+    paths = stacks.found(_as_fixed(start, model), model, efforts)
+    if not paths:
+        return None
+    order = np.argsort(paths.cost, kind="stable")
+    some = np.unique(np.linspace(0, len(order) - 1, TRIES - 1, dtype=int))
+    return stacks.solutions(start, model, paths, order[some].tolist())
 
 
 def moved(found: Solution, target: Target, model: Model, giving: bool = True) -> Solution | Bound:
@@ -71,70 +83,102 @@ def moved(found: Solution, target: Target, model: Model, giving: bool = True) ->
     return Solution(target, model, tuple(there.point.layers), there.now(target) if missed else None)
 
 
-def obstacle(target: Target, model: Model) -> Bound | None:
-    """What keeps the model from lobes that the nearest one in closed form has a stack for; None if it has none."""
+def from_start(start: Stack, target: Target, model: Model) -> Solution | None:
+    """A stack itself, if it has the lobes of a target and all that is fixed; or else a stack close to it that has."""
+    layers, dragged = plain(start), DraggedStack.of(start, target, model, with_pins=True)
+    if dragged is None or start.exterior != target.exterior:
+        return None
+    if dragged.snapped(target) == target and _keeps(layers, target):
+        return Solution(target, model, tuple(layers))
+    there = moved(Solution(target, model, tuple(layers)), target, model)
+    return there if isinstance(there, Solution) and there.reached is None else None
+
+
+def _keeps(layers: Sequence[Layers], target: Target) -> bool:
+    """Whether layers have the values that a target fixes."""
+    parts = iter(layers)
+    for lobe in target.lobes:
+        for n in range(lobe.interfaces):
+            part = next(parts)
+            has = {"eta": part.eta, "k": part.kappa, "alpha": part.roughness[:2], "tau": part.tau}
+            for key, value in has.items():
+                asked = lobe.fixed.of(key, n)
+                if asked is not None and np.abs(np.ravel(value) - np.ravel(asked)).max() > KEPT:
+                    return False
+    return True
+
+
+def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
+    """What keeps the model from lobes that the nearest one in closed form has a stack for, and that stack; None if it
+    has none."""
     found = stacks.search(target, model.adder, EFFORT)
     if found is None:
         return None
-    there = moved(found, target, model)
-    return there if isinstance(there, Bound) else GREY
+    there = moved(found, target, model, giving=False)
+    return there if isinstance(there, Bound) else GREY, found
 
 
 def ways(offered: Sequence[Direction], target: Target, model: Model) -> list[Direction]:
-    """Ways out by the model in closed form that the model itself has a stack for; where it has none for any, the first
-    lobes that it reads of the stacks of these, and finds again. Of several lobes, which take longer, one way."""
-    met = list[Direction]()
+    """Ways out that the model itself has: from the stacks of those of the closed form, the nearest lobes that it reads.
+
+    What a way changes may change, all else stays. The number of readings is limited, and one way is always found.
+    """
+    found, tried, left = dict[str, Direction](), list[object](), READINGS
     for way in offered:
-        if _is_met(way.target, model):
-            met.append(way)
-        elif not met and (near := _near(target, way.target, model)) is not None:
-            met.append(_way(way, target, near, model))
-        if met and len(target.lobes) > 1:
-            break
-    return sorted(met, key=lambda way: way.change)
+        loose, form = _loose(way, target), _in_form_of(way.target, target)
+        readings = _readings(target, min(left, READINGS // 2))
+        if (form, loose) in tried or (found and readings < LEAST_READINGS):
+            continue
+        tried.append((form, loose))
+        start = stacks.search(way.target, model.adder, EFFORT)
+        if start is not None:
+            near = nearest(start, form, loose, model, max(readings, LEAST_READINGS))
+            left -= READINGS // 2
+            direction = _way(way, target, near, model)
+            found.setdefault(direction.words, direction)
+    return sorted(found.values(), key=lambda way: way.change)
 
 
-def _is_met(target: Target, model: Model) -> bool:
-    """Whether the first stack that is found leads to one of the model."""
-    found = next(_candidates(target, model.adder, EFFORT), None)
-    return found is not None and isinstance(moved(found, target, model, giving=False), Solution)
+def ways_from(found: Solution, target: Target, bound: Bound, model: Model) -> list[Direction]:
+    """Ways out where the closed form has a stack, and the model itself meets a bound near it."""
+    directions = []
+    for what, name in (("energy", "energy"), ("blur", "variance")):
+        way = Direction(f"lobe {bound.lobe + 1} {name}", "", 0.0, target)
+        near = nearest(found, target, [(bound.lobe, what)], model, _readings(target, READINGS // 2))
+        directions.append(_way(way, target, near, model))
+    return sorted(directions, key=lambda way: way.change)
 
 
-def _near(target: Target, way: Target, model: Model) -> Target | None:
-    """Lobes that the model reads of a stack with those of a way, or of a target just beyond, and finds again: where it
-    must, with the indices between interfaces of that stack, and nothing else fixed."""
-    asked = (_beyond(target, way, share) for share in FURTHER)
-    found = next(filter(None, (stacks.search(each, model.adder, EFFORT) for each in asked)), None)
-    if found is None:
-        return None
-    near = seen(found.stack, way, model)
-    kept = (near, _with_indices(near, found.stack), _with_indices(freed(near), found.stack))
-    return next((each for n, each in enumerate(kept) if each not in kept[:n] and _is_met(each, model)), None)
+def _readings(target: Target, interfaces: int) -> int:
+    """How many readings of a stack of a target read as many interfaces; brushed ones count twice."""
+    units = sum(lobe.interfaces for lobe in target.lobes)
+    return interfaces // (units if target.kind is Isotropic else 2 * units)
 
 
-def _with_indices(target: Target, stack: Stack) -> Target:
-    """A target whose pairs keep the indices between their interfaces that a stack has."""
-    first = 0
-    for k, lobe in enumerate(target.lobes):
-        if stacks.is_open(lobe):
-            eta = float(np.mean(plain(stack)[first].eta)), lobe.fixed.of("eta", 1)
-            target = target.with_lobe(k, fixed=lobe.fixed.model_copy(update={"eta": eta}))
-        first += lobe.interfaces
-    return target
+def nearest(found: Solution, target: Target, loose: Sequence[tuple[int, str]], model: Model, readings: int) -> Target:
+    """The lobes nearest to a target that the model reads on the way from a stack, and the stack that has them."""
+    dragged = DraggedStack.of(found.stack, target, model, with_pins=True)
+    assert dragged is not None
+    stack = dragged.nearest(target, loose, readings).stack
+    there = DraggedStack.of(stack, target, model, with_pins=True)
+    assert there is not None
+    return there.snapped(target).model_copy(update={"start": stack})
 
 
-def _beyond(target: Target, way: Target, share: float) -> Target:
-    """A target beyond another one, as seen from a first one: by a share of how their energies and variances differ."""
-    found = way
-    for k, (asked, lobe) in enumerate(zip(target.lobes, way.lobes)):
-        one, two = (np.log(np.maximum(each.colour, LEAST)) for each in (asked, lobe))
-        if np.any(one != two):
-            step = two - one if np.ptp(two) else np.mean(two - one)
-            found = found.with_lobe(k, energy=tuple(np.exp(two + share * step).tolist()))
-        a, b = (max(float(BLUR.variance(each.roughness)), LEAST) for each in (asked, lobe))
-        if a != b:
-            found = found.with_variance(k, min(b * (b / a) ** share, float(BLUR.variance(1.0))))
+def _loose(way: Direction, target: Target) -> list[tuple[int, str]]:
+    """Which energies and blurs a way changes."""
+    found = []
+    for k, (asked, lobe) in enumerate(zip(target.lobes, way.target.lobes)):
+        found += [(k, "energy")] if asked.colour != lobe.colour else []
+        found += [(k, "blur")] if asked.axes != lobe.axes else []
     return found
+
+
+def _in_form_of(form: Target, target: Target) -> Target:
+    """The lobes of a target, made as those of another one are."""
+    for k, made in enumerate(form.lobes):
+        target = target.with_lobe(k, interfaces=made.interfaces, base=made.base, fixed=made.fixed)
+    return target
 
 
 def _dragged(found: Solution, target: Target, model: Model) -> DraggedStack | None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ROUNDS, NARROW = 60, 1e-12  # of false position, and the width of a bracket that holds one number
+ROUNDS, NARROW = 40, 1e-11  # of false position, and the width of a bracket that holds one number
 ZOOMS, PEAKS, BETWEEN = 6, 8, 4  # of a grid about its highest peaks, and points between these and their neighbours
 
 

@@ -105,13 +105,21 @@ def invert_stack(
         Infeasible: there is no such stack; the error gives the reason, and the nearest targets that have one.
     """
     wanted = read(target)
-    chosen = model_of(wanted, model, **switches)
-    found = search(wanted, chosen)
+    chosen, start = model_of(wanted, model, **switches), wanted.start
+    wanted = wanted.model_copy(update={"start": None})
+    found = (start and _near(start, wanted, chosen)) or search(wanted, chosen)
     if found is None:
         from velatura.inverse.explain import infeasible
 
         raise infeasible(wanted, chosen)
     return found
+
+
+def _near(start: Stack, target: Target, model: Model) -> Solution | None:
+    """The stack that a search begins with, or one close to it, where it has the lobes of a target."""
+    from velatura.inverse import refined  # which solves with this
+
+    return refined.from_start(start, target, model)
 
 
 def model_of(target: Target, model: str | Model, **switches: str) -> Model:

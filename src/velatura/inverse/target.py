@@ -13,7 +13,7 @@ from pydantic import model_validator
 from velatura.errors import InvalidInput
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
-from velatura.stack import RGB, io
+from velatura.stack import RGB, Stack, io
 from velatura.stack.schema import Parameter, Record, show
 from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Pair, Scalar, Text
 
@@ -58,6 +58,28 @@ class Entries(Parameter):
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "array", "items": {"anyOf": [self.entry.json_schema(), {"type": "null"}]}}
+
+
+@dataclass(frozen=True)
+class Start(Parameter):
+    """A material."""
+
+    @property
+    def values(self) -> str:
+        return "a material"
+
+    def check(self, value: Any) -> Stack:
+        if isinstance(value, Stack):
+            return value
+        if not isinstance(value, Mapping):
+            raise self.refuse(value)
+        try:
+            return Stack.from_dict(value)
+        except InvalidInput as error:
+            raise ValueError(str(error)) from None
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "object"}
 
 
 def _number(doc: str, low: float = 0.0, **options: Any) -> Scalar:
@@ -182,6 +204,7 @@ class Target(Record):
         Choice("one variance for all colours or the brightest one's; else the model's", options=("mean", "separate")),
     ] = None
     lobes: tuple[TargetLobe, ...]
+    start: Annotated[Stack | None, Start("material that the search begins with, of as many interfaces")] = None
 
     def __init__(self, /, lobes: Iterable[TargetLobe | Mapping[str, Any]] = (), **options: Any) -> None:
         if isinstance(lobes, str | Mapping) or not isinstance(lobes, Iterable):
@@ -195,6 +218,10 @@ class Target(Record):
         for n, lobe in enumerate(self.lobes[:-1], 1):
             if lobe.base != "dielectric":
                 raise ValueError(f"lobe {n}: base: only the last lobe may have a {lobe.base}, nothing lies below it")
+        wanted = sum(lobe.interfaces for lobe in self.lobes)
+        if self.start is not None and len(self.start.interfaces) != wanted:
+            found = len(self.start.interfaces)
+            raise ValueError(f"start: must have as many interfaces as the lobes, {wanted}, got {found}")
         return self
 
     @property

@@ -257,10 +257,11 @@ class Space:
 
     def clipped(self, x: Array) -> Array:
         """The point (D,) within the bounds on coordinates."""
-        return np.clip(x, *self._box)
+        return np.clip(x, *self.box)
 
     @cached_property
-    def _box(self) -> tuple[Array, Array]:
+    def box(self) -> tuple[Array, Array]:
+        """The least and the largest values of all coordinates, (D,) each."""
         size = 1 + max(bound.coordinate for bound in self.bounds if bound.coordinate is not None)
         low, high = np.full(size, -np.inf), np.full(size, np.inf)
         for bound in self.bounds:
@@ -412,7 +413,9 @@ class Reader:
         """The last interface of a lobe, a conductor: all that absorbs is kept."""
         reflectance = np.broadcast_to(fresnel.normal_incidence(ratio, kappa), (3, 1))
         tint = conductor_tint(ratio, kappa)
-        tint = retinted(tint, float(np.mean(tint)), self.target.lobes[k].tint)
+        lobe = self.target.lobes[k]
+        if lobe.fixed.of("eta", lobe.interfaces - 1) is None and lobe.fixed.of("k", lobe.interfaces - 1) is None:
+            tint = retinted(tint, float(np.mean(tint)), lobe.tint)
         low, why = (ENERGY_MIN, "upper") if values["absorbs"] else (float(CONDUCTOR_MIN), "metal")
         reflectances = np.maximum(reflectance[:, 0], low).tolist()
         span = self._colour(k, reflectances, why, low, float(CONDUCTOR_MAX))

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from velatura.inverse.coats import scattered
+from velatura.inverse.drag.approach import Approach
 from velatura.inverse.drag.coordinates import (
     REFLECTANCE_MAX,
     SLACK,
@@ -35,6 +36,7 @@ from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
+SAME = 1e-6  # energies and roughnesses that are as asked
 FAR = 0.1  # share of a wish that is a long way
 
 
@@ -55,16 +57,18 @@ class DraggedStack:
     # From and to materials -------------------------------------------------------------------------------------------
 
     @classmethod
-    def of(cls, stack: Stack, target: Target, model: Model) -> DraggedStack | None:
+    def of(cls, stack: Stack, target: Target, model: Model, with_pins: bool = False) -> DraggedStack | None:
         """The stack with its interfaces assigned to the lobes of a target; None if these do not match.
+
+        with_pins: also where more is fixed than a drag can keep, as `nearest` does.
 
         Raises:
             InvalidInput: a layer that no target can have.
         """
         layers = plain(stack)
-        if len(layers) != sum(lobe.interfaces for lobe in target.lobes) or any(
-            pinned(lobe, n == 0) for n, lobe in enumerate(target.lobes)
-        ):
+        if len(layers) != sum(lobe.interfaces for lobe in target.lobes):
+            return None
+        if not with_pins and any(pinned(lobe, n == 0) for n, lobe in enumerate(target.lobes)):
             return None
         reader = Reader(
             target, model, kind_of([*(lobe.axes for lobe in target.lobes), *(part.roughness for part in layers)])
@@ -158,6 +162,18 @@ class DraggedStack:
         reading = self.space.sorted(self.point.x[:, None], list(zip(found.energy, roughnesses)))[:, 0]
         return self._target_of(reading, self.target)
 
+    def snapped(self, wish: Target) -> Target:
+        """The present lobes, in the form of a target; its own where they differ by rounding."""
+        now = self.now(wish)
+        for k, (lobe, asked) in enumerate(zip(now.lobes, wish.lobes)):
+            if np.abs(np.subtract(lobe.colour, asked.colour)).max() < SAME:
+                now = now.with_lobe(k, energy=asked.energy)
+            elif np.ptp(lobe.colour) < SAME:
+                now = now.with_lobe(k, energy=float(np.mean(lobe.colour)))
+            if np.abs(np.subtract(lobe.axes, asked.axes)).max() < SAME:
+                now = now.with_lobe(k, alpha=asked.alpha, variance=asked.variance, rotation=asked.rotation)
+        return now
+
     def between(self, wish: Target, t: float) -> Target:
         """A target between the present lobes and the wished ones, in energies and variances."""
         now = self.point.reading.value
@@ -216,6 +232,49 @@ class DraggedStack:
         problem = self._problem(self._wanted(wish))
         found = self._met(problem) if giving else problem.solve()
         return self._at(found).renamed(wish) if isinstance(found, Solution) else found
+
+    def nearest(self, wish: Target, loose: Sequence[tuple[int, str]], readings: int) -> DraggedStack:
+        """The stack whose lobes come nearest to a target of the same form, and that keeps what is fixed there.
+
+        loose: the "energy" or "blur" of which lobes may change; others stay, as far as they can.
+        readings: the most that it takes.
+        """
+        may = np.zeros(len(self.point.reading.value), bool)
+        for k, what in loose:
+            if what == "energy":
+                may[3 * k : 3 * k + 3] = True
+        spans = may[3 * self.space.lobes :].reshape(len(self.interfaces), -1)
+        for span, own in zip(spans, self.interfaces):
+            span[:] = (own.lobe, "blur") in loose
+        held, caps = self._constant(wish)
+        point = Approach(self.point, self._wanted(wish), may, held, caps).solve(readings)
+        return dataclasses.replace(self, point=point)
+
+    def _constant(self, target: Target) -> tuple[list[int], list[tuple[int, int]]]:
+        """Coordinates that stay since values of a target are fixed, and those that stay below others.
+
+        Indices stay with those of all interfaces above, which they are relative to.
+        """
+        held, caps, x = list[int](), list[tuple[int, int]](), self.point.x
+        settled = max((k for k, lobe in enumerate(target.lobes) if _fixes_last(lobe)), default=-1)
+        for n, own in enumerate(self.interfaces):
+            lobe, above = target.lobes[own.lobe], own.lobe <= settled
+            place = n - min(m for m, other in enumerate(self.interfaces) if other.lobe == own.lobe)
+            if lobe.fixed.of("alpha", place) is not None:
+                held += range(own.variance.start, own.variance.stop)
+            if own.log_index is not None and (above or lobe.fixed.of("eta", place) is not None):
+                held.append(own.log_index)
+            depth = lobe.fixed.of("tau", place) is not None
+            if own.depth is not None and depth:
+                held.append(own.depth)
+            if own.reflectances is not None and above:
+                span = list(range(own.reflectances.start, own.reflectances.stop))
+                most = max(span, key=lambda c: x[c])
+                if own.kind == "dielectric" and not depth:
+                    caps += [(c, most) for c in span if c != most]
+                    span = [most]
+                held += span
+        return held, caps
 
     def missed(self, wish: Target) -> float:
         """The largest difference of its energies and variances from those of a target."""
@@ -416,6 +475,11 @@ def _scaled_to(reflectances: Array, most: float) -> Array:
     """Reflectances with another largest one, no channel without any."""
     now = np.max(reflectances)
     return max(most, ENERGY_MIN) * (reflectances / now if now > 0 else np.ones_like(reflectances))
+
+
+def _fixes_last(lobe: TargetLobe) -> bool:
+    """Whether the last interface of a lobe, or the medium above it, keeps a value other than its roughness."""
+    return any(lobe.fixed.of(key, lobe.interfaces - 1) is not None for key in ("eta", "k", "tau"))
 
 
 def pinned(lobe: TargetLobe, first: bool) -> bool:

@@ -1,0 +1,192 @@
+"""From a stack towards lobes that it may not be able to have: the nearest that it can.
+
+Every stack that is read lies within the bounds of its coordinates, so that there is an answer at any time.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from velatura.inverse.drag.coordinates import Bound, Point, Reading, Space
+from velatura.inverse.partial_stack import Array, Mask
+from velatura.optics import fresnel
+
+MAY, STAYS = (0.03, 1e-4), 1.0  # weights of lobes that may change, at first and in the end, and of others
+ALIKE = 10.0  # weight of how the blurs of a pair differ
+STILL = 1e-7  # weight of the coordinates themselves, where readings leave them open
+ON_BOUND = 1e3  # weight of a bound that no box of coordinates expresses
+BOUNDS, HALVINGS = 4, 40  # of these in one step, and of a step that breaks one of them nevertheless
+ROUNDS, ENOUGH, CLOSE = 10, 1e-3, 1e-2  # of steps, the share by which the last gets nearer, and the shortest
+MET = 1e-8  # what is missing where all is met
+SETTLED = 0.9  # share of what was missing, above which corrections end
+FAINT, BLURRED = 1e-4, 0.01  # energy and variance that is added before logarithms are compared
+
+
+@dataclass(frozen=True)
+class Approach:
+    """The problem: a start, the readings (3 K + V I,) that are wanted, which of them may change, and what is held.
+
+    held: coordinates that keep their values. caps: coordinates that stay below others.
+    """
+
+    start: Point
+    goal: Array
+    loose: Mask
+    held: Collection[int] = ()
+    caps: Sequence[tuple[int, int]] = ()
+
+    def solve(self, readings: int) -> Point:
+        """The nearest point, by weighted squares, of those that are read.
+
+        Of a model that is slow, the nearest one that adds up layers descends, to a goal that is shifted by what the two
+        differ by at the last point; so each reading is one more correction.
+        """
+        space, goal = self.start.space, self._seen(self.goal)
+        x = best = space.clipped(self.start.x)
+        if space.model.recursion.closed_form:
+            return Point(space, self._descended(space, x, goal))
+        adder, found, least = dataclasses.replace(space, model=space.model.adder), np.empty(0), np.inf
+        for _ in range(readings):
+            read = space.read(x[:, None])[:, 0]
+            off = float(np.linalg.norm(self._rows(MAY[-1]) @ (goal - self._seen(read))))
+            gained = off < SETTLED * least
+            if off < least:
+                best, found, least = x, read, off
+            if not gained or off < MET:
+                break
+            x = self._descended(adder, x, goal + self._seen(adder.read(x[:, None])[:, 0]) - self._seen(read))
+        return Point(space, best, Reading(found, np.empty((len(found), 0))))
+
+    def _descended(self, space: Space, x: Array, goal: Array) -> Array:
+        """The nearest point to a goal, as it is seen, for a model in closed form: Gauss-Newton within the bounds.
+
+        What may change weighs more at first, so that what stays may be missed on the way.
+        """
+        free = np.setdiff1d(np.arange(len(x)), np.array(list(self.held), int))
+        reading = space.reading(x, free)
+        value = self._seen(reading.value)
+        for may in MAY:
+            rows, reach = self._rows(may), 1.0
+            for _ in range(ROUNDS):
+                slopes = reading.slopes * self._stretch(reading.value)[:, None]
+                missing = rows @ (goal - value)
+                off = float(np.linalg.norm(missing))
+                tried = self._step(x, missing, rows @ slopes, free, reach)
+                there = space.reading(tried, free)
+                now = self._seen(there.value)
+                nearer = float(np.linalg.norm(rows @ (goal - now)))
+                if nearer < off:
+                    x, value, reading, reach = tried, now, there, min(1.0, 2 * reach)
+                else:
+                    reach *= 0.3
+                if nearer > (1 - ENOUGH) * off and (nearer < off or reach < CLOSE):
+                    break
+        return x
+
+    @property
+    def _logarithmic(self) -> Array:
+        """What is added to readings, of which logarithms are seen: energies, and variances along axes; 0 of others."""
+        space, count = self.start.space, 3 * self.start.space.lobes
+        of_variance = [0.0 if field.name == "xy" else BLURRED for field in dataclasses.fields(space.kind)]
+        return np.r_[np.full(count, FAINT), np.tile(of_variance, len(space.interfaces))]
+
+    def _seen(self, reading: Array) -> Array:
+        """A reading as it is compared."""
+        more = self._logarithmic
+        return np.where(more > 0, np.log(np.maximum(reading, 0.0) + np.where(more > 0, more, 1.0)), reading)
+
+    def _stretch(self, reading: Array) -> Array:
+        """The derivative of `_seen`."""
+        more = self._logarithmic
+        return np.where(more > 0, 1 / (np.maximum(reading, 0.0) + np.where(more > 0, more, 1.0)), 1.0)
+
+    def _rows(self, may: float) -> Array:
+        """Weighted sums of readings: energies, of every lobe the mean variances and how those of a pair differ.
+
+        may: weight of what may change.
+        """
+        space, count = self.start.space, 3 * self.start.space.lobes
+        weight = np.where(self.loose, may, STAYS)
+        rows = list(np.diag(weight)[:count])
+        for k in range(space.lobes):
+            own = [n for n, part in enumerate(space.interfaces) if part.lobe == k]
+            first = count + space.entries * own[0]
+            size = np.abs(self.goal[first : first + space.entries]).max() + BLURRED
+            for entry in range(space.entries):
+                at = [count + space.entries * n + entry for n in own]
+                unit = 1.0 if self._logarithmic[at[0]] > 0 else 1 / size
+                row, apart = np.zeros(len(self.goal)), np.zeros(len(self.goal))
+                row[at] = weight[at[0]] * unit / len(at)
+                rows.append(row)
+                if len(at) == 2:
+                    apart[at] = ALIKE * unit, -ALIKE * unit
+                    rows.append(apart)
+        return np.array(rows)
+
+    def _step(self, x: Array, missing: Array, slopes: Array, free: Array, reach: float) -> Array:
+        """The point, within the bounds, to which a step of some coordinates leads that makes up best for what is
+        missing."""
+        from scipy.optimize import lsq_linear  # slow to load
+
+        space, size = self.start.space, np.abs(x[free]) + 0.01
+        low, high = (end[free] - x[free] for end in space.box)
+        for below, above in self.caps:
+            high[free == below] = x[above] - x[below]
+        far = reach * self._reach(x)[free]
+        low, high = np.maximum(low, -far) / size, np.minimum(high, far) / size
+        high = np.maximum(high, low + 1e-12)
+        a = np.vstack([slopes * size, STILL * np.eye(len(free))])
+        b = np.r_[missing, np.zeros(len(free))]
+        kept: list[Bound] = []
+        step = np.zeros(len(free))
+        for _ in range(BOUNDS):
+            step = np.clip(lsq_linear(a, b, (low, high), method="bvls").x, low, high) * size
+            broken = self._broken(x, step, free)
+            if broken is None or broken in kept:
+                break
+            kept.append(broken)
+            points = space.points(x, free)
+            margins = space.margin(broken, points)
+            change = (margins[1:] - margins[0]) / (points[free, 1 + np.arange(len(free))] - x[free])
+            a = np.vstack([a, ON_BOUND * change * size])
+            b = np.r_[b, -ON_BOUND * margins[0]]
+        for _ in range(HALVINGS):
+            tried = x.copy()
+            tried[free] += step
+            tried = self._capped(tried)
+            if space.broken(tried, None) is None:
+                return tried
+            step = step / 2
+        return x
+
+    def _broken(self, x: Array, step: Array, free: Array) -> Bound | None:
+        tried = x.copy()
+        tried[free] += step
+        return self.start.space.broken(tried, None)
+
+    def _capped(self, x: Array) -> Array:
+        """A point whose dielectrics reflect no more than indices within bounds do."""
+        space, x, above = self.start.space, x.copy(), self.start.space.exterior
+        for n, own in enumerate(space.interfaces):
+            if own.log_index is not None:
+                above = float(np.exp(x[own.log_index]))
+            elif own.kind == "dielectric":
+                ends = np.exp([bound.at for bound in space.bounds if bound.interface == n])
+                end = max(ends) if own.side > 0 else min(ends)
+                x[own.reflectances] = np.minimum(x[own.reflectances], fresnel.normal_incidence(end / above))
+                above = float(np.mean(space.layers(x[:, None])[n].eta))
+        return x
+
+    def _reach(self, x: Array) -> Array:
+        """The longest step of every coordinate."""
+        reach = np.full(len(x), np.inf)
+        for own in self.start.space.interfaces:
+            if own.reflectances is not None:
+                reach[own.reflectances] = np.maximum(0.7 * x[own.reflectances], 0.01)
+            if own.log_index is not None:
+                reach[own.log_index] = 0.2
+        return reach
