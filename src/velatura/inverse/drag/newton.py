@@ -70,7 +70,7 @@ class Problem:
         found = self._searched(compromise, nearest)
         space = self.start.space
         if isinstance(found, Bound) and compromise is None and not space.model.recursion.closed_form:
-            if space.winds:
+            if space.winds and nearest.missing > ALMOST:
                 self._approach(nearest)
             if nearest.missing < (WINDING if space.winds else ALMOST) and not space.broken(nearest.x, None):
                 return Solution(Point(space, nearest.x), 1.0)
@@ -80,7 +80,7 @@ class Problem:
         """The same by Newton's method with the slopes of `Space.reading`; also keeps the nearest point."""
         space, bound = self.start.space, compromise.bound if compromise else None
         closed = space.model.recursion.closed_form
-        enough = ENOUGH if bound and closed else ALMOST if closed or space.winds else SLOW_ALMOST
+        enough = ENOUGH if bound and closed else ALMOST if closed else SLOW_ALMOST
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, dict[int, int]()
         before, missing = None, self._missing(self.start.reading, part)
