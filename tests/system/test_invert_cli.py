@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import velatura as vt
@@ -77,17 +78,42 @@ def test_several_stacks_and_the_class_as_a_picture(run: Run, folder: Path) -> No
     assert "pair.png" in out
 
 
-def test_what_cannot_be_exits_with_3(run: Run, folder: Path) -> None:
-    """Expected: one line that says why and what is possible, the same as JSON, and nothing written."""
-    status, out, err = run("invert", "bright.yaml", "-o", "stack.yaml", "--plot", "--model", "bati2021")
+@pytest.mark.parametrize("model", ["velatura", "bati2021"])
+def test_what_cannot_be_exits_with_3(run: Run, folder: Path, model: str) -> None:
+    """Expected: one line that says why and what is possible, the same as JSON, and nothing written; .36 is what a
+    dielectric of index 4 reflects."""
+    status, out, err = run("invert", "bright.yaml", "-o", "stack.yaml", "--plot", "--model", model)
     assert (status, out) == (3, "")
     ways = "lobe 1 energy 0.36; lobe 1 base conductor"
     assert err == f"velatura: no stack: lobe 1: no index up to 4 reflects as much (possible: {ways})\n"
-    status, out, _ = run("invert", "bright.yaml", "--json", "--model", "bati2021")
+    status, out, _ = run("invert", "bright.yaml", "--json", "--model", model)
     report = json.loads(out)
-    assert (status, report["feasible"]) == (3, False)
+    assert (status, report["feasible"], report["model"]) == (3, False, model)
     assert report["nearest"]["lobes"][0]["energy"] == pytest.approx(0.36, abs=1e-3)
     assert files(folder) == set()
+
+
+@pytest.mark.parametrize(
+    "lobes",
+    [
+        "[{energy: [0.08, 0.04, 0.05]}]",
+        "[{energy: 0.1, alpha: 0.2}, {energy: [0.4, 0.3, 0.2], alpha: 0.02, base: conductor}]",
+        "[{energy: 0.05, fixed: {eta: [1.3]}}, {energy: 0.3, alpha: 0.1, base: conductor}]",
+    ],
+)
+def test_the_nearest_is_solved_when_it_is_fed_back(run: Run, folder: Path, lobes: str) -> None:
+    """Expected: the JSON of a refusal holds a target file, whose material has the lobes that it names."""
+    (folder / "wish.yaml").write_text(f"lobes: {lobes}\n")
+    status, out, _ = run("invert", "wish.yaml", "--json")
+    nearest = json.loads(out)["nearest"]
+    assert status == 3
+    (folder / "nearest.json").write_text(json.dumps(nearest))
+    assert run("invert", "nearest.json", "-o", "stack.yaml")[0] == 0
+    found, first = vt.lobes(vt.load("stack.yaml"), 1.0), 0
+    for lobe in nearest["lobes"]:
+        own = slice(first, first := first + lobe.get("interfaces", 1))
+        energy = np.sum(found.energy[own], axis=0)[:, 0]
+        assert energy == pytest.approx(np.broadcast_to(lobe["energy"], 3), abs=1e-6)
 
 
 @pytest.mark.parametrize(

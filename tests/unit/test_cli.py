@@ -12,6 +12,7 @@ import os
 import re
 import signal
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +22,7 @@ import numpy as np
 import pytest
 
 import velatura
-from velatura.cli import options
+from velatura.cli import options, progress
 from velatura.errors import MissingTool, NoSolution
 from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
 
@@ -351,3 +352,20 @@ def test_what_the_system_refuses_is_one_line(
 ) -> None:
     calls["meanwhile"] = raising(error)
     assert run("render", material, "-o", str(tmp_path / "a.png")) == (1, "", f"velatura: {says}\n")
+
+
+def test_a_step_that_takes_long_shows_the_time_that_passes(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Expected: on a terminal, once it takes long, and nothing at all before that or into a pipe."""
+    with progress.clock("Solving a.yaml", after=0.05):
+        time.sleep(0.3)
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setenv("FORCE_COLOR", "1")  # a terminal, for Rich
+    with progress.clock("Solving a.yaml"):
+        pass
+    assert capsys.readouterr() == ("", "")
+    with progress.clock("Solving a.yaml", after=0.05):
+        time.sleep(0.3)
+    out, err = capsys.readouterr()
+    assert out == "" and "Solving a.yaml" in err

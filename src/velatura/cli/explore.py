@@ -51,7 +51,8 @@ def explore(
         raise InvalidInput("-o: is for the sheet; add --sheet")
 
     # Sort them by how much more or less they reflect than the first
-    found = inverse.alternatives(wanted, count, name, seed, **switches)
+    with progress.clock(f"Solving {Path(target).name}"):
+        found = inverse.alternatives(wanted, count, name, seed, **switches)
     seen = [inverse.grazing(solution.stack, solution.model) for solution in found]
     apart = [float(np.abs(energy - seen[0]).mean()) for energy in seen]
     order = np.argsort(apart, kind="stable")

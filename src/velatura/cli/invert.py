@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from velatura.cli import options
+from velatura.cli import options, progress
 from velatura.errors import InvalidInput, needs
 
 if TYPE_CHECKING:
@@ -79,7 +79,8 @@ def invert(
     drawn = picture(target) if plot else None
 
     try:
-        found = inverse.alternatives(wanted, count, name, seed, **switches)
+        with progress.clock(f"Solving {Path(target).name}"):
+            found = inverse.alternatives(wanted, count, name, seed, **switches)
     except Infeasible as error:
         if as_json:
             nearest = error.nearest.to_dict() if error.nearest else None
