@@ -19,6 +19,7 @@ from velatura.ops import Value
 PLANS, ELITES, ROUNDS = 96, 12, 16  # of indices, those that have offspring, and generations of these
 WIDEST, SHRINKS = 0.4, 0.5  # share of the range of indices that the first of them spread over, and of that the next
 SETTLED = 3  # generations with a stack
+STALE, NEARER = 6, 0.99  # generations that end the search, unless what is missing is this share of it, or less
 DRAWN, KEPT = 1024, 256  # partial stacks that are tried and followed, to be drawn from
 SELDOM = 1e-9  # weight of an interface that vanishes
 NARROWEST = 1e-4  # share of a range within which others near a known stack are tried
@@ -47,7 +48,7 @@ def closer(target: Target, model: Model, found: Partial | None) -> Partial | Non
             return None
         y = rng.uniform(0, top, (len(open_), len(inside)))
         y[0] = np.log(inside)
-    parts, settled = [found] if found else [], 0
+    parts, settled, missing = [found] if found else [], 0, list[float]()
     for n in range(ROUNDS):
         paths, origin, score = _along(target, model, dict(zip(open_, np.exp(y))))
         cost = np.full(y.shape[1], np.inf)
@@ -55,7 +56,8 @@ def closer(target: Target, model: Model, found: Partial | None) -> Partial | Non
         if len(paths.cost):
             parts.append(paths.take(np.argsort(paths.cost)[:ELITES]))
             settled += 1
-        if settled > SETTLED:
+        missing.append(len(target.lobes) - float(score.max()))
+        if settled > SETTLED or (not parts and n >= STALE and missing[n] > NEARER * missing[n - STALE]):
             break
         scale = WIDEST * SHRINKS**n * top
         best = _apart(y, np.lexsort((cost, -score)), scale / 2)
@@ -106,7 +108,7 @@ def _along(target: Target, model: Model, indices: Mapping[int, Array]) -> tuple[
         margin = np.nan_to_num(np.min(np.broadcast_arrays(paths.cost * np.inf, *margins), axis=0), nan=-np.inf)
         margin = np.maximum(margin, -1e9)
         ok = margin >= 0
-        np.maximum.at(score, origin, n + np.where(ok, 1.0, margin / (1 - margin)))
+        np.maximum.at(score, origin, n + 1 + np.where(ok, 0.0, margin / (1 - margin)))
         paths, origin = paths.take(np.flatnonzero(ok)), origin[ok]
         if not len(origin):
             break
