@@ -29,7 +29,8 @@ from velatura.stack import Stack
 GREY = Bound(0, "colour", 1, 0.0)  # one index for all channels
 EFFORT = stacks.EFFORTS[:1]  # to find a stack near which the model is met
 STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
-READINGS, LEAST_READINGS = 60, 5  # to find ways out, as interfaces that are read, and for one of these
+READINGS = 60  # to find ways out, as interfaces that are read
+LEAST_READINGS, MOST_READINGS = 5, 8  # of stacks, for one way
 KEPT = 1e-6  # by which what is fixed may be missed
 SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
 TRIES, FEWER = 4, 2  # stacks that are begun with, of all that are found; where none has the lobes of the wish
@@ -152,7 +153,7 @@ def ways_from(found: Solution, target: Target, bound: Bound, model: Model) -> li
 def _readings(target: Target, interfaces: int) -> int:
     """How many readings of a stack of a target read as many interfaces; brushed ones count twice."""
     units = sum(lobe.interfaces for lobe in target.lobes)
-    return interfaces // (units if target.kind is Isotropic else 2 * units)
+    return min(interfaces // (units if target.kind is Isotropic else 2 * units), MOST_READINGS)
 
 
 def nearest(found: Solution, target: Target, loose: Sequence[tuple[int, str]], model: Model, readings: int) -> Target:

@@ -75,6 +75,8 @@ class Approach:
                 slopes = reading.slopes * self._stretch(reading.value)[:, None]
                 missing = rows @ (goal - value)
                 off = float(np.linalg.norm(missing))
+                if off < MET:
+                    return x
                 tried = self._step(x, missing, rows @ slopes, free, reach)
                 there = space.reading(tried, free)
                 now = self._seen(there.value)
