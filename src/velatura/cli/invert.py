@@ -68,7 +68,8 @@ def invert(
       base        dielectric or, of the last lobe, conductor
       tint        of a conductor, 0 (strongest edge tint) to 1
       fixed       {eta, k, alpha, tau}: what each interface keeps, or null: [1.5]
-    Of the whole: exterior (1), eta_max (4), channels (mean or separate), name.
+    Of the whole: exterior (1), eta_max (4), channels (mean or separate), name;
+      start       a material, as a file has it, with which the search begins
     """
     # Refuse what cannot work before anything slow begins
     from velatura import inverse
