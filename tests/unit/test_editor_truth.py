@@ -36,6 +36,21 @@ def test_the_view_is_that_of_the_body() -> None:
         assert float(np.mean(np.abs(picture(**changes) - first))) > 0.05, changes
 
 
+def test_light_bounces_between_facets_where_it_does_in_the_model() -> None:
+    """Expected: rough gold is brighter by 3 to 15 % in a model that has bounces; their switch counts."""
+    gold = {"layers": [{"interface": {"conductor": "Au", "alpha": 0.5}}]}
+    once, often, switched = (
+        float(np.mean(picture(material=gold, environment="furnace", **model)))
+        for model in (
+            {"model": "weier2020"},
+            {"model": "velatura"},
+            {"model": "belcour2018", "switches": {"reflectance": "fgd"}},
+        )
+    )
+    assert 1.03 < often / once < 1.15
+    assert switched == pytest.approx(once, rel=1e-3)
+
+
 def test_a_white_furnace_stays_white() -> None:
     seen = picture(environment="furnace")
     assert np.median(seen) == pytest.approx(1, abs=1e-4)

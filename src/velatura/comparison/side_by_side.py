@@ -59,7 +59,7 @@ def compare(
     described = load(stack)
     asked = _every(switches) if models is None else [_model(m, switches) for m in models]
     if microsurface is None:
-        microsurface = any(isinstance(m, Model) and m.reflectance == "fgd-multi" for m in asked)
+        microsurface = any(isinstance(m, Model) and m.microsurface for m in asked)
     if paths < 2:
         raise InvalidInput(f"paths: must be at least 2, got {paths}")
     names = [m.name if isinstance(m, Model) else plugins.name_of(m) for m in asked]

@@ -125,8 +125,7 @@ def pairs(alpha_u: float, alpha_v: float, body: Body) -> Answer:
     stack, layer = chosen_interface(body)
     changed = stack.replace(**{f"layer{layer}_alpha_u": alpha_u, f"layer{layer}_alpha_v": alpha_v})
     model = model_of(body)
-    # The walk bounces between facets where the model has that light
-    truth = _rendered(range(PASSES), changed, "reference", microsurface=model.reflectance == "fgd-multi")
+    truth = _rendered(range(PASSES), changed, "reference", microsurface=model.microsurface)
     modelled = _rendered(range(PASSES, 2 * PASSES), changed, model)
     missed, error = rmse(modelled, truth)
     return {

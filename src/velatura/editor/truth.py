@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import kernel
-from velatura.editor.messages import Answer, Body, Verb, array, material_of
+from velatura.editor.messages import Answer, Body, Verb, array, material_of, model_of
 from velatura.errors import InvalidInput
 from velatura.stack import Stack
 
@@ -21,8 +21,9 @@ MOST = 2**21  # samples of one call
 def truth(body: Body) -> Answer:
     """The view by random walks: `picture` (h, w, 3), linear RGB, from the upper left.
 
-    Of the body: `material`, `object`, `environment`, `rotation` (degrees about y), `camera` {origin, target, fov in
-    degrees over the shorter side}, `size` [w, h], `spp`, `seed`.
+    Light bounces between the facets of an interface where it does in the model. Of the body: `material`, `model`,
+    `switches`, `object`, `environment`, `rotation` (degrees about y), `camera` {origin, target, fov in degrees over the
+    shorter side}, `size` [w, h], `spp`, `seed`.
     """
     from velatura import scenes
 
@@ -44,12 +45,16 @@ def truth(body: Body) -> Answer:
     if size[0] * size[1] * spp > MOST:
         raise InvalidInput(f"spp: may be {MOST // (size[0] * size[1])} at most for this size, got {spp}")
     rotation = math.fmod(body.get("rotation", 0), 360)
-    return {"picture": array(_rendered(stack, name, environment, (size[0], size[1]), camera, rotation, spp, seed))}
+    many = model_of(body).microsurface
+    return {
+        "picture": array(_rendered(stack, many, name, environment, (size[0], size[1]), camera, rotation, spp, seed))
+    }
 
 
 @kernel.exclusive
 def _rendered(
     stack: Stack,
+    microsurface: bool,
     name: str,
     environment: str,
     size: tuple[int, int],
@@ -62,7 +67,7 @@ def _rendered(
     from velatura.api import bsdf
 
     mi = kernel.mitsuba()
-    scene = scenes.scene_dict(name, environment, bsdf(stack, "reference"), size)
+    scene = scenes.scene_dict(name, environment, bsdf(stack, "reference", microsurface=microsurface), size)
     scene["light"] = scenes.emitter(mi, environment, rotation)
     scene["sensor"] |= {
         "to_world": mi.ScalarTransform4f().look_at(camera["origin"], camera["target"], [0, 1, 0]),

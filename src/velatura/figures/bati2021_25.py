@@ -58,7 +58,7 @@ def compared(
 ) -> Iterator[tuple[dict[str, Any], Array]]:
     """Of every lobe of a target the row of `compute`, for a stack with it, and what energy and variance miss, (2,)."""
     read, first = stack_lobes(stack, 1.0, model=model), 0
-    many = named(model).reflectance == "fgd-multi"
+    many = named(model).microsurface
     true = reference.statistics(stack, 1.0, paths=paths, seed=seed, microsurface=many)
     for n, lobe in enumerate(target.lobes, 1):
         own = slice(first, first := first + lobe.interfaces)

@@ -82,6 +82,11 @@ class Model:
     recursion: Recursion = ADDING
 
     @property
+    def microsurface(self) -> bool:
+        """Whether light may bounce between the facets of an interface, as in the truth of that name."""
+        return self.reflectance == "fgd-multi"
+
+    @property
     def in_closed_form(self) -> Model:
         """The nearest model by the recursion of the papers, without total internal reflection."""
         return dataclasses.replace(self, recursion=ADDING, tir="off")

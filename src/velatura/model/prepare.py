@@ -171,7 +171,7 @@ class _Averages:
     def reflectance(self, eta: Value | None, kappa: Value | None) -> Average | None:
         if self.model.reflectance in ("fresnel", "fg"):
             return None
-        multiple = self.model.reflectance == "fgd-multi"
+        multiple = self.model.microsurface
         if self.model.reflectance == "split-sum":
             r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
             row = tables.schlick_row(self.context.tables, r_0)

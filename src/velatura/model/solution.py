@@ -252,7 +252,7 @@ class Solver:
             material,
             np.concatenate([cosine, INCIDENCES]),
             np.concatenate([phi, 0 * INCIDENCES]),
-            self.tables if self.model.reflectance == "fgd-multi" else None,
+            self.tables if self.model.microsurface else None,
             widths.nearly_straight,
             self.made,
             samples=self.normals or SAMPLES,

@@ -42,7 +42,7 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
     if nothing:
         others = replace(material, layers=tuple(x for place, x in enumerate(material.layers) if place not in nothing))
         return _with_dark(solved_lobes(others, model, wi), material, model, nothing, phi)
-    often = tables.load() if model.reflectance == "fgd-multi" else None
+    often = tables.load() if model.microsurface else None
     solved, found = energies(material, cos_theta, phi, often, widths.nearly_straight, incidences=NONE), parts(material)
     kind = variance_kind(material)
     # Symmetry has the axes of isotropic stacks in the plane of incidence

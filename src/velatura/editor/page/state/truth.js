@@ -65,5 +65,6 @@ function questionOf(state, { canvas, camera }) {
   if (!isPaired(state.view) || !other?.truth) return null;
   const scale = Math.min(1, LONGEST / Math.max(canvas.width, canvas.height));
   const size = [canvas.width, canvas.height].map((length) => Math.max(1, Math.round(length * scale)));
-  return { material: documentOf(state), object, environment, rotation, camera: state.camera ?? camera, size };
+  const { model, switches } = state;
+  return { material: documentOf(state), model, switches, object, environment, rotation, camera: state.camera ?? camera, size };
 }
