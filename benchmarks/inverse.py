@@ -20,19 +20,32 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from velatura.inverse import Above, Choice, EquivalenceClass, Target, interface, invert_stack, pair, stacks
+from velatura.inverse import (
+    Above,
+    Choice,
+    EquivalenceClass,
+    Target,
+    equivalence,
+    interface,
+    invert_stack,
+    pair,
+    stacks,
+)
 from velatura.inverse.drag import seen
 from velatura.inverse.partial_stack import Array, Layers, join, take
 from velatura.model import MODELS, Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
-from velatura.model.variance import Isotropic
+from velatura.model.variance import Isotropic, Roughness
 from velatura.stack import Interface, Layer, Medium, Stack
 
 EXACT = 1e-6  # of energies and variances, at normal incidence
 CONFIGURATION, PAIRS, REACH = 5e-3, 2e5, 50e-3  # seconds, targets a second, seconds
 LEAST_STEP = 0.08  # of the logarithm of the index, of random stacks
+NODES, FINE = equivalence.NODES, 4 * equivalence.NODES  # on which sets of indices are looked for, and truly are
 CHUNK = 4096  # targets at once: what the caches of a core hold
+
+PARTS = ("physical", "exactness", "narrow", "speed")
 
 #: One to three lobes: of one interface or a pair, the last one dielectric or a metal.
 KINDS = (
@@ -118,7 +131,7 @@ def met(found: Inverted, model: Model) -> Inverted:
     index, layers = [], []
     for n in range(len(found)):
         solution = stacks.search(asked(found, n, model), model)
-        if solution:
+        if solution and not solution.reached:
             index.append(n)
             layers.append(solution.layers)
     kept = found.take(np.array(index, int))
@@ -199,6 +212,40 @@ def physical_targets(count: int, model: Model, seed: int = 0) -> Iterator[Target
     return (physical(KINDS[n % len(KINDS)], rng, model) for n in range(count))
 
 
+def width(members: EquivalenceClass, scale: float, nodes: int) -> float:
+    """Width of the set of first indices of a class with other energies, as looked for on some nodes."""
+    equivalence.NODES = nodes
+    return sum(high / low - 1 for low, high in replace(members, energy=scale * members.energy).indices_1())
+
+
+def narrow(count: int = 60, seed: int = 0) -> list[tuple[float, bool]]:
+    """Widths, as shares of the index, of sets of first indices of rough pairs with almost as much energy as any has.
+
+    And whether they are found. Their truth is the same search on more nodes.
+    """
+    rng, found = np.random.default_rng(seed), list[tuple[float, bool]]()
+    while len(found) < count:
+        above, s = Above.nothing(named("bati2021")), 0.0
+        if rng.random() < 0.6:
+            alpha = np.array([rng.uniform(0, 0.15)])
+            coat = Layers("dielectric", np.array([[rng.uniform(1.2, 1.8)]]), None, Roughness(alpha, alpha, 0.0), 0.0)
+            s, (above, _) = 2.5 * float(above.f.variance(alpha)[0]), above.below(coat)
+        choice = Choice("conductor" if rng.random() < 0.3 else "dielectric", tint=rng.random())
+        colour = rng.uniform(0.02, 0.15) * rng.uniform(0.5, 1, (3, 1)) * (4 if choice.kind == "conductor" else 1)
+        members = EquivalenceClass(above, colour, s + float(above.f.variance(rng.uniform(0.02, 0.3))), 2, choice)
+        inside, outside = 1.0, 20.0
+        if not width(members, inside, FINE) or width(members, outside, FINE):
+            continue
+        for _ in range(40):
+            middle = (inside + outside) / 2
+            inside, outside = (middle, outside) if width(members, middle, FINE) else (inside, middle)
+        for share in 10 ** rng.uniform(-11, -2, 6):
+            scale = inside + (1 - inside) * share
+            if true := width(members, scale, FINE):
+                found.append((true, width(members, scale, NODES) > 0))
+    return found
+
+
 # Speed ---------------------------------------------------------------------------------------------------------------
 
 
@@ -250,9 +297,9 @@ def main() -> int:
     parser.add_argument("--physical", type=int, default=300, help="random stacks whose lobes are asked for")
     parser.add_argument("--models", nargs="+", help="of the round trip; all unless some are named")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--parts", nargs="+", choices=("physical", "exactness", "speed"), help="all unless named")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, help="all unless named")
     options = parser.parse_args()
-    parts, own = options.parts or ("physical", "exactness", "speed"), named("velatura")
+    parts, own = options.parts or PARTS, named("velatura")
     failed = False
 
     if "physical" in parts:
@@ -276,6 +323,12 @@ def main() -> int:
         )
         for target in found.beyond:
             print(" ", target.to_dict()["lobes"])
+
+    if "narrow" in parts:
+        sets = narrow(seed=options.seed)
+        for exponent in range(-8, -1):
+            own = [seen for size, seen in sets if 10.0**exponent <= size < 10.0 ** (exponent + 1)]
+            print(f"sets of 1e{exponent} to 1e{exponent + 1} of the index: {sum(own)} of {len(own)} found")
 
     if "speed" in parts:
         print(f"load when times are taken: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")

@@ -198,6 +198,14 @@ def test_an_answer_says_what_it_reaches_where_what_is_fixed_misses_the_target() 
     assert found.reached.lobes[1].colour == pytest.approx(METAL["energy"], rel=1e-4)
 
 
+def test_a_lobe_that_is_almost_smooth_is_answered_by_a_smooth_one() -> None:
+    """Lower lobes of rough interfaces have an alpha of .001 at least."""
+    target = Target([{"energy": (0.1, 0.086, 0.109), "alpha": 0.0002, "interfaces": 2}])
+    found = invert_stack(target, MODEL)
+    assert found.reached == target.with_lobe(0, alpha=0.0)
+    assert missed(found.reached, found.stack) < 1e-6
+
+
 def test_requests_are_changed_until_their_answers_are_read_as_is_wanted() -> None:
     """Of a reading that is neither linear nor of each request alone."""
     goal = np.array([0.3, 0.5])

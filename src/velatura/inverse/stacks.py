@@ -22,6 +22,7 @@ from velatura.inverse.partial_stack import Above, Array, Batch, Layers, take
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import Target, TargetLobe, read
 from velatura.model import DEFAULT, Model, named
+from velatura.model.mixture import ALPHA_MIN
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Variance
 from velatura.ops import Value
@@ -29,6 +30,7 @@ from velatura.stack import Diffuse, MaterialLike, Stack, load
 
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
 GRAZING = (0.5, 0.4, 0.3, 0.2, 0.1)  # cosines at which members of a class may differ
+NARROWEST = 2 * ALPHA_MIN  # roughness of lobes below a rough interface
 DRAWS = 4  # times that alternatives are drawn
 ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that is fixed, and may where that is sought
 
@@ -134,9 +136,22 @@ def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EF
     if not model.recursion.closed_form:
         from velatura.inverse import refined  # which begins with this
 
-        return refined.search(target, model)
+        met = refined.search(target, model)
+        smooth = _smoothed(target)
+        if met is None and smooth != target:
+            near = refined.search(smooth, model)
+            return near and dataclasses.replace(near, target=target, reached=smooth)
+        return met
     paths = found(target, model, efforts)
     return next(solutions(target, model, paths, [int(np.argmin(paths.cost))]), None) if paths else None
+
+
+def _smoothed(target: Target) -> Target:
+    """The target, smooth where a lobe is narrower than what is evaluated of rough interfaces."""
+    for n, lobe in enumerate(target.lobes):
+        if 0 < max(lobe.axes[:2]) < NARROWEST:
+            target = target.with_lobe(n, alpha=0.0, variance=None)
+    return target
 
 
 def found(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Partial | None:
