@@ -70,7 +70,8 @@ class Problem:
         found = self._searched(compromise, nearest)
         space = self.start.space
         if isinstance(found, Bound) and compromise is None and not space.model.recursion.closed_form:
-            if space.winds and nearest.missing > ALMOST:
+            # Near, one step ends the search; from further off, where readings wind, the way leads on
+            if (nearest.missing > ALMOST) == space.winds:
                 self._approach(nearest)
             if nearest.missing < (WINDING if space.winds else ALMOST) and not space.broken(nearest.x, None):
                 return Solution(Point(space, nearest.x), 1.0)
