@@ -103,7 +103,8 @@ def parts(
     if facets is not None:
         most = (np.maximum(x, y) for x, y in zip(drawn[1:], facets[1:]))
         drawn = Wanted(ops.mean(straightly) + facets.energy, *most)
-    others = Wanted.of(bouncing, bouncing, weight_bounced), Wanted.of(scattered, rest, weight_rest * peak)
+    heaviest = weight_rest * (1 + found.diffuse * (peak - 1))
+    others = Wanted.of(bouncing, bouncing, weight_bounced), Wanted.of(scattered, rest, heaviest)
     # Samples that do not pass the facets of an interface are among those of its lobe
     total = sum(each.energy for each in (drawn, *others)) + reflected.energy.sum(axis=0)
     odds = straight_through.chances(passage, wi)
