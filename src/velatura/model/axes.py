@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from math import pi
+from math import ceil, floor, pi
 from typing import Any, ClassVar
 
 import numpy as np
@@ -54,10 +54,9 @@ class Axis:
         least, most = (_coordinate(first, end) for end in first.declared.within)
         low, high = (_coordinate(first, end) for end in ends)
         step = STEPS.get(first.key, STEP)
-        while high - low > step * (NODES_MAX[together] - 2):
+        while (nodes := _around(low, high, step))[1] - nodes[0] >= NODES_MAX[together]:
             step *= 2
-        begin, end = np.floor(low / step + 1e-6) * step, np.ceil(high / step - 1e-6) * step
-        end = max(end, begin + step)
+        begin, end = (node * step for node in nodes)
         if end > most:
             begin, end = min(begin, most - step), most
         begin = max(begin, least)
@@ -147,6 +146,12 @@ class Wavelengths:
 
     def changed(self, x: float | None) -> dict[str, Any]:
         return {name: values if x is None else values[int(x)] for name, values in self.spectra}
+
+
+def _around(low: float, high: float, step: float) -> tuple[int, int]:
+    """Numbers of the nodes below and above two coordinates, at least one step apart."""
+    begin = floor(low / step + 1e-6)
+    return begin, max(ceil(high / step - 1e-6), begin + 1)
 
 
 def _coordinate(address: Address, value: Value) -> Value:
