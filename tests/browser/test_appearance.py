@@ -159,7 +159,9 @@ def test_a_visit_from_blur_to_class_to_coat(visit: Open, served: Server) -> None
     page.page.evaluate(
         "void (velatura.viewport.thumbnail = () => new Promise(() => {}))"
     )  # no paths but those asked for here
+    page.page.locator("details.section > summary", has_text="View").click()
     page.page.get_by_label("Object", exact=True).select_option("sphere")
+    page.page.locator("details.section > summary", has_text="View").click()
     open_material(page, "Coated rough metal")
     look = panel(page)
     first = page.picture()
