@@ -291,7 +291,7 @@ class _Weighed(Side):
         if passes:
             weights = [through * x for x in (passes.straight, passes.bounced, passes.rest)]
             parts = (passes.of_straight, passes.of_bounced, passes.of_rest)
-            passes = Parts(*weights, *(ops.divide(through * x, total) for x in parts))
+            passes = Parts(*weights, *(ops.divide(through * x, total) for x in parts), *passes.numbers)
         return Columns(
             [x * weight for x, weight in zip(lobes, columns.weights)],
             columns.roughness,
