@@ -26,7 +26,7 @@ Direction = tuple[Any, Any, Any]
 NODES = Nodes.of([1.0, 1.5], 24)
 BEYOND = Nodes.of([1.0, 1.5, 1.8], 24)
 COSINES = np.sqrt((np.arange(8) + 0.5) / 8)
-SOME = Remainder(0.1, 0.2, -0.05, 0.3, -0.1, 0.05, 0.1, 0.05)
+SOME = Remainder(0.1, 0.2, -0.05, 0.3, -0.1, 0.05, 0.03, 0.02)  # nowhere clipped
 BRIGHT_HORIZON = Remainder(0.1, -0.05, 0.1, 0.05, -0.1, 0.3, 0.05, 0.0)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import passed
+from velatura.model.sharing import Wanted
 from velatura.model.solved import Solved, exchanged
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -30,8 +31,11 @@ MOST_REST = 4.0  # for the remainder
 DARK = 1e-6
 
 
-def factors(solved: Solved, wi: Direction, shares: Shares, count: int, samples: int | None) -> list[list[Array]]:
-    """Squares of the factors, (C, M) at nodes wi, of each reflected part of a side and then of what passes.
+def factors(
+    solved: Solved, wi: Direction, shares: Shares, count: int, samples: int | None
+) -> tuple[list[list[Array]], list[Wanted]]:
+    """Squares of the factors, (C, M) at nodes wi, of each reflected part of a side and then of what passes; and by side
+    the weights of samples of reflected parts.
 
     `solved` is that of NumPy in the symmetric form, with the weights of the forward form; `shares` interpolates between
     the nodes; `samples` are those at each node, None for as many as a single material may take.
@@ -41,26 +45,39 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int, samples: 
     u = low_discrepancy.at_nodes(count, samples, None)
     nodes = np.repeat(np.arange(count), samples)
 
-    def kernel(value: Array, wo: Direction) -> Array:
+    def kernel(value: Array, reached: Sequence[tuple[Array, Array]]) -> Array:
         """Light (C, M, M) that goes from nodes to nodes."""
         found = np.zeros((len(value), count * count))
-        for index, share in shares(wo):
+        for index, share in reached:
             for colour, light in zip(found, value):
                 colour += np.bincount(nodes * count + index, light * (share / samples), count * count)
         return found.reshape(-1, count, count)
 
+    def wanted(value: Array, reached: Sequence[tuple[Array, Array]], squares: Array, energy: Array) -> Wanted:
+        """Of a part with its factors."""
+        s = np.sqrt(squares)
+        weights = value * s[:, nodes] * sum(share * s[:, index] for index, share in reached)
+        weights = weights.reshape(len(value), count, samples)
+        usual = ops.divide((weights**2).mean(axis=-1), weights.mean(axis=-1))
+        return Wanted.of(energy, usual, weights.max(axis=-1))
+
     sides = [side for side in (solved.above, solved.below) if side]
     result: list[list[Array]] = []
+    samples_of: list[Wanted] = []
     crossing: list[tuple[Array, Array]] = []
     for side, other in zip(sides, reversed(sides)):
         of, at_nodes = side.seen(i), side.seen(wi)
         result.append([])
+        found = []
         for k, energy in enumerate(at_nodes.energies):
             wo = of.out_of(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else of.samples.sample(i, *u[1:])
             up = wo[0], wo[1], np.maximum(wo[2], 0.0)
             value = _weight(of.part(k, i, wo), side.seen(up).part(k, up, i)[0], i, wo)
             most = MOST if k < len(of.lobes) else MOST_REST
-            result[-1].append(_balanced(kernel(value, up), energy, most))
+            reached = list(shares(up))
+            result[-1].append(_balanced(kernel(value, reached), energy, most))
+            found.append(wanted(value, reached, result[-1][-1], energy))
+        samples_of.append(Wanted.together(found))
         if side.passage and of.columns.passes:
             wo = passed.sample(side.passage, of.columns.passes, i, np.minimum(u[0], passed.BELOW_ONE), *u[1:])
             down = wo[0], wo[1], np.maximum(-wo[2], 0.0)
@@ -68,11 +85,11 @@ def factors(solved: Solved, wi: Direction, shares: Shares, count: int, samples: 
             value, density, _ = exchanged(of, other.seen(down), eta, i, wo)
             value = np.where(density > 0, ops.divide(value * of.columns.passes.share, density), 0.0)
             value = np.where(wo[2] < 0, value, 0.0)
-            crossing.append((kernel(value, down), at_nodes.passed))
+            crossing.append((kernel(value, shares(down)), at_nodes.passed))
     if crossing:
-        for found, passing in zip(result, _balanced_between(*crossing)):
-            found.append(passing)
-    return result
+        for factor, passing in zip(result, _balanced_between(*crossing)):
+            factor.append(passing)
+    return result, samples_of
 
 
 def _weight(there: tuple[Value, Value], back: Value, wi: Direction, wo: Direction) -> Array:

@@ -4,9 +4,9 @@ For z the cosines outside and s = -(x_i x_o + y_i y_o), positive on the side of 
 
     pi f(wi, wo) = sum_ab C_ab u_a(z_i) u_b(z_o) + B s + A (2 s^2 - |p_i|^2 |p_o|^2),    C_ab = C_ba,
 
-where u = (1, z, (1 - z)^4), whose last falls off as what an interface lets out does, and |p|^2 = 1 - z^2; it is clipped
-at 0. The first term is its mean over azimuths, the others vary as cos(phi) and cos(2 phi). It is fitted to what leaves
-a stack at nodes of the length of momentum.
+where u = (1, z, (1 - z)^4), whose last falls off as what an interface lets out does, and |p|^2 = 1 - z^2. The first
+term is its mean over azimuths, clipped at 0; the others vary as cos(phi) and cos(2 phi), and are clipped at the mean.
+It is fitted to what leaves a stack at nodes of the length of momentum.
 """
 
 from __future__ import annotations
@@ -51,10 +51,13 @@ class Remainder(ops.Named):
     def value(self, wi: Direction, wo: Direction) -> Value:
         """f(wi, wo) |cos theta_o|, a colour; 0 unless both are above the surface."""
         z = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
-        return ops.maximum(self.unclipped(wi, wo), 0.0) * (z * (1 / pi))
+        mean, tilt = self.apart(wi, wo)
+        mean = ops.maximum(mean, 0.0)
+        ops.names(mean=mean)
+        return (mean + ops.clip(tilt, -1 * mean, mean)) * (z * (1 / pi))
 
-    def unclipped(self, wi: Direction, wo: Direction) -> Value:
-        """pi f(wi, wo), a colour, of directions above; negative in places."""
+    def apart(self, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+        """The mean of pi f(wi, wo) over azimuths, and what it has beside, colours, of directions above, unclipped."""
         z_i, z_o = wi[2], wo[2]
         w_i, w_o = grazing(z_i), grazing(z_o)
         s = -1 * (wi[0] * wo[0] + wi[1] * wo[1])
@@ -62,7 +65,7 @@ class Remainder(ops.Named):
         once = self.c_01 * (z_i + z_o) + self.c_02 * (w_i + w_o)
         both = self.c_11 * (z_i * z_o) + self.c_12 * (z_i * w_o + w_i * z_o) + self.c_22 * (w_i * w_o)
         ops.names(s=s, twice=twice, once=once, both=both)
-        return self.c_00 + once + both + self.b * s + self.a * twice
+        return self.c_00 + once + both, self.b * s + self.a * twice
 
     def albedo(self, cos_theta: Value) -> Value:
         """Energy for light from a cosine, a colour, without clipping."""

@@ -136,13 +136,17 @@ class SolvedSide:
         """Those of the remainder, (8 C,)."""
         return np.concatenate(list(vars(self.polynomial).values()))
 
-    def weighed(self, factors: Sequence[Array]) -> SolvedSide:
-        """With the weights of reflected parts, and of what passes, scaled by factors (C, M)."""
+    def weighed(self, factors: Sequence[Array], wanted: Wanted) -> SolvedSide:
+        """With the weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared anew
+        where nothing passes."""
         columns = self.columns
         weights = [factor * weight for factor, weight in zip(factors, columns.weights)]
         columns = replace(columns, weights=weights, scale=factors[len(weights)] * columns.scale)
         if columns.passes:
             columns = replace(columns, passes=replace(columns.passes, straight=factors[-1]))
+        else:
+            *chances, chance = sharing.shared(_evened(wanted))
+            columns = replace(columns, chances=chances, chance=chance)
         return replace(self, columns=columns)
 
 
@@ -209,8 +213,10 @@ class Solver:
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
         numbers = self._numbers(material, found, layouts)
-        factors = exchange.factors(numbers, self.grid.directions, self.grid.shares, self.grid.count, self.samples)
-        return [side.weighed(each) for side, each in zip(found, factors)]
+        factors, wanted = exchange.factors(
+            numbers, self.grid.directions, self.grid.shares, self.grid.count, self.samples
+        )
+        return [side.weighed(*each) for side, each in zip(found, zip(factors, wanted))]
 
     def _numbers(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
         """The BSDF in NumPy."""
@@ -296,7 +302,8 @@ class Solver:
         # Share samples
         least = EVEN if self.model.form == "symmetric" else 0.0
         others = Wanted.together(wanted)
-        others.energy[-1] = np.maximum(others.energy[-1], least * others.energy.sum(axis=0))
+        if least:
+            others = _evened(others)
         passage, passes = self.passage(_slim(material), layout), None
         if passage:
             facets = None
@@ -485,8 +492,9 @@ def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
     numbers = Remainder(*(x[..., None] for x in vars(polynomial).values()))
     x, y, z = (each[:, None] for each in wi)
     wo = numbers.sample((x, y, z), *low_discrepancy.square(EVENLY))
-    values, share = numbers.unclipped((x, y, z), wo), wo[2] / (np.pi * numbers.density((x, y, z), wo))
-    return (np.maximum(-values, 0) * share).mean(axis=-1), np.maximum(values * share, 0).max(axis=-1)
+    density = numbers.density((x, y, z), wo)
+    value, unclipped = numbers.value((x, y, z), wo) / density, sum(numbers.apart((x, y, z), wo)) * wo[2]
+    return (value - unclipped / (np.pi * density)).mean(axis=-1), value.max(axis=-1)
 
 
 def _passing(passage: Passage, solved: Energies, cosines: Array) -> Array:
@@ -527,6 +535,12 @@ def _veiled(material: Material) -> set[int]:
             veiled |= {k} if above else set()
             k += 1
     return veiled
+
+
+def _evened(wanted: Wanted) -> Wanted:
+    """With samples for a share `EVEN` of the energy at least of the last part."""
+    *lobes, rest = wanted.energy
+    return wanted._replace(energy=np.array([*lobes, np.maximum(rest, EVEN * wanted.energy.sum(axis=0))]))
 
 
 def _evenly(of: Parts, least: float) -> Parts:

@@ -46,6 +46,7 @@ CANCELS = 0.3  # of columns of light: a sum that is less
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
 UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
 AGAIN = 1.0  # of light of repeated facets beside that of single ones, that has the shape of a lobe at most
+SMOOTH = 4.0  # power of that minimum
 AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
 
 Straight = Callable[[float], float]  # share of scattered light that counts as going straight on, by asymmetry
@@ -190,10 +191,11 @@ def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
 
 
 def _kept(share: float, all_light: Operator, once: Operator, leaving: Leaving) -> Operator:
-    """A share of the light of an interface that meets its facets again: no more than a lobe takes."""
+    """A share of the light of an interface that meets its facets again: no more than a lobe takes, without a kink."""
     again = all_light + -1.0 * once
-    most = AGAIN * np.maximum(leaving.energy(once), 0) / np.maximum(leaving.energy(again), TINY)
-    kept = np.minimum(most, share)[:, None, None]
+    most = AGAIN * np.maximum(leaving.energy(once), TINY) / np.maximum(leaving.energy(again), TINY)
+    ratio = np.minimum(most, share) / np.maximum(most, share)
+    kept = (np.minimum(most, share) * (1 + ratio**SMOOTH) ** (-1 / SMOOTH))[:, None, None]
     return replace(again, columns=kept * again.columns, beams=kept * again.beams)
 
 
