@@ -540,7 +540,8 @@ def _veiled(material: Material) -> set[int]:
 def _evened(wanted: Wanted) -> Wanted:
     """With samples for a share `EVEN` of the energy at least of the last part."""
     *lobes, rest = wanted.energy
-    return wanted._replace(energy=np.array([*lobes, np.maximum(rest, EVEN * wanted.energy.sum(axis=0))]))
+    least = np.maximum(EVEN * wanted.energy.sum(axis=0), FAINT)
+    return wanted._replace(energy=np.array([*lobes, np.maximum(rest, least)]))
 
 
 def _evenly(of: Parts, least: float) -> Parts:
