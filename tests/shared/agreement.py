@@ -195,7 +195,7 @@ def differences(truth: Results, found: Results) -> Differences:
     rough = (truth.alpha.reshape(-1, len(truth.density)) >= 0.05).all(axis=0)
 
     def relative(a: np.ndarray, b: np.ndarray) -> float:
-        return float((np.abs(a - b) / np.maximum(np.abs(a), 1e-6))[..., rough].max(initial=0.0))
+        return float((np.abs(a - b) / np.maximum(np.abs(a), 1e-5))[..., rough].max(initial=0.0))
 
     def absolute(a: np.ndarray, b: np.ndarray) -> float:
         return float(np.abs(a - b).max(initial=0.0)) if a.size else 0.0  # of a material without lobes
