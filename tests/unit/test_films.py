@@ -1,0 +1,122 @@
+"""Thin films: against `tmm`, by the laws of optics, and in the numbers of a renderer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import tmm
+
+from velatura import kernel
+from velatura.optics import films, fresnel
+from velatura.optics.films import Film
+
+COSINES = np.linspace(0.01, 1, 34)
+
+
+def random_stack(rng: np.random.Generator, clear: bool = False) -> dict[str, Any]:
+    """Light, up to four films, and the media around them; half of the lower ones absorb, and a third of the films."""
+    metal = not clear and rng.random() < 0.5
+    return {
+        "cos_theta": float(rng.uniform(0.001, 1)),
+        "wavelength_nm": float(rng.uniform(360, 830)),
+        "eta_1": float(rng.uniform(1, 2.5)),
+        "films": [
+            Film(
+                float(rng.uniform(1, 3)),
+                0.0 if clear or rng.random() < 0.7 else float(rng.uniform(0, 3)),
+                0.0 if rng.random() < 0.1 else float(rng.uniform(0, 5000) * rng.random() ** 3),
+            )
+            for _ in range(rng.integers(0, 5))
+        ],
+        "eta_2": float(rng.uniform(0.05, 4) if metal else rng.uniform(1, 2.5)),
+        "k_2": float(rng.uniform(0, 8)) if metal else 0.0,
+    }
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_ten_thousand_random_stacks_are_those_of_tmm() -> None:
+    rng = np.random.default_rng(0)
+    errors = []
+    for _ in range(10_000):
+        stack = random_stack(rng)
+        found = films.coherent(**stack)
+        index = [stack["eta_1"], *(f.eta + 1j * f.k for f in stack["films"]), stack["eta_2"] + 1j * stack["k_2"]]
+        depth = [np.inf, *(f.thickness_nm for f in stack["films"]), np.inf]
+        s, p = (tmm.coh_tmm(x, index, depth, np.arccos(stack["cos_theta"]), stack["wavelength_nm"]) for x in "sp")
+        errors += [found.reflected_s - s["R"], found.reflected_p - p["R"]]
+        errors += [found.transmitted_s - s["T"], found.transmitted_p - p["T"]]
+    assert np.abs(errors).max() < 1e-6
+
+
+def test_clear_films_lose_no_light() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        stack = random_stack(rng, clear=True)
+        found = films.coherent(**stack)
+        assert found.reflected_s + found.transmitted_s == pytest.approx(1, abs=1e-9)
+        assert found.reflected_p + found.transmitted_p == pytest.approx(1, abs=1e-9)
+
+
+def test_as_much_passes_from_either_side() -> None:
+    """At the same tangential momentum, also of films that absorb; beyond the critical angle, nothing."""
+    rng = np.random.default_rng(2)
+    for _ in range(300):
+        stack = random_stack(rng)
+        above, below = stack["eta_1"], stack["eta_2"]
+        downwards = films.coherent(**{**stack, "k_2": 0.0})
+        sin2 = (above / below) ** 2 * (1 - stack["cos_theta"] ** 2)
+        if sin2 >= 1:
+            assert downwards.transmitted == pytest.approx(0, abs=1e-9)
+            continue
+        upwards = films.coherent(np.sqrt(1 - sin2), stack["wavelength_nm"], below, stack["films"][::-1], above)
+        assert upwards.transmitted_s == pytest.approx(downwards.transmitted_s, abs=1e-9)
+        assert upwards.transmitted_p == pytest.approx(downwards.transmitted_p, abs=1e-9)
+
+
+@pytest.mark.parametrize("eta", [0.6, 1.5, 2.4])
+def test_a_thickness_of_0_is_no_film(eta: float) -> None:
+    none = films.coherent(COSINES, 550.0, 1.0, [Film(1.8, 0.3, 0.0)], eta)
+    assert none.reflected == pytest.approx(fresnel.dielectric(COSINES, eta), abs=1e-9)
+    metal = films.coherent(COSINES, 550.0, 1.0, [Film(1.8, 0.3, 0.0)], eta, 2.0)
+    assert metal.reflected == pytest.approx(fresnel.conductor(COSINES, eta, 2.0), abs=1e-9)
+
+
+def test_a_quarter_wave_takes_away_the_reflection() -> None:
+    """Of an index that is the mean of its neighbours' (Born and Wolf 1999, section 1.6)."""
+    found = films.coherent(1.0, 550.0, 1.0, [Film(1.5, 0.0, 550 / 6)], 2.25)
+    assert found.reflected == pytest.approx(0, abs=1e-15)
+
+
+@pytest.mark.parametrize("thickness_nm", [0.0, 40.0, 700.0])
+def test_light_that_grazes_a_film_is_nothing_special(thickness_nm: float) -> None:
+    """At the critical angle of a film, its field is linear over its depth."""
+    critical = np.sqrt(1 - (1.3 / 1.6) ** 2)
+    around = [films.coherent(critical + d, 550.0, 1.6, [Film(1.3, 0.0, thickness_nm)], 1.6) for d in (-1e-7, 0, 1e-7)]
+    for below, at, above in zip(*([x.reflected_s, x.reflected_p] for x in around)):
+        assert at == pytest.approx(0.5 * (below + above), abs=1e-6)
+
+
+def test_no_thickness_overflows() -> None:
+    found = films.coherent(COSINES, 400.0, 1.0, [Film(1.5, 3.0, 1e6)], 1.5)
+    assert found.reflected == pytest.approx(fresnel.conductor(COSINES, 1.5, 3.0), abs=1e-9)
+    assert found.transmitted == pytest.approx(np.zeros_like(COSINES), abs=1e-30)
+
+
+def test_a_renderer_has_the_same_values_and_gradients() -> None:
+    mi = kernel.mitsuba("llvm_ad_rgb")
+    import drjit as dr
+
+    def reflected(thickness: Any, eta: Any, cosine: Any) -> Any:
+        stack = [Film(1.4, 0.0, 120.0), Film(eta, 0.05, thickness)]
+        return films.coherent(cosine, 550.0, 1.0, stack, 0.9, 6.0).reflected
+
+    cosine, thickness, eta = mi.Float(COSINES), mi.Float(480.0), mi.Float(2.3)
+    dr.enable_grad(thickness, eta)
+    found = reflected(thickness, eta, cosine)
+    assert found.numpy() == pytest.approx(reflected(480.0, 2.3, COSINES), abs=2e-5)
+    dr.backward(dr.sum(found))
+    for value, step, at in ((thickness, 1e-3, (1, 0)), (eta, 1e-6, (0, 1))):
+        ends = [reflected(480.0 + x * at[0], 2.3 + x * at[1], COSINES).sum() for x in (-step, step)]
+        assert dr.grad(value)[0] == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-3)
