@@ -42,8 +42,8 @@ def test_another_language_prints_the_same_functions(pattern, model: str) -> None
     value, density = program.vt_eval_pdf(m, lobes, case.directions["wi"], case.directions["wo"])
     np.testing.assert_allclose(np.broadcast_to(value, (3, 20)), truth.value, rtol=1e-5 if solved else 1e-9, atol=1e-14)
     # The share of the remainder is what single precision leaves of 1
-    precision = {"rtol": 1e-5, "atol": 1e-8} if solved else {"rtol": 1e-9, "atol": 1e-14}
-    np.testing.assert_allclose(np.broadcast_to(density, 20), truth.density, **precision)
+    rtol, atol = (1e-5, 1e-8) if solved else (1e-9, 1e-14)
+    np.testing.assert_allclose(np.broadcast_to(density, 20), truth.density, rtol=rtol, atol=atol)
     drawn = program.vt_sample(m, lobes, case.directions["wi"], case.directions["u"])
     np.testing.assert_allclose(np.broadcast_arrays(*drawn), truth.drawn, atol=1e-5 if solved else 1e-11)
 
