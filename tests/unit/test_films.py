@@ -10,7 +10,9 @@ import tmm
 
 from velatura import kernel
 from velatura.optics import films, fresnel
+from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.films import Film
+from velatura.stack.spectra import srgb_sensitivity, srgb_weights
 
 COSINES = np.linspace(0.01, 1, 34)
 
@@ -120,3 +122,83 @@ def test_a_renderer_has_the_same_values_and_gradients() -> None:
     for value, step, at in ((thickness, 1e-3, (1, 0)), (eta, 1e-6, (0, 1))):
         ends = [reflected(480.0 + x * at[0], 2.3 + x * at[1], COSINES).sum() for x in (-step, step)]
         assert dr.grad(value)[0] == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-3)
+
+
+# Colours
+
+
+def white(value: float) -> tuple[float, float, float]:
+    return (value, value, value)
+
+
+def finely(coating: Coating, cosines: np.ndarray) -> np.ndarray:
+    """Its reflectance over wavelengths .02 nm apart, with straight lines between the CIE's values."""
+    at, weights = srgb_weights()
+    wavelengths_nm = np.arange(360, 830.001, 0.02)
+    found = []
+    for c in range(3):
+        stack = [Film(film.eta[c], film.k[c], film.thickness_nm) for film in coating.films]
+        media = coating.eta_1[c], stack, coating.eta_2[c], coating.k_2[c]
+        spectrum = films.coherent(cosines[:, None], wavelengths_nm, *media).reflected
+        weight = np.interp(wavelengths_nm, at, weights[c])
+        found.append(spectrum @ weight / weight.sum())
+    return np.clip(found, 0, 1)
+
+
+@pytest.mark.parametrize("thickness_nm", [1.0, 90.0, 320.0, 777.0, 1500.0, 2900.0, 5000.0])
+@pytest.mark.parametrize(
+    ("eta", "k", "eta_2", "k_2"),
+    [
+        (1.46, 0.0, (0.81, 0.97, 1.12), (6.0, 5.3, 4.5)),
+        (2.4, 0.0, white(1.5), white(0.0)),
+        (1.33, 0.0, white(1.5), white(0.0)),
+        (2.2, 0.05, (2.7, 2.5, 2.3), (3.8, 3.4, 3.1)),
+    ],
+)
+def test_colours_are_those_of_a_fine_integration(
+    thickness_nm: float, eta: float, k: float, eta_2: Any, k_2: Any
+) -> None:
+    cosines = np.array([1.0, 0.6, 0.2, 0.03])
+    coating = Coating((ColouredFilm(white(eta), white(k), thickness_nm),), white(1.0), eta_2, k_2)
+    found = coating.reflectance(cosines, srgb_sensitivity)
+    assert np.abs(found - finely(coating, cosines)).max() < 1e-3
+
+
+def test_colours_of_several_films_are_those_of_a_fine_integration() -> None:
+    """From either side of them; resonances between films ask for many wavelengths."""
+    rng = np.random.default_rng(3)
+    cosines = np.array([1.0, 0.5, 0.1])
+    for _ in range(12):
+        stack = tuple(
+            ColouredFilm(tuple(rng.uniform(1.2, 2.6, 3)), white(0.0), float(rng.uniform(0, 1500))) for _ in range(3)
+        )
+        coating = Coating(stack, white(float(rng.choice([1.0, 1.5]))), tuple(rng.uniform(1.1, 2, 3)))
+        found = coating.reflectance(cosines, srgb_sensitivity)
+        assert np.abs(found - finely(coating, cosines)).max() < 3e-3
+
+
+def test_a_film_of_no_thickness_has_no_colour() -> None:
+    media = white(1.0), (0.81, 0.97, 1.12), (6.0, 5.3, 4.5)
+    found = Coating((ColouredFilm(white(1.46), white(0.0), 0.0),), *media).reflectance(COSINES, srgb_sensitivity)
+    for c in range(3):
+        assert found[c] == pytest.approx(fresnel.conductor(COSINES, media[1][c], media[2][c]), abs=1e-9)
+
+
+def test_colours_change_with_thickness_as_they_do_with_fine_integration() -> None:
+    """No steps between numbers of wavelengths, and no ringing: of neighbours, differences are as they should be."""
+    thicknesses = np.linspace(0, 5000, 101)
+    at = np.array([1.0])
+    coatings = [Coating((ColouredFilm(white(1.5), white(0.0), float(x)),), white(1.0), white(2.2)) for x in thicknesses]
+    found = np.array([x.reflectance(at, srgb_sensitivity)[:, 0] for x in coatings])
+    exact = np.array([finely(x, at)[:, 0] for x in coatings])
+    assert np.abs(np.diff(found, axis=0) - np.diff(exact, axis=0)).max() < 1e-3
+
+
+def test_what_a_clear_coating_does_not_reflect_passes() -> None:
+    coating = Coating((ColouredFilm(white(2.0), white(0.0), 400.0),), white(1.0), white(1.5))
+    passed = coating.transmittance(COSINES, srgb_sensitivity)
+    assert coating.clear
+    assert coating.reflectance(COSINES, srgb_sensitivity) + passed == pytest.approx(np.ones((3, 34)), abs=1e-9)
+    tinted = Coating((ColouredFilm(white(2.0), white(0.2), 400.0),), white(1.0), white(1.5))
+    assert not tinted.clear
+    assert (tinted.transmittance(COSINES, srgb_sensitivity)[:, 1:] < passed[:, 1:]).all()

@@ -250,6 +250,17 @@ def srgb_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return wavelengths_nm, weights / weights.sum(axis=1, keepdims=True)
 
 
+def srgb_sensitivity(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Sensitivities (3, N) of linear sRGB under D65 at wavelengths (N,), in proportion; 0 where light is not visible.
+
+    They are those of `srgb_weights`, with straight lines between.
+    """
+    import numpy as np
+
+    at, weights = srgb_weights()
+    return np.stack([np.interp(wavelengths_nm, at, each, 0.0, 0.0) for each in weights])
+
+
 def _sellmeier(dispersion: Dispersion, wavelength_um: NDArray[np.float64]) -> NDArray[np.float64]:
     square = wavelength_um**2
     index: NDArray[np.float64] = (1 + sum(b * square / (square - c) for b, c in dispersion.terms)) ** 0.5

@@ -1,0 +1,134 @@
+"""Colours of an interface with thin films: its reflectance over the spectrum, as linear sRGB.
+
+Colours of indices are those of channels, as everywhere: a channel has one index at all wavelengths, and its reflectance
+is integrated with its own sensitivity. What depends on the wavelength is then the phase alone. An sRGB sensitivity is
+negative somewhere, so that the most saturated colours of films lie outside; they are clipped to 0 to 1.
+
+Over the wavenumber a film's reflectance is periodic, and sensitivities are smooth and vanish at both ends. There the
+trapezoidal rule has no error but aliasing, of the harmonics that its step does not resolve. So the step starts from the
+optical thickness, and is halved until the colour stays as it is: sharp resonances need more than thickness says.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.optics.films import Film, coherent
+
+Array: TypeAlias = NDArray[np.floating]
+RGB: TypeAlias = tuple[float, float, float]
+
+#: Sensitivities (3, N) of the channels at wavelengths (N,) in nanometres, up to a factor each.
+Sensitivity: TypeAlias = Callable[[Array], Array]
+
+RANGE_NM = (360.0, 830.0)  # beyond it, sensitivities are 0
+COARSEST = 48  # wavenumbers at first,
+PER_PERIOD = 2.5  # or as many in a period of the thickest film's reflectance
+CONVERGED = 1e-3  # change of a colour by half the step
+FINEST = 1 << 14  # wavenumbers at most
+BLOCK = 1 << 16  # cosines times wavenumbers at a time
+
+
+@dataclass(frozen=True)
+class ColouredFilm:
+    """A film by the colours of its index eta + i k, and its thickness."""
+
+    eta: RGB
+    k: RGB
+    thickness_nm: float
+
+
+@dataclass(frozen=True)
+class Coating:
+    """Films, from the top, between media of indices eta_1 and eta_2 + i k_2 (colours)."""
+
+    films: tuple[ColouredFilm, ...]
+    eta_1: RGB
+    eta_2: RGB
+    k_2: RGB = (0.0, 0.0, 0.0)
+
+    @property
+    def clear(self) -> bool:
+        """Whether neither the films nor the medium below absorb, so that what is not reflected is transmitted."""
+        return not any(self.k_2) and not any(any(film.k) for film in self.films)
+
+    def reflectance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
+        """Reflectance (3, N) of unpolarised light at cosines (N,) above, in [0, 1]."""
+        return np.clip(self._integrated("reflected", cos_theta, sensitivity), 0.0, 1.0)
+
+    def transmittance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
+        """Transmittance (3, N) into the medium below, at most what is not reflected."""
+        most = 1 - self.reflectance(cos_theta, sensitivity)
+        return np.clip(self._integrated("transmitted", cos_theta, sensitivity), 0.0, most)
+
+    def _integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
+        channels = [self._channel(c) for c in range(3)]
+        if channels[0] == channels[1] == channels[2]:
+            return channels[0].integrated(share, cos_theta, sensitivity)
+        each = (functools.partial(_only, sensitivity, c) for c in range(3))
+        return np.concatenate([channel.integrated(share, cos_theta, own) for channel, own in zip(channels, each)])
+
+    def _channel(self, c: int) -> _Channel:
+        stack = tuple(Film(film.eta[c], film.k[c], film.thickness_nm) for film in self.films)
+        return _Channel(self.eta_1[c], stack, self.eta_2[c], self.k_2[c])
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """The films as one channel sees them."""
+
+    eta_1: float
+    films: tuple[Film, ...]
+    eta_2: float
+    k_2: float
+
+    def integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
+        """A share of light as colours (channels, N)."""
+
+        def over(wavelengths_nm: Array, cosines: Array) -> Array:
+            found = coherent(cosines[:, None], wavelengths_nm, self.eta_1, self.films, self.eta_2, self.k_2)
+            return np.asarray(getattr(found, share))
+
+        thickness_nm = sum(film.eta * film.thickness_nm for film in self.films)
+        return integrated(over, cos_theta, thickness_nm, sensitivity)
+
+
+def integrated(
+    share: Callable[[Array, Array], Array], cosines: Array, thickness_nm: float, sensitivity: Sensitivity
+) -> Array:
+    """Colours (channels, N) of a share of light (N, W) over wavelengths (W,), at cosines (N,).
+
+    thickness_nm: optical thickness of all films.
+    """
+    low, high = 1 / RANGE_NM[1], 1 / RANGE_NM[0]
+    count = max(COARSEST, int(np.ceil(PER_PERIOD * 2 * thickness_nm * (high - low))))
+    step = (high - low) / count
+    total, whole = _summed(share, cosines, low + step * np.arange(1, count), sensitivity)
+    while True:
+        more, more_whole = _summed(share, cosines, low + step * (np.arange(count) + 0.5), sensitivity)
+        before, total, whole = total / whole, total + more, whole + more_whole
+        count, step = 2 * count, 0.5 * step
+        if np.abs(total / whole - before).max() < CONVERGED or 2 * count > FINEST:
+            return np.asarray(total / whole)
+
+
+def _summed(
+    share: Callable[[Array, Array], Array], cosines: Array, wavenumbers: Array, sensitivity: Sensitivity
+) -> tuple[Array, Array]:
+    """Sums over wavenumbers of weighted shares (channels, N), and of weights (channels, 1)."""
+    wavelengths_nm = 1 / wavenumbers
+    weights = sensitivity(wavelengths_nm) * wavelengths_nm**2
+    size = max(BLOCK // len(wavelengths_nm), 1)
+    blocks = [cosines[k : k + size] for k in range(0, len(cosines), size)]
+    total = [weights @ np.broadcast_to(share(wavelengths_nm, x), (len(x), len(wavelengths_nm))).T for x in blocks]
+    return np.concatenate(total, axis=1), weights.sum(axis=1, keepdims=True)
+
+
+def _only(sensitivity: Sensitivity, channel: int, wavelengths_nm: Array) -> Array:
+    return sensitivity(wavelengths_nm)[channel : channel + 1]
