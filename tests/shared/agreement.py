@@ -13,8 +13,9 @@ from chromium import Browser
 
 from velatura import tables
 from velatura.editor import messages
-from velatura.model import Model, bsdf, solution
+from velatura.model import Model, bsdf, solution, turned
 from velatura.model.context import Context, at_a_point
+from velatura.optics import ggx
 from velatura.shader import Recording, Shader, constant, record, shader, variance
 from velatura.shader.bake import Bake
 from velatura.shader.solved import Tabulated
@@ -117,8 +118,11 @@ def in_numpy(case: Case, recording: Recording) -> Results:
 
 
 def _solved(stack: Stack, model: Model, wi: Any, wo: Any, u: Any) -> Results:
-    body = solution.solve(Material.of(stack), model, variance(stack), Context())
-    seen, _ = body.seen(wi)
+    material = Material.of(stack)
+    frame = turned.frame(material)
+    solved = solution.solve(frame.back(material), model, frame.kind(variance(stack)), Context())
+    seen, _ = solved.seen(ggx.rotate(wi, np.radians(frame.degrees(material))))
+    body = frame.turned(solved, material)
     value, density = body.eval_pdf(wi, wo)
     drawn, _ = body.sample(wi, *u)
     count, columns, interfaces = len(density), seen.columns, range(len(stack.interfaces))

@@ -232,6 +232,37 @@ def test_a_textured_rotation_turns_a_brushed_metal() -> None:
     assert np.isclose(np.array(dr.grad(parameters[name])).sum(), (ends[1] - ends[0]) / 2, rtol=0.03)
 
 
+@pytest.mark.parametrize(
+    ("form", "textures"), (("forward", {}), ("symmetric", {}), ("forward", {"layer1_alpha_u": (0.3, 0.4)}))
+)
+def test_all_turns_with_the_layers(form: str, textures: dict[str, tuple[float, float]]) -> None:
+    """To 1e-3 of the light, where interfaces are brushed 30 to 1 along axes of their own, at an azimuth between those
+    at which materials are solved, and at the normal."""
+    angles, seen = (0.0, 37.3), []
+    for angle in angles:
+        layers = [
+            vt.Interface(eta=1.5, alpha=(0.3, 0.01), rotation=12 + angle),
+            vt.Interface(eta=0.2, k=3.9, alpha=(0.3, 0.15), rotation=130 + angle),
+        ]
+        bsdf = made(vt.Stack(layers), form=form, **{name: texture(*ends) for name, ends in textures.items()})
+        i, o = (
+            rotated(np.array(w, float), angle)
+            for w in ([[0.5, 0.3, 0.8], [0, 0, 1]], [[-0.42, -0.3, 0.9], [0.1, 0, 1]])
+        )
+        si = dr.zeros(mi.SurfaceInteraction3f, 2)
+        si.uv, si.wi = mi.Point2f(U, 0.5), mi.Vector3f(i)
+        seen.append(np.array(bsdf.eval_pdf(mi.BSDFContext(), si, mi.Vector3f(o))[0]))
+    assert np.all(seen[0] > 0)
+    np.testing.assert_allclose(seen[1], seen[0], rtol=1e-3)
+
+
+def rotated(w: np.ndarray, degrees: float) -> np.ndarray:
+    """Unit vectors (n, 3) turned about the normal, (3, n)."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    x, y, z = w.T / np.linalg.norm(w, axis=1)
+    return np.array([c * x - s * y, s * x + c * y, z])
+
+
 def test_samples_have_the_energy_of_values() -> None:
     """A pane of two textured roughnesses, from both sides: means of weights against values at directions that are
     even over the sphere, 2^18 each, to 2 %; the density integrates to 1 or less."""

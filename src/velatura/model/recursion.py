@@ -87,11 +87,13 @@ class InOwnMedia(Recursion):
         return solution.geometry(model)
 
     def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
-        from velatura.model import solution
+        from velatura.model import solution, turned
 
         if not self.solves(material):
             return super().body(material, self.unsolved(model), variance, context)
-        return solution.solve(material, model, variance, context)
+        frame = turned.frame(material)
+        solved = solution.solve(frame.back(material), model, frame.kind(variance), context)
+        return frame.turned(solved, material)
 
     def textured(self, material: Material, *values: Any) -> Textured | None:
         from velatura.model import textured

@@ -16,13 +16,14 @@ from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
 from velatura.model.axes import Wavelengths
+from velatura.model.bsdf import Body
 from velatura.model.context import Context
 from velatura.model.models import Model
 from velatura.model.remainder import Remainder
 from velatura.model.solution import Layout, SolvedSide, Solver, plain, sides
-from velatura.model.solved import Solved
 from velatura.model.transport.adding import Lambert, Part, parts
 from velatura.model.transport.interfaces import Facets
+from velatura.model.turned import Frame, frame
 from velatura.model.variables import Variables
 from velatura.model.variance import Variance
 from velatura.ops import Value
@@ -68,6 +69,7 @@ class _OfRay:
 class Spectra:
     """Both sides of a material, the lower one where it transmits."""
 
+    frame: Frame
     solver: Solver
     layouts: Sequence[Layout]
     sides: Sequence[_Side]
@@ -76,10 +78,11 @@ class Spectra:
     def symmetric(self) -> bool:
         return self.solver.model.form == "symmetric"
 
-    def at(self, material: Material, places: Value) -> Solved:
+    def at(self, material: Material, places: Value) -> Body:
         """The BSDF at the wavelengths of a ray, by their places on the spectrum from 0 to 1; `material` has its values
         there. The fixed wavelengths come first, in both."""
-        material, spectrum = material.solid(), type(places)
+        turned, spectrum = material.solid(), type(places)
+        material = self.frame.back(turned)
         solver = replace(self.solver, colours=len(places))
         context = Context(constant=False, colour=lambda *channels: spectrum(list(channels)), tables=solver.tables)
         made = []
@@ -87,7 +90,7 @@ class Spectra:
             curves = _OfRay(side, places, solver.colours)
             polynomial = Remainder(*ops.interpolate(side.polynomial, places))
             made.append(solver.side(seen, layout, curves, polynomial, context))
-        return solver.bsdf(material, made)
+        return self.frame.turned(solver.bsdf(material, made), turned)
 
 
 def solve(material: Material, places: Array, model: Model, variance: type[Variance], context: Context) -> Spectra:
@@ -96,6 +99,8 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     Colours have channels at `places` on the spectrum from 0 to 1 (C,): the fixed ones, and then `NODES` even ones.
     """
     material = material.solid()
+    own = frame(material)
+    material, variance = own.back(material), own.kind(variance)
     chosen = _chosen(plain(material), places)
     material, places = material.each(lambda _, value: _channels(value, chosen)), places[chosen]
     given, start = Variables.of(material), plain(material)
@@ -114,7 +119,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     for order in orders:
         curves = (directional_grid.interleaved(next(flat), shape, context.number) for shape in shapes)
         made.append(_Side(order, *curves))
-    return Spectra(solver, layouts, made)
+    return Spectra(own, solver, layouts, made)
 
 
 def axis(material: Material, places: Array) -> Wavelengths:

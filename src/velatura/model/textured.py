@@ -4,7 +4,7 @@ Each texture is an axis. Columns over direction are solved at all nodes of three
 one of them), splines refine them, and a renderer interpolates linearly; so do gradients. Of further textures every pair
 has a table, of what it changes beyond those before, with all others at their middle: it scales columns that are nowhere
 negative, and adds to others. Where interfaces are brushed each texture has a table of its own. A texture of the
-rotation that all brushed interfaces share turns directions, and is no axis.
+rotation that all brushed interfaces share is no axis: materials are turned back to the first one's.
 
 Of a texture of colours, each channel has its own coordinate, and solves are of grey values.
 """
@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, product
-from math import pi
 from typing import Protocol
 
 import numpy as np
@@ -28,17 +27,16 @@ from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
 from velatura.model.passed import Parts
-from velatura.model.prepare import is_same
 from velatura.model.solution import Layout, SolvedSide, Solver
 from velatura.model.solved import FAINT, Columns, Side, Solved
-from velatura.model.turned import Turned
+from velatura.model.turned import Frame
 from velatura.model.variables import Variables
 from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import differences, directional_grid
 from velatura.sampling.directional_grid import Packed, Packing
-from velatura.stack import InterfaceValues, Material
+from velatura.stack import Material
 
 Array = NDArray[np.floating]
 
@@ -77,18 +75,17 @@ class Same:
 
 @dataclass(frozen=True)
 class Turning:
-    """A material that a texture turns, by the rotation of one of its layers."""
+    """A material that was turned back to a frame."""
 
     straight: Textured
-    layer: int
+    frame: Frame
 
     @property
     def balanced(self) -> bool:
         return self.straight.balanced
 
     def at(self, material: Material, place: Value = None) -> Body:
-        angle = material.flat()[f"layer{self.layer}_rotation"]
-        return Turned(self.straight.at(_straight(material), place), angle * (pi / 180))
+        return self.frame.turned(self.straight.at(self.frame.back(material), place), material)
 
 
 @dataclass(frozen=True)
@@ -197,13 +194,14 @@ def textured(
     `symbolic` is the same material with values that may be compared. `before`, of the same material, is returned where
     it has all that is needed.
     """
-    layer = _turning(symbolic)
-    if layer is None:
+    names = {address.name for given in ranges if not isinstance(given, Wavelengths) for address in given[0]}
+    frame = Frame.of(symbolic, names)
+    if frame.layer is None:
         return _tabulated(material, ranges, model, variance, context, before)
-    inner = before.straight if isinstance(before, Turning) and before.layer == layer else None
+    inner = before.straight if isinstance(before, Turning) and before.frame == frame else None
     others = [given for given in ranges if isinstance(given, Wavelengths) or given[0][0].key != "rotation"]
-    straight = _tabulated(_straight(material), others, model, variance, context, inner)
-    return before if straight is inner and before else Turning(straight, layer)
+    straight = _tabulated(frame.back(material), others, model, frame.kind(variance), context, inner)
+    return before if straight is inner and before else Turning(straight, frame)
 
 
 def _tabulated(
@@ -340,23 +338,3 @@ def _flat(values: Array, group: Sequence[Axis | Wavelengths]) -> Array:
     fine = axes.refined(values, group)
     count = len(group)
     return np.transpose(fine, (*range(count + 1, fine.ndim), *range(count + 1))).ravel()
-
-
-def _turning(material: Material) -> int | None:
-    """The layer whose rotation, from a texture, all interfaces share that have axes; None without one. Values are only
-    compared."""
-    brushed = {
-        k: layer.rotation
-        for k, layer in enumerate(material.layers)
-        if isinstance(layer, InterfaceValues) and not is_same(layer.alpha_u, layer.alpha_v)
-    }
-    if not brushed:
-        return None
-    first, rotation = next(iter(brushed.items()))
-    alike = all(is_same(each, rotation) for each in brushed.values())
-    return first if alike else None
-
-
-def _straight(material: Material) -> Material:
-    """Without rotations."""
-    return material.each(lambda address, value: 0.0 if address.key == "rotation" else value)

@@ -10,22 +10,27 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
+from math import pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import Model, solution, straight_through
+from velatura.model import Model, solution, straight_through, turned
+from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.passed import Parts
+from velatura.model.prepare import is_same
 from velatura.model.remainder import Remainder
 from velatura.model.solution import Layout, SolvedSide, Solver
 from velatura.model.solved import Columns, Side, Solved
 from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import Made
-from velatura.model.variance import Variance
+from velatura.model.turned import Frame, Turned
+from velatura.model.variance import Covariance, Variance
 from velatura.ops import Value
+from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.shader.bake import Group, Texture, together
 from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, colour, number
@@ -67,14 +72,19 @@ class Tabulated:
     """A material, or all of its kind, whose columns are read from a texture by the recorded `body`.
 
     A line of texels holds one of them for all cosines; lines go over azimuths, sides and texels. `nodes` are those over
-    the cosine and maybe the azimuth.
+    the cosine and maybe the azimuth. They are of a material that was turned back by an `angle`, None for 0.
     """
 
-    body: Solved
+    straight: Solved
+    angle: Value | None
     solver: Solver
     layouts: Sequence[Layout]
     columns: Places
     solved: Solution | None = None  # of one material
+
+    @property
+    def body(self) -> Body:
+        return self.straight if self.angle is None else Turned(self.straight, self.angle)
 
     @property
     def groups(self) -> Sequence[Group]:
@@ -87,7 +97,7 @@ class Tabulated:
     @property
     def sides(self) -> int:
         """1 where light comes from above only."""
-        return 1 if self.body.below is None else 2
+        return 1 if self.straight.below is None else 2
 
     @property
     def colours(self) -> int:
@@ -97,8 +107,8 @@ class Tabulated:
     @property
     def numbers(self) -> int:
         """Of its layout."""
-        bodies = [self.body.above, *([self.body.below] if self.body.below else [])]
-        return sum(len(_flags(side.passage)) for side in bodies if side.passage)
+        bodies = [self.straight.above, *([self.straight.below] if self.straight.below else [])]
+        return sum(len(_flags(side.passage)) for side in bodies if side.passage) + (self.angle is not None)
 
     @property
     def turns(self) -> int:
@@ -124,10 +134,14 @@ class Tabulated:
     def fields(self, wi: Direction, general: bool) -> dict[str, Value]:
         """All that values and samples take from wi, by its place in the struct; in `general`, the two parts of samples
         of light that goes straight through as well."""
-        seen, _ = self.body.seen(wi)
+        wi = self._turned_back(wi)
+        seen, _ = self.straight.seen(wi)
         columns, found = seen.columns, dict[str, Value]()
         for k, (lobe, chance) in enumerate(zip(seen.lobes, columns.chances)):
-            parts = {"weight": lobe.weight, **lobe.roughness._asdict(), "chance": chance}
+            roughness = lobe.roughness
+            if self.angle is not None:
+                roughness = roughness._replace(rotation=roughness.rotation + self.angle)
+            parts = {"weight": lobe.weight, **roughness._asdict(), "chance": chance}
             found |= {f"reflected[{k}].{part}": value for part, value in parts.items()}
         found |= {"remainder": columns.scale, "remainder_chance": columns.chance}
         if columns.passes:
@@ -147,32 +161,43 @@ class Tabulated:
 
     def energies(self, wi: Direction) -> list[Value]:
         """Of what `shown` names, colours."""
-        columns = self.body.seen(wi)[0].columns
+        columns = self.straight.seen(self._turned_back(wi))[0].columns
         lobes = list(zip(columns.energies, self.interfaces))
         found = [sum(energy for energy, each in lobes if each == k) for k in dict.fromkeys(self.interfaces)]
         return [*found, columns.rest, *([] if columns.passed is None else [columns.passed])]
+
+    def _turned_back(self, w: Direction) -> Direction:
+        return w if self.angle is None else ggx.rotate(w, self.angle)
 
     def solve(self, stack: Stack, coarse: bool = False, lately: Made | None = None) -> Solution:
         """A stack of this kind; a `coarse` one is quicker. It takes from `lately` what the one before it has made of
         layers, and leaves there what it has."""
         made = _Made(lately or {})
-        solver, material = replace(self.solver, made=made), _numbers(stack)
+        numbers, frame = _numbers(stack)
+        material = frame.back(numbers)
+        solver = replace(self.solver, variance=frame.kind(self.solver.variance), made=made)
         if coarse:
             cosines, normals = COARSE
             solver = replace(solver, grid=replace(solver.grid, cosines=cosines), normals=normals)
         # All that its kind may draw, of its own shape
         own = [replace(own, lobes=kind.lobes) for own, kind in zip(solver.layouts([material]), self.layouts)]
-        found = self.solution(solver, solver.solve(material, own), material, own)
+        found = self.solution(solver, solver.solve(material, own), material, own, frame.degrees(numbers))
         if lately is not None:
             lately.clear()
             lately.update(made)
         return found
 
     def solution(
-        self, solver: Solver, found: Sequence[SolvedSide], material: Material, layouts: Sequence[Layout]
+        self,
+        solver: Solver,
+        found: Sequence[SolvedSide],
+        material: Material,
+        layouts: Sequence[Layout],
+        degrees: Value,
     ) -> Solution:
         passages = map(solver.passage, solution.sides(material), layouts)
-        layout = [flag for passage in passages if passage for flag in _flags(passage)]
+        layout = [] if self.angle is None else [degrees]
+        layout += [flag for passage in passages if passage for flag in _flags(passage)]
         return Solution(
             self.texels(_rows(solver, found)), np.concatenate(list(map(_colours, found))), np.array(layout, np.float32)
         )
@@ -188,12 +213,19 @@ class Tabulated:
 
 def tabulated(stack: Stack, material: Material, model: Model, variance: type[Variance], general: bool) -> Tabulated:
     """The recorded body of a stack; a `general` one is that of all values, and has weights of its parts."""
-    plain = _numbers(stack)
+    numbers, frame = _numbers(stack)
+    plain, flags = frame.back(numbers), map(number, (f"{LAYOUT}[{k}]" for k in count()))
+    degrees: Value = frame.degrees(numbers)
+    if not general:
+        material, variance = frame.back(material), frame.kind(variance)
+    elif variance is Covariance:
+        degrees = by = next(flags)
+        material = material.each(lambda address, x: x - by if address.key == "rotation" else x)
     solver = Solver.of(model, variance, Context(), None if general else plain)
     layouts = solver.layouts([_eventful(plain) if general else plain])
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
-    sides, flags = [], map(number, (f"{LAYOUT}[{k}]" for k in count()))
+    sides = []
     for k, (seen, layout) in enumerate(zip(solution.sides(material.solid()), layouts)):
         colours = [colour(f"{REMAINDER}[{OF_POLYNOMIAL * k + j}]") for j in range(OF_POLYNOMIAL)]
         polynomial = Remainder(*(_colours(found[k]) if found else colours))
@@ -204,8 +236,9 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     for k, beam in enumerate(_beams(len(sides), model)):
         curves = _Curves(columns, tuple(Texture(solver.shape, group, beam) for group in columns.groups))
         sides[k] = replace(_Weighed(**vars(sides[k])) if general else sides[k], curves=curves)
-    made = Tabulated(solver.bsdf(material.solid(), sides), solver, layouts, columns)
-    return made if found is None else replace(made, solved=made.solution(solver, found, plain, layouts))
+    angle = None if is_same(degrees, 0.0) else degrees * (pi / 180)
+    made = Tabulated(solver.bsdf(material.solid(), sides), angle, solver, layouts, columns)
+    return made if found is None else replace(made, solved=made.solution(solver, found, plain, layouts, degrees))
 
 
 def _flags(passage: Passage) -> list[Value]:
@@ -305,8 +338,10 @@ class _Weighed(Side):
         )
 
 
-def _numbers(stack: Stack) -> Material:
-    return solution.plain(Material.of(stack).solid())
+def _numbers(stack: Stack) -> tuple[Material, Frame]:
+    """A stack of numbers, and the axes that it is solved in."""
+    material = solution.plain(Material.of(stack).solid())
+    return material, turned.frame(material)
 
 
 def _rows(solver: Solver, found: Sequence[SolvedSide]) -> Array:
