@@ -32,6 +32,7 @@ ASKED: dict[str, Callable[[Any], Any]] = {
     "compare": lambda m: vt.compare(m, ["belcour2018"], [0.7], paths=100).truth.albedo,
     "reference.statistics": lambda m: vt.reference.statistics(m, 0.7, paths=100).energy[0],
     "reference.distribution": lambda m: vt.reference.distribution(m, 0.7, paths=100, bins=4).reflected,
+    "reference.stokes": lambda m: vt.reference.stokes(m, 0.7, paths=100).reflected[0],
     "inverse.coat": lambda m: vt.inverse.coat(m, 1.3).stack,
     "inverse.simplify": lambda m: refusal(lambda: vt.inverse.simplify(m, 2)),
     "inverse.grazing": lambda m: vt.inverse.grazing(m),
@@ -75,7 +76,7 @@ def test_what_is_no_material_is_refused_in_one_line(material: Any) -> None:
     ],
 )
 def test_directions_of_another_shape_are_refused_in_one_line(cos_theta: Any, phi: Any, message: str) -> None:
-    for function in (vt.lobes, vt.reference.statistics, vt.reference.distribution):
+    for function in (vt.lobes, vt.reference.statistics, vt.reference.distribution, vt.reference.stokes):
         with pytest.raises(vt.InvalidInput) as caught:
             function("coated-gold", cos_theta, phi)
         assert str(caught.value) == message

@@ -1,12 +1,17 @@
-"""Unpolarised Fresnel reflectance of a smooth interface.
+"""Fresnel reflectance of a smooth interface: of unpolarised light, and amplitudes of both polarisations.
 
-Indices are relative: eta = eta_2 / eta_1 and kappa = k_2 / eta_1 for light that travels in medium 1.
+Indices are relative: eta = eta_2 / eta_1 and kappa = k_2 / eta_1 for light that travels in medium 1. Amplitudes are
+pairs of a real and an imaginary part, for waves exp(i(kx - wt)), in which an index that absorbs is eta + i kappa. The
+field of s is along the normal of the plane of incidence, that of p along the direction of travel times this normal,
+before and after: at normal incidence r_p = -r_s (Born and Wolf 1999, section 1.5.2).
 """
 
 from __future__ import annotations
 
 from velatura import ops
 from velatura.ops import Value
+
+Complex = tuple[Value, Value]
 
 
 def cos_transmitted(cos_theta: Value, eta: Value) -> Value:
@@ -63,3 +68,39 @@ def normal_incidence(eta: Value, kappa: Value = 0.0) -> Value:
     """Reflectance at normal incidence, ((eta-1)^2 + kappa^2) / ((eta+1)^2 + kappa^2) (Bati et al. 2021, Eq. 1)."""
     kappa2 = kappa * kappa
     return ((eta - 1) * (eta - 1) + kappa2) / ((eta + 1) * (eta + 1) + kappa2)
+
+
+def dielectric_amplitudes(cos_theta: Value, cos_t: Value, eta: Value) -> tuple[Complex, Complex]:
+    """Reflected amplitudes of s and p, of a dielectric for given cosines on both sides, as `dielectric_between`."""
+    return _amplitude(cos_theta, (eta * cos_t, 0.0)), _amplitude(cos_theta, (ops.divide(cos_t, eta), 0.0))
+
+
+def total_amplitudes(cos_theta: Value, eta: Value) -> tuple[Complex, Complex]:
+    """Amplitudes of s and p under total reflection: of modulus 1, and of different phases.
+
+    (Born and Wolf 1999, section 1.5.4)
+    """
+    decay = ops.sqrt(1 - cos_theta * cos_theta - eta * eta)
+    return _amplitude(cos_theta, (0.0, decay)), _amplitude(cos_theta, (0.0, decay / (eta * eta)))
+
+
+def conductor_amplitudes(cos_theta: Value, eta: Value, kappa: Value) -> tuple[Complex, Complex]:
+    """Reflected amplitudes of s and p, of a conductor of relative index eta + i kappa at cos_theta in [0, 1]."""
+    # The square of the index, and the root of it less sin2, which is n cos(theta_t)
+    re, im = eta * eta - kappa * kappa, 2 * eta * kappa
+    t = re - (1 - cos_theta * cos_theta)
+    modulus = ops.sqrt(t * t + im * im)
+    a, b = ops.sqrt(0.5 * (modulus + t)), ops.sqrt(0.5 * (modulus - t))
+    square = re * re + im * im
+    over_square = ops.divide(a * re + b * im, square), ops.divide(b * re - a * im, square)
+    return _amplitude(cos_theta, (a, b)), _amplitude(cos_theta, over_square)
+
+
+def _amplitude(cos_theta: Value, inside: Complex) -> Complex:
+    """(cos_theta - z) / (cos_theta + z), where z is n cos(theta_t) for s, and that over the square of n for p."""
+    re, im = inside
+    square = (cos_theta + re) * (cos_theta + re) + im * im
+    return (
+        ops.divide(cos_theta * cos_theta - re * re - im * im, square),
+        -ops.divide(2 * cos_theta * im, square),
+    )

@@ -45,6 +45,10 @@ def normalize(w: Direction) -> Direction:
     return w[0] * scale, w[1] * scale, w[2] * scale
 
 
+def cross(a: Direction, b: Direction) -> Direction:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
 def reflect(w: Direction, h: Direction) -> Direction:
     """Mirror image of `w` about the normal `h`."""
     t = 2 * dot(w, h)

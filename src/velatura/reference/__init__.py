@@ -2,6 +2,7 @@
 
 from velatura.reference import plugin  # noqa: F401  (declares it)
 from velatura.reference.distribution import Distribution, distribution
+from velatura.reference.polarised import Stokes, stokes
 from velatura.reference.statistics import Statistics, WalkedLobe, statistics
 
-__all__ = ["Distribution", "Statistics", "WalkedLobe", "distribution", "statistics"]
+__all__ = ["Distribution", "Statistics", "Stokes", "WalkedLobe", "distribution", "statistics", "stokes"]

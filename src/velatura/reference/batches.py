@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.errors import InvalidInput
+from velatura.optics.polarisation import horizontal
 from velatura.reference.layers import Layers, from_material, zeros
 from velatura.reference.walk import walk
 from velatura.stack import RGB, Address, Material, Stack
@@ -27,26 +28,30 @@ class Ends:
 
     w (3, n): the direction in which they left, below the surface where light was transmitted; weight (3, n) by colour,
     0 where they died; deepest (n,): the deepest slab that they were in, counted from 0 above the first surface;
-    truncated: the mean weight of those that were cut off.
+    truncated: the mean weight of those that were cut off; stokes (3, 3, n): Q, U and V by colour, as the weight is the
+    intensity, in the frame of `velatura.reference.stokes`, or None where polarisation was left out.
     """
 
     w: Array
     weight: Array
     deepest: NDArray[np.unsignedinteger]
     truncated: float
+    stokes: Array | None = None
 
 
-def ends(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) -> Ends:
+def ends(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, polarised: bool = False) -> Ends:
     """All paths at once; see `trace`."""
-    parts = list(trace(stack, wi, paths, seed, microsurface))
+    parts = list(trace(stack, wi, paths, seed, microsurface, polarised))
     if len(parts) == 1:
         return parts[0]
-    w, weight = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("w", "weight"))
-    truncated = sum(part.truncated * len(part.deepest) for part in parts) / paths
-    return Ends(w, weight, np.concatenate([part.deepest for part in parts]), truncated)
+    names = ("w", "weight", "deepest", *(["stokes"] if polarised else []))
+    joined = {name: np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names}
+    return Ends(**joined, truncated=sum(part.truncated * len(part.deepest) for part in parts) / paths)
 
 
-def trace(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) -> Iterator[Ends]:
+def trace(
+    stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, polarised: bool = False
+) -> Iterator[Ends]:
     """Walk paths that come from the direction wi (3,), some millions at a time.
 
     Raises:
@@ -58,24 +63,28 @@ def trace(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool) ->
     kernel.require_llvm()
     layers = _layers(stack, microsurface)
     for start in range(0, paths, _AT_ONCE):
-        yield _part(layers, wi, min(_AT_ONCE, paths - start), _mixed(seed), start)
+        yield _part(layers, wi, min(_AT_ONCE, paths - start), _mixed(seed), start, polarised)
 
 
 @kernel.exclusive
-def _part(layers: Layers, wi: Array, count: int, seed: int, start: int) -> Ends:
+def _part(layers: Layers, wi: Array, count: int, seed: int, start: int, polarised: bool) -> Ends:
     import drjit as dr
     import drjit.llvm as types
 
     # Walk
     rng = types.PCG32(count, types.UInt64(seed), types.UInt64(start))
     x, y, z = (dr.opaque(types.Float, float(component)) for component in wi)
-    path = walk(types, layers, (x, y, z), rng, types.Array3f(1), max_depth=MAX_DEPTH)
+    path = walk(types, layers, (x, y, z), rng, types.Array3f(1), max_depth=MAX_DEPTH, polarised=polarised)
     # Look at the ends
     cut_off = dr.select(path.alive, dr.mean(path.weight), 0)
     weight = dr.select(path.alive, 0, path.weight)
     dr.eval(path.w, weight, path.deepest, cut_off)
     w = np.stack([component.numpy() for component in path.w])
-    return Ends(w, weight.numpy(), path.deepest.numpy(), float(cut_off.numpy().mean()))
+    stokes = None
+    if path.light is not None:
+        light = path.light.along(path.w, horizontal(path.w))
+        stokes = np.stack([(weight * part).numpy() for part in (light.q, light.u, light.v)])
+    return Ends(w, weight.numpy(), path.deepest.numpy(), float(cut_off.numpy().mean()), stokes)
 
 
 @kernel.exclusive

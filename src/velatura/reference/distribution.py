@@ -36,6 +36,7 @@ def distribution(
     seed: int = 0,
     microsurface: bool = False,
     bins: int = BINS,
+    polarised: bool = False,
 ) -> Distribution:
     """Energies of reflected and transmitted light on a grid over the projected disc; arguments as `statistics`.
 
@@ -43,15 +44,15 @@ def distribution(
         InvalidInput, MissingTool: as `statistics`.
     """
     stack = load(stack)
-    grids = [_grids(stack, wi, paths, seed, microsurface, bins) for wi in directions(cos_theta, phi)]
+    grids = [_grids(stack, wi, paths, seed, microsurface, bins, polarised) for wi in directions(cos_theta, phi)]
     reflected, transmitted = (np.stack([pair[side] for pair in grids], axis=1) for side in (0, 1))
     return Distribution(reflected, transmitted if stack.transmits else None)
 
 
-def _grids(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, bins: int) -> Array:
+def _grids(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, bins: int, polarised: bool) -> Array:
     """Energies (2, 3, bins, bins): reflected, transmitted."""
     total = np.zeros((3, 2 * bins * bins))
-    for part in trace(stack, wi, paths, seed, microsurface):
+    for part in trace(stack, wi, paths, seed, microsurface, polarised):
         x, y = np.clip((0.5 * (part.w[:2] + 1) * bins).astype(int), 0, bins - 1)
         cell = (np.where(part.w[2] > 0, 0, bins) + x) * bins + y
         total += [np.bincount(cell, weight, total.shape[1]) for weight in part.weight]

@@ -1,7 +1,8 @@
 """Events of a path at one surface: scattering into a random direction, or into a given one.
 
 All directions are local: the path comes from `wi`, which points away from the surface into the upper side, on either
-side of the stack. Energy is followed, not radiance: no squared index enters.
+side of the stack. Energy is followed, not radiance: no squared index enters. Where the path carries a polarisation,
+facets reflect the share of it that follows; densities, which only weigh strategies, are those of unpolarised light.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import ggx, refraction
 from velatura.optics.ggx import Direction
+from velatura.optics.polarisation import Polarisation, unpolarised
 from velatura.reference.layers import Layers, Surface, relative_index
 
 HUGE = 1e15  # products of densities stay finite
@@ -21,13 +23,17 @@ HUGE = 1e15  # products of densities stay finite
 
 @dataclass(frozen=True)
 class Meeting:
-    """A path that meets surface `j` from `wi`, out of a slab of index `n_in`; beyond lies index `n_out`."""
+    """A path that meets surface `j` from `wi`, out of a slab of index `n_in`; beyond lies index `n_out`.
+
+    `light` is its polarisation, along -wi; None where that is left out.
+    """
 
     layers: Layers
     j: Value
     n_in: Value
     n_out: Value
     wi: Direction
+    light: Polarisation | None = None
 
     @property
     def eta(self) -> Value:
@@ -47,7 +53,8 @@ class Scattered:
 
     The densities weigh strategies against each other: that of scattering on (`sample`), and that of coming back the
     same way when refraction is certain (`sample_refraction`). At a smooth surface both are infinite, and stand for
-    their ratio: the second is 1, and the first holds how far refraction spreads directions.
+    their ratio: the second is 1, and the first holds how far refraction spreads directions. `light` is the polarisation
+    along wo, None where it is left out or was not followed.
     """
 
     wo: Direction
@@ -55,6 +62,7 @@ class Scattered:
     reflected: Value
     density: Value
     density_back: Value
+    light: Polarisation | None = None
 
 
 def sample(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3: Value) -> Scattered:
@@ -62,7 +70,7 @@ def sample(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3: Value) ->
     return _with_diffuse_base(
         meeting,
         lambda: _sample_interface(meeting, carried, u1, u2, u3),
-        lambda: _sample_diffuse(meeting.layers.albedo, u1, u2),
+        lambda: _sample_diffuse(meeting, u1, u2),
     )
 
 
@@ -98,7 +106,8 @@ def _sample_interface(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3
     i = surface.into(meeting.wi)
     h = surface.sample_normal(i, u1, u2)
     # Choose between reflection and refraction
-    reflectance = meeting.reflectance(ggx.dot(i, h))
+    light = meeting.light and meeting.light.seen_by(surface.into)
+    reflectance, mirrored, refracted = meeting.layers.meet(meeting.j, i, h, meeting.n_in, meeting.n_out, light)
     chance = ops.divide(ops.mean(carried * reflectance), ops.mean(carried))
     chance = ops.select(meeting.opaque, 1.0, chance)
     reflected = u3 < chance
@@ -109,7 +118,9 @@ def _sample_interface(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3
     weight = ops.select(_same(o[2] > 0, reflected), weight, 0.0)
     density, back = _densities(surface, i, h, o, ops.select(reflected, 1.0, eta))
     density = ops.select(surface.smooth, _spread(i, o, eta), density) * ops.mean(share)
-    return Scattered(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back))
+    light = select(reflected, mirrored, refracted)
+    light = light and light.seen_by(surface.out_of)
+    return Scattered(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back), light)
 
 
 def _evaluate_interface(meeting: Meeting, wo: Direction, reflected: Value) -> Scattered:
@@ -140,9 +151,11 @@ def _spread(i: Direction, o: Direction, eta: Value) -> Value:
     return ops.divide(eta * eta * ops.absolute(o[2]), ops.absolute(i[2]))
 
 
-def _sample_diffuse(albedo: Value, u1: Value, u2: Value) -> Scattered:
+def _sample_diffuse(meeting: Meeting, u1: Value, u2: Value) -> Scattered:
     radius, phi, z = ops.sqrt(u1), 2 * pi * u2, ops.sqrt(1 - u1)
-    return Scattered((radius * ops.cos(phi), radius * ops.sin(phi), z), albedo, True, z / pi, 0.0)
+    wo = radius * ops.cos(phi), radius * ops.sin(phi), z
+    light = meeting.light and unpolarised(wo, meeting.light.q)
+    return Scattered(wo, meeting.layers.albedo, True, z / pi, 0.0, light)
 
 
 def _evaluate_diffuse(albedo: Value, wo: Direction) -> Scattered:
@@ -162,7 +175,11 @@ def _with_diffuse_base(
 
 
 def select(where: Value, a: Value, b: Value) -> Value:
-    """`ops.select` of values or of directions."""
+    """`ops.select` of values, directions or polarisations, which may be left out of both."""
+    if a is None or b is None:
+        return None
+    if isinstance(a, Polarisation):
+        return Polarisation(*(select(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
     return tuple(select(where, x, y) for x, y in zip(a, b)) if isinstance(a, tuple) else ops.select(where, a, b)
 
 

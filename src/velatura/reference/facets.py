@@ -13,6 +13,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import ggx, microsurface, refraction
 from velatura.optics.ggx import Direction
+from velatura.optics.polarisation import Polarisation
 from velatura.reference import events
 from velatura.reference.events import Meeting, Scattered, select
 
@@ -26,7 +27,8 @@ UP = (0.0, 0.0, 1.0)
 class Flight:
     """Light between facets: its direction of travel, and the rank of its height, both as seen from its own medium.
 
-    Beyond the interface (not `outside`) that is upside down. `weight` and `value` are colours.
+    Beyond the interface (not `outside`) that is upside down. `weight` and `value` are colours; `light` is the
+    polarisation, None where it is left out.
     """
 
     rng: Any
@@ -37,6 +39,7 @@ class Flight:
     value: Value
     count: Value
     alive: Value
+    light: Polarisation | None
 
 
 def scatter(
@@ -54,6 +57,8 @@ def scatter(
     flight = _fly(types, meeting, carried, rng, active & rough, surface.into(target))
     wo = surface.out_of(select(flight.outside, flight.w, _reverse(flight.w)))
     many = _weighed(events.evaluate(meeting, wo, flight.outside), flight.weight)
+    if flight.light is not None:
+        many = replace(many, light=select(flight.outside, flight.light, flight.light.inverted).seen_by(surface.out_of))
     value = _weighed(towards, flight.value)
     return _choose(rough, many, once), _choose(rough, value, towards), flight.rng
 
@@ -85,8 +90,9 @@ def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, 
     surface, colour = meeting.layers.surface(meeting.j), carried * 0
     alpha = surface.alpha_u, surface.alpha_v
     start = surface.into((-meeting.wi[0], -meeting.wi[1], -meeting.wi[2]))
+    light = meeting.light and meeting.light.seen_by(surface.into)
     flight = Flight(
-        rng, start, types.Float(1), types.Bool(True), colour + 1, colour, types.UInt32(0), types.Bool(active)
+        rng, start, types.Float(1), types.Bool(True), colour + 1, colour, types.UInt32(0), types.Bool(active), light
     )
 
     def step(f: Flight) -> tuple[Flight]:
@@ -99,7 +105,8 @@ def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, 
         f.value = ops.select(f.alive, f.value + f.weight * _value(meeting, f, i, goal), f.value)
         # Meet a facet
         h = ggx.sample_visible(i, *alpha, f.rng.next_float32(), f.rng.next_float32())
-        reflectance = _reflectance(meeting, f.outside, ggx.dot(i, h))
+        indices = _indices(meeting, f.outside)
+        reflectance, mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *indices, f.light)
         chance = ops.divide(ops.mean(carried * f.weight * reflectance), ops.mean(carried * f.weight))
         chance = ops.select(meeting.opaque, 1.0, chance)
         reflected = f.rng.next_float32() < chance
@@ -108,6 +115,8 @@ def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, 
         # Turn; for refracted light the surface is upside down
         o = select(reflected, ggx.reflect(i, h), _reverse(refraction.refract(i, h, _eta(meeting, f.outside))))
         f.w = select(f.alive, o, f.w)
+        if mirrored is not None and refracted is not None:
+            f.light = select(f.alive, select(reflected, mirrored, refracted.inverted), f.light)
         f.rank = ops.select(reflected | (f.alive ^ True), f.rank, 1 - f.rank)
         f.outside ^= f.alive & (reflected ^ True)
         f.count += 1
@@ -145,9 +154,14 @@ def _eta(meeting: Meeting, outside: Value) -> Value:
 
 
 def _reflectance(meeting: Meeting, outside: Value, cosine: Value) -> Value:
+    return meeting.layers.reflectance(meeting.j, cosine, *_indices(meeting, outside))
+
+
+def _indices(meeting: Meeting, outside: Value) -> tuple[Value, Value]:
+    """Of the medium that the light is in, and of that beyond."""
     here = ops.select(outside, meeting.n_in, meeting.n_out)
     there = ops.select(outside, meeting.n_out, meeting.n_in)
-    return meeting.layers.reflectance(meeting.j, cosine, here, there)
+    return here, there
 
 
 def _weighed(event: Scattered, weight: Value) -> Scattered:

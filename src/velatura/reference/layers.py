@@ -16,6 +16,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
+from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
 from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.stack.values import Pair
 
@@ -151,6 +152,35 @@ class Layers:
         dielectric = ops.select(cos_t > 0, fresnel.dielectric_between(cosine, cos_t, n_out / n_in), 1.0)
         return dielectric if base is None else ops.select(self.is_base(j), base, dielectric)
 
+    def mueller(self, j: Value, cosine: Value, n_in: Value, n_out: Value) -> tuple[Mueller, Mueller]:
+        """As `reflectance`, of polarised light: Mueller matrices of the light that a facet reflects, and refracts."""
+        eta = relative_index(n_in, n_out)
+        cos_t = fresnel.cos_transmitted(cosine, eta)
+        passes = cos_t > 0
+        between = mueller(*fresnel.dielectric_amplitudes(cosine, cos_t, n_out / n_in))
+        total = mueller(*fresnel.total_amplitudes(cosine, eta))
+        reflection = _of_either(passes, between, replace(total, s=1.0, p=1.0))
+        refraction = complement(reflection)
+        if self.base == "mirror":
+            base = Mueller(1.0, 1.0, -1.0, 0.0)
+        elif self.base == "conductor":
+            base = mueller(*fresnel.conductor_amplitudes(cosine, self.index[-1] / n_in, self.extinction / n_in))
+        else:
+            return reflection, refraction
+        return _of_either(self.is_base(j), base, reflection), refraction
+
+    def meet(
+        self, j: Value, i: Direction, h: Direction, n_in: Value, n_out: Value, light: Polarisation | None
+    ) -> tuple[Value, Polarisation | None, Polarisation | None]:
+        """Reflectance of a facet of normal h for light from i, and the light's polarisation once reflected, or
+        refracted; `light` is None where polarisation is left out."""
+        cosine = ggx.dot(i, h)
+        if light is None:
+            return self.reflectance(j, cosine, n_in, n_out), None, None
+        reflection, refraction = self.mueller(j, cosine, n_in, n_out)
+        light = light.at((-i[0], -i[1], -i[2]), h)
+        return reflection.share(light), reflection.applied(light), refraction.applied(light)
+
 
 def from_material(material: Material, microsurface: bool) -> Layers:
     """The layers of a material, in numbers and colours of any dialect."""
@@ -219,6 +249,10 @@ def _surface(layer: InterfaceValues, matched: Value) -> Surface:
 def _choose(where: Value, a: Value, b: Value) -> Value:
     same = a is b or (isinstance(a, float | bool) and isinstance(b, float | bool) and a == b)
     return a if same else ops.select(where, a, b)
+
+
+def _of_either(where: Value, a: Mueller, b: Mueller) -> Mueller:
+    return Mueller(*(_choose(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
 
 
 def _product(a: Value, b: Value) -> Value:

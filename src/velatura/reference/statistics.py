@@ -58,6 +58,7 @@ def statistics(
     paths: int = 10**6,
     seed: int = 0,
     microsurface: bool = False,
+    polarised: bool = False,
 ) -> Statistics:
     """Statistics of the light that a stack reflects and transmits, by random walks through it.
 
@@ -73,6 +74,8 @@ def statistics(
         paths: walks for each direction.
         seed: of the random numbers; the same one gives the same result.
         microsurface: whether light scatters many times between the facets of an interface (Heitz et al. 2016).
+        polarised: whether facets polarise the light, which comes in unpolarised; it takes longer. Media and diffuse
+            bases depolarise what they scatter.
 
     Raises:
         InvalidInput: no valid material, a cosine outside its range, lists of different lengths, or a texture where a
@@ -80,7 +83,7 @@ def statistics(
         MissingTool: LLVM is missing or too old; the message names the package to install.
     """
     stack = load(stack)
-    columns = [_column(stack, wi, paths, seed, microsurface) for wi in directions(cos_theta, phi)]
+    columns = [_column(stack, wi, paths, seed, microsurface, polarised) for wi in directions(cos_theta, phi)]
     truncated = np.array([lost for _, lost in columns])
     values, errors = (_collect([[pair[i] for pair in lobes] for lobes, _ in columns]) for i in (0, 1))
     standard_error = _statistics(stack, errors, np.zeros_like(truncated), None)
@@ -105,10 +108,10 @@ def _statistics(stack: Stack, lobes: Sequence[WalkedLobe], truncated: Array, err
 
 
 def _column(
-    stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool
+    stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, polarised: bool
 ) -> tuple[list[tuple[WalkedLobe, WalkedLobe]], float]:
     """The lobes of one direction with their errors, and the energy lost by cutting paths off."""
-    found = ends(stack, wi, paths, seed, microsurface)
+    found = ends(stack, wi, paths, seed, microsurface, polarised)
     surfaces = [stack.layers[place] for place in stack.surfaces]
     turned = any(_anisotropic(s) and s.rotation != 0 for s in stack.interfaces)
     lobes = []

@@ -14,6 +14,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import ggx, phase
 from velatura.optics.ggx import Direction
+from velatura.optics.polarisation import Polarisation, unpolarised
 from velatura.reference import events, facets
 from velatura.reference.events import Meeting
 from velatura.reference.facets import UP
@@ -29,7 +30,8 @@ class Path:
 
     `w` is the direction of travel in slab `slab`; `height` is measured downwards, in depths of the slab; `weight` and
     `value` are colours. `smooth`: only smooth surfaces were met so far; `painted`: the diffuse base was among them.
-    `density` and `chain` weigh the strategies of `connection`, where `value` comes from.
+    `density` and `chain` weigh the strategies of `connection`, where `value` comes from. `light` is the polarisation
+    along `w`, None where it is left out.
     """
 
     rng: Any
@@ -46,6 +48,7 @@ class Path:
     density: Value
     chain: Value
     value: Value
+    light: Polarisation | None
 
 
 def walk(
@@ -58,6 +61,7 @@ def walk(
     max_depth: int = 1000,
     out: WayOut | None = None,
     painted: bool | None = None,
+    polarised: bool = False,
 ) -> Path:
     """Follow paths that enter along -wi until they leave, die, or have met `max_depth` events.
 
@@ -68,6 +72,8 @@ def walk(
         colour: what a path carries at first, all channels 1.
         out: the way out that every event is connected to; the paths then gather the BSDF's `value` for it.
         painted: gathered is from paths that the diffuse base has scattered, from all others (False), or both (None).
+        polarised: whether the light, unpolarised at first, is polarised by facets; not together with `out`. Media
+            depolarise what they scatter, since their phase function has no Mueller matrix, and so does a diffuse base.
 
     Returns:
         The paths as they ended. Those still `alive` were cut off; the others left along `w`, or died with weight 0.
@@ -91,6 +97,7 @@ def walk(
         density=types.Float(1),
         chain=types.Float(0),
         value=colour * 0,
+        light=unpolarised((-wi[0], -wi[1], -wi[2]), colour) if polarised else None,
     )
     _travel(layers, path)
 
@@ -116,7 +123,8 @@ def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None, painted
     j = ops.select(down, path.slab, path.slab - 1)
     beyond = ops.select(down, path.slab + 1, path.slab - 1)
     wi = (-path.w[0], -path.w[1], ops.absolute(path.w[2]))
-    meeting = Meeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi)
+    light = path.light and path.light.mirrored(down ^ True)
+    meeting = Meeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi, light)
     u1, u2, u3 = (path.rng.next_float32() for _ in range(3))
     target = way_up(out, j, down) if out is not None else UP
     if layers.microsurface:
@@ -138,6 +146,7 @@ def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None, painted
     # Turn
     z = onward.wo[2]
     turned: Direction = (onward.wo[0], onward.wo[1], ops.select(down, z, -z))
+    light = onward.light and onward.light.mirrored(down ^ True)
     chain = ops.select(rough, types.Float(1), 0)
     chain += ops.select(onward.reflected, 0.0, ops.divide(onward.density_back, path.density) * path.chain)
     weight, density = onward.weight, onward.density
@@ -155,8 +164,9 @@ def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None, painted
         density = ops.select(path.inside, phase.henyey_greenstein(cosine, g), density)
         chain = ops.select(path.inside, 1.0, chain)
         slab = ops.select(path.inside, path.slab, slab)
+        light = light and events.select(path.inside, unpolarised(turned, path.weight), light)
     path.smooth &= (rough | path.inside) ^ True
-    path.w, path.slab = ggx.normalize(turned), slab
+    path.w, path.slab, path.light = ggx.normalize(turned), slab, light
     path.density, path.chain = density, ops.minimum(chain, events.HUGE)
     path.weight = path.weight * weight
     path.deepest = ops.maximum(path.deepest, slab)
