@@ -147,9 +147,9 @@ async (material) => {
     return performance.now() - start;
   };
   const slot = viewport.slots.a, { contents } = slot, uniforms = viewport.uniforms();
-  const ours = (quick, alpha) => () => {
+  const ours = (block, alpha) => () => {
     slot.setContents({ ...contents, values: { ...contents.values, layer0_alpha_u: alpha, layer0_alpha_v: alpha } });
-    slot.drawPreview(viewport.gbuffer, uniforms, quick);
+    slot.drawPreview(viewport.gbuffer, uniforms, block);
     viewport.paint();
   };
   const theirs = (roughness) => () => {
@@ -159,8 +159,8 @@ async (material) => {
   const found = { fine: [], quick: [], theirs: [] };
   for (let k = 0; k < 24; k++) {
     const roughness = 0.1 + 0.01 * k;
-    found.fine.push(timed(gl, ours(false, roughness)));
-    found.quick.push(timed(gl, ours(true, roughness)));
+    found.fine.push(timed(gl, ours(1, roughness)));
+    found.quick.push(timed(gl, ours(2, roughness)));
     found.theirs.push(timed(renderer.getContext(), theirs(roughness)));
   }
   const ratio = (name) => found[name].map((time, k) => time / found.theirs[k]).slice(4).sort((a, b) => a - b)[10];

@@ -70,3 +70,17 @@ def test_the_sun_is_as_bright_as_in_mitsuba(stage: viewport.Stage) -> None:
     found = viewport.compare(stage, vt.Stack([vt.Diffuse(albedo=0.5)]), "ball", "sky", 512, 1024)
     page, truth = (picture.mean(axis=(0, 1)) for picture in found.pictures)
     np.testing.assert_allclose(page, truth, rtol=0.02)
+
+
+def test_no_paths_are_traced_of_what_is_dragged(stage: viewport.Stage) -> None:
+    """A coarse answer knows light from above alone; paths begin with the whole one."""
+    stage.resize(12, 12)
+    stage.show(vt.preset("frosted-glass"), "sphere", "studio")
+    stage.trace(1)
+    contents = "const { contents } = viewport.slots.a; viewport.setContents('a', { ...contents, coarse: %s })"
+    stage.page.evaluate("() => {" + contents % "true" + "}")
+    stage.page.wait_for_function("() => viewport.idle && viewport.rested(500)")
+    assert stage.page.evaluate("viewport.samples") == 0
+    stage.page.evaluate("() => {" + contents % "false" + "}")
+    stage.trace(1)
+    assert not stage.errors

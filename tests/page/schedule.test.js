@@ -143,3 +143,13 @@ test('slices grow on a quick device, shrink on a slow one, and are bounded', () 
   bands.restart();
   assert.deepEqual([slice(bands, 100).rows, slice(bands, 100).samples], [6400, 64]);
 });
+
+test('blocks of pixels grow while previews of what is dragged take long, two in a row, and are small again after it', () => {
+  const schedule = begun();
+  schedule.hold(true, 1000);
+  const blocks = [90, 40, 90, 90, 90, 90, 90, 90, 90].map((took) => preview(schedule, 1000, took).block);
+  assert.deepEqual(blocks, [2, 2, 2, 2, 3, 3, 4, 4, 4]);
+  schedule.hold(false, 2000);
+  assert.equal(preview(schedule, 2000, 90).block, 2);
+  assert.equal(preview(schedule, 2010, 90).block, 1);
+});

@@ -14,7 +14,7 @@ import pytest
 from velatura import tables
 from velatura.editor import bundle, shading
 from velatura.editor.folder import Conflict, Folder
-from velatura.editor.messages import admitted
+from velatura.editor.messages import admitted, document
 from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, MissingTool
 from velatura.exports import FORMATS, export
@@ -174,6 +174,21 @@ def test_what_is_solved_comes_with_the_code_and_by_itself() -> None:
     assert VERBS["values"]({"material": COAT, "model": "belcour2018"})["solution"] is None
     with pytest.raises(InvalidInput, match="coarse: must be true or false"):
         VERBS["values"]({"material": COAT, "coarse": 1})
+
+
+def test_what_is_dragged_is_solved_for_light_from_above() -> None:
+    """Nearly the same as a whole solution there, which is all that a preview reads; the symmetric form reads both."""
+    stack = document(preset("frosted-glass"))
+
+    def texels(form: str, coarse: bool) -> np.ndarray:
+        question = {"material": stack, "switches": {"form": form}, "coarse": coarse}
+        lines = decoded(VERBS["values"](question)["solution"]["texels"])
+        return lines.reshape(-1, 2, *lines.shape[1:]).swapaxes(0, 1)  # by side
+
+    for form, alike in (("forward", True), ("symmetric", False)):
+        (fine, _), (above, below) = texels(form, False), texels(form, True)
+        assert np.mean(np.abs(fine - above)) < 0.05
+        assert np.array_equal(above, below) is alike
 
 
 def test_a_drag_takes_over_the_layers_that_it_leaves_alone() -> None:

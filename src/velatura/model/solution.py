@@ -332,7 +332,8 @@ class Solver:
         )
         columns = folded.unfolded(columns)
         numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
-        narrow = [_reflects_all(found) and np.min(tensor.roughness(phi)[:2]) < NARROW for tensor in shown]
+        sharp = self.normals is None and _reflects_all(found)  # edges are lost in the error of few normals
+        narrow = [sharp and np.min(tensor.roughness(phi)[:2]) < NARROW for tensor in shown]
         edged = [shape if each else None for shape, each in zip(shapes, narrow)]
         return SolvedSide(columns, numbers, self._colours(clipped), edged)
 

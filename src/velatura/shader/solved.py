@@ -170,8 +170,9 @@ class Tabulated:
         return w if self.angle is None else ggx.rotate(w, self.angle)
 
     def solve(self, stack: Stack, coarse: bool = False, lately: Made | None = None) -> Solution:
-        """A stack of this kind; a `coarse` one is quicker. It takes from `lately` what the one before it has made of
-        layers, and leaves there what it has."""
+        """A stack of this kind. It takes from `lately` what the one before it has made of layers, and leaves there what
+        it has. A `coarse` one is quicker, and is for light from above alone: that from below has the same columns
+        where a program reads one side at a time."""
         made = _Made(lately or {})
         numbers, frame = _numbers(stack)
         material = frame.back(numbers)
@@ -181,11 +182,15 @@ class Tabulated:
             solver = replace(solver, grid=replace(solver.grid, cosines=cosines), normals=normals)
         # All that its kind may draw, of its own shape
         own = [replace(own, lobes=kind.lobes) for own, kind in zip(solver.layouts([material]), self.layouts)]
-        found = self.solution(solver, solver.solve(material, own), material, own, frame.degrees(numbers))
+        if coarse and solver.model.form == "forward":
+            found = solver.solve(material, own[:1]) * self.sides
+        else:
+            found = solver.solve(material, own)
+        solved = self.solution(solver, found, material, own, frame.degrees(numbers))
         if lately is not None:
             lately.clear()
             lately.update(made)
-        return found
+        return solved
 
     def solution(
         self,

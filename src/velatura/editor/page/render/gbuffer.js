@@ -3,7 +3,7 @@
 
 import { Box3, Matrix4, Vector3, Vector4 } from 'three';
 
-import { COARSE, coarsening, spreading, surroundings } from './glsl/preview.glsl.js';
+import { coarsening, spreading, surroundings } from './glsl/preview.glsl.js';
 import { raster, rasterVertex } from './glsl/raster.glsl.js';
 import { OBJECT } from './scene.js';
 
@@ -22,8 +22,9 @@ export class GBuffer {
   #corners = []; // of the box around the object
   #bounds = null; // of the object in the picture
   #seen = null; // targets
-  #coarse = null;
+  #coarse = null; // targets of blocks of pixels, null where none were asked for
   #coarseLight = null;
+  #block = 0; // their pixels along both axes
   #outdated = true;
 
   constructor(device) {
@@ -80,9 +81,7 @@ export class GBuffer {
     const device = this.#device;
     device.free(this.#seen, this.#coarse, this.#coarseLight);
     this.#seen = device.target(width, height, SEEN, { depth: true });
-    const size = [width, height].map((length) => Math.ceil(length / COARSE));
-    this.#coarse = device.target(...size, SEEN);
-    this.#coarseLight = device.target(...size, ['RGBA16F'], { filter: 'LINEAR' });
+    this.#coarse = this.#coarseLight = null;
     this.#outdated = true;
   }
 
@@ -97,7 +96,7 @@ export class GBuffer {
     this.#outdated = false;
     this.#bounds = projected(this.#corners, projection);
     this.#draw(projection);
-    this.#device.draw(this.#coarsening, named(this.#seen), this.#coarse);
+    if (this.#coarse) this.#coarsen();
   }
 
   /** Draws all around the object. */
@@ -105,14 +104,16 @@ export class GBuffer {
     this.#device.draw(this.#surroundings, { ...uniforms, ...named(this.#seen) }, target);
   }
 
-  /** Draws the object by a program into its surroundings, by `coarse` pixels where it has to be quick. */
-  drawObject(program, uniforms, target, coarse) {
+  /** Draws the object by a program into its surroundings; a `block` of pixels, along both axes, is one. */
+  drawObject(program, uniforms, target, block) {
     const device = this.#device;
     const draw = (program, uniforms, target) => device.draw(program, uniforms, target, within(this.#bounds, target));
-    if (!coarse) return draw(program, { ...uniforms, ...named(this.#seen), seen_every: 1 }, target);
-    device.clear(this.#coarseLight, 0);
-    draw(program, { ...uniforms, ...named(this.#coarse), seen_every: COARSE }, this.#coarseLight);
-    return draw(this.#spreading, { coarse_light: this.#coarseLight.textures[0], ...named(this.#seen) }, target);
+    if (block === 1) return draw(program, { ...uniforms, ...named(this.#seen), seen_every: 1 }, target);
+    this.#setBlock(block);
+    const light = this.#coarseLight;
+    device.clear(light, 0);
+    draw(program, { ...uniforms, ...named(this.#coarse), seen_every: block }, light);
+    return draw(this.#spreading, { coarse_light: light.textures[0], seen_every: block, ...named(this.#seen) }, target);
   }
 
   /** Draws a pixel by a program that is to draw the object, once: some devices compile only then, beside other work. */
@@ -121,9 +122,24 @@ export class GBuffer {
     if (program.warm) return;
     program.warm = true;
     const pixel = device.target(1, 1, ['RGBA16F']);
-    device.draw(program, { ...uniforms, ...named(this.#coarse), seen_every: COARSE }, pixel);
+    device.draw(program, { ...uniforms, ...named(this.#seen), seen_every: 1 }, pixel);
     device.free(pixel);
     device.gl.flush();
+  }
+
+  #setBlock(block) {
+    if (this.#coarse && this.#block === block) return;
+    const device = this.#device, { width, height } = this.#seen;
+    device.free(this.#coarse, this.#coarseLight);
+    const size = [width, height].map((length) => Math.ceil(length / block));
+    this.#coarse = device.target(...size, SEEN);
+    this.#coarseLight = device.target(...size, ['RGBA16F'], { filter: 'LINEAR' });
+    this.#block = block;
+    this.#coarsen();
+  }
+
+  #coarsen() {
+    this.#device.draw(this.#coarsening, { ...named(this.#seen), seen_every: this.#block }, this.#coarse);
   }
 
   #draw(projection) {

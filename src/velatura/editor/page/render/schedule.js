@@ -7,6 +7,8 @@ const LOOK = 1000; // until the next look where nothing is to be done
 const SLICE = 40; // that the device may be busy without a break
 const MOST_SAMPLES = 64; // in a slice, however quick they are
 const FRAMES = 100; // that are remembered
+const BLOCKS = [2, 4]; // pixels along both axes that are one in a coarse preview: at first, and at most
+const FLUENT = 50; // for a coarse preview, from which on the next ones have larger blocks while something is dragged
 
 export class Schedule {
   held = false; // whether something is being dragged
@@ -15,6 +17,8 @@ export class Schedule {
   frames = []; // when previews were there
   #coarse = false; // whether a coarse preview shows the present state
   #fineTook = Infinity; // the last preview with all pixels
+  #block = BLOCKS[0];
+  #slow = 0; // coarse previews in a row that took long
   #drawing = null; // the preview on its way, unless it is of a state that has gone
   #touched = 0; // when a value, or the hand on it, last changed
   #changed = 0; // when the state last changed
@@ -35,6 +39,7 @@ export class Schedule {
   /** Something is dragged from now on, or no more. */
   hold(held, now) {
     if (this.held && !held) this.outdate();
+    if (this.held !== held) this.#setBlock(BLOCKS[0]);
     this.held = held;
     this.#touched = now;
   }
@@ -49,18 +54,35 @@ export class Schedule {
     return isEnough ? { act: 'wait', milliseconds: LOOK } : { act: 'trace' };
   }
 
-  /** Begins a preview: `coarse` while something is dragged, and at first where the last fine one took long. */
+  /**
+   * Begins a preview: `coarse` while something is dragged, and at first where the last fine one took long. A `block` of
+   * its pixels, along both axes, is one.
+   */
   beginPreview(now) {
-    this.#drawing = { coarse: this.held || (!this.#coarse && this.#fineTook > SLOW), begun: now };
+    const coarse = this.held || (!this.#coarse && this.#fineTook > SLOW);
+    this.#drawing = { coarse, block: coarse ? this.#block : 1, begun: now };
     return this.#drawing;
   }
 
   endPreview(drawing, now) {
-    if (!drawing.coarse) this.#fineTook = now - drawing.begun;
+    const took = now - drawing.begun;
+    if (drawing.coarse) this.#pace(took);
+    else this.#fineTook = took;
     this.frames = [...this.frames.slice(-FRAMES), now];
     if (this.#drawing !== drawing) return; // the state has changed meanwhile
     this.#coarse = drawing.coarse && !this.held;
     this.previewed = this.#coarse ? 0 : now;
+  }
+
+  /** Takes larger blocks where two coarse previews have taken long, one after the other. */
+  #pace(took) {
+    this.#slow = took > FLUENT ? this.#slow + 1 : 0;
+    if (this.held && this.#slow > 1 && this.#block < BLOCKS[1]) this.#setBlock(this.#block + 1);
+  }
+
+  #setBlock(block) {
+    this.#block = block;
+    this.#slow = 0;
   }
 
   /** Whether there is nothing to do but to trace paths. */

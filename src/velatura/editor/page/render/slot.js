@@ -10,7 +10,7 @@ import { sobol } from './sobol.js';
 export class Slot {
   device;
   shader = null; // the answer of call("shader")
-  contents = null; // {values by flat name, solution}, as call("values") has them
+  contents = null; // {values by flat name, solution}, as call("values") has them; maybe `coarse`, for previews alone
   lobe = null; // the one that is shown alone, by its number
   samples = 0;
   preview = null; // the target that it is drawn to
@@ -136,16 +136,17 @@ export class Slot {
 
   /**
    * Draws the preview of the contents of a G-buffer; all around the object stays as it is until the view changes, and the
-   * object while nothing of it does.
+   * object while nothing of it does. A `block` of pixels, along both axes, is one.
    */
-  drawPreview(gbuffer, uniforms, coarse) {
+  drawPreview(gbuffer, uniforms, block) {
+    const coarse = block > 1;
     if (this.#drawn === 'fine' || (this.#drawn && coarse)) return;
     this.#drawn = coarse ? 'coarse' : 'fine';
     const shade = this.shades[0].textures[0];
     if (!this.#surrounded) gbuffer.drawSurroundings({ ...uniforms, shade }, this.preview);
     this.#surrounded = true;
     if (this.#outdated) this.warm(gbuffer, { ...uniforms, shade });
-    gbuffer.drawObject(this.#lighting, { ...this.uniforms(coarse), ...uniforms, shade }, this.preview, coarse);
+    gbuffer.drawObject(this.#lighting, { ...this.uniforms(coarse), ...uniforms, shade }, this.preview, block);
   }
 
   /** Draws a pixel of the object, where this was never done by the same program. */

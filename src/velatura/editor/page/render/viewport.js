@@ -105,7 +105,7 @@ export class Viewport {
     this.slots[slot].forget();
   }
 
-  /** Other values of the same material: nothing is compiled. */
+  /** Other values of the same material: nothing is compiled. Of `coarse` ones no paths are traced. */
   setContents(slot, contents) {
     this.slots[slot].setContents(contents);
     this.#changed();
@@ -352,7 +352,8 @@ export class Viewport {
     if (!hasObject || !hasLight || this.#seen().some((slot) => !slot.shader)) return this.#sleep(RETRY);
     const { act, milliseconds } = this.schedule.next(performance.now(), this.samples);
     if (act === 'preview') return this.#drawPreview();
-    return act === 'trace' ? this.#trace() : this.#sleep(milliseconds);
+    if (act === 'wait') return this.#sleep(milliseconds);
+    return this.#seen().some((slot) => slot.contents.coarse) ? this.#sleep(RETRY) : this.#trace();
   }
 
   /** Until so much time has gone, or something has changed. */
@@ -369,7 +370,7 @@ export class Viewport {
   async #drawPreview() {
     const uniforms = this.uniforms(), drawing = this.schedule.beginPreview(performance.now());
     this.gbuffer.update(uniforms.camera_projection);
-    for (const slot of this.#seen()) slot.drawPreview(this.gbuffer, uniforms, drawing.coarse);
+    for (const slot of this.#seen()) slot.drawPreview(this.gbuffer, uniforms, drawing.block);
     this.#show();
     this.schedule.endPreview(drawing, await this.device.done());
   }

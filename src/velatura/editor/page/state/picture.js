@@ -88,7 +88,7 @@ class Slot {
       this.#moved = null;
       try {
         const contents = await this.#services.call('values', question);
-        if (shape === this.drawn && !this.#settled) this.#setContents(contents, state);
+        if (shape === this.drawn && !this.#settled) this.#setContents({ ...contents, coarse: true }, state);
       } catch {
         // The reason is shown when the shader is asked for, after a pause
       }

@@ -3,9 +3,6 @@
 import { camera } from './camera.glsl.js';
 import { blurredEnvironment } from './environment.glsl.js';
 
-/** Pixels of the picture, along both axes, that are one while something is dragged. */
-export const COARSE = 2;
-
 const SAMPLES = 3; // of a lobe
 const FEWER = 2; // where pixels are fewer, too
 const LARGE = 0.2; // share of the energy up to which one sample of a lobe is enough
@@ -114,14 +111,15 @@ precision highp float;
 uniform highp sampler2D seen_normal;
 uniform highp sampler2D seen_tangent;
 uniform highp sampler2D seen_uv;
+uniform int seen_every;
 layout(location = 0) out vec4 coarse_normal;
 layout(location = 1) out vec4 coarse_tangent;
 layout(location = 2) out vec2 coarse_uv;
 
 void main() {
-  ivec2 first = ${COARSE} * ivec2(gl_FragCoord.xy), last = textureSize(seen_normal, 0) - 1, found = first;
-  for (int k = ${COARSE * COARSE} - 1; k >= 0; k--) {
-    ivec2 pixel = min(first + ivec2(k % ${COARSE}, k / ${COARSE}), last);
+  ivec2 first = seen_every * ivec2(gl_FragCoord.xy), last = textureSize(seen_normal, 0) - 1, found = first;
+  for (int k = seen_every * seen_every - 1; k >= 0; k--) {
+    ivec2 pixel = min(first + ivec2(k % seen_every, k / seen_every), last);
     if (texelFetch(seen_normal, pixel, 0).w == 1.0) found = pixel;
   }
   coarse_normal = texelFetch(seen_normal, found, 0);
@@ -135,11 +133,12 @@ export const spreading = /* glsl */ `#version 300 es
 precision highp float;
 uniform highp sampler2D coarse_light; // 0 where the object is not, in A, too
 uniform highp sampler2D seen_normal;
+uniform int seen_every;
 out vec4 radiance;
 
 void main() {
   if (texelFetch(seen_normal, ivec2(gl_FragCoord.xy), 0).w != 1.0) discard;
-  vec4 light = texture(coarse_light, gl_FragCoord.xy / (${COARSE}.0 * vec2(textureSize(coarse_light, 0))));
+  vec4 light = texture(coarse_light, gl_FragCoord.xy / (float(seen_every) * vec2(textureSize(coarse_light, 0))));
   radiance = vec4(light.rgb / light.a, 1.0);
 }
 `;
