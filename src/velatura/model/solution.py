@@ -212,11 +212,13 @@ class Solver:
         if self.model.form == "forward":
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
-        numbers = self._numbers(material, found, layouts)
-        factors, wanted = exchange.factors(
-            numbers, self.grid.directions, self.grid.shares, self.grid.count, self.samples
-        )
-        return [side.weighed(*each) for side, each in zip(found, zip(factors, wanted))]
+        numbers, folded = self._numbers(material, found, layouts), Folded.of(self.grid, material)
+        factors, wanted = exchange.factors(numbers, folded.directions, folded.shares, folded.count, self.samples)
+        spread = folded.everywhere
+        return [
+            side.weighed(list(map(spread, each)), Wanted(*map(spread, of)))
+            for side, each, of in zip(found, factors, wanted)
+        ]
 
     def _numbers(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
         """The BSDF in NumPy."""

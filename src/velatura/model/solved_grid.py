@@ -147,9 +147,19 @@ class Folded:
     def _of(self, values: Array) -> Array:
         return values.reshape(-1, self.grid.turns)[:, self.kept].ravel()
 
+    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
+        """As those of the grid, of these directions: where what is interpolated looks alike in mirrors."""
+        places = np.arange(self.grid.cosines)[:, None] * len(self.kept) + self.source
+        return [(places.ravel()[index], share) for index, share in self.grid.shares(w)]
+
     def around(self, values: Array) -> Array:
         """Values for cosines, (..., cosines), at all of these directions."""
         return np.repeat(values, len(self.kept), axis=-1)
+
+    def everywhere(self, values: Array) -> Array:
+        """Values at these directions, (..., count), that look alike in mirrors, at all of the grid."""
+        found = values.reshape(*values.shape[:-1], self.grid.cosines, len(self.kept))[..., self.source]
+        return found.reshape(*values.shape[:-1], self.grid.count)
 
     def unfolded(self, columns: Columns) -> Columns:
         """Columns at these directions, at all of the grid. Matrices are of the frame of the plane of incidence, where
@@ -162,8 +172,7 @@ class Folded:
                 return type(values)(each(x) for x in values)
             if isinstance(values, Parts):
                 return Parts(*(each(x) for x in vars(values).values()))
-            found = values.reshape(*values.shape[:-1], self.grid.cosines, len(self.kept))[..., self.source]
-            return found.reshape(*values.shape[:-1], self.grid.count)
+            return self.everywhere(values)
 
         found = Columns(*(each(x) for x in vars(columns).values()))
         if self.grid.isotropic:
