@@ -352,7 +352,8 @@ class Solver:
                 rows[there] = self._between(shape, weight, roughness, rows[there])
         energies, others = ([slice(k, k + self.colours) for k in places] for places in side.light)
         whole = self.grid.spread(np.sum([side.rows[each] for each in energies], axis=0), self.shape)
-        share = ops.divide(whole, np.sum([rows[each] for each in energies], axis=0))
+        # One share for all colours, so that what is grey stays so
+        share = ops.divide(ops.mean(whole), ops.mean(np.sum([rows[each] for each in energies], axis=0)))
         for each in (*energies, *others):
             rows[each] *= np.where(share > 0, share, 1)
         left = self.grid.spread(side.columns.chance[None], self.shape)

@@ -88,10 +88,10 @@ class Columns:
 
     @property
     def all(self) -> list[Value]:
-        """In the order in which they are read; the chance of the remainder is what the others leave."""
-        lobes = zip(self.weights, self.energies, self.roughness, self.chances)
-        found = [x for weight, energy, roughness, chance in lobes for x in (weight, energy, *roughness, chance)]
-        found += [self.scale, self.rest]
+        """In the order in which they are read, those of densities first; the chance of the remainder is what the others
+        leave."""
+        found = [x for roughness, chance in zip(self.roughness, self.chances) for x in (*roughness, chance)]
+        found += [*self.weights, self.scale, *self.energies, self.rest]
         if self.passes:
             found += [*vars(self.passes).values(), self.passed]
         return found
@@ -129,13 +129,12 @@ class Side:
         def number() -> Value:
             return ops.channel(next(channels))
 
-        weights, roughness, chances, found = [], [], [], []
+        roughness, chances = [], []
         for _ in self.shapes:
-            weights.append(colour())
-            found.append(colour())
             roughness.append(tuple(number() for _ in fields(self.kind)))
             chances.append(number())
-        scale, rest = colour(), colour()
+        weights, scale = [colour() for _ in self.shapes], colour()
+        found, rest = [colour() for _ in self.shapes], colour()
         passes, through, chance = None, None, 1 - sum(chances)
         if self.passage:
             passes = Parts(colour(), colour(), colour(), *(number() for _ in range(len(fields(Parts)) - 3)))
