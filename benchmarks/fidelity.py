@@ -17,8 +17,8 @@ Columns, means over stacks and directions of incidence:
 - spread, heaviest: variance of the weight of samples over the square of their mean, and the greatest weight.
 
 Light that is less than .02 of what comes in is left out, of what passes less than .03. Last, a solid sphere of rough
-glass in a white furnace, of index 1.5: the energy that comes out, after 40 meetings with its surface at most, and the
-relative variance of a path's weight, beside those of `roughdielectric`.
+glass in a white furnace, of index 1.5: the energy that comes out, after 40 meetings with its surface at most, what is
+still inside then, and the relative variance of a path's weight, beside those of `roughdielectric`.
 """
 
 from __future__ import annotations
@@ -216,8 +216,9 @@ def _variation(difference: Array, true: Array) -> float:
 # Glass ---------------------------------------------------------------------------------------------------------------
 
 
-def furnace(bsdf: Any) -> tuple[float, float]:
-    """Energy that comes out of a solid sphere, lit evenly, and the relative variance of a path's weight.
+def furnace(bsdf: Any) -> tuple[float, float, float]:
+    """Energy that comes out of a solid sphere, lit evenly, what is still inside, and the relative variance of a path's
+    weight.
 
     A chord makes the same angle with the normal at both ends, and an isotropic surface has no azimuth, so that light
     meets the surface next as it left it last.
@@ -237,11 +238,11 @@ def furnace(bsdf: Any) -> tuple[float, float]:
         path, weight, w = path[on], weight[on], drawn.wo[on]
         if not len(path):
             break
-    return float(out.mean()), float(out.var() / out.mean() ** 2)
+    return float(out.mean()), float(weight.sum() / IN_GLASS), float(out.var() / out.mean() ** 2)
 
 
 def spheres(model: str, switches: dict[str, str]) -> dict[str, dict[str, list[float]]]:
-    """By name of what is in the furnace and alpha: energy that comes out, and variance."""
+    """By name of what is in the furnace and alpha: what `furnace` returns."""
     mi = kernel.mitsuba()
     found: dict[str, dict[str, list[float]]] = {}
     for alpha in GLASS:
@@ -293,9 +294,10 @@ def printed(table: dict[str, dict[str, float]], glass: dict[str, dict[str, list[
             f" {row['own noise']:.3f}  {row['albedo']:.4f} {goals[1]:8s}{row['worst']:.3f} {goals[2]:8s}"
             f"{row['its noise']:.4f} {row['spread']:6.2f} {row['heaviest']:7.2f}"
         )
-    print(f"\n{'sphere of glass in a white furnace':52s}" + "".join(f"   alpha {a:g}" for a in GLASS))
+    print(f"\n{'sphere of glass in a white furnace':52s}" + "".join(f"{f'alpha {a:g}':>21s}" for a in GLASS))
     for name, found in glass.items():
-        print(f"{name:52s}" + "".join(f"  {energy:.3f} {spread:5.2f}" for energy, spread in found.values()))
+        columns = (f"  {energy:.3f} {inside:.4f} {spread:5.2f}" for energy, inside, spread in found.values())
+        print(f"{name:52s}" + "".join(columns))
 
 
 def main() -> None:

@@ -2,8 +2,8 @@
 
 Three systems of layers share their interfaces. In the first, light meets all that there is. In the others a lobe has
 the light that meets one facet of each interface and is not scattered by media (sharp), or is scattered by little (its
-veil). Of light that meets facets of its interface again it has a share: all where nothing above it refracts. What the
-first system reflects besides is the remainder.
+veil). Of light that meets facets of its interface again it has a share: all where nothing above it refracts, and little
+inside a denser medium. What the first system reflects besides is the remainder.
 """
 
 from __future__ import annotations
@@ -181,11 +181,14 @@ def _ended(found: list[Part]) -> list[Part]:
 
 def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
     """Share of the light that meets facets of an interface again, and that no step of the index above takes from its
-    lobe, by the number of the interface among the layers."""
+    lobe, by the number of the interface among the layers.
+
+    Facets inside a denser medium make such light diffuse, but for its axes, which the remainder has not.
+    """
     shares, steps = {}, 0.0
     for i, part in enumerate(found):
         if isinstance(part, Facets):
-            shares[i] = float(np.exp(-steps / UNDISTURBED))
+            shares[i] = float(np.exp(-steps / UNDISTURBED)) * (part.brushed if part.is_exit else 1.0)
             steps += part.step
     return shares
 

@@ -56,6 +56,16 @@ class Facets:
         return self.below is None or self.k is not None
 
     @property
+    def is_exit(self) -> bool:
+        """Whether it may reflect all light, of a denser medium above."""
+        return not self.opaque and self.below is not None and bool(ops.mean(self.below) < ops.mean(self.above))
+
+    @property
+    def brushed(self) -> float:
+        """0 for isotropic facets, towards 1 for those that are long along an axis."""
+        return 1 - min(self.alpha_u, self.alpha_v) / max(self.alpha_u, self.alpha_v, ALPHA_MIN)
+
+    @property
     def is_smooth(self) -> bool:
         """Whether it changes no direction."""
         stepless = not self.opaque and bool((self.above == self.below).all())
