@@ -19,7 +19,7 @@ from velatura.inverse.drag import Bound, DraggedStack, pinned, plain, seen
 from velatura.inverse.explain import Direction, digits, distance
 from velatura.inverse.interface import ENERGY_MIN, Choice
 from velatura.inverse.partial_stack import Array, Layers
-from velatura.inverse.stacks import Solution
+from velatura.inverse.stacks import Partial, Solution
 from velatura.inverse.target import BLUR, Target
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
@@ -33,7 +33,7 @@ READINGS = 60  # to find ways out, as interfaces that are read
 LEAST_READINGS, MOST_READINGS = 5, 8  # of stacks, for one way
 KEPT = 1e-6  # by which what is fixed may be missed
 SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
-TRIES, FEWER = 4, 2  # stacks that are begun with, of all that are found; where none has the lobes of the wish
+TRIES, OWN, FEWER = 6, 4, 2  # stacks that are begun with; those that have the lobes of one target; where none has
 SAME = 0.03  # logarithm by which models differ about the energy of an index
 MISSED = 1e-4  # energy or variance that is mentioned
 SMALL = 0.01  # variance that is added to that of a goal, for units in which it is missed
@@ -58,13 +58,30 @@ def _approaching(target: Target, model: Model) -> Iterator[Solution]:
 
 
 def _of(start: Target, model: Model, efforts: Sequence[tuple[int, int]]) -> Iterator[Solution] | None:
-    """Stacks with the lobes of a start: preferred ones, then ones from all over. None if there are none."""
+    """Stacks with the lobes of a start: the preferred ones of either side, then ones from all over. None if there are
+    none."""
     paths = stacks.found(_as_fixed(start, model), model, efforts)
     if not paths:
         return None
     order = np.argsort(paths.cost, kind="stable")
-    some = np.unique(np.linspace(0, len(order) - 1, TRIES - 1, dtype=int))
+    _, first = np.unique(_sides(start, paths)[order], return_index=True)
+    spread = np.linspace(0, len(order) - 1, OWN, dtype=int)
+    some = list(dict.fromkeys([*sorted(first), *spread]))[:OWN]
     return stacks.solutions(start, model, paths, order[some].tolist())
+
+
+def _sides(target: Target, paths: Partial) -> Array:
+    """Which lobes end in an interface denser than what is above it, of N stacks, as bits, (N,).
+
+    No step leads from one side to the other.
+    """
+    sides, above = np.zeros(len(paths.cost), int), np.array(target.exterior)
+    last = np.cumsum([lobe.interfaces for lobe in target.lobes]) - 1
+    for n, part in enumerate(paths.layers):
+        if part.kind == "dielectric":
+            sides = 2 * sides + (part.eta > above)[0] * (n in last)
+            above = part.eta
+    return sides
 
 
 def moved(found: Solution, target: Target, model: Model, giving: bool = True) -> Solution | Bound:
@@ -229,7 +246,8 @@ def starts(wish: Target) -> Iterator[Target]:
             grey = k == 0 and lobe.interfaces == 1 and lobe.base == "dielectric"
             energy = (float(np.mean(lobe.colour)),) * 3 if grey else lobe.colour
             start = start.with_lobe(k, energy=tuple(scale * e for e in energy)).with_variance(k, s)
-        yield start
+        if distance(wish, start) > SAID:
+            yield start
 
 
 def _as_fixed(target: Target, model: Model) -> Target:

@@ -301,6 +301,10 @@ def extended(
         if pinned is None and lobe.fixed.of("alpha", 1) is not None:
             index, eta = _of_fixed_roughness(paths, lobe, _variance(paths, lobe), choice, tried)
         paths, energy = with_upper(paths.take(index), lobe, target, eta[None], pinned_above(lobe))
+        possible = np.broadcast_to(paths.layers[-1].feasible, paths.cost.shape)
+        if possible.any():  # what the others leave takes long to solve for
+            kept = np.flatnonzero(possible)
+            paths, energy = paths.take(kept), take(energy, kept, len(possible))
 
     # Take either index of the interface that gives what is left
     if choice.kind == "dielectric" and choice.eta is None:

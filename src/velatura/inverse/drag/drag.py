@@ -36,6 +36,7 @@ from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
+ASIDE = 0.02  # by which free choices change to lead past a jump
 SAME = 1e-6  # energies and roughnesses that are as asked
 FAR = 0.1  # share of a wish that is a long way
 
@@ -231,7 +232,27 @@ class DraggedStack:
         """
         problem = self._problem(self._wanted(wish))
         found = self._met(problem) if giving else problem.solve()
-        return self._at(found).renamed(wish) if isinstance(found, Solution) else found
+        if isinstance(found, Bound):
+            return found
+        met = self._at(found).renamed(wish)
+        if self.model.recursion.closed_form or met.missed(wish) < SAME:
+            return met
+        beside = met._beside()
+        other = beside and beside._problem(problem.goal).solve()
+        if beside is None or not isinstance(other, Solution):
+            return met
+        return min(met, beside._at(other).renamed(wish), key=lambda stack: stack.missed(wish))
+
+    def _beside(self) -> DraggedStack | None:
+        """The stack with free choices a little off, which leads past a jump of readings; None without any."""
+        x = self.point.x.copy()
+        for own in self.interfaces:
+            if own.depth is not None:
+                x[own.depth] += ASIDE
+            if own.log_index is not None and self.target.lobes[own.lobe].fixed.of("eta", 0) is None:
+                x[own.log_index] += ASIDE if x[own.log_index] < ASIDE else -ASIDE
+        x = self.space.clipped(x)
+        return None if np.array_equal(x, self.point.x) else dataclasses.replace(self, point=Point(self.space, x))
 
     def nearest(self, wish: Target, loose: Sequence[tuple[int, str]], readings: int) -> DraggedStack:
         """The stack whose lobes come nearest to a target of the same form, and that keeps what is fixed there.

@@ -18,6 +18,7 @@ SLOW_ROUNDS, PATIENCE = 16, 3  # for models that are slow: of Broyden's method, 
 # Of lobes with axes, whose readings wind: what those rounds may miss where differences of the model itself follow,
 # rounds with these, shares of a step that are tried, and what may be missing in the end
 NEAR, MEASURED, STEPS, WINDING = 0.05, 4, (1.0, 0.3), 1e-3
+JUMP = 3e-4  # what may be missing of other lobes in the end, since readings jump where nodes are shared out anew
 NEARER, SLOW_PATIENCE = 0.8, 5  # share of what was missing that is nearer, and such rounds without any
 
 
@@ -73,7 +74,8 @@ class Problem:
             # Near, one step ends the search; from further off, where readings wind, the way leads on
             if (nearest.missing > ALMOST) == space.winds:
                 self._approach(nearest)
-            if nearest.missing < (WINDING if space.winds else ALMOST) and not space.broken(nearest.x, None):
+            enough = WINDING if space.winds else JUMP if found.reason in UNMET else ALMOST
+            if nearest.missing < enough and not space.broken(nearest.x, None):
                 return Solution(Point(space, nearest.x), 1.0)
         return found
 
