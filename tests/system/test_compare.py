@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tmm
 
 import velatura as vt
 from velatura.comparison import Comparison, Pictures, save_figure
@@ -132,6 +133,29 @@ def test_the_baseline_is_further_from_the_truth_than_the_model(run: Run, tmp_pat
     assert float(baseline[2]) > 3 * float(model[2])
 
 
+def test_what_leaving_out_polarisation_costs() -> None:
+    """Both truths against the exact sums for a smooth stack, 2 over 1 + 1i: with polarisation that of `tmm`, and
+    without it 3.5 % more at 60 degrees."""
+    stack = Stack([Interface(eta=2.0), Interface(eta=1.0, k=1.0)])
+    told: list[tuple[int, int]] = []
+    found = vt.compare(stack, ["velatura"], [1.0, 0.5], 100_000, polarised=True, progress=lambda *at: told.append(at))
+    assert told[-1] == (12, 12) and found.polarised and list(found.models) == ["velatura", "unpolarised"]
+    exact = [
+        np.mean(
+            [
+                tmm.inc_tmm(kind, [1, 2, 1 + 1j], [np.inf, 1e6, np.inf], ["i"] * 3, np.arccos(c), 500)["R"]
+                for kind in "sp"
+            ]
+        )
+        for c in found.cos_theta
+    ]
+    np.testing.assert_allclose(found.truth.albedo[0], exact, atol=4.5 * found.albedo_error.max())
+    ratio = found.models["unpolarised"].albedo[0] / found.truth.albedo[0]
+    np.testing.assert_allclose(ratio, [1, 1.035], atol=0.006)
+    assert found.total_variation["unpolarised"][0] < 1e-3 < 0.01 < found.total_variation["unpolarised"][1]
+    assert found.to_dict()["polarised"] and "unpolarised" in found.to_dict()["models"]
+
+
 # Forms of the result
 
 
@@ -142,7 +166,7 @@ def assert_schema(report: dict, names: list[str], directions: int) -> None:
         assert set(entry) == {*parts, "rotation"} and len(entry["rotation"]) == directions
         assert all(np.shape(entry[key]) == (directions, size) for key, size in parts.items())
 
-    assert set(report) == {"material", "cos", "paths", "microsurface", "truth", "models"}
+    assert set(report) == {"material", "cos", "paths", "microsurface", "polarised", "truth", "models"}
     errors = report["truth"]["standard_error"]
     for account in (report["truth"], *report["models"].values(), errors):
         assert list(account["lobes"]) == names
@@ -165,9 +189,9 @@ def test_command_line(run: Run, tmp_path: Path) -> None:
     assert report["paths"] == 20000 and report["models"]["belcour2018"]["rmse"] is None
     assert figure.read_bytes().startswith(b"\x89PNG") and list(tmp_path.iterdir()) == [figure]
 
-    status, out, err = run("compare", "frosted-glass", "--paths", "20000", "--cos", "0.7")
+    status, out, err = run("compare", "frosted-glass", "--paths", "20000", "--cos", "0.7", "--polarised")
     assert status == 0, err
-    assert all(word in out for word in ("truth", "belcour2018", "R1", "T", "total variation"))
+    assert all(word in out for word in ("truth", "unpolarised", "belcour2018", "R1", "T", "total variation"))
 
 
 def test_pictures_have_an_error_and_a_place_in_the_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -207,6 +231,8 @@ def test_the_error_of_a_picture_is_a_root_mean_square() -> None:
         (["--cos", "0"], "cos"),
         (["--cos", "1,x"], "--cos"),
         (["--paths", "1"], "--paths"),
+        (["--polarised", "--pictures"], "pictures: not with polarised"),
+        (["--polarised", "--models", "unpolarised"], "unpolarised is the name of the truth"),
         (["--set", "channels=separate"], "channels=separate"),
         (["--set", "tir=maybe"], "tir"),
         (["--plot", "figure.jpeg2"], "figure.jpeg2"),

@@ -43,6 +43,13 @@ def compare(
             help="In the truth, let light scatter many times between microfacets; default: if a model does.",
         ),
     ] = None,
+    polarised: Annotated[
+        bool,
+        typer.Option(
+            "--polarised",
+            help="Follow polarisation in the truth, and report what leaving it out costs; not with --pictures.",
+        ),
+    ] = False,
     plot: Annotated[Path | None, typer.Option(metavar="F", help="A figure of the results (PNG, PDF or SVG).")] = None,
     pictures: Annotated[
         bool, typer.Option("--pictures", help="Also render spheres, for their errors and the figure.")
@@ -67,6 +74,7 @@ def compare(
             seed,
             microsurface,
             pictures=pictures,
+            polarised=polarised,
             progress=advance,
             **switches,
         )

@@ -18,6 +18,9 @@ Array = NDArray[np.floating]
 #: Lobes of less energy (mean of the colours) do not count in `Comparison.roughness_error`.
 ENERGY_MIN = 1e-3
 
+#: Name of the truth without polarisation, beside one with it.
+UNPOLARISED = "unpolarised"
+
 # A lobe's quantities, and whether their components (rgb, uv, ...) stand before the directions.
 _FIELDS = {"energy": True, "alpha": True, "rotation": False, "mean": True, "covariance": True}
 
@@ -73,8 +76,9 @@ class Comparison:
 
     name: of the material; lobe_names: "R1", "R2", ... from the top, "D" for a diffuse base, "T" for what is
     transmitted; cos_theta: the N cosines of incidence; paths: of the truth, for each; microsurface: whether light
-    scatters many times between its facets; standard_error: of the truth's lobes, in their order; noise (N,): the part
-    of a total variation that is the truth's own noise.
+    scatters many times between its facets; polarised: whether the truth's facets polarise it, with the truth that
+    leaves this out among the models, as `UNPOLARISED`; standard_error: of the truth's lobes, in their order; noise
+    (N,): the part of a total variation that is the truth's own noise.
     """
 
     name: str
@@ -82,6 +86,7 @@ class Comparison:
     cos_theta: tuple[float, ...]
     paths: int
     microsurface: bool
+    polarised: bool
     truth: Account
     standard_error: tuple[WalkedLobe, ...]
     noise: Array
@@ -145,7 +150,8 @@ class Comparison:
             for name, model in self.models.items()
         }
         about = {"material": self.name, "cos": list(self.cos_theta), "paths": self.paths}
-        return {**about, "microsurface": self.microsurface, "truth": truth, "models": models}
+        kind = {"microsurface": self.microsurface, "polarised": self.polarised}
+        return {**about, **kind, "truth": truth, "models": models}
 
 
 def _account_dict(names: tuple[str, ...], account: Account) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from velatura.comparison import plugins
 from velatura.comparison.evaluated_lobes import account, along
 from velatura.comparison.pictures import pictures as spheres
 from velatura.comparison.plugins import Plugin
-from velatura.comparison.result import Account, Comparison
+from velatura.comparison.result import UNPOLARISED, Account, Comparison
 from velatura.comparison.truth import truth as walked
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
@@ -31,6 +31,7 @@ def compare(
     microsurface: bool | None = None,
     pictures: bool = False,
     progress: Progress | None = None,
+    polarised: bool = False,
     **switches: str,
 ) -> Comparison:
     """Energies, roughnesses and distributions of a material by several models, against random walks through it.
@@ -50,6 +51,8 @@ def compare(
             that it does if the reflectance of a model counts that.
         pictures: whether to render spheres as well.
         progress: called with (steps done, all steps) now and then.
+        polarised: whether the truth follows polarisation. The truth that leaves it out is then one of the models,
+            "unpolarised", and its errors are what leaving it out costs. Not with `pictures`, which leave it out.
 
     Raises:
         InvalidInput: not a valid material, an unknown model or switch, a value outside its range, a texture.
@@ -62,9 +65,13 @@ def compare(
         microsurface = any(isinstance(m, Model) and m.microsurface for m in asked)
     if paths < 2:
         raise InvalidInput(f"paths: must be at least 2, got {paths}")
+    if polarised and pictures:
+        raise InvalidInput("pictures: not with polarised, since they are rendered without polarisation")
     names = [m.name if isinstance(m, Model) else plugins.name_of(m) for m in asked]
     if not names:
         raise InvalidInput("models: name at least one")
+    if polarised and UNPOLARISED in names:
+        raise InvalidInput(f"models: with polarised, {UNPOLARISED} is the name of the truth without polarisation")
     if len(set(names)) < len(names):
         raise InvalidInput(f"models: {max(names, key=names.count)} is given twice")
     if switches and not any(isinstance(m, Model) for m in asked):
@@ -77,14 +84,17 @@ def compare(
         name: account(described, cos_theta, m) if isinstance(m, Model) else plugins.account(m, described, cos_theta)
         for name, m in chosen.items()
     }
-    advance = _counter(progress, 3 * len(cos_theta) + (len(chosen) + 2) * pictures)
-    truth, error, noise = walked(described, cos_theta, paths, seed, microsurface, advance)
+    advance = _counter(progress, 3 * len(cos_theta) * (1 + polarised) + (len(chosen) + 2) * pictures)
+    truth, error, noise = walked(described, cos_theta, paths, seed, microsurface, polarised, advance)
+    if polarised:
+        modelled[UNPOLARISED], *_ = walked(described, cos_theta, paths, seed, microsurface, False, advance)
     return Comparison(
         name=described.name,
         lobe_names=_lobe_names(described),
         cos_theta=tuple(float(c) for c in cos_theta),
         paths=paths,
         microsurface=microsurface,
+        polarised=polarised,
         truth=truth,
         standard_error=error,
         noise=noise,

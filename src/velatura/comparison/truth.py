@@ -17,7 +17,13 @@ Array = NDArray[np.floating]
 
 
 def truth(
-    stack: Stack, cos_theta: Sequence[float], paths: int, seed: int, microsurface: bool, advance: Callable[[], None]
+    stack: Stack,
+    cos_theta: Sequence[float],
+    paths: int,
+    seed: int,
+    microsurface: bool,
+    polarised: bool,
+    advance: Callable[[], None],
 ) -> tuple[Account, tuple[WalkedLobe, ...], Array]:
     """The truth's account, the standard errors of its lobes, and the noise of its distribution as a total variation.
 
@@ -29,11 +35,13 @@ def truth(
     # One direction at a time, so that progress is reported and memory is bounded
     each, halves = [], []
     for cosine in cos_theta:
-        each.append(reference.statistics(stack, cosine, 0.0, paths, seed, microsurface))
+        each.append(reference.statistics(stack, cosine, 0.0, paths, seed, microsurface, polarised))
         advance()
         pair = []
         for half in (1, 2):
-            found = reference.distribution(stack, cosine, 0.0, paths // 2, seed + half, microsurface)
+            found = reference.distribution(
+                stack, cosine, 0.0, paths // 2, seed + half, microsurface, polarised=polarised
+            )
             pair.append(found.reflected[:, 0])
             advance()
         halves.append(pair)

@@ -78,12 +78,13 @@ def _part(layers: Layers, wi: Array, count: int, seed: int, start: int, polarise
     # Look at the ends
     cut_off = dr.select(path.alive, dr.mean(path.weight), 0)
     weight = dr.select(path.alive, 0, path.weight)
-    dr.eval(path.w, weight, path.deepest, cut_off)
-    w = np.stack([component.numpy() for component in path.w])
-    stokes = None
+    parts = []
     if path.light is not None:
         light = path.light.along(path.w, horizontal(path.w))
-        stokes = np.stack([(weight * part).numpy() for part in (light.q, light.u, light.v)])
+        parts = [weight * part for part in (light.q, light.u, light.v)]
+    dr.eval(path.w, weight, path.deepest, cut_off, parts)
+    w = np.stack([component.numpy() for component in path.w])
+    stokes = np.stack([part.numpy() for part in parts]) if parts else None
     return Ends(w, weight.numpy(), path.deepest.numpy(), float(cut_off.numpy().mean()), stokes)
 
 
