@@ -504,7 +504,7 @@ def test_a_material_that_is_no_target_says_why(visit: Open) -> None:
     open_material(page, "Frosted glass pane")
     page.page.get_by_label("Thin pane").click()
     look = panel(page)
-    look.locator(".says", has_text="a target has no such last index").wait_for()
+    look.locator(".says", has_text="turn thin off to drag them").wait_for()
     assert look.locator(".lobe").count() == 2
     assert "dielectric" in look.locator(".lobe").last.inner_text()
     assert look.get_by_label("Blur, slider").is_disabled()

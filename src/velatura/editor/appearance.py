@@ -85,6 +85,8 @@ def described(target: Target) -> Answer:
 def appearance(body: Body) -> Answer:
     """A material as a target; if it is not one, `says` is the reason, and the target is for display only."""
     stack, model = material_of(body), model_of(body)
+    if varies := _varies(stack):
+        return _shown(stack, model, varies)
     try:
         parts = plain(stack)
     except InvalidInput as error:
@@ -109,6 +111,16 @@ def appearance(body: Body) -> Answer:
         "held": _held_back(target, whole.scatters),
         "says": None,
     }
+
+
+def _varies(stack: Stack) -> str | None:
+    """Why lobes are not those of one point, if they are not."""
+    last = len(stack.layers) - 1 if stack.base else None
+    for address, value in stack.values():
+        if isinstance(value, Varying) and address.layer not in (None, last):
+            own = "so that every point of the surface has lobes of its own; give it one value to drag them"
+            return f"layer {address.layer}: has a {value.what}, {own}"
+    return None
 
 
 def _variances(target: Target, model: Model) -> list[float]:

@@ -466,7 +466,9 @@ def plain(stack: Stack) -> list[Layers]:
         InvalidInput: a layer that no target can have, in one line.
     """
     if stack.thin:
-        raise InvalidInput("thin: a pane ends in the index outside; a target has no such last index")
+        raise InvalidInput(
+            "thin: behind a pane is what lies in front, and dragging lobes changes that; turn thin off to drag them"
+        )
     found: list[Layers] = []
     tau: Array | float = 0.0
     scatters: MediumValues | None = None

@@ -194,7 +194,7 @@ export function mountAppearance(element, services) {
     </div>
   </section>`;
 
-  const saying = () => (read.target ? `Its lobes can be seen, but not dragged. ${capital(read.says)}.` : read.says);
+  const saying = () => (read.target ? `Its lobes can be seen, but not dragged. ${capital(read.says)}.` : capital(read.says));
 
   /** The target under the hand: as it is asked for while it is held, else as it is. */
   const underHand = () => ((held || wishes.busy) && asked ? asked : read.target);
