@@ -102,6 +102,15 @@ def test_what_is_drawn_is_the_energy_of_the_layers(name: str) -> None:
             )
 
 
+def test_a_gap_of_air_gains_nothing() -> None:
+    """Between water and a mirror below rough glass: all light is reflected at cosines below .66. To 0.5 %; standard
+    errors are 0.05 % or less."""
+    air, glass = vt.Interface(eta=1.0, alpha=0.0), vt.Interface(eta=1.5, alpha=0.3)
+    stack = vt.Stack([air, glass, vt.Interface(conductor="mirror", alpha=0.005)], exterior=1.33)
+    for cos_theta in (0.9, 0.8):
+        assert albedo(stack, cos_theta, "symmetric").max() < 1.005
+
+
 def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change() -> None:
     import drjit as dr
 

@@ -188,7 +188,11 @@ class Solver:
         """As `of`, in a number of colours that is not that of the renderer's."""
         isotropic = variance is Isotropic
         shape = directional_grid.LINE if isotropic else directional_grid.PLANE
-        return cls(model, variance, Grid.of(isotropic, material), shape, colours, context.tables)
+        grid = Grid.of(isotropic, material)
+        if isotropic and model.form == "symmetric" and material and not material.transmits:
+            # Factors bend where all light from outside is reflected
+            grid = replace(grid, cosines=grid.cosines * (1 + _reflects_all(parts(material))))
+        return cls(model, variance, grid, shape, colours, context.tables)
 
     @property
     def isotropic(self) -> bool:
