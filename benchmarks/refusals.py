@@ -18,8 +18,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from velatura.errors import VelaturaError
-from velatura.inverse import Infeasible, Target, invert_stack
-from velatura.model import DEFAULT
+from velatura.inverse import Infeasible, Target, invert_stack, stacks
+from velatura.inverse.explain import infeasible
+from velatura.model import DEFAULT, named
 
 
 def wish(rng: np.random.Generator, most: int = 3) -> Target:
@@ -45,17 +46,18 @@ def wish(rng: np.random.Generator, most: int = 3) -> Target:
     return Target(lobes)
 
 
-def refused(count: int, seed: int, model: str = DEFAULT, most: int = 3) -> Iterator[tuple[Target, Infeasible, float]]:
-    """Random wishes without a stack, their refusals, and the seconds that these took."""
+def refused(
+    count: int, seed: int, model: str = DEFAULT, most: int = 3
+) -> Iterator[tuple[Target, Infeasible, tuple[float, float]]]:
+    """Random wishes without a stack, their refusals, and the seconds of the search and of the explanation."""
     rng = np.random.default_rng(seed)
     while count:
-        target = wish(rng, most)
-        start = time.process_time()
-        try:
-            invert_stack(target, model)
-        except Infeasible as error:
-            count -= 1
-            yield target, error, time.process_time() - start
+        target, start = wish(rng, most), time.process_time()
+        if stacks.search(target, named(model)):
+            continue
+        count, begin = count - 1, time.process_time()
+        refusal = infeasible(target, named(model))
+        yield target, refusal, (begin - start, time.process_time() - begin)
 
 
 def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | None:
@@ -107,8 +109,9 @@ def main() -> int:
     print(f"{options.model}: {faults} of {options.wishes} refusals are at fault")
     print("reasons:", dict(reasons.most_common()))
     print("nearest:", dict(kinds.most_common()))
-    typical, most = np.quantile(seconds, [0.5, 0.95])
-    print(f"processor: median {typical:.2f} s, 95 % below {most:.2f} s, at most {max(seconds):.2f} s")
+    for name, took in zip(("search", "explanation"), np.transpose(seconds)):
+        typical, most = np.quantile(took, [0.5, 0.95])
+        print(f"{name}, processor: median {typical:.2f} s, 95 % below {most:.2f} s, at most {took.max():.2f} s")
     return int(faults > 0)
 
 

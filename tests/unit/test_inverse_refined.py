@@ -153,6 +153,17 @@ def test_random_refusals_have_ways_out() -> None:
         assert refusals.wrong(target, refusal) is None
 
 
+def test_a_refusal_is_explained_where_no_start_has_the_roughness_that_is_fixed() -> None:
+    """Energies that sum to more than 1, and a first lobe that no stack on the way has."""
+    first = {"energy": (0.2873503, 0.293682, 0.07576605), "alpha": 0.0}
+    pair = {"energy": (0.4796654, 0.4247675, 0.3272766), "alpha": 0.2769960, "interfaces": 2}
+    lobes = [first, {**pair, "fixed": {"alpha": (None, 0.4537447)}}, {"energy": 0.3514613, "alpha": 0.2176515}]
+    with pytest.raises(Infeasible, match="energies sum") as error:
+        invert_stack(lobes, MODEL)
+    assert error.value.nearest is not None
+    invert_stack(error.value.nearest, MODEL)
+
+
 def test_a_search_begins_with_a_given_stack() -> None:
     """Expected: of all stacks that have a lobe the one that is given; another lobe is met near it."""
     target = Target(FIGURES["15 b"])

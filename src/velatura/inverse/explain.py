@@ -211,13 +211,13 @@ class Search:
             known = target.lobes[: n + 1]
             if known in self.followed:
                 paths = self.followed[known]
-                continue
-            paths = stacks.pruned(stacks.extended(paths, lobe, target, spread, n == 0), lobe.interfaces, keep)
-            if n < len(target.lobes) - 1:
-                self.followed[known] = paths
+            else:
+                paths = stacks.pruned(stacks.extended(paths, lobe, target, spread, n == 0), lobe.interfaces, keep)
+                if n < len(target.lobes) - 1:
+                    self.followed[known] = paths
             if not len(paths.cost):
                 return False
-        return bool(len(paths.cost))
+        return True
 
     def nearest(self, ways: Iterable[Way]) -> list[Direction]:
         """The first targets along ways that have a stack, of each description one; the nearest of them."""
