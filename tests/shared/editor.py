@@ -93,7 +93,7 @@ class Visit:
     def __init__(self, page: Any, address: str) -> None:
         self.open.append(self)
         self.page = page
-        page.set_default_timeout(300_000)  # clicks, too, wait for shaders that the processor compiles
+        page.set_default_timeout(90_000)  # clicks, too, wait for shaders that the processor compiles
         self.complaints: list[str] = []
         page.add_init_script(EVERYTHING_OPEN)
         page.on("console", self._listen)
