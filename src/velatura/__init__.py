@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
     from velatura.exports import export
     from velatura.model import MODELS, Model
-    from velatura.stack import Diffuse, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
+    from velatura.stack import Diffuse, Film, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
 
 __version__ = "0.1.0"
 
@@ -38,6 +38,7 @@ _HOMES = {
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": (
         "Diffuse",
+        "Film",
         "Interface",
         "Medium",
         "Spectrum",
@@ -55,6 +56,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "MODELS",
     "Diffuse",
+    "Film",
     "Interface",
     "InvalidInput",
     "LawBroken",

@@ -20,18 +20,23 @@ import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.stack import (
+    RGB,
     Address,
     Brushing,
+    CoatingValues,
     Material,
     Measured,
     Stack,
     Texture,
     addressed,
+    is_of_film,
     load,
     loads,
+    refuse_films,
     spectrum,
     srgb_weights,
 )
+from velatura.stack import coatings as films_of
 from velatura.stack.spectra import VISIBLE_NM
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
@@ -179,7 +184,7 @@ class Binding:
         for name, value in given.items():
             if isinstance(value, mi.Object):
                 found = addressed(name)
-                if not all(address.declared.texturable for address in found):
+                if not all(address.declared.texturable for address in found) or is_of_film(name):
                     raise InvalidInput(
                         f"{name}: must be a number, which is the same everywhere and for all wavelengths"
                     )
@@ -205,6 +210,9 @@ class Binding:
                 self._bind(address, value)
         self.steering: dict[str, Any] = {}
         self.clamped: set[str] = set()
+        self.coatings: tuple[CoatingValues | None, ...] = ()
+        if not mi.is_rgb:
+            refuse_films(self.stack, f"{mi.variant()} has")
         self.update()
 
     @property
@@ -223,6 +231,7 @@ class Binding:
 
         self.constants = {name: self._within_range(name, value) for name, value in self.parameters.items()}
         dr.make_opaque(self.constants)  # a changed value needs no new kernel
+        self.coatings = films_of.of(self.stack, self._index)
         if self.mi.is_spectral:
             si = self._at_fixed_wavelengths(dr.zeros(self.mi.SurfaceInteraction3f))
             flat = [name for name, image in self.images.items() if image.colour and not image.varies]
@@ -252,9 +261,26 @@ class Binding:
             return dr.replace_grad(dr.clip(value, *declared.within), value)
         return value
 
+    def _index(self, name: str, described: Any) -> RGB:
+        """The colour of an index now.
+
+        Raises:
+            InvalidInput: it comes from a texture, or is being differentiated: films are worked out once.
+        """
+        if name in self.images:
+            raise InvalidInput(f"{name}: must be a number or a colour beside thin films")
+        import drjit as dr
+
+        if name not in self.constants:
+            return films_of.as_written(name, described)
+        if dr.grad_enabled(self.constants[name]):
+            raise InvalidInput(f"{name}: has no gradient beside thin films")
+        channels = np.array(dr.detach(self.constants[name]), float).reshape(-1).tolist()
+        return (channels[0], channels[1], channels[2]) if len(channels) >= 3 else (channels[0],) * 3
+
     def material(self, values: Mapping[str, Any]) -> Material:
         """The material with these values by flat name."""
-        return Material.from_flat(self.stack.kinds, values, self.stack.thin)
+        return Material.from_flat(self.stack.kinds, values, self.stack.thin, self.coatings)
 
     def at(self, si: Any, active: Any) -> Material:
         """The material at a surface point."""

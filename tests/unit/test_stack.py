@@ -388,7 +388,7 @@ def test_the_schema_knows_every_key_and_range() -> None:
         for entry, keys in option["properties"].items()
     }
     assert {entry: set(keys) for entry, keys in layers.items()} == {
-        "interface": {"eta", "k", "conductor", "alpha", "rotation"},
+        "interface": {"eta", "k", "conductor", "alpha", "rotation", "films"},
         "medium": {"depth", "sigma_a", "sigma_s", "g"},
         "diffuse": {"albedo"},
     }
@@ -404,6 +404,8 @@ def test_the_schema_knows_every_key_and_range() -> None:
     assert schema["$defs"]["spectrum"]["required"] == ["spectrum"]
     assert "mirror" in layers["interface"]["conductor"]["enum"]
     assert schema["$defs"]["texture"]["required"] == ["texture"]
+    assert schema["$defs"]["film"]["required"] == ["eta", "thickness_nm"]
+    assert layers["interface"]["films"]["items"] == {"$ref": "#/$defs/film"}
     json.dumps(schema)
 
 

@@ -95,7 +95,7 @@ VALUES = {
     # Keys
     one_layer("eta: 1.5, alhpa: 0.1"): "layer 0 (interface): unknown key 'alhpa' (did you mean alpha?)",
     one_layer("eta: 1.5, gloss: 1"): (
-        "layer 0 (interface): unknown key 'gloss' (known: eta, k, conductor, alpha, rotation)"
+        "layer 0 (interface): unknown key 'gloss' (known: eta, k, conductor, alpha, rotation, films)"
     ),
     "nmae: x\n" + COAT: "unknown key 'nmae' (did you mean name?)",
     "1: x\n" + COAT: "unknown key '1' (known: name, source, exterior, thin, layers)",
@@ -277,9 +277,12 @@ def test_a_path_that_cannot_be_written_gets_one_line(
     [
         (
             {"layer0_etta": 1},
-            "layer0_etta: layer 0 (dielectric) has no etta, only eta, alpha, alpha_u, alpha_v, rotation",
+            "layer0_etta: layer 0 (dielectric) has no etta, only eta, alpha, alpha_u, alpha_v, rotation, films",
         ),
-        ({"layer0_k": 1}, "layer0_k: layer 0 (dielectric) has no k, only eta, alpha, alpha_u, alpha_v, rotation"),
+        (
+            {"layer0_k": 1},
+            "layer0_k: layer 0 (dielectric) has no k, only eta, alpha, alpha_u, alpha_v, rotation, films",
+        ),
         ({"layer1_eta": 1}, "layer1_eta: layer 1 (medium) has no eta, only depth, sigma_a, sigma_s, g"),
         ({"layer3_eta": 1}, "layer3_eta: the last layer is layer 2"),
         ({"layer_0_eta": 1}, "unknown parameter 'layer_0_eta' (did you mean layer0_eta?)"),
@@ -315,7 +318,7 @@ def test_a_wrong_change_gets_one_line(values: dict[str, Any], message: str) -> N
         (
             None,
             {"layer0_eta": 1.5, "layer0_depth": 1},
-            "layer0_depth: layer 0 (dielectric) has no depth, only eta, alpha, alpha_u, alpha_v, rotation",
+            "layer0_depth: layer 0 (dielectric) has no depth, only eta, alpha, alpha_u, alpha_v, rotation, films",
         ),
         (["conductor"], {"layer0_eta": 1.5}, "layer 0: the values are those of a dielectric, not of a conductor"),
         (["dielectric"], {"layer0_eta": 1.5, "layer1_eta": 1}, "layer1_eta: the last layer is layer 0"),
@@ -332,7 +335,7 @@ def test_wrong_flat_values_get_one_line(kinds: Any, values: dict[str, Any], mess
     "model, fields, message",
     [
         (Interface, {"eta": 1.5, "alpha": 2}, "alpha: must lie in 0 to 1, got 2"),
-        (Interface, {"ior": 1.5}, "unknown key 'ior' (known: eta, k, conductor, alpha, rotation)"),
+        (Interface, {"ior": 1.5}, "unknown key 'ior' (known: eta, k, conductor, alpha, rotation, films)"),
         (
             Medium,
             {"g": "forward"},

@@ -14,7 +14,7 @@ from velatura.errors import InvalidInput
 from velatura.model import Model
 from velatura.shader import Shader, atlas, constant, shader
 from velatura.shader.bake import Bake
-from velatura.stack import Address, Stack, Varying
+from velatura.stack import Address, Stack, Varying, refuse_films
 from velatura.stack.schema import unknown
 from velatura.tables import load
 
@@ -95,6 +95,7 @@ def _free(stack: Stack, made: Shader) -> list[tuple[Address, Any]]:
 
 def pattern(stack: Stack, stretched: bool) -> Stack:
     """The stack that stands for all with the same code: of the same layers and textures, stretched or not."""
+    refuse_films(stack, "the editor has")
     values: dict[str, Any] = {"thin": stack.thin}
     for address, value in stack.values():
         if isinstance(value, Varying):

@@ -31,6 +31,7 @@ from velatura.stack import (
     MediumValues,
     Stack,
     load,
+    refuse_films,
 )
 
 KEEP = 64  # partial stacks that are followed
@@ -103,6 +104,7 @@ def coat(
         NoSolution: no material keeps any of the appearance; the message names the layer and the constraint.
     """
     chosen, stack = named(model, **switches), load(stack)
+    refuse_films(stack, "the inverse has")
     top = Interface(eta=eta, alpha=alpha)
     losses: list[str] = []
     if keep_appearance:

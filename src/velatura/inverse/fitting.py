@@ -30,6 +30,7 @@ from velatura.stack import (
     Stack,
     as_described,
     load,
+    refuse_films,
 )
 
 STARTS = 4
@@ -99,6 +100,7 @@ def simplify(
         InvalidInput: not a valid material, no such number of interfaces, a texture, an unknown model or switch.
     """
     chosen, stack = named(model, **switches), load(stack)
+    refuse_films(stack, "the inverse has")
     count = len(stack.interfaces)
     if not 1 <= interfaces < count:
         raise InvalidInput(

@@ -32,7 +32,6 @@ from velatura.model.remainder import EVEN, Samples
 from velatura.model.straight_through import EXPONENT, WIDTHS, Crossed, Passage, Slab, entered, is_none
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
-from velatura.optics import fresnel
 from velatura.optics.ggx import Direction
 
 BOUNCES = 0.3  # of the two faces of the slab that light bounces in
@@ -139,7 +138,7 @@ def _leaving(passage: Passage, under: Sequence[Value]) -> Callable[[Value], Valu
                 continue
             above, below = (ops.sqrt(1 - p2 * (n[-1] / x) * (n[-1] / x)) for x in n[l : l + 2])
             below = cos_o if l == len(crossings) - 1 else below
-            passes = passes * (1 - flag * fresnel.dielectric_between(above, below, crossing.eta))
+            passes = passes * (1 - flag * crossing.reflectance(above, below))
         return passes
 
     return leaving

@@ -15,6 +15,7 @@ from math import pi
 import numpy as np
 
 from velatura import ops
+from velatura.errors import InvalidInput
 from velatura.model import operators
 from velatura.model.context import as_it_is
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
@@ -69,9 +70,14 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     """`prepared` with what the stack does to diffuse light from the base, and what its nodes are worth.
 
     `settle` is applied to every cosine, row and energy: a renderer evaluates them, so that one kernel serves all nodes.
+
+    Raises:
+        InvalidInput: thin films, of which the tables of diffuse light know nothing.
     """
     if prepared.base is None:
         return prepared
+    if any(isinstance(layer, PreparedInterface) and layer.films for layer in prepared.layers):
+        raise InvalidInput(f"films: {prepared.model.name} has none over a diffuse base; velatura and the reference do")
     inside, nodes = _Inside.of(prepared), [node for node, _ in _NODES]
     measures = [2 * weight * node for node, weight in _NODES]
 

@@ -5,7 +5,7 @@ Values arrive as a `Material`, in any dialect; a renderer hands in constants onc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 
@@ -16,7 +16,8 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
+from velatura.sampling.coated import Coated, Films, coated, dielectric_between
+from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
 from velatura.tables import Average, Row, Tables
 
 COS_MIN = 1e-4  # keeps ways through media, and Snell's factors, finite at grazing
@@ -39,6 +40,7 @@ class PreparedInterface(ops.Named):
     s_r: Variance
     reflectance: Average | None
     leaving: Average | None
+    films: Films = None
 
     @property
     def opaque(self) -> bool:
@@ -48,13 +50,17 @@ class PreparedInterface(ops.Named):
         """Fresnel reflectance of its facets."""
         if self.eta is None:
             return 1.0
+        if self.films:
+            if isinstance(self.films, Coated) and self.opaque:
+                return self.films.at(cos_theta, self.eta)
+            return dielectric_between(self.films, cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
         if self.kappa is None:
             return fresnel.dielectric(cos_theta, self.eta)
         return fresnel.conductor(cos_theta, self.eta, self.kappa)
 
     def reflect_together(self, cos_theta: Value) -> Value:
         """As `reflect`, with the one refracted direction: all colours are totally reflected from the same angle on."""
-        if self.eta is None or self.kappa is not None:
+        if self.eta is None or self.kappa is not None or self.films:
             return self.reflect(cos_theta)
         return fresnel.dielectric_between(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
 
@@ -157,8 +163,9 @@ def _interface(
     eta = layer.eta / eta_1 if layer.kind != "mirror" else None
     kappa = layer.k / eta_1 if layer.kind == "conductor" else None
     n12 = ops.mean(layer.eta) / ops.mean(eta_1) if layer.kind == "dielectric" else 1.0
-    reflectance, leaving = averages.reflectance(eta, kappa), averages.leaving(n_leaving)
-    return PreparedInterface(eta, kappa, n12, roughness, s_r, reflectance, leaving)
+    films = coated(layer.coating, srgb_sensitivity) if layer.coating else None
+    facets = PreparedInterface(eta, kappa, n12, roughness, s_r, None, averages.leaving(n_leaving), films)
+    return replace(facets, reflectance=averages.reflectance(facets))
 
 
 @dataclass(frozen=True)
@@ -168,12 +175,15 @@ class _Averages:
     model: Model
     context: Context
 
-    def reflectance(self, eta: Value | None, kappa: Value | None) -> Average | None:
+    def reflectance(self, facets: PreparedInterface) -> Average | None:
+        eta, kappa = facets.eta, facets.kappa
         if self.model.reflectance in ("fresnel", "fg"):
             return None
         multiple = self.model.microsurface
         if self.model.reflectance == "split-sum":
             r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
+            if isinstance(facets.films, Coated):
+                r_0 = facets.films.at(1.0, eta)
             row = tables.schlick_row(self.context.tables, r_0)
         elif eta is None:
             if multiple:
@@ -183,6 +193,8 @@ class _Averages:
             row = tables.dielectric_row(self.context.tables, eta, self.context.constant, multiple)
         else:
             row = tables.conductor_row(self.context.tables, eta, kappa, self.context.constant, multiple)
+        if facets.films and self.model.reflectance != "split-sum":
+            row = tables.with_films(self.context.tables, row, facets.reflect)
         return self._of(row)
 
     def _of(self, row: Row) -> Average:

@@ -28,6 +28,7 @@ from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
+from velatura.sampling.coated import Coated, either
 
 ALL = Asked()
 FAINT = 1e-9  # energy of a part that is drawn even where it has none
@@ -407,11 +408,13 @@ def _of_either(where: Value, a: PreparedInterface | None, b: PreparedInterface |
     eta, n12 = (
         ops.select(where, getattr(a, name) if a else 1.0, getattr(b, name) if b else 1.0) for name in ("eta", "n12")
     )
-    return replace(some, eta=eta, n12=n12)
+    return replace(some, eta=eta, n12=n12, films=either(where, *(x.films if x else None for x in (a, b))))
 
 
 def select(where: Value, a: Any, b: Any) -> Any:
     """Records of values, value by value."""
+    if isinstance(a, Coated) or isinstance(b, Coated):
+        return either(where, a, b)
     if is_dataclass(a) and not isinstance(a, type):
         return type(a)(*(select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
     if isinstance(a, tuple) and hasattr(a, "_fields"):

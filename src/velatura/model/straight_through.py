@@ -26,7 +26,7 @@ below is light from above a material that is turned over (`Material.reversed`).
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
 from functools import reduce
 from math import pi
@@ -43,7 +43,8 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.sampling import low_discrepancy
-from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.sampling.coated import Films, coated, dielectric_between
+from velatura.stack import InterfaceValues, Material, MediumValues, srgb_sensitivity
 
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
 WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
@@ -60,6 +61,7 @@ WEIGHT_MIN = 1e-12  # squared width that decides the shares where no interface h
 WIDTHS = RoughnessMap(lambda a, _: ops.power(a, EXPONENT), lambda s, _: ops.power(s, 1 / EXPONENT))
 
 Momentum = tuple[Value, Value]
+Reflectance = Callable[[Value, Value], Value]
 Array = NDArray[np.floating]
 
 
@@ -69,7 +71,7 @@ class Crossing(ops.Named):
 
     `width` is the roughness in the space of `WIDTHS`, `area` its product over the axes, `sign` that of n_1 - n_2: 0
     where facets turn light by less than single precision has. Then all make the step `least`, none hides another, and
-    light passes as at a smooth interface.
+    light passes as at a smooth interface. `films` are thin films on it.
     """
 
     n_1: Value
@@ -80,6 +82,11 @@ class Crossing(ops.Named):
     area: Value
     sign: Value
     least: Value
+    films: Films = None
+
+    def reflectance(self, cos_1: Value, cos_2: Value) -> Value:
+        """Fresnel's reflectance (a colour) for cosines above and below."""
+        return dielectric_between(self.films, cos_1, cos_2, self.eta)
 
 
 @dataclass(frozen=True)
@@ -169,7 +176,8 @@ def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Varia
     least = n_1 * ops.sqrt(ratio) * WIDTH_MIN / ops.sqrt(u * v)
     turns = step > least
     sign, least = ops.select(turns, ops.select(ratio < 1, 1.0, -1.0), 0.0), ops.select(turns, FLAT, least)
-    return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least)
+    films = coated(layer.coating, srgb_sensitivity) if layer.coating else None
+    return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least, films)
 
 
 @dataclass(frozen=True)
@@ -203,7 +211,7 @@ def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -
             cosines[l], bounded[l] = known, ops.maximum(known, GRAZING)
     crossings = passage.crossings
     steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(crossings)]
-    passes = [1 - fresnel.dielectric_between(cosines[l], cosines[l + 1], c.eta) for l, c in enumerate(crossings)]
+    passes = [1 - c.reflectance(cosines[l], cosines[l + 1]) for l, c in enumerate(crossings)]
     slabs = [1.0 if slab.is_clear else ops.exp(-slab.depth / c) for slab, c in zip(passage.slabs, bounded)]
     return Crossed(p, p2, passage.indices, cosines, bounded, steps, passes, slabs)
 
@@ -328,12 +336,13 @@ def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> D
     i = entered(passage, wi)
     components, shares = _drawn(passage, i)
     with ops.block("Choose an interface"):
-        every = []
-        begin: Value = 0.0
+        every, begins = [], []
+        u_chosen, begin = u, 0.0
         for j, (c, component, share) in enumerate(zip(passage.crossings, components, shares)):
             bounds = _lowest2(n[: j + 1]), _lowest2(n[j + 1 :])
             own = c.n_1, c.n_2, c.eta, c.sign, c.least, i.bounded[j], ops.mean(i.passes[j])
             every.append([*own, *component.roughness, *bounds, share, begin])
+            begins.append(begin)
             begin = begin + share
         chosen = every[0]
         for fields in every[1:]:
@@ -344,7 +353,7 @@ def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> D
         w = i.p[0] / -n_1, i.p[1] / -n_1, cosine
         h = _turned(ggx.sample_visible(_turned(w, rotation), alpha_u, alpha_v, u1, u2), -rotation)
     with ops.block("Refract or reflect"):
-        p, passes = _refracted(n_1, n_2, eta, i.p, w, h, down2)
+        p, passes = _refracted(n_1, n_2, _chosen(passage.crossings, eta, u_chosen, begins), i.p, w, h, down2)
         r, phi, turns = least * ops.sqrt(ops.divide(u2, 1 - u2)), 2 * pi * u1, _turns(sign)
         x, y, _ = _turned((r * alpha_u * ops.cos(phi), r * alpha_v * ops.sin(phi), 1.0), -rotation)
         p = ops.select(turns, p[0], i.p[0] + x), ops.select(turns, p[1], i.p[1] + y)
@@ -377,12 +386,12 @@ def _facet(crossing: Crossing, i: Crossed, o: Crossed, j: int, step: Value) -> _
     forwards = ops.select(turns, crossing.sign * (n_1 * c_1 - n_2 * c_2), 1.0)
     faces = (v_i > 0) & (v_o > 0) & (forwards > 0)
     v_i, v_o = ops.maximum(v_i, 0.0), ops.maximum(v_o, 0.0)
-    reflectance = fresnel.dielectric_between(v_i * c_1 * height, v_o * c_2 * height, crossing.eta)
+    reflectance = crossing.reflectance(v_i * c_1 * height, v_o * c_2 * height)
     return _Facet(slope, ops.select(faces, (1 - reflectance) * (v_i * v_o / (step * step)), 0.0))
 
 
 def _refracted(
-    n_1: Value, n_2: Value, eta: Value, p: Momentum, w: Direction, h: Direction, lowest2: Value
+    n_1: Value, n_2: Value, reflectance: Reflectance, p: Momentum, w: Direction, h: Direction, lowest2: Value
 ) -> tuple[Momentum, Value]:
     """Momentum p, of direction w above, after refraction about a normal h, and the probability that light takes it:
     none unless it crosses all slabs below."""
@@ -391,8 +400,22 @@ def _refracted(
     step = n_1 * cos_1 - n_2 * cos_2
     x, y = p[0] + step * h[0], p[1] + step * h[1]
     crosses = (cos_1 > 0) & (cos_2 > 0) & (n_1 * w[2] > step * h[2]) & (x * x + y * y < lowest2)
-    passes = 1 - ops.mean(fresnel.dielectric_between(cos_1, cos_2, eta))
+    passes = 1 - ops.mean(reflectance(cos_1, cos_2))
     return (x, y), ops.select(crosses, passes, 0.0)
+
+
+def _chosen(crossings: Sequence[Crossing], eta: Value, u: Value, begins: Sequence[Value]) -> Reflectance:
+    """Fresnel's reflectance of the interface of relative index `eta` that u has chosen, by where each begins."""
+    if not any(crossing.films for crossing in crossings):
+        return lambda cos_1, cos_2: fresnel.dielectric_between(cos_1, cos_2, eta)
+
+    def reflectance(cos_1: Value, cos_2: Value) -> Value:
+        found = crossings[0].reflectance(cos_1, cos_2)
+        for crossing, begin in zip(crossings[1:], begins[1:]):
+            found = ops.select(u > begin, crossing.reflectance(cos_1, cos_2), found)
+        return found
+
+    return reflectance
 
 
 def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roughness) -> Value:
@@ -401,7 +424,7 @@ def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roug
     cos_i, cos_o = i.bounded[j], o.bounded[j]
     w = i.p[0] / -c.n_1, i.p[1] / -c.n_1, cos_i
     h = ggx.normalize((w[0] + o.p[0] / c.n_1, w[1] + o.p[1] / c.n_1, cos_i + cos_o))
-    _, passes = _refracted(c.n_1, c.n_2, c.eta, i.p, w, h, _lowest2(n[j + 1 :]))
+    _, passes = _refracted(c.n_1, c.n_2, c.reflectance, i.p, w, h, _lowest2(n[j + 1 :]))
     passes = ops.select(_turns(c.sign), passes, ops.mean(i.passes[j]))
     visible = ggx.ndf(_turned(h, roughness.rotation), roughness.alpha_u, roughness.alpha_v)
     density = visible * _masking(roughness, i, j) * (1 - passes) / (4 * cos_i * cos_o * c.n_1 * c.n_1)

@@ -147,6 +147,7 @@ class _Coat:
     n_below: float
     cosine: Array
     passed: Array
+    facets: Facets
 
     @property
     def contrast(self) -> float:
@@ -154,7 +155,10 @@ class _Coat:
 
     def leaving(self, cos_theta: Array) -> Array:
         """Share that it lets pass, at cosines outside."""
-        return np.asarray(1 - fresnel.dielectric(_cosine(cos_theta, self.n), self.n_below / self.n))
+        cosine = _cosine(cos_theta, self.n)
+        if self.facets.films is not None:
+            return np.asarray(1 - ops.mean(self.facets.reflectance(cosine)))
+        return np.asarray(1 - fresnel.dielectric(cosine, self.n_below / self.n))
 
     def moved(self) -> Tensor:
         """Displacement of momentum in a refraction."""
@@ -210,7 +214,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
         if not part.opaque:
             assert part.below is not None
             passed = 1 - part.reflectance(cosine)
-            coats.append(_Coat(own, n, float(ops.mean(part.below)), cosine, passed))
+            coats.append(_Coat(own, n, float(ops.mean(part.below)), cosine, passed, part))
     return result
 
 
@@ -244,7 +248,13 @@ def features(
     if not part.opaque:
         assert part.below is not None
         below = float(ops.mean(part.below)) / n
-        both = own_medium.integral(replace(lobe, facets=lambda c: fresnel.dielectric(c, below)), wi, COARSE)
+
+        def facets(c: Array) -> Array:
+            if part.films is not None:
+                return np.asarray(ops.mean(part.reflectance(c)))
+            return np.asarray(fresnel.dielectric(c, below))
+
+        both = own_medium.integral(replace(lobe, facets=facets), wi, COARSE)
         reflected = both / np.maximum(let_out, 1e-9)
         expected = both * ops.mean(share)
     brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(expected, 1e-9))

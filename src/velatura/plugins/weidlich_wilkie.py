@@ -16,7 +16,7 @@ from velatura.binding import Binding, plugin_class
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
-from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
+from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues, refuse_films
 
 ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 EXCEPTIONS = frozenset({"lossless"})  # laws of `velatura.checks`: light that is reflected twice, or passes, is lost
@@ -47,6 +47,7 @@ def make(mi: Any) -> type:
             mi.BSDF.__init__(self, properties)
             self.binding = Binding(mi, properties)
             stack = self.binding.stack
+            refuse_films(stack, "weidlich_wilkie has")
             self.surfaces = stack.surfaces
             common = flags.FrontSide | (flags.SpatiallyVarying if self.binding.varies else flags.Empty)
             self.types = [flags.GlossyReflection] * len(self.surfaces)

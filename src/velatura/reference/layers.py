@@ -17,7 +17,8 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
-from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues
+from velatura.sampling.coated import Coated, coated
+from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
 from velatura.stack.values import Pair
 
 ALPHA_MIN = 1e-3  # an interface smoother than this along both axes is perfectly smooth
@@ -86,7 +87,8 @@ Part = TypeVar("Part", Surface, Slab)
 class Layers:
     """Surfaces and slabs from the top, slab n included; `base` is the kind of the last surface.
 
-    With `microsurface`, light scatters many times between the facets of a surface.
+    With `microsurface`, light scatters many times between the facets of a surface. `films` are those on each surface,
+    counted from below where the stack is `flipped`.
     """
 
     base: str
@@ -96,6 +98,8 @@ class Layers:
     extinction: Value = 0.0
     albedo: Value = 0.0
     microsurface: bool = False
+    films: tuple[Coated | None, ...] = ()
+    flipped: Value = False
 
     @property
     def count(self) -> int:
@@ -121,7 +125,7 @@ class Layers:
             return tuple(type(items[0])(*values) for values in zip(*columns))
 
         surfaces, slabs = swapped(self.surfaces), swapped(self.slabs)
-        return replace(self, surfaces=surfaces, slabs=slabs, index=swap(self.index))
+        return replace(self, surfaces=surfaces, slabs=slabs, index=swap(self.index), flipped=where)
 
     # Surfaces and slabs -----------------------------------------------------------------------------------------------
 
@@ -141,6 +145,8 @@ class Layers:
         """
         if self.base == "mirror":
             base: Value = 1.0
+        elif self.base == "conductor" and self.films[-1]:
+            base = self.films[-1].at(cosine, n_in)
         elif self.base == "conductor":
             base = fresnel.conductor(cosine, self.index[-1] / n_in, self.extinction / n_in)
         else:
@@ -149,7 +155,12 @@ class Layers:
             return base
         eta = relative_index(n_in, n_out)
         cos_t = fresnel.cos_transmitted(cosine, eta)
-        dielectric = ops.select(cos_t > 0, fresnel.dielectric_between(cosine, cos_t, n_out / n_in), 1.0)
+        dielectric = fresnel.dielectric_between(cosine, cos_t, n_out / n_in)
+        if any(self.films[:-1]) or (self.transmits and self.films[-1]):
+            rarer = ops.select(eta > 1, cosine, cos_t)
+            each = [dielectric if films is None else films.at(rarer, n_in) for films in self.films]
+            dielectric = _choose(self.flipped, pick(each[::-1], j), pick(each, j))
+        dielectric = ops.select(cos_t > 0, dielectric, 1.0)
         return dielectric if base is None else ops.select(self.is_base(j), base, dielectric)
 
     def mueller(self, j: Value, cosine: Value, n_in: Value, n_out: Value) -> tuple[Mueller, Mueller]:
@@ -187,6 +198,7 @@ def from_material(material: Material, microsurface: bool) -> Layers:
     surfaces: list[Surface] = []
     slabs: list[Slab] = []
     index: list[Value] = [material.exterior]
+    films: list[Coated | None] = []
     medium, last = Slab(), material.layers[-1]
     for layer in material.solid().layers:
         if isinstance(layer, MediumValues):
@@ -197,10 +209,12 @@ def from_material(material: Material, microsurface: bool) -> Layers:
         if isinstance(layer, DiffuseValues):
             index.append(1.0)
             surfaces.append(Surface(1.0, 1.0, 0.0, False))
+            films.append(None)
         else:
             index.append(1.0 if layer.eta is None else layer.eta)
             matched = layer.kind == "dielectric" and ops.absolute(relative_index(*index[-2:]) - 1) < _MATCHED
             surfaces.append(_surface(layer, matched))
+            films.append(coated(layer.coating, srgb_sensitivity) if layer.coating else None)
     extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
     return Layers(
         material.kinds[-1],
@@ -210,6 +224,7 @@ def from_material(material: Material, microsurface: bool) -> Layers:
         extinction,
         last.albedo if isinstance(last, DiffuseValues) else 0.0,
         microsurface,
+        tuple(films),
     )
 
 

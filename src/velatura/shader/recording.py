@@ -23,7 +23,7 @@ from velatura.shader import material, symbol
 from velatura.shader.bake import Bake, bake
 from velatura.shader.graph import Graph, known_before
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Address, Material, Stack, Varying, as_described
+from velatura.stack import Address, Material, Stack, Varying, as_described, refuse_films
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:  # it loads SciPy
@@ -91,6 +91,7 @@ def record(
         InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture.
     """
     chosen = named(model, **switches)
+    refuse_films(stack, "shaders have")
     if chosen.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
     flat = stack.flat()

@@ -1,9 +1,11 @@
 """Materials: layers, their parameters, and the files that hold them, without optics or rendering."""
 
+from velatura.stack.coatings import refuse as refuse_films
 from velatura.stack.describe import json_schema, parameter_table
-from velatura.stack.flat_names import Address, addressed
+from velatura.stack.flat_names import Address, addressed, is_of_film
 from velatura.stack.io import MaterialLike, dumps, load, loads, preset, presets, save
 from velatura.stack.layers import (
+    CoatingValues,
     Diffuse,
     DiffuseValues,
     Interface,
@@ -16,16 +18,18 @@ from velatura.stack.layers import (
     Value,
 )
 from velatura.stack.material import Material, as_described, number
-from velatura.stack.spectra import Measured, Named, names, rgb, spectrum, srgb_weights
+from velatura.stack.spectra import Measured, Named, names, rgb, spectrum, srgb_sensitivity, srgb_weights
 from velatura.stack.stack import Stack
-from velatura.stack.values import RGB, Brushing, Spectrum, Texture, Varying
+from velatura.stack.values import RGB, Brushing, Film, Spectrum, Texture, Varying
 
 __all__ = [
     "RGB",
     "Address",
     "Brushing",
+    "CoatingValues",
     "Diffuse",
     "DiffuseValues",
+    "Film",
     "Interface",
     "InterfaceValues",
     "Kind",
@@ -45,6 +49,7 @@ __all__ = [
     "addressed",
     "as_described",
     "dumps",
+    "is_of_film",
     "json_schema",
     "load",
     "loads",
@@ -53,8 +58,10 @@ __all__ = [
     "parameter_table",
     "preset",
     "presets",
+    "refuse_films",
     "rgb",
     "save",
     "spectrum",
+    "srgb_sensitivity",
     "srgb_weights",
 ]

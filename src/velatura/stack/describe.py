@@ -7,7 +7,7 @@ from typing import Any
 from velatura.stack.layers import LAYERS
 from velatura.stack.schema import Parameter, Record, parameters
 from velatura.stack.stack import Stack
-from velatura.stack.values import Brushing, Spectrum, Texture
+from velatura.stack.values import Brushing, Film, Spectrum, Texture
 
 
 def json_schema() -> dict[str, Any]:
@@ -24,6 +24,7 @@ def json_schema() -> dict[str, Any]:
             "spectrum": {**_keys(Spectrum), "required": ["spectrum"]},
             "texture": {**_keys(Texture), "required": ["texture"]},
             "brushing": {**_keys(Brushing), "required": ["brushing"]},
+            "film": {**_keys(Film), "required": ["eta", "thickness_nm"]},
         },
     }
 
@@ -40,6 +41,7 @@ def parameter_table() -> str:
         "spectrum": Spectrum,
         "texture": Texture,
         "brushing": Brushing,
+        "film": Film,
     }
     for where, model in models.items():
         for key, parameter in parameters(model).items():

@@ -20,6 +20,7 @@ from velatura.stack.values import RGB, Colour, Scalar, Varying
 
 _OPTIONS = ("name", "source", "exterior", "thin")
 _LAYER = re.compile(r"layer(\d{1,9})_(\w+)")
+_FILM = re.compile(r"film(\d)_(\w+)")
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,12 @@ def addressed(name: str) -> tuple[Address, ...]:
     return ()
 
 
+def is_of_film(name: str) -> bool:
+    """Whether a flat name is that of a value of a film, which is always a number."""
+    parts = _LAYER.fullmatch(name)
+    return bool(parts and _FILM.fullmatch(parts[2]))
+
+
 def _keys(kind: str) -> list[str]:
     """The keys that a layer of a kind may be given, those of single values included."""
     found: list[str] = []
@@ -110,12 +117,15 @@ def changed(mapping: Mapping[str, Any], kinds: Sequence[str], values: Mapping[st
             raise InvalidInput(f"layer{index}_{next(iter(fields))}: the last layer is layer {len(entries) - 1}")
         keys = _keys(kinds[index])
         for key in fields:
-            if key not in keys:
+            if key not in keys and not ("films" in keys and _FILM.fullmatch(key)):
                 where = f"layer{index}_{key}: layer {index} ({kinds[index]})"
                 raise InvalidInput(f"{where} has no {key}, only {', '.join(keys)}")
         # Write it in
         ((entry, old),) = entries[index].items()
-        entries[index] = {entry: _merged(old, fields)}
+        try:
+            entries[index] = {entry: _merged(old, fields)}
+        except InvalidInput as error:
+            raise InvalidInput(f"layer {index} ({entry}): {error}") from None
     return {**mapping, **options, "layers": entries}
 
 
@@ -155,7 +165,20 @@ def _inferred_kind(fields: Mapping[str, Any]) -> str:
 
 def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     """The keys of one layer with some of them changed."""
-    fields = {**old, **new}
+    fields = {**old, **{key: value for key, value in new.items() if not _FILM.fullmatch(key)}}
+
+    # Let a value of a film replace that one, or begin the next film
+    films = [dict(film) if isinstance(film, Mapping) else film.to_dict() for film in fields.get("films", ())]
+    for key, value in sorted(new.items()):
+        parts = _FILM.fullmatch(key)
+        if not parts:
+            continue
+        number = int(parts[1])
+        if number > len(films):
+            raise InvalidInput(f"{key}: the next film is film {len(films)}")
+        films += [{}] if number == len(films) else []
+        films[number][parts[2]] = value
+    fields = {**fields, "films": films} if films else fields
 
     # Let a new metal replace indices, and a new index a part of a named metal
     if "conductor" in new:

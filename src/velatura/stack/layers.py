@@ -22,6 +22,8 @@ from velatura.stack.values import (
     Brushing,
     Colour,
     Conductor,
+    Film,
+    Films,
     Index,
     Pair,
     Scalar,
@@ -36,9 +38,34 @@ Value: TypeAlias = float | RGB | Named | Spectrum | Texture | Brushing
 
 
 @dataclass(frozen=True)
+class CoatingValues:
+    """Thin films, from the top, between media of indices eta_1 and eta_2 + i k_2: plain numbers, by channel."""
+
+    films: tuple[FilmValues, ...]
+    eta_1: RGB
+    eta_2: RGB
+    k_2: RGB
+    opaque: bool
+
+    def reversed(self) -> CoatingValues:
+        """As seen from below."""
+        return CoatingValues(self.films[::-1], self.eta_2, self.eta_1, self.k_2, self.opaque)
+
+
+@dataclass(frozen=True)
+class FilmValues:
+    """A film of index eta + i k."""
+
+    eta: RGB
+    k: RGB
+    thickness_nm: float
+
+
+@dataclass(frozen=True)
 class InterfaceValues:
     """A dielectric, a conductor or a mirror: GGX roughness along two axes, turned by `rotation` (degrees), and absolute
-    indices of the medium below; a mirror has none, and a dielectric no extinction `k`.
+    indices of the medium below; a mirror has none, and a dielectric no extinction `k`. Thin films are numbers in every
+    dialect.
     """
 
     kind: Kind
@@ -47,6 +74,7 @@ class InterfaceValues:
     rotation: Any
     eta: Any = None
     k: Any = None
+    coating: CoatingValues | None = None
 
     @property
     def spreads(self) -> bool:
@@ -149,7 +177,7 @@ class Interface(LayerRecord):
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {
         "dielectric": ("k", "conductor"),
         "conductor": (),
-        "mirror": ("eta", "k"),
+        "mirror": ("eta", "k", "films"),
     }
     surface = True
     title = "interface"
@@ -182,6 +210,7 @@ class Interface(LayerRecord):
         float | Texture | Brushing,
         Angle("turn of the tangent, anticlockwise seen from outside, from dp/du", unit="degrees"),
     ] = 0.0
+    films: Annotated[tuple[Film, ...], Films("thin films on it, from the top")] = ()
 
     @model_validator(mode="after")
     def _one_way_to_say_it(self) -> Interface:
@@ -192,6 +221,13 @@ class Interface(LayerRecord):
             raise ValueError("eta: missing; write eta, or eta and k, or conductor")
         if self.k is None and isinstance(self.eta, str) and self.eta in names()[0]:
             raise ValueError(f"eta: {self.eta} is a metal; write conductor: {self.eta}")
+        if self.films and self.kind == "mirror":
+            raise ValueError("films: not on a mirror, which reflects all light")
+        if self.films and isinstance(self.eta, Texture) | isinstance(self.k, Texture):
+            raise ValueError("films: not over an index from a texture")
+        for k, film in enumerate(self.films):
+            if not self.opaque and any(film.colour("k")):
+                raise ValueError(f"films: film {k}: k: only over a metal, an interface with k or conductor")
         return self
 
     @property

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
+from velatura.stack import coatings
 from velatura.stack.flat_names import Address, addresses
-from velatura.stack.layers import KINDS, InterfaceValues, Kind, LayerValues
+from velatura.stack.layers import KINDS, CoatingValues, InterfaceValues, Kind, LayerValues
 from velatura.stack.stack import Stack
 
 Value: TypeAlias = Any
@@ -45,20 +46,30 @@ class Material:
     def of(cls, stack: Stack, value: Callable[[Address, Any], Value] = number) -> Material:
         """The values of a stack, each as `value` converts it: in NumPy unless given."""
         values = iter([value(address, described) for address, described in stack.values()])
-        return cls._of(stack.kinds, values, stack.thin)
+        return cls._of(stack.kinds, values, stack.thin, coatings.of(stack))
 
     @classmethod
-    def from_flat(cls, kinds: Sequence[Kind], values: Mapping[str, Value], thin: bool = False) -> Material:
-        """Values by flat name, as `Stack.flat` has them."""
-        return cls._of(kinds, (values[address.name] for address in addresses(tuple(kinds))), thin)
+    def from_flat(
+        cls,
+        kinds: Sequence[Kind],
+        values: Mapping[str, Value],
+        thin: bool = False,
+        films: Sequence[CoatingValues | None] = (),
+    ) -> Material:
+        """Values by flat name, as `Stack.flat` has them, and the films of each layer."""
+        return cls._of(kinds, (values[address.name] for address in addresses(tuple(kinds))), thin, films)
 
     @classmethod
-    def _of(cls, kinds: Sequence[Kind], values: Iterator[Value], thin: bool) -> Material:
+    def _of(
+        cls, kinds: Sequence[Kind], values: Iterator[Value], thin: bool, films: Sequence[CoatingValues | None]
+    ) -> Material:
         exterior, layers = next(values), []
         of_layers = addresses(tuple(kinds))[1:]
         for index, kind in enumerate(kinds):
             own: dict[str, Any] = {address.key: next(values) for address in of_layers if address.layer == index}
-            several = {"kind": kind} if len(KINDS[kind].lacks) > 1 else {}
+            several: dict[str, Any] = {"kind": kind} if len(KINDS[kind].lacks) > 1 else {}
+            if films and films[index]:
+                own["coating"] = films[index]
             layers.append(KINDS[kind].record(**several, **own))
         return cls(tuple(layers), exterior, thin)
 
@@ -70,7 +81,12 @@ class Material:
 
     def each(self, change: Callable[[Address, Value], Value]) -> Material:
         """The material with every value changed."""
-        return self._of(self.kinds, (change(*pair) for pair in self.values()), self.thin)
+        return self._of(self.kinds, (change(*pair) for pair in self.values()), self.thin, self.coatings)
+
+    @property
+    def coatings(self) -> tuple[CoatingValues | None, ...]:
+        """The films of each layer; None of those without."""
+        return tuple(layer.coating if isinstance(layer, InterfaceValues) else None for layer in self.layers)
 
     def flat(self) -> dict[str, Value]:
         """All values by flat name."""
@@ -122,6 +138,7 @@ class Material:
         above = solid.exterior
         for layer in solid.layers:
             if isinstance(layer, InterfaceValues):
-                layer, above = replace(layer, eta=above), layer.eta
+                coating = layer.coating and layer.coating.reversed()
+                layer, above = replace(layer, eta=above, coating=coating), layer.eta
             layers.append(layer)
         return Material(tuple(reversed(layers)), above)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import model_validator
 
 from velatura.errors import InvalidInput
-from velatura.stack import flat_names
+from velatura.stack import coatings, flat_names
 from velatura.stack.flat_names import Address
 from velatura.stack.layers import EXTERIOR, LAYERS, Diffuse, Interface, Kind, Layer, Value, entry_name
 from velatura.stack.schema import Record, show, unknown
@@ -48,6 +48,7 @@ class Stack(Record):
         if not self.layers[-1].surface:
             last = f"layer {len(self.layers) - 1} ({self.kinds[-1]})"
             raise ValueError(f"{last}: an interface or a diffuse base must lie below a {self.kinds[-1]}")
+        coatings.check(self)
         if self.thin and not self.transmits:
             raise ValueError("thin: only for a stack that ends in a dielectric interface")
         return self

@@ -1,7 +1,17 @@
 """Averages of Fresnel over GGX interfaces: integrated, compressed, stored, looked up."""
 
 from velatura.tables.anisotropic_albedo import drawn_albedo
-from velatura.tables.fetch import Row, conductor_row, dielectric_row, fgd, fgd_sheet, mirror_row, tir, tir_sheet
+from velatura.tables.fetch import (
+    Row,
+    conductor_row,
+    dielectric_row,
+    fgd,
+    fgd_sheet,
+    mirror_row,
+    tir,
+    tir_sheet,
+    with_films,
+)
 from velatura.tables.material_average import Average
 from velatura.tables.split_sum import schlick_row
 from velatura.tables.store import FILE, Table, Tables, load, save
@@ -23,4 +33,5 @@ __all__ = [
     "schlick_row",
     "tir",
     "tir_sheet",
+    "with_films",
 ]

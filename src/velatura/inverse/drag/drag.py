@@ -33,7 +33,7 @@ from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
-from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
+from velatura.stack import Diffuse, Interface, Layer, Stack, Varying, refuse_films
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
 ASIDE = 0.02  # by which free choices change to lead past a jump
@@ -66,6 +66,7 @@ class DraggedStack:
         Raises:
             InvalidInput: a layer that no target can have.
         """
+        refuse_films(stack, "the inverse has")
         layers = plain(stack)
         if len(layers) != sum(lobe.interfaces for lobe in target.lobes):
             return None

@@ -10,7 +10,7 @@ out, a layer that reflects R and transmits T adds
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,8 @@ from velatura import ops
 from velatura.model.transport.interfaces import Facets, Setting, interface
 from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.operators import Layer, Operator
-from velatura.stack import DiffuseValues, Material, MediumValues
+from velatura.sampling.coated import coated
+from velatura.stack import DiffuseValues, Material, MediumValues, srgb_sensitivity
 
 Array = NDArray[np.floating]
 
@@ -122,7 +123,11 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
             below = None if each.kind == "mirror" else _colours(each.eta) / outside
             k = _colours(each.k) / outside if each.kind == "conductor" else None
             angle = float(np.radians(each.rotation))
-            found.append(Facets(above, below, k, float(each.alpha_u), float(each.alpha_v), angle))
+            facets = Facets(above, below, k, float(each.alpha_u), float(each.alpha_v), angle)
+            if each.coating:
+                films = coated(each.coating, srgb_sensitivity)
+                facets = replace(facets, films=films.data, rarer=films.rarer)
+            found.append(facets)
             if each.kind == "dielectric" and below is not None:
                 above = below
     return found

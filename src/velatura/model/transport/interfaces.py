@@ -20,6 +20,7 @@ from velatura import ops, tables
 from velatura.model.transport.modes import TINY, Basis, Light
 from velatura.model.transport.operators import Layer, Operator
 from velatura.optics import fresnel, ggx
+from velatura.sampling.coated import Coated
 from velatura.sampling.low_discrepancy import fibonacci
 from velatura.tables import Tables
 
@@ -41,6 +42,7 @@ BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which
 class Facets:
     """An interface between indices `above` and `below`, by colour (C,); `k` is None for a dielectric, and `below` too
     for a mirror. Roughnesses, and a rotation in radians. `final` says that nothing sends back what it lets through.
+    `films` is the reflectance of thin films on it (nodes, 3), as of `Coated`, whose `rarer` side is 1 or 2.
     """
 
     above: Array
@@ -50,6 +52,8 @@ class Facets:
     alpha_v: float
     rotation: float = 0.0
     final: bool = False
+    films: Array | None = None
+    rarer: int = 1
 
     @property
     def opaque(self) -> bool:
@@ -87,7 +91,12 @@ class Facets:
 
     def reversed(self) -> Facets:
         assert self.below is not None
-        return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation)
+        films = self.films, 3 - self.rarer
+        return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation, False, *films)
+
+    def bare(self) -> Facets:
+        """Without films."""
+        return replace(self, films=None)
 
     def reflectance(self, cosine: Array) -> Array:
         """Fresnel reflectance (C, ...) of facets."""
@@ -95,8 +104,12 @@ class Facets:
         if self.below is None:
             return np.ones((1, *np.shape(cosine)))
         eta = (self.below / self.above).reshape(shape)
+        if self.films is not None and self.k is not None:
+            return np.asarray(Coated(self.films, 1).at(cosine, eta))
         if self.k is None:
             cos_t = fresnel.cos_transmitted(cosine, float(ops.mean(self.below) / ops.mean(self.above)))
+            if self.films is not None:
+                return np.asarray(Coated(self.films, self.rarer).between(cosine, cos_t, eta))
             return np.asarray(fresnel.dielectric_between(cosine, cos_t, eta))
         return np.asarray(fresnel.conductor(cosine, eta, (self.k / self.above).reshape(shape)))
 
@@ -281,6 +294,7 @@ class _Met:
         key = (
             *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in lengths),
             *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes(), setting.samples, *setting.ways),
+            *(facets.rarer, None if facets.films is None else facets.films.tobytes()),
             *(type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), nodes.cells),
         )
         if key not in setting.made:
@@ -377,12 +391,15 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> t
         row = tables.dielectric_row(known, ratio, True, True)
     else:
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
+        if facets.films is not None:
+            row = tables.with_films(known, row, lambda c: facets.reflectance(np.full(1, c)))
     found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean)))
-    often = found.reshape(len(events.blocked_reflected), -1)
     stand_in: _Met | _Events = events
-    if facets.alpha_u != facets.alpha_v:
-        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, setting.samples, [True])
-    once = stand_in.kept
+    # Of what a dielectric blocks, films change no share
+    clear = facets.bare() if facets.k is None else facets
+    if facets.alpha_u != facets.alpha_v or (facets.films is not None and facets.k is None):
+        stand_in = _events(replace(clear, alpha_u=mean, alpha_v=mean), p, 0 * p, setting.samples, [True])
+    often, once = found.reshape(len(stand_in.blocked_reflected), -1), stand_in.kept
     blocked: Array
     little: Array
     if facets.k is None:

@@ -1,0 +1,292 @@
+"""Thin films on the interfaces of a material: files, lobes of all models, the walk, plugins, and what has none yet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+from velatura.model.models import MODELS
+from velatura.optics import fresnel
+from velatura.optics.coatings import Coating, ColouredFilm
+from velatura.stack import dumps, loads, srgb_sensitivity
+
+COSINES = [1.0, 0.6, 0.3]
+
+ANODISED = """
+layers:
+  - interface: {eta: [2.7, 2.5, 2.3], k: [3.8, 3.4, 3.1], alpha: [0.1, 0.25], films: [{eta: 2.4, thickness_nm: 60}]}
+"""
+COATED = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.05, films: [{eta: 2.0, thickness_nm: 200}]}
+  - medium: {sigma_a: [0.1, 0.2, 0.3]}
+  - interface: {conductor: Al, alpha: 0.15, films: [{eta: 1.46, thickness_nm: 320}]}
+"""
+GLASS = """
+thin: true
+layers:
+  - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 1.38, thickness_nm: 100}]}
+  - interface: {eta: 1, alpha: 0.05, films: [{eta: 2.2, thickness_nm: 150}, {eta: 1.38, thickness_nm: 90}]}
+"""
+OVER_DIFFUSE = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 2.2, thickness_nm: 250}]}
+  - diffuse: {albedo: [0.2, 0.5, 0.7]}
+"""
+
+
+def white(value: float) -> tuple[float, float, float]:
+    return (value, value, value)
+
+
+def of_thickness(stack: vt.Stack, thickness_nm: float | None) -> vt.Stack:
+    """With films of another thickness, or without."""
+    layers = []
+    for layer in stack.layers:
+        if isinstance(layer, vt.Interface):
+            films = [film.model_copy(update={"thickness_nm": thickness_nm}) for film in layer.films]
+            layer = layer.model_copy(update={"films": () if thickness_nm is None else tuple(films)})
+        layers.append(layer)
+    return vt.Stack(layers, exterior=stack.exterior, thin=stack.thin)
+
+
+# Files
+
+
+@pytest.mark.parametrize("format", ["yaml", "json"])
+def test_a_file_keeps_films(format: str) -> None:
+    stack = loads(COATED)
+    assert loads(dumps(stack, format), name=f"material.{format}") == stack
+    assert stack.interfaces[0].films == (vt.Film(eta=2.0, thickness_nm=200),)
+
+
+def test_flat_names_change_films_and_add_them() -> None:
+    stack = loads(COATED).replace(layer0_film0_thickness_nm=120.0, layer0_film1_eta=1.4, layer0_film1_thickness_nm=50)
+    assert [film.thickness_nm for film in stack.interfaces[0].films] == [120, 50]
+    made = vt.Stack.from_flat(None, {"layer0_conductor": "Al", "layer0_film0_eta": 1.7, "layer0_film0_thickness_nm": 9})
+    assert made.interfaces[0].films == (vt.Film(eta=1.7, thickness_nm=9),)
+
+
+@pytest.mark.parametrize(
+    ("interface", "message"),
+    [
+        ("{eta: 1.5, films: [{eta: 1.4}]}", "films: film 0: thickness_nm: missing"),
+        (
+            "{eta: 1.5, films: [{eta: 1.4, thickness_nm: 6000}]}",
+            "films: film 0: thickness_nm: must lie in 0 to 5000, got 6000",
+        ),
+        (
+            "{eta: 1.5, films: [{eta: 2, k: 0.1, thickness_nm: 9}]}",
+            "films: film 0: k: only over a metal, an interface with k or conductor",
+        ),
+        ("{conductor: mirror, films: [{eta: 2, thickness_nm: 9}]}", "films: not on a mirror, which reflects all light"),
+        ("{eta: 1.5, films: 3}", "films: must be a list of films, got 3"),
+        (
+            "{eta: 1, films: [{eta: 1.4, thickness_nm: 9}]}",
+            "films: only between media whose indices differ by more than 0.001",
+        ),
+    ],
+)
+def test_a_wrong_film_gets_one_line(interface: str, message: str) -> None:
+    with pytest.raises(vt.InvalidInput) as error:
+        loads(f"layers:\n  - interface: {interface}")
+    assert str(error.value) == f"material.yaml: layer 0 (interface): {message}"
+
+
+def test_a_film_that_does_not_exist_gets_one_line() -> None:
+    with pytest.raises(vt.InvalidInput, match=r"layer 0 \(interface\): film2_eta: the next film is film 1"):
+        loads(COATED).replace(layer0_film2_eta=1.5)
+
+
+# Lobes
+
+
+@pytest.mark.parametrize("model", [model.name for model in MODELS])
+@pytest.mark.parametrize("material", [COATED, GLASS])
+def test_films_of_no_thickness_change_nothing(model: str, material: str) -> None:
+    stack = loads(material)
+    with_films, without = (vt.lobes(of_thickness(stack, x), COSINES, model=model) for x in (0.0, None))
+    assert np.abs(np.array(with_films.energy) - without.energy).max() < 5e-4
+    assert np.abs(with_films.passed - without.passed).max() < 5e-4
+
+
+@pytest.mark.parametrize("model", [model.name for model in MODELS])
+def test_a_smooth_interface_reflects_what_its_films_do(model: str) -> None:
+    """At the normal, of a metal; on both sides of glass that adds up to the pane."""
+    media = white(1.0), (2.7, 2.5, 2.3), (3.8, 3.4, 3.1)
+    expected = Coating((ColouredFilm(white(2.4), white(0.0), 60.0),), *media).reflectance(np.ones(1), srgb_sensitivity)
+    found = vt.lobes(loads(ANODISED).replace(layer0_alpha=0.0), 1.0, model=model, **_smooth(model)).energy[0]
+    assert found[:, 0] == pytest.approx(expected[:, 0], abs=1e-3)
+    pane = loads(GLASS).replace(layer0_alpha=0.0, layer1_alpha=0.0)
+    upper = Coating((ColouredFilm(white(1.38), white(0.0), 100.0),), white(1.0), white(1.5))
+    below = ColouredFilm(white(1.38), white(0.0), 90.0), ColouredFilm(white(2.2), white(0.0), 150.0)
+    lower = Coating(below, white(1.0), white(1.5))
+    a, b = (x.reflectance(np.ones(1), srgb_sensitivity)[:, 0] for x in (upper, lower))
+    lobes = vt.lobes(pane, 1.0, model=model, **_smooth(model))
+    assert np.sum(lobes.energy, axis=0)[:, 0] == pytest.approx(a + (1 - a) ** 2 * b / (1 - a * b), abs=2e-3)
+
+
+def _smooth(model: str) -> dict[str, str]:
+    return {"tir": "off"} if model == "belcour2018" else {}
+
+
+@pytest.mark.parametrize("material", [ANODISED, COATED, GLASS, OVER_DIFFUSE])
+@pytest.mark.parametrize("cosine", [1.0, 0.4])
+def test_the_model_has_the_light_of_the_walk(material: str, cosine: float) -> None:
+    """Energies of all interfaces, and what passes, within what they err by without films; the noise of the walk is a
+    tenth of that."""
+    stack = loads(material)
+    truth = vt.reference.statistics(stack, cosine, paths=200_000, seed=3)
+    found = vt.lobes(stack, cosine, reflectance="fgd")
+    of_walk = np.sum(np.reshape(truth.energy, (len(truth.energy), 3)), axis=0)
+    of_model = (np.sum(found.energy, axis=0) + found.remainder)[:, 0]
+    assert of_model == pytest.approx(of_walk, abs=6e-3)
+    if truth.transmitted:
+        assert found.passed[:, 0] == pytest.approx(np.reshape(truth.transmitted.energy, 3), abs=6e-3)
+
+
+def test_clear_films_keep_all_light() -> None:
+    lobes = vt.lobes(loads(GLASS), COSINES)
+    assert np.abs(lobes.absorbed).max() < 1e-3
+
+
+# In Mitsuba
+
+
+@pytest.fixture(scope="module")
+def mi() -> Any:
+    return kernel.mitsuba("llvm_ad_rgb")
+
+
+def albedo(mi: Any, bsdf: Any, cosine: float) -> np.ndarray:
+    import drjit as dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f, 1)
+    si.wi = mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0.0, cosine)
+    return np.array(bsdf.eval_diffuse_reflectance(si)).ravel()
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018"])
+@pytest.mark.parametrize("material", [COATED, GLASS])
+def test_a_plugin_has_the_energies_of_the_lobes(mi: Any, model: str, material: str) -> None:
+    stack = loads(material)
+    lobes = vt.lobes(stack, 0.6, model=model)
+    whole = np.sum(lobes.energy, axis=0) + lobes.remainder + lobes.passed
+    assert albedo(mi, vt.bsdf(stack, model=model), 0.6) == pytest.approx(whole[:, 0], abs=5e-3)
+
+
+def test_films_lie_under_a_textured_roughness(mi: Any, tmp_path: Path) -> None:
+    """The albedo of a texture of one value is that of the value."""
+    path = tmp_path / "roughness.png"
+    mi.util.write_bitmap(str(path), np.repeat([[[0.3]], [[0.5]]], 2, axis=1).astype(np.float32), write_async=False)
+    for model in ("velatura", "belcour2018"):
+        texture = {"texture": str(path), "scale": 0.0, "offset": 0.1}
+        textured, plain = (loads(ANODISED).replace(layer0_alpha=x) for x in (texture, 0.1))
+        assert albedo(mi, vt.bsdf(textured, model=model), 0.6) == pytest.approx(
+            albedo(mi, vt.bsdf(plain, model=model), 0.6), abs=5e-3
+        )
+
+
+def test_light_from_below_meets_the_films_in_their_order(mi: Any) -> None:
+    """What a pane reflects from below is what the same pane, turned over, reflects from above."""
+    stack = loads(GLASS)
+    first, last = stack.interfaces
+    over = vt.Stack(
+        [
+            vt.Interface(eta=1.5, alpha=last.alpha, films=last.films[::-1]),
+            vt.Interface(eta=1.0, alpha=first.alpha, films=first.films[::-1]),
+        ],
+        thin=True,
+    )
+    for name in ("velatura", "weier2020", "reference"):
+        below, above = sampled(mi, vt.bsdf(stack, model=name), -0.6), sampled(mi, vt.bsdf(over, model=name), 0.6)
+        assert below == pytest.approx(above, abs=0.01)
+
+
+def sampled(mi: Any, bsdf: Any, cosine: float) -> np.ndarray:
+    """The mean weight of samples that are reflected: 40,000, whose noise is a fifth of what is allowed."""
+    import drjit as dr
+
+    count = 40_000
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    si.wi = mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0.0, cosine)
+    rng = mi.PCG32(count)
+    u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    bs, weight = bsdf.sample(mi.BSDFContext(), si, *u)
+    return np.array(dr.mean(dr.select(bs.wo.z * cosine > 0, weight, 0), axis=1)).ravel()
+
+
+def test_an_index_that_changes_changes_the_films(mi: Any) -> None:
+    bsdf = vt.bsdf(loads(COATED), model="belcour2018")
+    parameters = mi.traverse(bsdf)
+    parameters["layer0_eta"] = mi.Float(1.8)
+    parameters.update()
+    other = vt.bsdf(loads(COATED).replace(layer0_eta=1.8), model="belcour2018")
+    assert albedo(mi, bsdf, 0.6) == pytest.approx(albedo(mi, other, 0.6), abs=1e-4)
+
+
+def test_a_scene_may_name_films(mi: Any) -> None:
+    flat = {"layer0_conductor": "Al", "layer0_alpha": 0.2, "layer0_film0_eta": 1.7, "layer0_film0_thickness_nm": 90}
+    named = kernel.load_dict({"type": "layered", **flat})
+    assert albedo(mi, named, 0.6) == pytest.approx(albedo(mi, vt.bsdf(vt.Stack.from_flat(None, flat)), 0.6), abs=1e-5)
+    texture = {"type": "checkerboard"}
+    with pytest.raises(vt.InvalidInput, match="layer0_film0_eta: must be a number"):
+        kernel.load_dict({"type": "layered", **flat, "layer0_film0_eta": texture})
+
+
+# What has no films yet
+
+
+def spectral(stack: vt.Stack) -> None:
+    try:
+        kernel.mitsuba("llvm_ad_spectral")
+        vt.bsdf(stack)
+    finally:
+        kernel.mitsuba("llvm_ad_rgb")
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda stack: vt.shader.shader(stack),
+        lambda stack: vt.export(stack, to="glsl"),
+        lambda stack: vt.bsdf(stack, model="weidlich_wilkie"),
+        lambda stack: vt.inverse.coat(stack, 1.5, 0.1),
+        lambda stack: vt.inverse.simplify(stack, 1),
+        lambda stack: vt.reference.statistics(stack, 1.0, paths=100, polarised=True),
+        spectral,
+    ],
+)
+def test_what_has_no_films_says_so(mi: Any, use: Callable[[vt.Stack], Any]) -> None:
+    with pytest.raises(vt.InvalidInput, match=r"layer 0 \(interface\): films: .* no thin films yet"):
+        use(loads(COATED))
+
+
+def test_models_of_the_papers_have_none_over_a_diffuse_base() -> None:
+    with pytest.raises(vt.InvalidInput, match="films: belcour2018 has none over a diffuse base"):
+        vt.lobes(loads(OVER_DIFFUSE), 1.0, model="belcour2018")
+
+
+def test_an_index_beside_films_has_no_gradient_and_no_texture(mi: Any, tmp_path: Path) -> None:
+    import drjit as dr
+
+    parameters = mi.traverse(vt.bsdf(loads(COATED), model="belcour2018"))
+    dr.enable_grad(parameters["layer0_eta"])
+    parameters.set_dirty("layer0_eta")
+    with pytest.raises(vt.InvalidInput, match="layer0_eta: has no gradient beside thin films"):
+        parameters.update()
+    mi.util.write_bitmap(str(tmp_path / "index.png"), np.full((2, 2, 3), 0.5), write_async=False)
+    texture = {"texture": str(tmp_path / "index.png")}
+    with pytest.raises(vt.InvalidInput, match="films: not over an index from a texture"):
+        vt.Interface(eta=texture, films=[{"eta": 1.4, "thickness_nm": 90}])
+
+
+def test_fresnel_without_films_stays() -> None:
+    found = vt.lobes(vt.Stack([vt.Interface(eta=1.5, alpha=0.0)]), [1.0, 0.5], reflectance="fgd").energy[0]
+    assert found[0] == pytest.approx(fresnel.dielectric(np.array([1.0, 0.5]), 1.5), abs=1e-6)
