@@ -18,12 +18,14 @@ from velatura.stack import Address, Material
 Array = NDArray[np.floating]
 Range = tuple[Sequence[Address], float, float]  # values that one texture gives, its least and its greatest
 
-NODES_MAX = {1: 17, 2: 9, 3: 8}  # by the number of axes of a table
+NODES_MAX = {1: 17, 2: 7, 3: 7}  # by the number of axes of a table
+BESIDE = 9  # nodes of an axis in a table beside one that others resolve
 COARSE = 5  # nodes of an axis in a table that another one resolves
 FINE = {1: 3, 2: 3, 3: 2}  # likewise, places of a table from one node to the next
 ROOTS = frozenset({"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k"})  # of which nodes are even in the root
 STEPS = {"rotation": 22.5}
 STEP = 0.1
+COARSER = 1.2  # times, where there would be too many nodes
 QUARTER = 90.0  # of a turn, to either side
 
 #: What textures span that cannot be looked at, by key; values beyond take the nearest.
@@ -55,7 +57,7 @@ class Axis:
         low, high = (_coordinate(first, end) for end in ends)
         step = STEPS.get(first.key, STEP)
         while (nodes := _around(low, high, step))[1] - nodes[0] >= NODES_MAX[together]:
-            step *= 2
+            step *= COARSER
         begin, end = (node * step for node in nodes)
         if end > most:
             begin, end = min(begin, most - step), most

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import axes, solution
-from velatura.model.axes import COARSE, NODES_MAX, Axis, Range, Wavelengths
+from velatura.model.axes import BESIDE, COARSE, Axis, Range, Wavelengths
 from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
@@ -298,7 +298,7 @@ Group = tuple[Axis | Wavelengths, ...]
 def _groups(spanned: Sequence[Axis | Wavelengths], together: int) -> list[tuple[Group, Sequence[int]]]:
     """The axes of all tables, some together in the first one, and those at whose middle others have the columns."""
     groups: list[tuple[Group, Sequence[int]]] = [(tuple(spanned[:together]), ())]
-    others = [axis.with_middle(NODES_MAX[2]) for axis in spanned[together:]]
+    others = [axis.with_middle(BESIDE) for axis in spanned[together:]]
     if together == 1:
         return [*groups, *(((axis,), (0,)) for axis in others)]
     first, *coarse = (axis.with_middle(COARSE) for axis in spanned)
