@@ -101,7 +101,9 @@ def parts(
     usual = np.minimum(weight_straight * ops.divide(squares, of_straight), UNLIKE * mean)
     drawn = Wanted.of(mean, usual, usual)
     if facets is not None:
-        most = (np.maximum(x, y) for x, y in zip(drawn[1:], facets[1:]))
+        # Only samples that do not pass the facets are reflected
+        weights = (np.minimum(ops.divide(x, 1 - passes), UNLIKE) for x in facets[1:])
+        most = (np.maximum(*each) for each in zip(drawn[1:], weights))
         drawn = Wanted(ops.mean(straightly) + facets.energy, *most)
     heaviest = weight_rest * (1 + found.diffuse * (peak - 1))
     others = Wanted.of(bouncing, bouncing, weight_bounced), Wanted.of(scattered, rest, heaviest)
