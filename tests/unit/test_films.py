@@ -192,13 +192,3 @@ def test_colours_change_with_thickness_as_they_do_with_fine_integration() -> Non
     found = np.array([x.reflectance(at, srgb_sensitivity)[:, 0] for x in coatings])
     exact = np.array([finely(x, at)[:, 0] for x in coatings])
     assert np.abs(np.diff(found, axis=0) - np.diff(exact, axis=0)).max() < 1e-3
-
-
-def test_what_a_clear_coating_does_not_reflect_passes() -> None:
-    coating = Coating((ColouredFilm(white(2.0), white(0.0), 400.0),), white(1.0), white(1.5))
-    passed = coating.transmittance(COSINES, srgb_sensitivity)
-    assert coating.clear
-    assert coating.reflectance(COSINES, srgb_sensitivity) + passed == pytest.approx(np.ones((3, 34)), abs=1e-9)
-    tinted = Coating((ColouredFilm(white(2.0), white(0.2), 400.0),), white(1.0), white(1.5))
-    assert not tinted.clear
-    assert (tinted.transmittance(COSINES, srgb_sensitivity)[:, 1:] < passed[:, 1:]).all()

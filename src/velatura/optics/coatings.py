@@ -53,19 +53,9 @@ class Coating:
     eta_2: RGB
     k_2: RGB = (0.0, 0.0, 0.0)
 
-    @property
-    def clear(self) -> bool:
-        """Whether neither the films nor the medium below absorb, so that what is not reflected is transmitted."""
-        return not any(self.k_2) and not any(any(film.k) for film in self.films)
-
     def reflectance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
         """Reflectance (3, N) of unpolarised light at cosines (N,) above, in [0, 1]."""
         return np.clip(self._integrated("reflected", cos_theta, sensitivity), 0.0, 1.0)
-
-    def transmittance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
-        """Transmittance (3, N) into the medium below, at most what is not reflected."""
-        most = 1 - self.reflectance(cos_theta, sensitivity)
-        return np.clip(self._integrated("transmitted", cos_theta, sensitivity), 0.0, most)
 
     def _integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
         channels = [self._channel(c) for c in range(3)]

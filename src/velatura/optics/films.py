@@ -28,11 +28,6 @@ class Film:
     k: Value
     thickness_nm: Value
 
-    @property
-    def clear(self) -> bool:
-        """Whether it is known to absorb nothing."""
-        return isinstance(self.k, float) and self.k == 0.0
-
 
 @dataclass(frozen=True)
 class Response:
