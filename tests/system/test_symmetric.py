@@ -10,6 +10,7 @@ from scipy import stats
 
 import velatura as vt
 from velatura import kernel, tables
+from velatura.checks.probe import Probe
 from velatura.model import bsdf, named
 from velatura.model.transport.energies import energies
 from velatura.model.widths import nearly_straight
@@ -109,6 +110,26 @@ def test_a_gap_of_air_gains_nothing() -> None:
     stack = vt.Stack([air, glass, vt.Interface(conductor="mirror", alpha=0.005)], exterior=1.33)
     for cos_theta in (0.9, 0.8):
         assert albedo(stack, cos_theta, "symmetric").max() < 1.005
+
+
+def test_samples_of_rough_glass_are_as_good_as_those_of_a_rough_dielectric() -> None:
+    """Rationale: light of one interface is the same there and back, so that no sample has to be spent on what the other
+    direction alone would see. Expected, from inside, where paths meet the surface again and again: the mean square of
+    weights within 2 % of those of Mitsuba's plugin (standard errors .2 %); with a share of such samples it is 1.3
+    times as large."""
+    bsdf = vt.bsdf(vt.Stack([vt.Interface(eta=1.5, alpha=0.05)]), form="symmetric", reflectance="fgd")
+    rough = {"type": "roughdielectric", "distribution": "ggx", "alpha": 0.05, "int_ior": 1.5, "ext_ior": 1.0}
+    u = np.random.default_rng(0).random((2**14, 3))
+    for cosine in (-0.3, -0.6, -0.9):
+        wi = np.broadcast_to((np.sqrt(1 - cosine * cosine), 0.0, cosine), u.shape)
+        ours, theirs = (np.mean(_importance(b).sample(wi, u).weight ** 2) for b in (bsdf, mi.load_dict(rough)))
+        assert ours < 1.02 * theirs
+
+
+def _importance(bsdf: Any) -> Probe:
+    probe = Probe(bsdf)
+    probe.context = mi.BSDFContext(mi.TransportMode.Importance)
+    return probe
 
 
 def test_a_material_is_prepared_by_the_same_kernels_when_its_values_change() -> None:

@@ -306,7 +306,9 @@ class Solver:
         wanted.append(Wanted.of(rest + FAINT, rest, scale * folded.around(largest_of_rest)))
 
         # Share samples
-        least = EVEN if self.model.form == "symmetric" else 0.0
+        # Light of a single isotropic interface is the same there and back
+        alike = self.isotropic and len(material.layers) == 1
+        least = EVEN if self.model.form == "symmetric" and not alike else 0.0
         others = Wanted.together(wanted)
         if least:
             others = _evened(others)
