@@ -16,6 +16,7 @@ from velatura.errors import InvalidInput
 from velatura.inverse import Target, stacks
 from velatura.inverse.coats import scattered
 from velatura.inverse.drag import DraggedStack
+from velatura.inverse.drag.coordinates import Space
 from velatura.model import named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Roughness
@@ -398,6 +399,23 @@ def test_the_lobes_that_are_reported_are_read_from_the_returned_stack() -> None:
     moved = class_maps.member({**body, "target": state["target"], "lobe": 1, "point": [0.3]})
     for answer in (state, met, snapped, moved):
         assert deviation(answer["material"], answer["target"], "velatura") < 1e-12
+
+
+def test_a_mirror_that_is_blurred_more_gives_up_energy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Brushed, below a brushed coat: its facets lose what no brighter metal makes good. The answer at rest takes few
+    readings of the model."""
+    body = {"material": document(vt.preset("crossed-brushing")), "model": "velatura"}
+    wish = copy.deepcopy(appearance.appearance(body)["target"])
+    before = wish["lobes"][1]["energy"][0]
+    wish["lobes"][1]["alpha"] = [1.3 * alpha for alpha in wish["lobes"][1]["alpha"]]
+    solved, readings = Space._solved, list[Any]()
+    monkeypatch.setattr(Space, "_solved", lambda *of: readings.append(of) or solved(*of))
+    answer = appearance.invert({**body, "target": wish})
+    assert len(readings) < 20
+    lobe = answer["target"]["lobes"][1]
+    assert answer["snapped"].startswith("lobe 2: not even the brightest metal")
+    assert lobe["alpha"] == pytest.approx(wish["lobes"][1]["alpha"], rel=1e-3)
+    assert before - 0.005 < lobe["energy"][0] < before
 
 
 @pytest.mark.filterwarnings("error")

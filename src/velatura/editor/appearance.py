@@ -17,7 +17,7 @@ from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.drag import Bound, DraggedStack, plain, seen
-from velatura.inverse.explain import REASONS
+from velatura.inverse.explain import REASONS, UNMET
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.interface import conductor_tint
 from velatura.model import Model, named
@@ -30,6 +30,8 @@ ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is shown itself
 EFFORT = stacks.EFFORTS[:1]  # to find a stack that is not near
 ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
+OF_BLUR = ("blur", "fixed", UNMET[1])  # reasons that are not about energy
+READINGS = 6  # by a slow model, on the way to a wish that cannot be met
 HALVES = 7  # of the way to a wish that cannot be met
 SAVED = tuple(str(n) for n in range(15, 23))  # figures of Bati et al. 2021
 SAVED_MODEL = "bati2021"
@@ -238,8 +240,8 @@ def invert(body: Body) -> Answer:
             return {"feasible": False, "why": "a medium that scatters stays where it is, and the interfaces around it"}
         return _fresh(wish, model)
     possible = near.achromatic(wish)
-    found, bound = near.towards(possible)
-    if bound is not None and not near.rough:
+    found, bound = near.towards(possible) if near.model.recursion.closed_form else _slowly(possible, near)
+    if bound is not None and near.model.recursion.closed_form and not near.rough:
         other = _elsewhere(possible, near)
         if other is not None:
             found, bound = other, None
@@ -278,6 +280,20 @@ def _under(found: DraggedStack) -> Stack:
     if not isinstance(base, Diffuse) or isinstance(base.albedo, Varying) or found.diffuse is None:
         return found.stack
     return with_albedo(found.stack, np.array(found.diffuse), found.model)
+
+
+def _slowly(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound | None]:
+    """As `DraggedStack.towards`, for a model each reading of which takes a while: few lead to the nearest lobes.
+
+    What the wish changes may give, and what the bound is on; where that is far, another stack may have the lobes.
+    """
+    there = near.met(wish)
+    if isinstance(there, DraggedStack):
+        return there, None
+    of_bound = there.lobe, "blur" if there.reason in OF_BLUR else "energy"
+    found = near.nearest(wish, [*near.changes(wish), of_bound], READINGS).renamed(wish)
+    other = _elsewhere(wish, near) if found.far(wish) else None
+    return (other, None) if other else (found, there)
 
 
 def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:

@@ -38,6 +38,7 @@ from velatura.stack import Diffuse, Interface, Layer, Stack, Varying, refuse_fil
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
 ASIDE = 0.02  # by which free choices change to lead past a jump
 SAME = 1e-6  # energies and roughnesses that are as asked
+CHANGED = 0.01  # share of an energy or a roughness that a wish changes it by
 FAR = 0.1  # share of a wish that is a long way
 
 
@@ -301,6 +302,15 @@ class DraggedStack:
     def missed(self, wish: Target) -> float:
         """The largest difference of its energies and variances from those of a target."""
         return float(np.max(np.abs(self.point.reading.value - self._wanted(wish))))
+
+    def changes(self, wish: Target) -> list[tuple[int, str]]:
+        """The "energy" or "blur" of which lobes a target asks to be others than the present ones."""
+        found = []
+        for k, (lobe, asked) in enumerate(zip(self.now(wish).lobes, wish.lobes)):
+            for what, now, then in (("energy", lobe.colour, asked.colour), ("blur", lobe.axes, asked.axes)):
+                if np.abs(np.subtract(now, then)).max() > CHANGED * np.abs(now).max():
+                    found.append((k, what))
+        return found
 
     def far(self, wish: Target) -> bool:
         """Whether the lobes of a target are far away."""

@@ -71,9 +71,11 @@ class Problem:
         found = self._searched(compromise, nearest)
         space = self.start.space
         if isinstance(found, Bound) and compromise is None and not space.model.recursion.closed_form:
-            # Near, one step ends the search; from further off, where readings wind, the way leads on
-            if (nearest.missing > ALMOST) == space.winds:
-                self._approach(nearest)
+            # Near, one step ends the search; from further off, where readings wind, the way leads on: once at a bound,
+            # and not where what misses most is at its own
+            stopped = space.winds and found.coordinate is not None
+            if (nearest.missing > ALMOST) == space.winds and not (stopped and self._ends(nearest)):
+                self._approach(nearest, 1 if stopped else MEASURED)
             enough = WINDING if space.winds else JUMP if found.reason in UNMET else ALMOST
             if nearest.missing < enough and not space.broken(nearest.x, None):
                 return Solution(Point(space, nearest.x), 1.0)
@@ -123,10 +125,10 @@ class Problem:
                 return space.bound_at(min(held), full)
         return space.broken(x, bound) or bound or self._in_the_way(nearest)
 
-    def _approach(self, nearest: Nearest) -> None:
+    def _approach(self, nearest: Nearest, rounds: int) -> None:
         """Newton's method from the nearest point, with differences of the model itself."""
         space, free = self.start.space, self.start.space.free
-        for _ in range(MEASURED if nearest.missing < NEAR else 0):
+        for _ in range(rounds if nearest.missing < NEAR else 0):
             x, before = nearest.x, nearest.missing
             points = space.points(x, free)
             read = space.read(points)
@@ -139,21 +141,25 @@ class Problem:
                 nearest.keep(tried, self._scaled(space.read(tried[:, None])[:, 0] - self.goal))
                 if nearest.missing < before / 2:
                     break
-            if nearest.missing < ALMOST or nearest.missing == before:
+            if nearest.missing < ALMOST or nearest.missing > before / 2:
                 break
 
     def _in_the_way(self, nearest: Nearest) -> Bound:
         """The bound that stops a search that does not end: that of the coordinate whose reading misses most."""
-        space, x = self.start.space, nearest.x
-        worst = int(space.free[nearest.worst])
-        on = [b for b in space.bounds if b.coordinate == worst and len(x) and abs(x[worst] - b.at) <= SLACK]
-        if on:
-            return on[0]
+        space = self.start.space
+        if ends := self._ends(nearest):
+            return ends[0]
         reading, energies = int(space.counted[nearest.worst]), 3 * space.lobes
         if reading < energies:
             return replace(space.bounds[0], lobe=reading // 3, reason=UNMET[0])
         own = space.interfaces[(reading - energies) // space.entries]
         return replace(space.bounds[0], lobe=own.lobe, reason=UNMET[1])
+
+    def _ends(self, nearest: Nearest) -> list[Bound]:
+        """The bounds that the coordinate lies on whose reading misses most."""
+        space, x = self.start.space, nearest.x
+        worst = int(space.free[nearest.worst])
+        return [b for b in space.bounds if b.coordinate == worst and len(x) and abs(x[worst] - b.at) <= SLACK]
 
     @cached_property
     def way(self) -> Array:
