@@ -404,7 +404,7 @@ def test_the_lobes_that_are_reported_are_read_from_the_returned_stack() -> None:
 def test_a_mirror_that_is_blurred_more_gives_up_energy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Brushed, below a brushed coat: its facets lose what no brighter metal makes good. The answer at rest takes few
     readings of the model."""
-    body = {"material": document(vt.preset("crossed-brushing")), "model": "velatura"}
+    body = {"material": vt.load(vt.preset("crossed-brushing")).to_dict(), "model": "velatura"}
     wish = copy.deepcopy(appearance.appearance(body)["target"])
     before = wish["lobes"][1]["energy"][0]
     wish["lobes"][1]["alpha"] = [1.3 * alpha for alpha in wish["lobes"][1]["alpha"]]

@@ -114,6 +114,15 @@ def test_fewer_interfaces_come_less_close() -> None:
     assert all(row["error"] == pytest.approx(row["relative"] * row["wanted"]) for row in two.by_angle)
 
 
+def test_more_interfaces_are_never_worse() -> None:
+    """By the default model: of two coats over a mirror, one interface more comes much closer."""
+    coats = [Interface(eta=1.35, alpha=0.03), Interface(eta=1.6, alpha=0.1)]
+    stack = Stack([*coats, Interface(conductor="mirror", alpha=0.1)])
+    two, one = (simplify(stack, count, "velatura") for count in (2, 1))
+    assert two.error < 0.2 * one.error
+    assert two.error == two.errors[0] and len(two.stack.interfaces) == 2
+
+
 @pytest.mark.parametrize("model", ["bati2021", "velatura"])
 @pytest.mark.parametrize("stack", ["coated-gold", "copper"])
 def test_one_interface_keeps_energy_and_hue(model: str, stack: str) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.inverse import angles
-from velatura.inverse.angles import ReflectanceTable, radiance, read
+from velatura.inverse.angles import ReflectanceTable, radiance
 from velatura.inverse.interface import conductor_extinction
 from velatura.inverse.partial_stack import CLEAR, Array
 from velatura.model import Model, bsdf, named, variance_kind
@@ -40,7 +40,9 @@ from velatura.stack import (
 STEP, STRIDE = 1e-5, 1e-3  # of a value, to see how a model changes: in closed form, and solved anew for each value
 MAPPED = 3  # readings by a model without a closed form, between descents of the one that stands in for it
 LAST = 6  # rounds of its own descent, from the closest end
-ROUNDS, TOLERANCE = 100, 1e-9  # of a descent, and where it ends: the relative change in a round
+ALONE = 20  # rounds of its own descent, from a start that is close
+# Of a descent the rounds, and the relative change in a round where it ends: also where a model is solved anew
+ROUNDS, TOLERANCE, COARSE = 100, 1e-9, 1e-5
 CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
 DEPTH_MAX = 10.0  # of a medium
 AS_WELL, EXACT = 1.05, 1e-6  # of the smallest error, and beside it: other stacks fit as well
@@ -177,7 +179,7 @@ def descended(
     ends = [Descent(table, load(start), model.adder, eta_max, darkest).run().of(model) for start in starts]
     ends.sort(key=lambda end: end.cost)
     if ends and not model.recursion.closed_form:
-        ends[0] = ends[0].descent.run()
+        ends[0] = ends[0].descent.run(LAST)
     return ends
 
 
@@ -348,8 +350,8 @@ class Descent:
         x = np.array([free.coordinate(self._first(free)) for free in self.free])
         return End(self, x, self.residuals(x[None])[0])
 
-    def run(self) -> End:
-        """The end of the descent."""
+    def run(self, rounds: int = ROUNDS) -> End:
+        """The end of the descent, after a number of rounds at most."""
         from scipy.optimize import least_squares
 
         bounds = np.transpose([free.bounds for free in self.free])
@@ -362,9 +364,9 @@ class Descent:
             bounds=bounds,
             x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
             xtol=TOLERANCE,
-            ftol=TOLERANCE,
+            ftol=TOLERANCE if self.model.recursion.closed_form else COARSE,
             gtol=None,
-            max_nfev=ROUNDS if self.model.recursion.closed_form else LAST,
+            max_nfev=rounds,
         )
         # Keep the start where the descent has gained nothing
         best = first if first.cost <= found.cost else End(self, found.x, found.fun)
@@ -385,8 +387,9 @@ class Descent:
 
     def _read(self, x: Array) -> Array:
         """As `missed`, at one point (free,), of the material there."""
-        value, energy = read(Material.of(self.placed(x)[0]), self.table.directions, self.model)
-        return self.missed(1, value[:, None], energy[:, None])[0]
+        found = angles.table_of(self.placed(x)[0], self.table.directions, self.model, with_energy=True)
+        assert found.energy is not None
+        return self.missed(1, (found.value * self.table.directions.wo[2])[:, None], found.energy[:, None])[0]
 
     def missed(self, count: int, value: Value, energy: Value) -> Array:
         """Errors of log(1 + f cos), (P, 3 N), of a number P of points (Low et al. 2012).

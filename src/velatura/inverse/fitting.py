@@ -13,7 +13,7 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.inverse import angles
 from velatura.inverse.angles import Directions, ReflectanceTable
-from velatura.inverse.descent import Descent, Fit, descended, fit, written
+from velatura.inverse.descent import ALONE, ROUNDS, Descent, End, Fit, descended, fit, written
 from velatura.inverse.explain import Infeasible
 from velatura.inverse.stacks import Solution, alternatives, model_of
 from velatura.inverse.target import Target, read
@@ -36,6 +36,7 @@ from velatura.stack import (
 STARTS = 4
 BRUSHED, BRUSHING = (22.5, 67.5, 112.5, 157.5), 1.5  # degrees, and by which ratios, fits of brushed samples start
 DARKEST = -0.5  # share of a conductor's reflectance, with which its k is 0: a base may be darker than any metal
+GAINED = 0.99  # share of the squares of errors below which another interface gains something
 TRIED = 3  # sets of interfaces from which simplification descends
 
 
@@ -94,7 +95,7 @@ def simplify(
 
     Args:
         stack: a material (a stack, a file, or a preset's name).
-        interfaces: how many are kept, at least 1, and fewer than there are.
+        interfaces: how many are kept, at least 1, and fewer than there are; fewer, where the last gain nothing.
 
     Raises:
         InvalidInput: not a valid material, no such number of interfaces, a texture, an unknown model or switch.
@@ -108,16 +109,41 @@ def simplify(
         )
     turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
     table = angles.table_of(stack, Directions.about_lobes(turned), chosen, with_energy=True)
-
-    # Descend from the sets of interfaces that are closest before any change
-    opaque = stack.interfaces[-1].opaque
-    sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
-    starts = [_of_some(stack, kept) for kept in sets]
-    ends = descended(table, _closest(table, starts, chosen, eta_max, TRIED), chosen, eta_max, DARKEST)
-    best = ends[0]
+    best, *_ = ends = _simplest(stack, interfaces, table, chosen, eta_max)
     found = angles.table_of(best.stack, table.directions, chosen, with_energy=True)
     errors, by_angle = [end.error for end in ends], angles.report(table, found)
     return Fit(best.stack, chosen, best.error, by_angle, errors, energies=angles.energies(table, found))
+
+
+def _simplest(stack: Stack, interfaces: int, table: ReflectanceTable, model: Model, eta_max: float) -> list[End]:
+    """The ends of descents from the sets of interfaces that are closest before any change, the closest first.
+
+    Where one interface less comes as close, a descent begins at that stack with another interface, without effect; if
+    it gains nothing either, that stack is the closest.
+    """
+    count, opaque, closed = len(stack.interfaces), stack.interfaces[-1].opaque, model.recursion.closed_form
+
+    def itself(start: Stack) -> End:
+        return Descent(table, start, model, eta_max, DARKEST).run(ROUNDS if closed else ALONE)
+
+    sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
+    starts = [_of_some(stack, kept) for kept in sets]
+    starts = _closest(table, starts, model, eta_max, TRIED if closed else 1)
+    found = descended(table, starts, model, eta_max, DARKEST)
+    # A model that is slow also descends by itself: the one that stands in for it leads far away from a close start
+    found += [] if closed else [itself(start) for start in starts]
+    if interfaces > 1:
+        fewer = _simplest(stack, interfaces - 1, table, model, eta_max)[0]
+        if fewer.cost <= min(end.cost for end in found):
+            more = itself(_with_one_more(fewer.stack))
+            found.append(more if more.cost < GAINED * fewer.cost else fewer)
+    return sorted(found, key=lambda end: end.cost)
+
+
+def _with_one_more(stack: Stack) -> Stack:
+    """The stack with another interface on top, between equal indices."""
+    alpha = Material.of(stack).interfaces[0].alpha_u
+    return stack.with_layers([Interface(eta=stack.exterior, alpha=alpha), Medium(), *stack.layers])
 
 
 def _closest(table: ReflectanceTable, starts: list[Stack], model: Model, eta_max: float, count: int) -> list[Stack]:
