@@ -409,7 +409,12 @@ def test_a_mirror_that_is_blurred_more_gives_up_energy(monkeypatch: pytest.Monke
     before = wish["lobes"][1]["energy"][0]
     wish["lobes"][1]["alpha"] = [1.3 * alpha for alpha in wish["lobes"][1]["alpha"]]
     solved, readings = Space._solved, list[Any]()
-    monkeypatch.setattr(Space, "_solved", lambda *of: readings.append(of) or solved(*of))
+
+    def counted(*of: Any) -> Any:
+        readings.append(of)
+        return solved(*of)
+
+    monkeypatch.setattr(Space, "_solved", counted)
     answer = appearance.invert({**body, "target": wish})
     assert len(readings) < 20
     lobe = answer["target"]["lobes"][1]
