@@ -144,9 +144,9 @@ def read(material: Material, directions: Directions, model: Model) -> tuple[Valu
     seen = model.recursion.body(material, model, variance_kind(material), Context())
     if isinstance(seen, bsdf.Lobed):
         return radiance(seen, directions)
-    value, _ = seen.eval_pdf(tuple(directions.wi), tuple(directions.wo), bsdf.Asked(transmission=False))
-    solved: Any = seen
-    return value, sum(solved.seen(tuple(directions.lit))[0].energies)
+    reflected = bsdf.Asked(transmission=False)
+    value, _ = seen.eval_pdf(tuple(directions.wi), tuple(directions.wo), reflected)
+    return value, seen.albedo(tuple(directions.lit), reflected)
 
 
 def radiance(seen: bsdf.Lobed, directions: Directions) -> tuple[Value, Value]:

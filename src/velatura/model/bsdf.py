@@ -71,7 +71,7 @@ class Body(Protocol):
     def lit(self, wi: Direction) -> Body:
         """The same for light from wi alone, which is looked up once."""
 
-    def albedo(self, wi: Direction) -> Value: ...
+    def albedo(self, wi: Direction, asked: Asked = ...) -> Value: ...
 
     def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ...) -> tuple[Value, Value]: ...
 
@@ -113,9 +113,9 @@ class Lobed:
     def lit(self, wi: Direction) -> Lobed:
         return self
 
-    def albedo(self, wi: Direction) -> Value:
-        """Energy of all parts, a colour."""
-        return scattered(self, wi).albedo
+    def albedo(self, wi: Direction, asked: Asked = Asked()) -> Value:
+        """Energy of the queried parts, a colour."""
+        return scattered(self, wi).only(asked).albedo
 
     def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
         """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; 0 from below an opaque stack."""

@@ -291,10 +291,11 @@ class Solved:
         )
         return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
 
-    def albedo(self, wi: Direction) -> Value:
-        """Energy of all parts, a colour."""
+    def albedo(self, wi: Direction, asked: Asked = ALL) -> Value:
+        """Energy of the queried parts, a colour."""
         of, _ = self.seen(wi)
-        return sum(of.energies) + of.passed
+        reflected = sum(energy for number, energy in zip(of.numbers, of.energies) if asked.reflects(number))
+        return reflected + of.passed if asked.transmission else reflected
 
     def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
         """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""

@@ -103,8 +103,8 @@ class Turned:
     def lit(self, wi: Direction) -> Turned:
         return replace(self, body=self.body.lit(self._inside(wi)))
 
-    def albedo(self, wi: Direction) -> Value:
-        return self.body.albedo(self._inside(wi))
+    def albedo(self, wi: Direction, asked: Asked = ALL) -> Value:
+        return self.body.albedo(self._inside(wi), asked)
 
     def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
         return self.body.eval_pdf(self._inside(wi), self._inside(wo), asked)
