@@ -65,6 +65,30 @@ def test_the_shader_is_the_model(pattern: int, model: str, switches: dict[str, s
     assert found.drawn < 1e-4
 
 
+# One metal, two dielectrics over one, a pane, each of a model that looks films up in its own way; what is solved
+COATED: list[tuple[int, str, dict[str, str]]] = [
+    (0, "weier2020", {}),
+    (10, "belcour2018", {}),
+    (11, "velatura", {}),
+    (18, "yamaguchi2019", {"form": "symmetric"}),
+    (18, "velatura", {}),
+    (20, "realtime", {}),
+]
+
+
+@pytest.mark.parametrize(("pattern", "model", "switches"), COATED)
+def test_films_are_those_of_the_model(
+    pattern: int, model: str, switches: dict[str, str], page: chromium.Browser
+) -> None:
+    """Expected: the same bounds; films are numbers, and all values live but the indices beside them."""
+    found = compare(PATTERNS[pattern], model, 60, 7, page, films=True, **switches)
+    assert found.energy < 1e-4
+    assert found.alpha < 1e-4
+    assert found.value < 1e-3
+    assert found.density < 1e-3
+    assert found.drawn < 1e-4
+
+
 def test_a_shader_knows_its_material(page: chromium.Browser) -> None:
     """Expected: `vt_material` holds the numbers of the file, so that the text draws as it is."""
     stack = vt.preset("coated-gold")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, TypeAlias
 
@@ -18,8 +18,9 @@ from velatura.model.context import Context, at_a_point
 from velatura.optics import ggx
 from velatura.shader import Recording, Shader, constant, record, shader, variance
 from velatura.shader.bake import Bake
+from velatura.shader.films import beside
 from velatura.shader.solved import Tabulated
-from velatura.stack import Kind, Material, Stack
+from velatura.stack import Film, Interface, Kind, Material, Stack, coatings
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
 
@@ -95,13 +96,30 @@ def random_case(pattern: Pattern, count: int, rng: np.random.Generator) -> Case:
     )
 
 
+def coated(case: Case) -> Case:
+    """The case with films on all interfaces that may have any; what these are worked out from is that of the first."""
+    layers: list[Any] = []
+    for k, layer in enumerate(case.stack.layers):
+        if isinstance(layer, Interface) and layer.kind != "mirror":
+            absorbs = 0.2 if layer.opaque else 0.0
+            films = [Film(eta=2.1, k=absorbs, thickness_nm=60 + 110 * k), Film(eta=(1.36, 1.38, 1.4), thickness_nm=90)]
+            layer = layer.model_copy(update={"films": tuple(films)})
+        layers.append(layer)
+    stack = Stack(layers, exterior=case.stack.exterior, thin=case.stack.thin)
+    alike = beside(stack)
+    values = {
+        name: np.repeat(x[..., :1], x.shape[-1], axis=-1) if name in alike else x for name, x in case.values.items()
+    }
+    return replace(case, stack=stack, values=values)
+
+
 def in_numpy(case: Case, recording: Recording) -> Results:
     """What the model says; where it solves materials, of the first stack for all directions."""
     stack = case.stack
     wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
     if isinstance(recording.baked, Tabulated):
         return _solved(stack, recording.model, wi, wo, u)
-    material = Material.from_flat(stack.kinds, case.values, stack.thin)
+    material = Material.from_flat(stack.kinds, case.values, stack.thin, coatings.of(stack))
     body = bsdf.body(material, recording.model, variance(stack), at_a_point())
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]
@@ -169,6 +187,8 @@ void main() {{
     textures = {"inputs": inputs, "vt_tables": made.tables}
     if made.columns is not None:
         textures["vt_baked"] = made.columns
+    if made.films is not None:
+        textures["vt_films"] = made.films
     rows = inputs.shape[0]
     drawn = browser.draw(f"#version 300 es\n{made.text}{main}", textures, len(answers), rows)
     by_answer = np.moveaxis(drawn.pixels.astype(float), 0, -1)  # (answers, 4, N)
@@ -213,9 +233,12 @@ def differences(truth: Results, found: Results) -> Differences:
     )
 
 
-def compare(pattern: Pattern, model: str, count: int, seed: int, browser: Browser, **switches: Any) -> Differences:
-    """Random stacks of a pattern through both."""
+def compare(
+    pattern: Pattern, model: str, count: int, seed: int, browser: Browser, films: bool = False, **switches: Any
+) -> Differences:
+    """Random stacks of a pattern through both, with `films` or without."""
     case = random_case(pattern, count, np.random.default_rng(seed))
+    case = coated(case) if films else case
     recording, made = record(case.stack, model, **switches), shader(case.stack, model, **switches)
     found, _, _ = in_browser(case, recording, made, browser)
     return differences(in_numpy(case, recording), found)

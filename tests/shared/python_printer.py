@@ -64,6 +64,9 @@ class PythonPrinter(Printer):
     def value(self, table: str, args: Sequence[str], wide: bool) -> str:
         return f"vt_{table}({', '.join(args)})[0]"
 
+    def film(self, line: int, cosine: str) -> str:
+        return f"vt_film(vt_films, {line}, {cosine})"
+
     # Statements
 
     def title(self, text: str) -> str:
@@ -146,6 +149,9 @@ class PythonPrinter(Printer):
             for x in bake.groups
         )
 
+    def films(self, count: int) -> str:
+        return ""
+
     def helpers(self, called: Set[tuple[str, Kind]]) -> str:
         return ""
 
@@ -170,7 +176,7 @@ class PythonPrinter(Printer):
 def run(text: str, **given: Any) -> SimpleNamespace:
     """The functions of a program that was printed; textures and parameters are `given` by name."""
     names = {"np": np, "vt_colour": _colour, "vt_mean": _mean, "vt_sqrt": _sqrt}
-    program: dict[str, Any] = {**names, "vt_looked_up": _looked_up, "vt_read": _read, **given}
+    program: dict[str, Any] = {**names, "vt_looked_up": _looked_up, "vt_read": _read, "vt_film": _film, **given}
     exec(compile(text, "<printed>", "exec"), program)
     return SimpleNamespace(**program)
 
@@ -216,6 +222,11 @@ def _looked_up(texture: np.ndarray, start: int, nodes: tuple[int, ...], channels
     width = channels if channels == 1 else -(-channels // 4) * 4
     data = texture.reshape(-1)[4 * start :][: int(np.prod(nodes)) * width].reshape(*nodes, width)
     return ops.interpolate(SimpleNamespace(data=data), *place)
+
+
+def _film(texture: np.ndarray, line: int, cosine: Any) -> np.ndarray:
+    """A line of the texture of films at a cosine."""
+    return _colour(*ops.interpolate(SimpleNamespace(data=texture[line, :, :3]), cosine))
 
 
 def _read(texture: np.ndarray, nodes: tuple[int, ...], sides: int, group: tuple[int, int], place: Sequence[Any]) -> Any:

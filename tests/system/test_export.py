@@ -75,6 +75,36 @@ def test_json_holds_the_material_and_its_numbers(preset: str, run: Run) -> None:
         np.testing.assert_allclose(a, b, rtol=1e-12)
 
 
+FILMS = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.05, films: [{eta: 2.0, thickness_nm: 200}]}
+  - interface: {conductor: Al, alpha: 0.15, films: [{eta: [1.4, 1.46, 1.5], k: 0.1, thickness_nm: 320}]}
+"""
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_films_are_exported(to: str, run: Run, tmp_path: Path) -> None:
+    """Expected: a shader has a texture of films beside it; the others describe the same material."""
+    (tmp_path / "film.yaml").write_text(FILMS, encoding="utf-8")
+    stack, path = vt.load(tmp_path / "film.yaml"), tmp_path / f"film{FORMATS[to].endings[0]}"
+    assert run("export", str(tmp_path / "film.yaml"), "--to", to, "-o", str(path))[0] == 0
+    if to == "glsl":
+        films = np.frombuffer((tmp_path / "film.films.bin").read_bytes(), "<f4").reshape(2, 257, 4)
+        np.testing.assert_array_equal(films, shader(stack).films)
+        assert "uniform highp sampler2D vt_films;" in path.read_text()
+    elif to == "json":
+        found = json.loads(path.read_text())
+        assert vt.Stack.from_dict(found["material"]) == stack
+        assert found["values"]["layer1_film0_eta"] == [1.4, 1.46, 1.5]
+        assert found["values"]["layer0_film0_thickness_nm"] == 200
+    elif to == "python":
+        assert runpy.run_path(str(path))["stack"] == stack
+    else:
+        expected, shape = vt.bsdf(stack), '<shape type="sphere"><ref id="material"/></shape>'
+        found = kernel.mitsuba().load_string(f'<scene version="3.0.0"><include filename="{path}"/>{shape}</scene>')
+        assert str(found.shapes()[0].bsdf()) == str(expected)
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_scene_of_mitsuba_can_include_it(preset: str, run: Run, tmp_path: Path) -> None:
     """Expected: the BSDF of the XML answers as the one that Python makes, switches included."""

@@ -254,8 +254,6 @@ def spectral(stack: vt.Stack) -> None:
 @pytest.mark.parametrize(
     "use",
     [
-        lambda stack: vt.shader.shader(stack),
-        lambda stack: vt.export(stack, to="glsl"),
         lambda stack: vt.bsdf(stack, model="weidlich_wilkie"),
         lambda stack: vt.inverse.coat(stack, 1.5, 0.1),
         lambda stack: vt.inverse.simplify(stack, 1),

@@ -20,7 +20,8 @@ import velatura as vt
 from velatura import ops, tables
 from velatura.errors import InvalidInput
 from velatura.shader import Recording, constant, record, shader
-from velatura.shader.bake import Bake
+from velatura.shader.bake import Bake, Group
+from velatura.shader.films import texture
 from velatura.shader.glsl import GLSL
 from velatura.shader.graph import Graph
 from velatura.shader.material import place
@@ -28,6 +29,7 @@ from velatura.shader.solved import Tabulated
 from velatura.shader.statements import statements
 from velatura.shader.symbol import Symbol, colour, component, in_order, number
 from velatura.shader.tape import tape
+from velatura.stack import loads
 
 X, Y = np.random.default_rng(1).uniform(0.05, 0.95, (2, 20))
 RGB = np.random.default_rng(2).uniform(0.05, 0.95, (3, 20))
@@ -291,12 +293,16 @@ def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
         assert made.text.count("\n") <= 300
 
 
+@pytest.mark.parametrize("films", [False, True])
 @pytest.mark.parametrize("name", ["coated-gold", "frosted-glass", "tinted-plate", "varnished-paint"])
-def test_values_that_change_are_solved_anew(name: str) -> None:
+def test_values_that_change_are_solved_anew(name: str, films: bool) -> None:
     """What is read of other values is what a shader of these alone reads, though more is drawn of a kind of stack: of a
-    pane it has all interfaces shape the light that passes, and any medium scatter it."""
+    pane it has all interfaces shape the light that passes, and any medium scatter it; films are those of the values."""
     stack = vt.preset(name)
     other = stack.replace(layer0_eta=1.4)
+    if films:
+        stack = stack.replace(layer0_film0_eta=1.3, layer0_film0_thickness_nm=90)
+        other = other.replace(layer0_film0_eta=2.2, layer0_film0_thickness_nm=160)
     general, alone = shader(stack, values="uniforms"), shader(other)
     assert general.key == shader(other, values="uniforms").key
     assert isinstance(general.baked, Tabulated)
@@ -310,12 +316,83 @@ def test_values_that_change_are_solved_anew(name: str) -> None:
     values |= {f"m.{place(at)}": np.reshape(constant(at, x), (-1, 1)) for at, x in other.values()}
     seen = []
     for recording, read in zip(recordings, (reader(general.baked, found), reader(alone.baked))):
-        given = {**values, **colours, "vt_baked": read}
+        given = {**values, **colours, "vt_baked": read, "vt_films": texture(other)}
         lobes = dict(zip(recording.lobes, evaluate(list(recording.lobes.values()), given)))
         given |= {f"l.{name}{end}": value for name, value in lobes.items() for end in ("", ".r")}
         seen.append(evaluate([recording.value, *recording.energies], given))
     for a, b in zip(*seen):
         np.testing.assert_allclose(np.broadcast_to(a, (3, 40)), np.broadcast_to(b, (3, 40)), rtol=2e-3, atol=1e-4)
+
+
+# Films
+
+UNDER_A_COAT = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 1.3, thickness_nm: 90}]}
+  - medium: {sigma_a: 0.1}
+  - interface: {conductor: Al, alpha: 0.2, films: [{eta: 1.4, thickness_nm: 50}, {eta: 1.9, thickness_nm: 250}]}
+"""
+PANE = """
+thin: true
+layers:
+  - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 1.3, thickness_nm: 90}]}
+  - interface: {eta: 1, alpha: 0.2, films: [{eta: 2.1, thickness_nm: 250}]}
+"""
+
+
+@pytest.mark.parametrize("textured", [False, True])
+@pytest.mark.parametrize("text", [UNDER_A_COAT, PANE])
+@pytest.mark.parametrize("model", ["belcour2018", "weier2020", "realtime"])
+def test_films_may_change(text: str, model: str, textured: bool, tmp_path: Path) -> None:
+    """A shader of one stack, given the films and the values of another, has the lobes of that, from either side."""
+    (tmp_path / "rough.png").touch()
+    other = loads(text)
+    changed: dict[str, Any] = {"layer0_eta": 1.9, "layer0_film0_eta": 2.3, "layer0_film0_thickness_nm": 120}
+    if textured:
+        changed["layer0_alpha"] = {"texture": str(tmp_path / "rough.png")}
+    general, alone = record(other.replace(**changed), model, parameters=True), record(other, model)
+    cos_theta = np.array([0.2, 0.5, 0.9, 0.2, 0.5, 0.9])
+    side = np.repeat([1.0, -1.0 if other.transmits else 1.0], 3)
+    given = {"wi.x": np.sqrt(1 - cos_theta**2), "wi.y": 0 * cos_theta, "wi.z": side * cos_theta}
+    given |= {f"m.{place(at)}": np.reshape(constant(at, x), (-1, 1)) for at, x in other.values()}
+    given |= {f"vt_shown[{k}]": 1.0 for k in range(len(general.shown))} | {"vt_films": texture(other)}
+
+    def baked(group: Group, at: Any) -> Any:
+        assert isinstance(general.baked, Bake)
+        columns = evaluate(general.baked.columns, {**given, **dict(zip(("place.x", "place.y", "place.z"), at))})
+        return columns[4 * group.begin : 4 * (group.begin + group.texels)]
+
+    energies = [name for name in alone.lobes if name.endswith("energy")]
+    seen = (evaluate([x.lobes[name] for name in energies], {**given, "vt_baked": baked}) for x in (general, alone))
+    for name, a, b in zip(energies, *seen, strict=True):
+        np.testing.assert_allclose(np.broadcast_to(a, (3, 6)), np.broadcast_to(b, (3, 6)), atol=1e-6, err_msg=name)
+    bare = evaluate([record(without_films(other), model).lobes[name] for name in energies], given)
+    assert max(np.abs(a - b).max() for a, b in zip(bare, evaluate([alone.lobes[x] for x in energies], given))) > 0.02
+
+
+def without_films(stack: vt.Stack) -> vt.Stack:
+    layers = [
+        layer.model_copy(update={"films": ()}) if isinstance(layer, vt.Interface) else layer for layer in stack.layers
+    ]
+    return vt.Stack(layers, thin=stack.thin)
+
+
+def test_indices_beside_films_are_worked_in() -> None:
+    """Films are of their neighbours' indices, which no code reads; roughness and media stay parameters."""
+    made = shader(loads(UNDER_A_COAT), "belcour2018")
+    assert set(made.uniforms) == {
+        "layer0_alpha_u",
+        "layer1_depth",
+        "layer1_sigma_a",
+        "layer1_sigma_s",
+        "layer1_g",
+        "layer2_alpha_u",
+    }
+    assert made.films is None
+    read = shader(loads(UNDER_A_COAT), "weier2020").films
+    assert read is not None and read.shape == (2, 257, 4)
+    with pytest.raises(InvalidInput, match="films: belcour2018 has none over a diffuse base"):
+        shader(vt.Stack([loads(UNDER_A_COAT).layers[0], vt.Diffuse(albedo=0.5)]), "belcour2018")
 
 
 # Tapes

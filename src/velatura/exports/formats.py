@@ -29,7 +29,7 @@ class Format(NamedTuple):
 
 
 FORMATS: dict[str, Format] = {
-    "glsl": Format((".glsl", ".frag"), "velatura.exports.shader", beside=(".tables.bin",), constants=True),
+    "glsl": Format((".glsl", ".frag"), "velatura.exports.shader", beside=(".tables.bin", ".films.bin"), constants=True),
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),

@@ -12,9 +12,10 @@ PRINTERS = {"glsl": GLSL}
 
 
 def write(request: Request) -> Export:
-    """The shader; beside it the texture that it reads, if any, little-endian floats in rows of RGBA."""
+    """The shader; beside it the textures that it reads, little-endian floats in rows of RGBA."""
     free = [name for name, value in request.stack.flat().items() if not isinstance(value, Varying)]
     constant = free if list(request.constant) == ["all"] else request.constant
     made = shader(request.stack, request.model, constant, printer=PRINTERS[request.to])
     read = made.tables if made.looked_up else made.columns
-    return Export(made.text, {} if read is None else {".tables.bin": read.astype("<f4").tobytes()})
+    textures = {".tables.bin": read, ".films.bin": made.films}
+    return Export(made.text, {end: x.astype("<f4").tobytes() for end, x in textures.items() if x is not None})

@@ -96,7 +96,10 @@ _uploading = Lock()
 
 
 def coated(described: Any, sensitivity: Sensitivity) -> Coated:
-    """The interface described by `velatura.stack.CoatingValues`, as `sensitivity` sees it; made once."""
+    """The interface described by `velatura.stack.CoatingValues`, as `sensitivity` sees it; made once. What is read
+    elsewhere stays."""
+    if isinstance(described, Coated):
+        return described
     with _making:
         return _coated(described, sensitivity)
 

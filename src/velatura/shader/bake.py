@@ -94,7 +94,7 @@ def bake(material: Material, body: bsdf.Lobed) -> Bake:
 def _seen(material: Material, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], int]:
     """The columns of all lobes at an upright direction, and how many lobes there are."""
     above = number(f"{PLACE}.z") < 0.5
-    if body.below is not None and material.kinds == material.kinds[::-1]:
+    if body.below is not None and material.kinds == material.kinds[::-1] and not any(material.coatings):
         # Layers that are of the same kinds from both sides are added up once, for either
         turned = dict(material.reversed().values())
         chosen = material.solid().each(lambda address, value: ops.select(above, value, turned[address]))

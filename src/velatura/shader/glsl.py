@@ -12,6 +12,7 @@ import numpy as np
 
 from velatura.shader.atlas import WIDTH, Layout, height
 from velatura.shader.bake import Bake, Group
+from velatura.shader.films import NODES
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Field, Output, Printer, Struct
 from velatura.shader.statements import assignments, statements
@@ -98,6 +99,9 @@ class Glsl(Printer):
     def value(self, table: str, args: Sequence[str], wide: bool) -> str:
         return f"vt_{table}({', '.join(args)})"
 
+    def film(self, line: int, cosine: str) -> str:
+        return f"vt_film({line}, {cosine})"
+
     # Statements
 
     def title(self, text: str) -> str:
@@ -181,6 +185,9 @@ class Glsl(Printer):
     def lookup(self, bake: Bake | Tabulated) -> str:
         return _BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides, height=bake.height)
 
+    def films(self, count: int) -> str:
+        return _FILMS.format(nodes=NODES, count=count)
+
     def helpers(self, called: Set[tuple[str, Kind]]) -> str:
         parts = []
         for comment, helpers in _HELPERS.items():
@@ -258,7 +265,7 @@ _HEADER = """\
 //     vec3 wo = vt_sample(m, l, wi, u);      // from three uniform numbers; f may be 0 there
 //
 // Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
-// `velatura export -o` writes the texture that is read beside this text, row by row.
+// `velatura export -o` writes the textures that are read beside this text, row by row.
 
 precision highp float;
 precision highp int;
@@ -357,6 +364,18 @@ vec4 vt_baked_texel(int texel, vec3 place) {{
 }}
 """,
 }
+
+_FILMS = """\
+// Reflectance of thin films over the cosine on the rarer side: RGBA32F, {nodes} x {count} texels, never filtered
+uniform highp sampler2D vt_films;
+
+vec3 vt_film(int line, float cosine) {{
+    float position = clamp(cosine, 0.0, 1.0) * float({nodes} - 1);
+    int node = min(int(position), {nodes} - 2);
+    vec3 a = texelFetch(vt_films, ivec2(node, line), 0).rgb, b = texelFetch(vt_films, ivec2(node + 1, line), 0).rgb;
+    return mix(a, b, position - float(node));
+}}
+"""
 
 _SINE = """\
 {0} vt_sin({0} x) {{

@@ -97,6 +97,10 @@ class Printer(ABC):
     def value(self, table: str, args: Sequence[str], wide: bool) -> str:
         """A table of a single channel, looked up at numbers, or for each channel of colours where it is `wide`."""
 
+    @abstractmethod
+    def film(self, line: int, cosine: str) -> str:
+        """The reflectance of thin films at a cosine, a colour, in a line of their texture."""
+
     # Statements
 
     @abstractmethod
@@ -170,6 +174,10 @@ class Printer(ABC):
     @abstractmethod
     def lookup(self, bake: Bake | Tabulated) -> str:
         """The texture of lobes over direction, and functions that look up each group of its texels."""
+
+    @abstractmethod
+    def films(self, count: int) -> str:
+        """The texture of thin films, a line for each interface that has any, and a function that looks it up."""
 
     @abstractmethod
     def helpers(self, called: Set[tuple[str, Kind]]) -> str:

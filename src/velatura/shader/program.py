@@ -12,7 +12,7 @@ import numpy as np
 
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.lobe_merging import merging
-from velatura.shader import atlas, material
+from velatura.shader import atlas, films, material
 from velatura.shader.bake import Bake
 from velatura.shader.glsl import GLSL
 from velatura.shader.printer import Field, Printer, Struct
@@ -33,6 +33,8 @@ class Shader:
     Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baked` is what works out
     the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point. A solved material
     always has one; `columns` is the texture of a single one.
+    `films` is the texture of the thin films that the code reads, float32 of shape (interfaces with films, nodes, 4);
+    None where it reads none.
     `lobes` are the layers whose light each reflected lobe is, seen from above; `shares` names the energies or chances,
     fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
     """
@@ -45,6 +47,7 @@ class Shader:
     shown: Sequence[str]
     shares: Sequence[str]
     baked: Bake | Tabulated | None
+    films: np.ndarray | None
 
     @property
     def tables(self) -> np.ndarray:
@@ -92,6 +95,7 @@ def shader(
     baked, read, shown = recording.baked, list(recording.read), recording.shown
     looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
     layouts, filled = atlas.layouts(looked_up), material.filled(stack, read, bool(shown))
+    read_films = films.texture(stack) if recording.films else None
     name = "A material" if shown else " ".join(stack.name.split()) or "A material"
     parts = [
         printer.header(name, _described(recording.model), bool(recording.energies)),
@@ -101,6 +105,7 @@ def shader(
         printer.structs(_structs(recording)),
         *([printer.tables(layouts)] if layouts else []),
         *([printer.lookup(baked)] if baked else []),
+        *([printer.films(len(read_films))] if read_films is not None else []),
         printer.helpers({(symbol.op, symbol.kind) for symbol in recording.symbols}),
         printer.lobes({name: (value, recording.kinds[name]) for name, value in recording.lobes.items()}),
         *([printer.energies([(value, "colour") for value in recording.energies])] if recording.energies else []),
@@ -116,6 +121,7 @@ def shader(
         shown=shown,
         shares=_shares(recording),
         baked=baked,
+        films=read_films,
     )
 
 

@@ -19,11 +19,11 @@ from velatura.model.prepare import PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.shader import material, symbol
+from velatura.shader import films, material, symbol
 from velatura.shader.bake import Bake, bake
 from velatura.shader.graph import Graph, known_before
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Address, Material, Stack, Varying, as_described, refuse_films
+from velatura.stack import Address, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:  # it loads SciPy
@@ -66,6 +66,11 @@ class Recording:
         return self._places({s.detail for s in self.symbols if s.op == "input"})
 
     @property
+    def films(self) -> bool:
+        """Whether the code reads the texture of films."""
+        return any(symbol.op == films.FILM for symbol in self.symbols)
+
+    @property
     def parameters(self) -> dict[str, str]:
         """Those that anything reads: a tape, which stands for the code that works out the lobes, reads others."""
         return {**self._places(set(self.baked.tape.inputs)), **self.read} if isinstance(self.baked, Bake) else self.read
@@ -88,10 +93,10 @@ def record(
     of the stack, with a weight for every lobe, and, without textures, with lobes that are read.
 
     Raises:
-        InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture.
+        InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture; films
+            over a diffuse base in closed form.
     """
     chosen = named(model, **switches)
-    refuse_films(stack, "shaders have")
     if chosen.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
     flat = stack.flat()
@@ -105,10 +110,11 @@ def record(
     if not (uniform and stack.interfaces):
         chosen = chosen.adder  # which is worked out at every point, and is Lambert's law for a diffuse base alone
     solved = not chosen.recursion.closed_form
-    constants = flat if solved and not parameters else constant
+    constants = flat if solved and not parameters else {*constant, *([] if parameters else films.beside(stack))}
     recorded = Material.of(
         stack, lambda at, value: material.constant(at, value) if at.name in constants else _input(at)
     )
+    recorded = films.recorded(recorded, parameters)
     kind = structure(stack) if parameters else variance(stack)
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     baked: Bake | Tabulated | None = None

@@ -153,6 +153,8 @@ class _Statements:
             return printer.input(symbol.detail), ATOM
         if op == "value":
             return printer.value(symbol.detail, [self.of(x, wide=wide) for x in args], wide), ATOM
+        if op == "film":
+            return printer.film(symbol.detail, self.of(args[0])), ATOM
         if op == "item":
             return printer.item(self.of(args[0], ATOM), str(symbol.detail)), ATOM
         if op == "component":

@@ -34,8 +34,8 @@ class Symbol:
 
     Args:
         op: the operation: an elementary function by its name in `ops`, an operator (`add`, `less`, ...), or `input`,
-            `texels`, `value`, `component`, `colour`; of loops `bound`, which stands for a node or for a value of the
-            state, `each`, `repeat`, and `item`.
+            `texels`, `value`, `film`, `component`, `colour`; of loops `bound`, which stands for a node or for a value
+            of the state, `each`, `repeat`, and `item`.
         args: its arguments; constants as floats, or as three of them; of a loop its results, which are made of the
             bound symbols, and before them the initial state.
         kind: number, colour, the truth of either, the channels of a table, or a loop.

@@ -14,8 +14,8 @@ from typing import Any
 from velatura.shader.graph import COMMUTE
 from velatura.shader.symbol import Operand, Symbol, in_order
 
-#: Operations with a detail besides their name: a table, or a channel.
-_DETAILED = ("texels", "value", "component")
+#: Operations with a detail besides their name: a table, a channel, or a line of films.
+_DETAILED = ("texels", "value", "component", "film")
 
 
 @dataclass(frozen=True)
