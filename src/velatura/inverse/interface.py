@@ -261,17 +261,18 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
         ratio = (1 + root) / (1 - root)
         return above.eta * np.where(denser, ratio, 1 / ratio)[None]
 
-    def excess(u: Array) -> Array:
-        # As a logarithm, which does not get steep where next to nothing is reflected
-        return np.min(np.log((above.reflectance(layers(index(u))) + FAINT) / (r + FAINT)), axis=0)
+    def excess(log_u: Array) -> Array:
+        # Both as logarithms, in which it is almost straight where next to nothing is reflected, too
+        reflectance = above.reflectance(layers(index(np.exp(log_u) - FAINT)))
+        return np.min(np.log((reflectance + FAINT) / (r + FAINT)), axis=0)
 
     ratio = np.mean(np.atleast_2d(np.where(denser, choice.eta_max, 1.0) / above.eta), axis=0)
     exists = np.where(denser, ratio >= 1, ratio <= 1)
     u_max = np.where(exists, ((ratio - 1) / (ratio + 1)) ** 2, 0.0)
-    most = np.where(u_max > 0, excess(u_max), -1.0)
-    u = false_position(
-        excess, np.zeros_like(u_max), u_max, np.min(np.log(FAINT / (r + FAINT)), axis=0) + 0.0 * u_max, most
-    )
+    low, high = np.full_like(u_max, np.log(FAINT)), np.log(u_max + FAINT)
+    most = np.where(u_max > 0, excess(high), -1.0)
+    least = np.min(np.log(FAINT / (r + FAINT)), axis=0) + 0.0 * u_max
+    u = np.exp(false_position(excess, low, high, least, most)) - FAINT
     solved = np.where(most < 0, u_max, u)
     return layers(index(solved)).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))
 

@@ -152,7 +152,7 @@ class Approach:
                 break
             kept.append(broken)
             points = space.points(x, free)
-            margins = space.margin(broken, points)
+            (margins,) = space.margins([broken], points)
             change = (margins[1:] - margins[0]) / (points[free, 1 + np.arange(len(free))] - x[free])
             a = np.vstack([a, ON_BOUND * change * size])
             b = np.r_[b, -ON_BOUND * margins[0]]

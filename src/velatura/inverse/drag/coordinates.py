@@ -8,7 +8,7 @@ coordinates, too, that are kept as long as they can be.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -120,11 +120,16 @@ class Space:
 
     def layers(self, x: Array) -> list[Layers]:
         """The interfaces of N points."""
+        return [
+            Layers(own.kind, eta, kappa, self._roughness(x[own.variance], own.axis), tau, scatters=own.scatters)
+            for own, (eta, kappa, tau) in zip(self.interfaces, self._values(x))
+        ]
+
+    def _values(self, x: Array) -> Iterator[tuple[Array, Array | None, Value]]:
+        """Absolute eta and kappa of each interface of N points, and the optical depths above it."""
         eta_1 = np.full((1, x.shape[1]), self.exterior)
-        found = []
         for own in self.interfaces:
             tau = own.kept if own.depth is None else own.kept * x[own.depth]
-            roughness = self._roughness(x[own.variance], own.axis)
             kappa = None
             if own.log_index is not None:
                 eta = np.exp(x[own.log_index][None])
@@ -138,10 +143,9 @@ class Space:
             else:
                 eta, absorbed = _dielectric(own, x[own.reflectances])
                 eta, tau = eta * eta_1, tau + absorbed
-            found.append(Layers(own.kind, eta, kappa, roughness, tau, scatters=own.scatters))
+            yield eta, kappa, tau
             if own.kind == "dielectric":
                 eta_1 = eta
-        return found
 
     def _roughness(self, entries: Array, axis: float) -> Roughness:
         """The roughness of a variance, smooth where that is next to nothing, the axis first that is nearer to one."""
@@ -269,19 +273,25 @@ class Space:
                 (low if bound.sign > 0 else high)[bound.coordinate] = bound.at
         return low, high
 
-    def margin(self, bound: Bound, x: Array) -> Array:
-        """Distance of N points from a bound, negative outside, (N,)."""
-        if bound.coordinate is not None:
-            return bound.sign * (x[bound.coordinate] - bound.at)
-        if bound.axes is not None:
-            return bound.sign * (least(self.kind(*x[bound.axes])) - bound.at)
-        assert bound.interface is not None
-        return bound.sign * (np.log(self.layers(x)[bound.interface].eta[0]) - bound.at)
+    def margins(self, bounds: Sequence[Bound], x: Array) -> Array:
+        """Distances of N points from bounds, negative outside, (bounds, N)."""
+        indices = [np.log(eta[0]) for eta, _, _ in self._values(x)]
+        found = np.empty((len(bounds), x.shape[1]))
+        for n, bound in enumerate(bounds):
+            if bound.coordinate is not None:
+                value = x[bound.coordinate]
+            elif bound.axes is not None:
+                value = least(self.kind(*x[bound.axes]))
+            else:
+                assert bound.interface is not None
+                value = indices[bound.interface]
+            found[n] = bound.sign * (value - bound.at)
+        return found
 
     def broken(self, x: Array, met: Bound | None) -> Bound | None:
         """The bound that a point violates most, except the one that it lies on; None if all hold."""
         others = [bound for bound in self.bounds if bound != met]
-        margins = [float(self.margin(bound, x[:, None])[0]) for bound in others]
+        margins = self.margins(others, x[:, None])[:, 0]
         worst = int(np.argmin(margins))
         return others[worst] if margins[worst] < -SLACK else None
 

@@ -170,7 +170,7 @@ class Problem:
         self, compromise: Compromise, missing: Array, slopes: Array, points: Array, free: Array
     ) -> tuple[Array, Array]:
         """The equations with one more, that the point lies on a bound, and one more unknown if the goal gives way."""
-        margins = self.start.space.margin(compromise.bound, points)
+        (margins,) = self.start.space.margins([compromise.bound], points)
         change = (margins[1:] - margins[0]) / (points[free, 1 + np.arange(len(free))] - points[free, 0])
         if compromise.of_goal:
             slopes, change = np.c_[slopes, -self.way], np.r_[change, 0.0]
