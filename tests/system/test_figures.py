@@ -31,6 +31,13 @@ Made = Callable[[str], dict[str, Any]]
 
 SMALL: dict[str, dict[str, Any]] = {
     "before-after": {"presets": ("frosted-metal",), "size": 16, "spp": 2},
+    "films-under-coats": {
+        "metals": ("titanium",),
+        "coats": ("rough coat",),
+        "size": 24,
+        "spp": 24,
+        "paths": 30_000,
+    },
     "bati2021-01": {"size": 16, "spp": 2},
     "bati2021-04": {"count": 8},
     "bati2021-05": {"size": 16, "spp": 2},
@@ -444,6 +451,14 @@ def test_what_anisotropy_costs(made: Made) -> None:
 
 
 # The verb
+
+
+def test_films_keep_their_colours_under_coats(made: Made) -> None:
+    """Expected: ours are those of the truth within noise; who forgets the coat above the film has other ones."""
+    for cell in made("films-under-coats")["cells"]:
+        assert max(cell["difference"]["velatura"]) < 1.5 and abs(cell["worst"]["velatura"]) < 0.01, cell["name"]
+        assert all(cell["mean"][who] > 1.5 for who in ("OpenPBR", "Blender", "MaterialX, OSL")), cell["name"]
+        assert all(cell["mean"][who] > 10 for who in ("Blender", "MaterialX, OSL")), cell["name"]
 
 
 def test_every_figure_is_tried_here_and_is_found_by_its_name() -> None:

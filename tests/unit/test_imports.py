@@ -33,7 +33,7 @@ MAY_IMPORT = {
     "checks": "kernel",
     "scenes": "kernel",
     "comparison": "stack optics model reference sampling checks scenes api kernel",
-    "figures": "stack optics model inverse reference checks scenes comparison api kernel",
+    "figures": "stack optics ops sampling model inverse reference checks scenes comparison api kernel",
 }
 
 # The ends of the stream -> who may import them.

@@ -21,6 +21,7 @@ Progress = Callable[[int, int], None]
 
 FIGURES = (
     "before-after",
+    "films-under-coats",
     "bati2021-01",
     "bati2021-04",
     "bati2021-05",

@@ -57,9 +57,13 @@ def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int, 
 
 def pictures(scene: str, stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:
     """As `spheres`, of any object."""
-    made = bsdf(stack, model, **switches)
+    return taken(bsdf(stack, model, **switches), model, scene, env, size, spp, seed)
+
+
+def taken(made: Any, name: str, scene: str, env: str, size: int, spp: int, seed: int) -> Array:
+    """As `pictures`, of a BSDF, whose name chooses its random numbers."""
     count = min(max(spp // PASS_SAMPLES, 3), PASSES)  # no fewer than a standard error takes
-    numbers = np.random.default_rng([seed, *model.encode()]).integers(2**31, size=count)
+    numbers = np.random.default_rng([seed, *name.encode()]).integers(2**31, size=count)
     passes = [scenes.render(made, scene, env, max(spp // count, 1), (size, size), int(number)) for number in numbers]
     return np.array(passes)
 

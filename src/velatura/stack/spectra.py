@@ -34,6 +34,12 @@ _BROKEN = ("AlAs", "AlSb", "SnTe")
 _LARGEST = 2**20  # characters of a table
 VISIBLE_NM = (360.0, 830.0)  # that Mitsuba renders
 
+SRGB_FROM_XYZ = (  # ITU-R BT.709 primaries
+    (3.240479, -1.537150, -0.498535),
+    (-0.969256, 1.875991, 0.041556),
+    (0.055648, -0.204043, 1.057311),
+)
+
 _ALIASES = {
     "aluminium": "Al",
     "aluminum": "Al",
@@ -237,16 +243,16 @@ def rgb(measured: Measured) -> tuple[float, float, float]:
 
 
 @functools.cache
-def srgb_weights() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Wavelengths (95,) and the weights (3, 95) that turn a spectrum into linear sRGB; each row sums to 1."""
+def srgb_weights(d65: bool = True) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths (95,) and the weights (3, 95) that turn a spectrum into linear sRGB; each row sums to 1.
+
+    d65: seen under D65, else under light of equal energy.
+    """
     import numpy as np
 
     with resources.files("velatura.stack").joinpath("cie1931.csv").open(encoding="utf-8") as file:
-        wavelengths_nm, x_bar, y_bar, z_bar, d65 = np.loadtxt(file, delimiter=",").T
-    srgb_from_xyz = np.array(  # ITU-R BT.709 primaries
-        [[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556], [0.055648, -0.204043, 1.057311]]
-    )
-    weights = srgb_from_xyz @ np.stack([x_bar, y_bar, z_bar]) * d65
+        wavelengths_nm, x_bar, y_bar, z_bar, illuminant = np.loadtxt(file, delimiter=",").T
+    weights = np.array(SRGB_FROM_XYZ) @ np.stack([x_bar, y_bar, z_bar]) * (illuminant if d65 else 1.0)
     return wavelengths_nm, weights / weights.sum(axis=1, keepdims=True)
 
 

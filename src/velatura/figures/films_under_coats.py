@@ -1,0 +1,130 @@
+"""Metals with a thin film, bare and under coats: ours, neighbours' formulas, and random walks.
+
+Not a figure of a paper. Titanium is anodised to 50 nm of oxide, the tantalum mirror to 160 nm; they lie bare, under a
+smooth varnish, and under a rough coat. Facets are met once in all. What neighbours do is in
+`velatura.figures.neighbours`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura import scenes
+from velatura.checks.probe import Probe
+from velatura.figures import canvas, neighbours
+from velatura.figures.neighbours import Coat, Metal
+from velatura.stack import Film, Interface, Named, Stack, rgb
+from velatura.stack.spectra import SRGB_FROM_XYZ
+
+Array = canvas.Array
+
+COSINES = tuple(round(0.1 * k, 1) for k in range(10, 0, -1))
+TRUTH = "reference"
+OURS = "velatura"
+COLUMNS = (TRUTH, OURS, *neighbours.NEIGHBOURS)
+BANDS = 40  # height of a strip of colours, in pixels
+
+# Titanium: Johnson and Christy 1974; its oxide at 550 nm: Siefke et al. 2016. Tantalum: Ta of the files in Mitsuba's
+# wheel; its oxide at 550 nm: Gao et al. 2012.
+TITANIUM = Metal((2.737, 2.507, 2.236), (3.828, 3.397, 3.010), 0.15, 2.435, 50.0)
+MIRROR = Metal(rgb(Named("Ta", "eta")), rgb(Named("Ta", "k")), 0.01, 2.157, 160.0)
+METALS = {"titanium": TITANIUM, "tantalum": MIRROR}
+COATS = {"bare": None, "varnish": Coat(1.5, 0.01), "rough coat": Coat(1.5, 0.3)}
+
+
+def stack_of(metal: Metal, coat: Coat | None) -> Stack:
+    """The same as a stack."""
+    films = (Film(eta=metal.film_eta, thickness_nm=metal.thickness_nm),)
+    base = Interface(eta=metal.eta, k=metal.k, alpha=metal.alpha, films=films)
+    return Stack([Interface(eta=coat.eta, alpha=coat.alpha), base] if coat else [base])
+
+
+def compute(
+    metals: Sequence[str] = tuple(METALS),
+    coats: Sequence[str] = tuple(COATS),
+    size: int = canvas.SIZE,
+    spp: int = canvas.SAMPLES,
+    paths: int = 200_000,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """For each metal and coat, by `name`, and each column but the truth:
+
+    `rmse` and `rmse_error` of its picture; of the colour of all reflected light the `difference` to that of the truth
+    over `cosines` (CIE 1976), at the `normal` and `mean` over the cosines; and the mean over colours of its `energy`
+    less that of the truth, at the `normal` and the `worst`. `albedo` has all colours, those of the truth with noise.
+    And `pictures`.
+
+    Raises:
+        InvalidInput, MissingTool: as `vt.render`.
+    """
+    cells, pictures = [], []
+    each = [(f"{metal}, {coat}", METALS[metal], COATS[coat]) for metal in metals for coat in coats]
+    for name, metal, coat in canvas.track(each, progress):
+        stack = stack_of(metal, coat)
+        made = {who: canvas.bsdf(stack, who) for who in (TRUTH, OURS)}
+        made |= {who: neighbours.bsdf(show(metal, coat)) for who, show in neighbours.NEIGHBOURS.items()}
+        albedo = {who: [_albedo(one, cosine, paths, seed) for cosine in COSINES] for who, one in made.items()}
+        images = {who: canvas.taken(one, who, "sphere", "studio", size, spp, seed) for who, one in made.items()}
+        pictures.append({who: passes.mean(axis=0).tolist() for who, passes in images.items()})
+        cell: dict[str, Any] = {"name": name, "albedo": {who: np.array(x).tolist() for who, x in albedo.items()}}
+        truth, seen = np.array(albedo.pop(TRUTH)), images.pop(TRUTH)
+        cell |= canvas.errors(images, seen)
+        cell |= {"difference": {}, "normal": {}, "mean": {}, "energy": {}, "worst": {}}
+        for who, colours in albedo.items():
+            difference = colour_difference(np.array(colours), truth)
+            energy = (np.array(colours) - truth).mean(axis=-1)
+            cell["difference"][who] = difference.tolist()
+            cell["normal"][who], cell["mean"][who] = float(difference[0]), float(difference.mean())
+            cell["energy"][who], cell["worst"][who] = float(energy[0]), float(energy[np.abs(energy).argmax()])
+        cells.append(cell)
+    return {"cosines": list(COSINES), "cells": cells, "pictures": pictures}
+
+
+def _albedo(made: Any, cosine: float, paths: int, seed: int) -> Array:
+    """Reflected light (3,) for a direction."""
+    wi = np.array([np.sqrt(1 - cosine**2), 0, cosine])
+    u = np.random.default_rng(seed).random((paths, 3))
+    return np.asarray(Probe(made).sample(np.tile(wi, (paths, 1)), u).weight.mean(axis=0))
+
+
+def colour_difference(a: Array, b: Array) -> Array:
+    """Distance in L*a*b* of colours (..., 3) in linear sRGB, white being that of D65 (CIE 1976)."""
+    return np.asarray(np.linalg.norm(_lab(a) - _lab(b), axis=-1))
+
+
+def _lab(colour: Array) -> Array:
+    xyz_from_srgb = np.linalg.inv(SRGB_FROM_XYZ)
+    t = colour @ xyz_from_srgb.T / xyz_from_srgb.sum(axis=1)
+    x, y, z = np.moveaxis(np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29), -1, 0)
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+def draw(numbers: dict[str, Any], path: str | Path) -> None:
+    """A row for each material: spheres, and the colours of all reflected light from the normal to grazing angles.
+
+    Raises:
+        InvalidInput: the file cannot be written.
+    """
+    figure = canvas.canvas(2.1 * (len(COLUMNS) + 1), 2.2 * len(numbers["cells"]))
+    axes = figure.subplots(len(numbers["cells"]), len(COLUMNS) + 1, squeeze=False)
+    for row, cell, seen in zip(axes, numbers["cells"], numbers["pictures"]):
+        for axis, who in zip(row, COLUMNS):
+            canvas.show(axis, seen[who], "")
+            said = cell["name"] if who == TRUTH else canvas.error_label(cell, who)
+            axis.set_title(f"{who}\n{said}", fontsize=8)
+        strips = [np.repeat(np.array(cell["albedo"][who])[None], BANDS, axis=0) for who in COLUMNS]
+        picture = np.repeat(np.concatenate(strips), BANDS * len(COLUMNS) // len(COSINES), axis=1)
+        row[-1].imshow(scenes.tone_map(picture))
+        row[-1].set(xticks=(), yticks=[BANDS * (k + 0.5) for k in range(len(COLUMNS))], yticklabels=COLUMNS)
+        row[-1].tick_params(labelsize=6, length=0)
+        row[-1].set_title("colour, normal to cos .1", fontsize=8)
+    canvas.save(figure, path)
+
+
+if __name__ == "__main__":
+    draw(compute(), "films-under-coats.png")
