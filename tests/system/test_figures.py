@@ -455,7 +455,9 @@ def test_what_anisotropy_costs(made: Made) -> None:
 
 def test_films_keep_their_colours_under_coats(made: Made) -> None:
     """Expected: ours are those of the truth within noise; who forgets the coat above the film has other ones."""
-    for cell in made("films-under-coats")["cells"]:
+    found = made("films-under-coats")
+    assert found["integration"]["ours"]["most"] < 0.003 < found["integration"]["Gaussians"]["mean"]
+    for cell in found["cells"]:
         assert max(cell["difference"]["velatura"]) < 1.5 and abs(cell["worst"]["velatura"]) < 0.01, cell["name"]
         assert all(cell["mean"][who] > 1.5 for who in ("OpenPBR", "Blender", "MaterialX, OSL")), cell["name"]
         assert all(cell["mean"][who] > 10 for who in ("Blender", "MaterialX, OSL")), cell["name"]

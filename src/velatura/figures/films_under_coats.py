@@ -8,6 +8,7 @@ smooth varnish, and under a rough coat. Facets are met once in all. What neighbo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from velatura import scenes
 from velatura.checks.probe import Probe
 from velatura.figures import canvas, neighbours
 from velatura.figures.neighbours import Coat, Metal
-from velatura.stack import Film, Interface, Named, Stack, rgb
+from velatura.optics import films
+from velatura.optics.coatings import RANGE_NM, Coating, ColouredFilm
+from velatura.stack import Film, Interface, Named, Stack, rgb, srgb_sensitivity
 from velatura.stack.spectra import SRGB_FROM_XYZ
 
 Array = canvas.Array
@@ -26,6 +29,9 @@ COSINES = tuple(round(0.1 * k, 1) for k in range(10, 0, -1))
 TRUTH = "reference"
 OURS = "velatura"
 COLUMNS = (TRUTH, OURS, *neighbours.NEIGHBOURS)
+THICKNESSES_NM = tuple(range(0, 5001, 50))  # of the oxide of titanium, for whose colours integrals are compared
+FINE = 12_000  # wavenumbers of the integral that they are compared with
+PRIMARIES_NM = (611.4, 549.1, 464.2)  # dominant wavelengths of the primaries of sRGB
 BANDS = 40  # height of a strip of colours, in pixels
 
 # Titanium: Johnson and Christy 1974; its oxide at 550 nm: Siefke et al. 2016. Tantalum: Ta of the files in Mitsuba's
@@ -38,8 +44,8 @@ COATS = {"bare": None, "varnish": Coat(1.5, 0.01), "rough coat": Coat(1.5, 0.3)}
 
 def stack_of(metal: Metal, coat: Coat | None) -> Stack:
     """The same as a stack."""
-    films = (Film(eta=metal.film_eta, thickness_nm=metal.thickness_nm),)
-    base = Interface(eta=metal.eta, k=metal.k, alpha=metal.alpha, films=films)
+    film = Film(eta=metal.film_eta, thickness_nm=metal.thickness_nm)
+    base = Interface(eta=metal.eta, k=metal.k, alpha=metal.alpha, films=(film,))
     return Stack([Interface(eta=coat.eta, alpha=coat.alpha), base] if coat else [base])
 
 
@@ -57,7 +63,7 @@ def compute(
     `rmse` and `rmse_error` of its picture; of the colour of all reflected light the `difference` to that of the truth
     over `cosines` (CIE 1976), at the `normal` and `mean` over the cosines; and the mean over colours of its `energy`
     less that of the truth, at the `normal` and the `worst`. `albedo` has all colours, those of the truth with noise.
-    And `pictures`.
+    Of ways to integrate over wavelengths the `integration` errors. And `pictures`.
 
     Raises:
         InvalidInput, MissingTool: as `vt.render`.
@@ -82,7 +88,31 @@ def compute(
             cell["normal"][who], cell["mean"][who] = float(difference[0]), float(difference.mean())
             cell["energy"][who], cell["worst"][who] = float(energy[0]), float(energy[np.abs(energy).argmax()])
         cells.append(cell)
-    return {"cosines": list(COSINES), "cells": cells, "pictures": pictures}
+    return {"cosines": list(COSINES), "cells": cells, "integration": integration(), "pictures": pictures}
+
+
+def integration(cosines: Sequence[float] = (1.0, 0.5)) -> dict[str, Any]:
+    """Errors of colours of films of 0 to 5,000 nm, at `most` and the `mean`: of ours, of Gaussians fitted to the
+    observer with three orders, and of three wavelengths. The film is that on titanium."""
+    at = np.array(cosines)
+    wavenumbers = np.linspace(1 / RANGE_NM[1], 1 / RANGE_NM[0], FINE)
+    weights = srgb_sensitivity(1 / wavenumbers) / wavenumbers**2
+    weights /= weights.sum(axis=1, keepdims=True)
+    errors: dict[str, list[Array]] = {"ours": [], "Gaussians": [], "three wavelengths": []}
+    for thickness_nm in THICKNESSES_NM:
+        metal = replace(TITANIUM, thickness_nm=float(thickness_nm))
+        film, media = [films.Film(metal.film_eta, 0.0, metal.thickness_nm)], list(zip(metal.eta, metal.k))
+        spectra = [films.coherent(at[:, None], 1 / wavenumbers, 1.0, film, n, k).reflected for n, k in media]
+        exact = np.clip(np.stack([found @ row for found, row in zip(spectra, weights)]), 0, 1)
+        colours = ColouredFilm((metal.film_eta,) * 3, (0.0,) * 3, metal.thickness_nm)
+        coating = Coating((colours,), (1.0,) * 3, metal.eta, metal.k)
+        errors["ours"].append(coating.reflectance(at, srgb_sensitivity) - exact)
+        errors["Gaussians"].append(neighbours.interference(at, 1.0, metal, neighbours.fitted).T - exact)
+        each = [films.coherent(at, nm, 1.0, film, n, k).reflected for nm, (n, k) in zip(PRIMARIES_NM, media)]
+        errors["three wavelengths"].append(np.stack(each) - exact)
+    return {
+        who: {"most": float(np.abs(found).max()), "mean": float(np.abs(found).mean())} for who, found in errors.items()
+    }
 
 
 def _albedo(made: Any, cosine: float, paths: int, seed: int) -> Array:
