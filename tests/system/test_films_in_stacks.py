@@ -151,6 +151,38 @@ def test_the_model_has_the_light_of_the_walk(material: str, cosine: float) -> No
         assert found.passed[:, 0] == pytest.approx(np.reshape(truth.transmitted.energy, 3), abs=6e-3)
 
 
+ROUGH = {
+    "glass": vt.Stack([vt.Interface(eta=1.5, alpha=0.6, films=[vt.Film(eta=2.0, thickness_nm=200)])]),
+    "glass from inside": vt.Stack(
+        [vt.Interface(eta=1.0, alpha=0.5, films=[vt.Film(eta=2.0, thickness_nm=200)])], exterior=1.5
+    ),
+    "aluminium": vt.Stack(
+        [vt.Interface(conductor="Al", alpha=[0.3, 0.6], films=[vt.Film(eta=1.33, k=0.1, thickness_nm=1200)])]
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ROUGH)
+def test_light_that_facets_reflect_again_meets_their_films(name: str) -> None:
+    """Within what quadrature errs by; the noise of the walk is a quarter of that."""
+    stack = ROUGH[name]
+    cosines = [1.0, 0.4]
+    truth = vt.reference.statistics(stack, cosines, paths=200_000, seed=3, microsurface=True)
+    found = vt.lobes(stack, cosines, reflectance="fgd-multi")
+    assert found.energy[0] + found.remainder == pytest.approx(truth.energy[0], abs=3.5e-3)
+
+
+@pytest.mark.parametrize("reflectance", ["fgd", "fgd-multi"])
+@pytest.mark.parametrize("name", ["glass", "glass from inside", "aluminium"])
+def test_averages_of_the_papers_are_those_of_the_films(name: str, reflectance: str) -> None:
+    """Of isotropic interfaces; the films of 1,200 nm have the reflectance that bends the most over the angle."""
+    stack, cosines = ROUGH[name].replace(layer0_alpha=0.05 if name == "aluminium" else 0.3), [1.0, 0.5, 0.2]
+    often = reflectance == "fgd-multi"
+    truth = vt.reference.statistics(stack, cosines, paths=200_000, seed=4, microsurface=often)
+    found = vt.lobes(stack, cosines, model="belcour2018", tir="off", reflectance=reflectance)
+    assert found.energy[0] == pytest.approx(truth.energy[0], abs=4e-3)
+
+
 def test_clear_films_keep_all_light() -> None:
     lobes = vt.lobes(loads(GLASS), COSINES)
     assert np.abs(lobes.absorbed).max() < 1e-3

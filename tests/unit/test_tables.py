@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from velatura import kernel, tables
 from velatura.errors import InvalidInput
 from velatura.optics import fresnel
-from velatura.tables import coordinates
-from velatura.tables.build import Built, belcour_grid, makers, microsurface_walks
+from velatura.tables import coordinates, microsurface_walks
+from velatura.tables.build import Built, belcour_grid, makers
 from velatura.tables.build.quadrature import average, ignore
 from velatura.tables.build.report import report
 

@@ -11,6 +11,7 @@ from math import pi
 
 from velatura import ops, tables
 from velatura.model.context import Context
+from velatura.model.film_average import film_average
 from velatura.model.models import Model
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
@@ -180,6 +181,9 @@ class _Averages:
         if self.model.reflectance in ("fresnel", "fg"):
             return None
         multiple = self.model.microsurface
+        if isinstance(facets.films, Coated) and self.model.reflectance != "split-sum":
+            films = facets.films
+            return lambda cos_theta, alpha: film_average(films, multiple)(cos_theta, alpha, eta)
         if self.model.reflectance == "split-sum":
             r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
             if isinstance(facets.films, Coated):
@@ -193,8 +197,6 @@ class _Averages:
             row = tables.dielectric_row(self.context.tables, eta, self.context.constant, multiple)
         else:
             row = tables.conductor_row(self.context.tables, eta, kappa, self.context.constant, multiple)
-        if facets.films and self.model.reflectance != "split-sum":
-            row = tables.with_films(self.context.tables, row, facets.reflect)
         return self._of(row)
 
     def _of(self, row: Row) -> Average:

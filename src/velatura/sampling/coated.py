@@ -22,18 +22,11 @@ Array = NDArray[np.floating]
 NODES = 257  # even over the cosine; between them no reflectance bends by more than 3e-4
 
 
-class Coated:
-    """Reflectance of an interface by colour, for light from either side.
+class Sampled:
+    """Colours at the nodes of a grid, which a look-up interpolates; `data` has the channels on its last axis."""
 
-    Where it transmits it absorbs nothing, so that light of one tangential momentum is reflected alike from both sides:
-    it is sampled over the cosine on the `rarer` side, beyond which light is totally reflected. That is 1 above the
-    interface, and 2 below it; above, where it is opaque. `data` are the values at the nodes, (NODES, 3).
-    """
-
-    shape = (NODES,)
-
-    def __init__(self, data: Array, rarer: int) -> None:
-        self.data, self.rarer = data, rarer
+    def __init__(self, data: Array) -> None:
+        self.data, self.shape = data, data.shape[:-1]
         self._packets: dict[Any, Packets] = {}
 
     def packets(self, dialect: Any) -> Packets:
@@ -43,18 +36,36 @@ class Coated:
                 self._packets[dialect] = packets(self.data.ravel(), self.data.shape[-1], dialect)
             return self._packets[dialect]
 
+    def fetched(self, like: Value, *coordinates: Value) -> Value:
+        """A colour of the kind of `like`."""
+        channels = ops.interpolate(self, *coordinates)
+        if not isinstance(like, float | np.ndarray):
+            kind: Any = type(like)
+            return _colour(kind)(channels)
+        colour = np.stack(channels)
+        return colour if colour.ndim > 1 else colour[:, None]
+
+
+class Coated(Sampled):
+    """Reflectance of an interface by colour, for light from either side.
+
+    Where it transmits it absorbs nothing, so that light of one tangential momentum is reflected alike from both sides:
+    it is sampled over the cosine on the `rarer` side, beyond which light is totally reflected. That is 1 above the
+    interface, and 2 below it; above, where it is opaque. `data` are the values at the nodes, (NODES, 3), and `n12` the
+    relative index for all colours, None where it is opaque.
+    """
+
+    def __init__(self, data: Array, rarer: int, n12: float | None = None) -> None:
+        super().__init__(data)
+        self.rarer, self.n12 = rarer, n12
+
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         """For cosines above and below, 0 where light cannot be; a colour of the kind of `like`."""
         return self.at(cos_1 if self.rarer == 1 else cos_2, like)
 
     def at(self, cosine: Value, like: Value) -> Value:
         """For the cosine on the rarer side."""
-        channels = ops.interpolate(self, cosine)
-        if not isinstance(like, float | np.ndarray):
-            kind: Any = type(like)
-            return _colour(kind)(channels)
-        colour = np.stack(channels)
-        return colour if colour.ndim > 1 else colour[:, None]
+        return self.fetched(like, cosine)
 
 
 @dataclass(frozen=True)
@@ -114,4 +125,5 @@ def _coated(described: Any, sensitivity: Sensitivity) -> Coated:
     rarer = 1 if described.opaque or sum(described.eta_1) < sum(described.eta_2) else 2
     if rarer == 2:
         coating = Coating(films[::-1], described.eta_2, described.eta_1)
-    return Coated(coating.reflectance(np.linspace(0, 1, NODES), sensitivity).T.copy(), rarer)
+    n12 = None if described.opaque else sum(described.eta_2) / sum(described.eta_1)
+    return Coated(coating.reflectance(np.linspace(0, 1, NODES), sensitivity).T.copy(), rarer, n12)

@@ -26,6 +26,19 @@ def square(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @functools.cache
+def cube(count: int, dimensions: int) -> np.ndarray:
+    """Numbers in [0, 1), (dimensions, count), for a cube of any number of dimensions; not to be written to."""
+    # The root of x^(d+1) = x + 1, whose powers are the steps
+    root = 2.0
+    for _ in range(64):
+        root = (1 + root) ** (1 / (dimensions + 1))
+    steps = root ** -np.arange(1.0, dimensions + 1)
+    numbers: np.ndarray = (0.5 + np.arange(1, count + 1) * steps[:, None]) % 1
+    numbers.flags.writeable = False
+    return numbers
+
+
+@functools.cache
 def fibonacci(count: int) -> tuple[np.ndarray, np.ndarray]:
     """A Fibonacci lattice of at least `count` points in the unit square; not to be written to."""
     a, b = 1, 1

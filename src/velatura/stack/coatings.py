@@ -51,15 +51,16 @@ def check(stack: Stack) -> None:
 
 
 def of(stack: Stack, read: Reader = as_written) -> tuple[CoatingValues | None, ...]:
-    """Of each layer, None without films."""
+    """Of each layer, None without films; a thickness of 0 is no film."""
     outside: tuple[str, Any] = ("exterior", stack.exterior)
     above, found = outside, []
     for index, layer in enumerate(stack.layers):
         coating = None
         if isinstance(layer, Interface):
             below = f"layer{index}_eta", layer.written("eta")
-            if layer.films:
-                films = tuple(FilmValues(x.colour("eta"), x.colour("k"), x.thickness_nm) for x in layer.films)
+            thick = [film for film in layer.films if film.thickness_nm > 0]
+            if thick:
+                films = tuple(FilmValues(x.colour("eta"), x.colour("k"), x.thickness_nm) for x in thick)
                 k = read(f"layer{index}_k", layer.written("k")) if layer.opaque else (0.0, 0.0, 0.0)
                 leaves = stack.thin and layer is stack.layers[-1]
                 coating = CoatingValues(films, read(*above), read(*(outside if leaves else below)), k, layer.opaque)

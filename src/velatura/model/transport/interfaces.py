@@ -22,7 +22,8 @@ from velatura.model.transport.operators import Layer, Operator
 from velatura.optics import fresnel, ggx
 from velatura.sampling.coated import Coated
 from velatura.sampling.low_discrepancy import fibonacci
-from velatura.tables import Tables
+from velatura.tables import Tables, coordinates
+from velatura.tables.microsurface_walks import reflected_share
 
 Array = NDArray[np.floating]
 
@@ -35,6 +36,8 @@ BLOCK = 1 << 15  # samples at a time
 DIGITS = 9  # of lengths of momentum that are alike
 SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
 OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
+WALKED = 16  # directions of walks between facets with films
+PATHS = 2048  # from each
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
 
@@ -93,10 +96,6 @@ class Facets:
         assert self.below is not None
         films = self.films, 3 - self.rarer
         return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation, False, *films)
-
-    def bare(self) -> Facets:
-        """Without films."""
-        return replace(self, films=None)
 
     def reflectance(self, cosine: Array) -> Array:
         """Fresnel reflectance (C, ...) of facets."""
@@ -384,33 +383,62 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> t
     assert known is not None
     if facets.below is None:
         return events.whole, np.zeros_like(events.whole)
-    mean = float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
+    blocked: Array = events.whole if facets.opaque else events.blocked_reflected + events.blocked_refracted
+    if facets.films is not None:
+        share = share_of_films(facets, setting.made, p)
+        return blocked * share, np.zeros_like(blocked) if facets.opaque else blocked * (1 - share)
+    mean = _mean_alpha(facets)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
     ratio = (facets.below / facets.above)[:, None]
     if facets.k is None:
         row = tables.dielectric_row(known, ratio, True, True)
     else:
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
-        if facets.films is not None:
-            row = tables.with_films(known, row, lambda c: facets.reflectance(np.full(1, c)))
     found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean)))
     stand_in: _Met | _Events = events
-    # Of what a dielectric blocks, films change no share
-    clear = facets.bare() if facets.k is None else facets
-    if facets.alpha_u != facets.alpha_v or (facets.films is not None and facets.k is None):
-        stand_in = _events(replace(clear, alpha_u=mean, alpha_v=mean), p, 0 * p, setting.samples, [True])
+    if facets.alpha_u != facets.alpha_v:
+        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, setting.samples, [True])
     often, once = found.reshape(len(stand_in.blocked_reflected), -1), stand_in.kept
-    blocked: Array
+    met: Array
     little: Array
     if facets.k is None:
-        blocked = stand_in.blocked_reflected + stand_in.blocked_refracted
+        met = stand_in.blocked_reflected + stand_in.blocked_refracted
         little = np.where(ratio < 1, 0.9, 0.15)
     else:
-        blocked, little = stand_in.whole, often * often
+        met, little = stand_in.whole, often * often
     # Little that is blocked has a share that the tables do not resolve
-    seen = np.clip((blocked - BLOCKED[0]) / (BLOCKED[1] - BLOCKED[0]), 0, 1)
-    share = seen * np.clip((often - once) / np.maximum(blocked, BLOCKED[0]), 0, 1) + (1 - seen) * little
-    if facets.k is not None:
-        return events.whole * share, np.zeros_like(once)
-    blocked = events.blocked_reflected + events.blocked_refracted
-    return blocked * share, blocked * (1 - share)
+    seen = np.clip((met - BLOCKED[0]) / (BLOCKED[1] - BLOCKED[0]), 0, 1)
+    share = seen * np.clip((often - once) / np.maximum(met, BLOCKED[0]), 0, 1) + (1 - seen) * little
+    return blocked * share, np.zeros_like(once) if facets.k is not None else blocked * (1 - share)
+
+
+def _mean_alpha(facets: Facets) -> float:
+    return float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
+
+
+def share_of_films(facets: Facets, made: dict[Hashable, Any], p: Array) -> Array:
+    """Share (C, sources) of blocked light of lengths p that films reflect in the end, by walks, since no table has
+    them."""
+    mean = _mean_alpha(facets)
+    assert facets.below is not None and facets.films is not None
+    numbers = facets.above, facets.below, facets.k, facets.films
+    key = mean, facets.rarer, *(None if x is None else x.tobytes() for x in numbers)
+    # Walk in directions that crowd where shares bend
+    places = (np.arange(WALKED) + 0.5) / WALKED
+    critical = np.arcsin(float(ops.mean(facets.below) / ops.mean(facets.above))) if facets.is_exit else None
+    if key not in made:
+        back = None if facets.opaque else facets.reversed().reflectance
+        eta = float(ops.mean(facets.below) / ops.mean(facets.above))
+        cosines = coordinates.to_cosine(places) if critical is None else coordinates.to_angle(places, critical)
+        alpha = np.full(WALKED, mean)
+        made[key] = reflected_share((facets.reflectance, back), eta, np.asarray(cosines), alpha, PATHS)
+    cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
+    at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
+    return np.array([np.interp(at, places, each) for each in made[key]])
+
+
+def of_first_events(facets: Facets, p: Array, samples: int, often: bool) -> tuple[Array, Array]:
+    """Shares (C, N) of light of lengths p that facets with films reflect when they are first met, and that meets others
+    then."""
+    events = _events(facets, p, 0 * p, samples, [often])
+    return events.kept, events.whole if facets.opaque else events.blocked_reflected + events.blocked_refracted

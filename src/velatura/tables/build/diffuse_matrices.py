@@ -12,10 +12,10 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.tables import coordinates
-from velatura.tables.build.microsurface_walks import MOST_MEETINGS, Walks
 from velatura.tables.build.quadrature import Progress, ignore
 from velatura.tables.build.single_scattering import closest_interpolant
 from velatura.tables.diffuse_nodes import COUNT, OPEN, OPEN_WEIGHTS, TRAPPED, TRAPPED_WEIGHTS, edge_cosine
+from velatura.tables.microsurface_walks import MOST_MEETINGS, Walks
 from velatura.tables.store import Table
 
 ENTERING = (32, 11, 17)  # nodes of the tables

@@ -22,8 +22,8 @@ from scipy.interpolate import BSpline
 from scipy.linalg import lstsq
 
 from velatura.optics import fresnel
-from velatura.tables import coordinates
-from velatura.tables.build import microsurface_walks, single_scattering
+from velatura.tables import coordinates, microsurface_walks
+from velatura.tables.build import single_scattering
 from velatura.tables.build.quadrature import Progress, Reflections, average
 from velatura.tables.build.single_scattering import ABSORBING, ABSORBING_ANGLES, ALPHA_MIN, COS_MIN, FINE, INSIDE
 from velatura.tables.store import Table

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from velatura.optics import fresnel
-from velatura.tables import anisotropic_albedo, diffuse_nodes
-from velatura.tables.build import belcour_grid, build, diffuse_matrices, microsurface_walks
+from velatura.tables import anisotropic_albedo, diffuse_nodes, microsurface_walks
+from velatura.tables.build import belcour_grid, build, diffuse_matrices
 from velatura.tables.build.anisotropic_albedo import albedo
 from velatura.tables.build.multiple_scattering import bin_cosines
 from velatura.tables.build.quadrature import Progress, Reflections, average, ignore

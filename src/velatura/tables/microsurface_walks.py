@@ -7,27 +7,34 @@ walks give a directional albedo to a thousandth.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from scipy.stats import qmc
 
 from velatura.optics import fresnel, ggx, microsurface, refraction
 from velatura.optics.ggx import Direction
+from velatura.sampling.low_discrepancy import cube
 
 QUASI_RANDOM = 4  # meetings whose numbers come from the sequence; later ones, which matter less, draw random numbers
+DIMENSIONS = 9  # of a sequence that all points share, likewise
 FAINT = 0.05  # weight below which walks are ended at random, and the others take their weight
 MOST_MEETINGS = 1000
 
 Array = np.ndarray
+Reflectance = Callable[[Array], Array]  # of facets, (C, walks) by their cosines
 
 
 class Walks:
     """Walks for light that comes from above at (cos_theta, alpha > 0), both of shape (points,), single precision.
 
     One entry per walk: the point it belongs to, direction of travel, rank of its height, both as seen from its own
-    medium (which is upside down for light that is not `outside`), and weight.
+    medium (which is upside down for light that is not `outside`), and weight, which may have channels before it. The
+    walks of all points draw the same numbers if they are `alike`, and each point's own ones otherwise.
     """
 
-    def __init__(self, cos_theta: Array, alpha: Array, paths: int, rng: np.random.Generator):
+    def __init__(
+        self, cos_theta: Array, alpha: Array, paths: int, rng: np.random.Generator, alike: bool = False
+    ) -> None:
         self.rng, self.paths, self.meetings = rng, paths, 0
         self.point = np.repeat(np.arange(len(alpha)), paths)
         self.alpha = alpha.astype(np.float32)[self.point]
@@ -37,12 +44,17 @@ class Walks:
         self.weight = np.ones_like(cosine)
         self.outside = np.ones(len(cosine), bool)
         self._path = np.arange(len(cosine))
-        sequences = [qmc.Sobol(3 * QUASI_RANDOM, seed=rng).random(paths) for _ in alpha]
-        self._numbers = np.minimum(np.concatenate(sequences).T.astype(np.float32), np.float32(1 - 2**-24))
+        if alike:
+            numbers = np.tile(cube(paths, DIMENSIONS), len(alpha))
+        else:
+            from scipy.stats import qmc
+
+            numbers = np.concatenate([qmc.Sobol(3 * QUASI_RANDOM, seed=rng).random(paths) for _ in alpha]).T
+        self._numbers = np.minimum(numbers.astype(np.float32), np.float32(1 - 2**-24))
         self._meets = np.ones_like(cosine)
 
     def __len__(self) -> int:
-        return len(self.weight)
+        return len(self.rank)
 
     def leave(self) -> Array:
         """Weight that leaves the interface now, per walk; what stays is left in the walks."""
@@ -53,8 +65,10 @@ class Walks:
 
     def end_faint(self) -> Array:
         """End some of the faint walks; indices of those that go on."""
-        kept = np.flatnonzero(self.weight > FAINT * self.rng.random(len(self), dtype=np.float32))
-        self.weight = np.maximum(self.weight, np.float32(FAINT))
+        carried = self.weight if self.weight.ndim == 1 else self.weight.mean(axis=0)
+        kept = np.flatnonzero(carried > FAINT * self.rng.random(len(self), dtype=np.float32))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.weight = np.where(carried < FAINT, self.weight * (np.float32(FAINT) / carried), self.weight)
         self._take(kept)
         return kept
 
@@ -70,28 +84,36 @@ class Walks:
     def reflect(self, i: Direction, h: Direction) -> None:
         self.w = ggx.reflect(i, h)
 
-    def scatter(self, i: Direction, h: Direction, eta: Array) -> None:
-        """Reflect and refract: two walks out of each one; `eta` by point, as seen from above."""
+    def scatter(
+        self, i: Direction, h: Direction, eta: Array, facets: tuple[Reflectance, Reflectance] | None = None
+    ) -> None:
+        """Reflect and refract: two walks out of each one; `eta` by point, as seen from above, and the reflectances of
+        facets from above and from below, Fresnel's without."""
         eta_here = eta.astype(np.float32)[self.point]
         eta_here = np.where(self.outside, eta_here, 1 / eta_here)
-        reflectance = fresnel.dielectric(np.clip(ggx.dot(i, h), 0, 1), eta_here)
+        cosine = np.clip(ggx.dot(i, h), 0, 1)
+        if facets is None:
+            reflectance = fresnel.dielectric(cosine, eta_here)
+        else:
+            from_above, from_below = (facet(cosine) for facet in facets)
+            reflectance = np.where(self.outside, from_above, from_below)
         refracted = reverse(refraction.refract(i, h, eta_here))
         self._take(np.tile(np.arange(len(self)), 2))
         x, y, z = map(np.concatenate, zip(ggx.reflect(i, h), refracted))
         self.w = x, y, z
-        self.weight *= np.concatenate([reflectance, 1 - reflectance])
+        self.weight = self.weight * np.concatenate([reflectance, 1 - reflectance], axis=-1)
         # For refracted light the surface is upside down
-        below = len(reflectance)
+        below = len(cosine)
         self.rank[below:] = 1 - self.rank[below:]
         self.outside[below:] ^= True
 
     def _take(self, index: Array) -> None:
         self.w = self.w[0][index], self.w[1][index], self.w[2][index]
         for name in ("point", "alpha", "rank", "weight", "outside", "_path", "_meets"):
-            setattr(self, name, getattr(self, name)[index])
+            setattr(self, name, getattr(self, name)[..., index])
 
     def _draw(self) -> Array:
-        if self.meetings < QUASI_RANDOM:
+        if 3 * self.meetings < len(self._numbers):
             return self._numbers[3 * self.meetings : 3 * self.meetings + 3, self._path]
         return self.rng.random((3, len(self)), dtype=np.float32)
 
@@ -111,6 +133,44 @@ def reflected_later(cos_theta: Array, alpha: Array, eta: Array, paths: int, rng:
             energy += np.bincount(walks.point, leaving, minlength=len(energy))
         walks.end_faint()
     return energy / paths
+
+
+def reflected_share(
+    facets: tuple[Reflectance, Reflectance | None], eta: float, cos_theta: Array, alpha: Array, paths: int
+) -> Array:
+    """Share (C, points) of light, of what meets facets again, that is reflected in the end.
+
+    facets: their reflectance from above and from below, None for what is opaque. That takes its share already at the
+        first meeting, so that the share is of light that meets facets again if they first reflect all.
+    eta: relative index, of what is not opaque.
+
+    Points draw the same numbers, and so they have nearly the same error.
+    """
+    above, below = facets
+    walks, count = Walks(cos_theta, alpha, paths, np.random.default_rng(0), alike=True), len(alpha)
+    again: Array = np.zeros(1)
+    energy: Array = np.zeros(1)
+    while len(walks) and walks.meetings < MOST_MEETINGS:
+        i, h = walks.meet()
+        if below is None:
+            walks.reflect(i, h)
+        else:
+            walks.scatter(i, h, np.full(count, eta), (above, below))
+        leaving = walks.leave()
+        if below is None:
+            reflectance = above(np.clip(ggx.dot(i, h), 0, 1))
+            leaving, walks.weight = leaving * reflectance, walks.weight * reflectance
+        if walks.meetings == 1:
+            met = walks.weight if below else walks.weight / reflectance
+            again = _by_point(met, walks, count)
+        else:
+            energy = energy + _by_point(np.where(walks.outside, leaving, 0), walks, count)
+        walks.end_faint()
+    return energy / np.maximum(again, np.finfo(float).tiny)
+
+
+def _by_point(weights: Array, walks: Walks, count: int) -> Array:
+    return np.array([np.bincount(walks.point, each, minlength=count) for each in weights])
 
 
 def reflected_by_metals(

@@ -1,0 +1,63 @@
+"""Averages of interfaces with thin films, of which the tables know nothing."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.ops import Value
+from velatura.sampling.coated import Coated, Sampled
+from velatura.tables import coordinates
+
+NODES = (65, 33)  # over direction and roughness
+SAMPLES, SAMPLES_INSIDE = 377, 610  # of normals
+WALKED = 4  # roughnesses for one at which light walks between facets
+
+
+class FilmAverage(Sampled):
+    """The directional albedo of an isotropic interface, sampled over direction and roughness.
+
+    `critical` is the critical angle that the angular axis follows, None for an axis in the cosine.
+    """
+
+    def __init__(self, data: NDArray[np.floating], critical: float | None) -> None:
+        super().__init__(data)
+        self.critical = critical
+
+    def __call__(self, cos_theta: Value, alpha: Value, like: Value) -> Value:
+        """A colour of the kind of `like`."""
+        x = (
+            coordinates.from_cosine(cos_theta)
+            if self.critical is None
+            else coordinates.from_angle(cos_theta, self.critical)
+        )
+        return self.fetched(like, x, coordinates.from_roughness(alpha))
+
+
+@functools.lru_cache(32)
+def film_average(films: Coated, often: bool) -> FilmAverage:
+    """Of an interface whose facets are met once or often; made once."""
+    from velatura.model.transport.interfaces import Facets, of_first_events, share_of_films
+
+    opaque, n12 = films.n12 is None, films.n12 or 1.0
+    critical = None if opaque or n12 >= 1 else float(np.arcsin(n12))
+    x, y = (np.linspace(0, 1, n) for n in NODES)
+    cosines = np.asarray(coordinates.to_cosine(x) if critical is None else coordinates.to_angle(x, critical))
+    p = np.sqrt(np.maximum(1 - cosines * cosines, 0))
+    samples = SAMPLES if critical is None else SAMPLES_INSIDE
+    one, below = np.ones(1), np.full(1, n12)
+    each = [
+        Facets(one, below, one if opaque else None, alpha, alpha, films=films.data, rarer=films.rarer)
+        for alpha in coordinates.to_roughness(y).tolist()
+    ]
+    kept, blocked = zip(*(of_first_events(facets, p, samples, often) for facets in each))
+    found = np.array(kept)
+    if often:
+        walked = np.array([share_of_films(facets, {}, p) for facets in each[::WALKED]])
+        place = np.arange(NODES[1]) / WALKED
+        before = np.minimum(place.astype(int), len(walked) - 2)
+        upper = (place - before)[:, None, None]
+        found = found + np.array(blocked) * ((1 - upper) * walked[before] + upper * walked[before + 1])
+    return FilmAverage(found.transpose(2, 0, 1).copy(), critical)
