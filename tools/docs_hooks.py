@@ -115,7 +115,7 @@ def _item(found: Any, key: str) -> Any:
 def _written(value: Any, places: int) -> str:
     if isinstance(value, list):
         return ", ".join(_written(item, places) for item in value)
-    return re.sub(r"^(-?)0\.", r"\1.", f"{value:.{places}f}")
+    return re.sub(r"^(-?)0\.", r"\1.", f"{round(value, places) + 0.0:.{places}f}")  # no -.000
 
 
 def _with_error(value: float, error: float) -> str:
