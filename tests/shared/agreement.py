@@ -16,11 +16,13 @@ from velatura.editor import messages
 from velatura.model import Model, bsdf, solution, turned
 from velatura.model.context import Context, at_a_point
 from velatura.optics import ggx
+from velatura.sampling.coated import Coated
+from velatura.sampling.coated import coated as coated_interface
 from velatura.shader import Recording, Shader, constant, record, shader, variance
 from velatura.shader.bake import Bake
 from velatura.shader.films import beside
 from velatura.shader.solved import Tabulated
-from velatura.stack import Film, Interface, Kind, Material, Stack, coatings
+from velatura.stack import Film, Interface, Kind, Material, Stack, coatings, srgb_sensitivity
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
 
@@ -113,13 +115,26 @@ def coated(case: Case) -> Case:
     return replace(case, stack=stack, values=values)
 
 
+class InTables(Coated):
+    """Films whose averages are looked up in tables, as shaders do, instead of those that are worked out."""
+
+    known = False
+
+    def __init__(self, films: Coated) -> None:
+        super().__init__(films.data, films.rarer, films.n12)
+
+    def reversed(self) -> InTables:
+        return InTables(Coated(self.data, 3 - self.rarer, self.n12))
+
+
 def in_numpy(case: Case, recording: Recording) -> Results:
     """What the model says; where it solves materials, of the first stack for all directions."""
     stack = case.stack
     wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
     if isinstance(recording.baked, Tabulated):
         return _solved(stack, recording.model, wi, wo, u)
-    material = Material.from_flat(stack.kinds, case.values, stack.thin, coatings.of(stack))
+    films: Any = [x and InTables(coated_interface(x, srgb_sensitivity)) for x in coatings.of(stack)]
+    material = Material.from_flat(stack.kinds, case.values, stack.thin, films)
     body = bsdf.body(material, recording.model, variance(stack), at_a_point())
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]

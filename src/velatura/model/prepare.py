@@ -181,8 +181,8 @@ class _Averages:
         if self.model.reflectance in ("fresnel", "fg"):
             return None
         multiple = self.model.microsurface
-        if isinstance(facets.films, Coated) and self.model.reflectance != "split-sum":
-            films = facets.films
+        films = facets.films if self.model.reflectance != "split-sum" else None
+        if isinstance(films, Coated) and films.known:
             return lambda cos_theta, alpha: film_average(films, multiple)(cos_theta, alpha, eta)
         if self.model.reflectance == "split-sum":
             r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
@@ -197,6 +197,8 @@ class _Averages:
             row = tables.dielectric_row(self.context.tables, eta, self.context.constant, multiple)
         else:
             row = tables.conductor_row(self.context.tables, eta, kappa, self.context.constant, multiple)
+        if films:
+            row = tables.with_films(self.context.tables, row, facets.reflect)
         return self._of(row)
 
     def _of(self, row: Row) -> Average:

@@ -57,6 +57,10 @@ class Coating:
         """Reflectance (3, N) of unpolarised light at cosines (N,) above, in [0, 1]."""
         return np.clip(self._integrated("reflected", cos_theta, sensitivity), 0.0, 1.0)
 
+    def share(self, name: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
+        """A property of `optics.films.Response`, by its name, as `reflectance`, with colours outside sRGB."""
+        return self._integrated(name, cos_theta, sensitivity)
+
     def _integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
         channels = [self._channel(c) for c in range(3)]
         if channels[0] == channels[1] == channels[2]:

@@ -30,26 +30,6 @@ class Film:
 
 
 @dataclass(frozen=True)
-class Response:
-    """Shares of light that films and the media around them reflect and transmit, for each polarisation."""
-
-    reflected_s: Value
-    reflected_p: Value
-    transmitted_s: Value
-    transmitted_p: Value
-
-    @property
-    def reflected(self) -> Value:
-        """The share of unpolarised light that is reflected."""
-        return 0.5 * (self.reflected_s + self.reflected_p)
-
-    @property
-    def transmitted(self) -> Value:
-        """The share of unpolarised light that is transmitted."""
-        return 0.5 * (self.transmitted_s + self.transmitted_p)
-
-
-@dataclass(frozen=True)
 class _Complex:
     """A complex number of any dialect."""
 
@@ -80,6 +60,62 @@ class _Complex:
     def square(self) -> Value:
         """The square of the modulus."""
         return self.re * self.re + self.im * self.im
+
+
+@dataclass(frozen=True)
+class Response:
+    """Shares of light that films and the media around them reflect and transmit, for each polarisation.
+
+    `_s` and `_p` are fields that are incident and reflected at the top, up to a factor each.
+    """
+
+    reflected_s: Value
+    reflected_p: Value
+    transmitted_s: Value
+    transmitted_p: Value
+    _s: tuple[_Complex, _Complex]
+    _p: tuple[_Complex, _Complex]
+
+    @property
+    def reflected(self) -> Value:
+        """The share of unpolarised light that is reflected."""
+        return 0.5 * (self.reflected_s + self.reflected_p)
+
+    @property
+    def transmitted(self) -> Value:
+        """The share of unpolarised light that is transmitted."""
+        return 0.5 * (self.transmitted_s + self.transmitted_p)
+
+    @property
+    def reflected_real(self) -> Value:
+        """The real part of r_s conj(r_p), of amplitudes that are reflected (`optics.polarisation.Mueller`)."""
+        return self._reflected.re
+
+    @property
+    def reflected_imaginary(self) -> Value:
+        """Its imaginary part."""
+        return self._reflected.im
+
+    @property
+    def transmitted_real(self) -> Value:
+        """The real part of t_s conj(t_p), of amplitudes that are transmitted into a medium that does not absorb; their
+        squares are shares of energy."""
+        return self._transmitted.re
+
+    @property
+    def transmitted_imaginary(self) -> Value:
+        """Its imaginary part."""
+        return self._transmitted.im
+
+    @property
+    def _reflected(self) -> _Complex:
+        (incident_s, reflected_s), (incident_p, reflected_p) = self._s, self._p
+        return (reflected_s / incident_s) * (reflected_p / incident_p).conjugate
+
+    @property
+    def _transmitted(self) -> _Complex:
+        phase = self._p[0] * self._s[0].conjugate
+        return phase.times(ops.sqrt(ops.divide(self.transmitted_s * self.transmitted_p, phase.square)))
 
 
 def coherent(
@@ -114,9 +150,9 @@ def coherent(
         left = left * decay * decay
 
     q_1 = eta_1 * cos_theta
-    r_s, t_s = _at_the_top(q_1, s)
-    r_p, t_p = _at_the_top(q_1 / (eta_1 * eta_1), p)
-    return Response(r_s, r_p, t_s * flux_s * left, t_p * flux_p * left)
+    r_s, t_s, fields_s = _at_the_top(q_1, s)
+    r_p, t_p, fields_p = _at_the_top(q_1 / (eta_1 * eta_1), p)
+    return Response(r_s, r_p, t_s * flux_s * left, t_p * flux_p * left, fields_s, fields_p)
 
 
 def _square(eta: Value, k: Value) -> _Complex:
@@ -153,9 +189,10 @@ def _through(
     return cosine * u + upper * v, lower * u + cosine * v
 
 
-def _at_the_top(admittance: Value, fields: tuple[_Complex, _Complex]) -> tuple[Value, Value]:
-    """The reflectance, and transmittance over the flux below, for fields at the top."""
+def _at_the_top(admittance: Value, fields: tuple[_Complex, _Complex]) -> tuple[Value, Value, tuple[_Complex, _Complex]]:
+    """The reflectance, and transmittance over the flux below, for fields at the top; and what is incident and reflected
+    there."""
     u, v = fields
     incident, reflected = u.times(admittance) + v, u.times(admittance) - v
     square = ops.maximum(incident.square, ops.TINY)
-    return reflected.square / square, 4 * admittance / square
+    return reflected.square / square, 4 * admittance / square, (incident, reflected)

@@ -55,6 +55,8 @@ class Coated(Sampled):
     relative index for all colours, None where it is opaque.
     """
 
+    known = True  # whether the data may be looked at now
+
     def __init__(self, data: Array, rarer: int, n12: float | None = None) -> None:
         super().__init__(data)
         self.rarer, self.n12 = rarer, n12

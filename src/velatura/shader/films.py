@@ -29,6 +29,8 @@ class Read(Coated):
     `from_above` is whether the medium above is the rarer one, a condition where values change; then there are no data.
     """
 
+    known = False
+
     def __init__(self, line: int, from_above: Value, data: Array | None) -> None:
         super().__init__(np.empty((0, 0)) if data is None else data, 1)
         self.line, self.from_above = line, from_above

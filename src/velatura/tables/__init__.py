@@ -10,6 +10,7 @@ from velatura.tables.fetch import (
     mirror_row,
     tir,
     tir_sheet,
+    with_films,
 )
 from velatura.tables.material_average import Average
 from velatura.tables.split_sum import schlick_row
@@ -32,4 +33,5 @@ __all__ = [
     "schlick_row",
     "tir",
     "tir_sheet",
+    "with_films",
 ]
