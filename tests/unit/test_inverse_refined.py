@@ -58,6 +58,49 @@ def test_alternatives_share_the_lobes_that_the_model_itself_reads() -> None:
     assert all(members.contains(*indices(found[0])).all() for members in found[0].classes)
 
 
+def test_alternatives_have_other_tints() -> None:
+    """Expected: brushed metals that differ by more than rounding, all with the lobe that was asked for."""
+    target = Target([COAT, {**METAL, "alpha": (0.15, 0.4), "rotation": 60}])
+    found = [solution.stack for solution in alternatives(target, 3, MODEL)]
+    red = sorted(stack.interfaces[1].eta[0] for stack in found)
+    assert min(np.diff(red)) > 0.01
+    read = [vt.lobes(stack, 1.0, model=MODEL) for stack in found]
+    assert all(one.energy[1][:, 0] == pytest.approx(METAL["energy"], abs=1e-5) for one in read)
+    assert all(sorted(one.alpha[1][:, 0]) == pytest.approx([0.15, 0.4], abs=1e-5) for one in read)
+
+
+def test_a_metal_whose_index_is_fixed_has_the_lobe_that_is_asked_for() -> None:
+    metal = {"energy": 0.5, "alpha": 0.3, "base": "conductor", "fixed": {"eta": [1.2]}}
+    target = Target([{**COAT, "alpha": 0.1}, metal])
+    stack = invert_stack(target, MODEL).stack
+    assert stack.interfaces[1].eta == pytest.approx(1.2)
+    assert missed(target, stack) < 1e-6
+
+
+def test_a_start_that_has_the_lobes_keeps_its_tint() -> None:
+    metal = {"eta": [0.08, 0.4, 1.56], "k": [3.39, 2.5, 1.77], "alpha": 0.2}
+    stack = Stack.from_dict({"layers": [{"interface": {"eta": 1.5}}, {"interface": metal}]})
+    read = vt.lobes(stack, 1.0, model=MODEL)
+    energy, alpha = tuple(read.energy[1][:, 0].tolist()), float(read.alpha[1][0, 0])
+    lobes = [{"energy": 0.04}, {"energy": energy, "alpha": alpha, "base": "conductor"}]
+    assert invert_stack({"lobes": lobes, "start": stack.to_dict()}, MODEL).stack == stack
+
+
+def test_the_search_leads_past_a_jump_of_readings() -> None:
+    target = Target(
+        [
+            {"energy": 0.11543720020443492},
+            {"energy": (0.031517551462987764, 0.03836517364447956, 0.032928344274168846), "alpha": 0.1512762717479406},
+            {
+                "energy": (0.2713277971252697, 0.22636485975841017, 0.23873940843396405),
+                "alpha": 0.34743004489989143,
+                "base": "conductor",
+            },
+        ]
+    )
+    assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
+
+
 def indices(solution: Any) -> list[Any]:
     return [part.eta[0] for part in solution.layers]
 

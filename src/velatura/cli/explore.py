@@ -88,7 +88,8 @@ def _listed(solution: Any) -> str:
     for layers in solution.layers:
         tau = f"tau {colour(layers.tau)} | " if np.max(layers.tau) > 1e-6 else ""
         k = f" + {colour(layers.kappa)}i" if layers.kappa is not None else ""
-        parts.append(f"{tau}eta {colour(layers.eta)}{k} alpha {colour(layers.alpha)}")
+        blur = colour(layers.roughness[:2])
+        parts.append(f"{tau}eta {colour(layers.eta)}{k} alpha {blur}")
     return " | ".join(parts)
 
 

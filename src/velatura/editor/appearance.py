@@ -57,9 +57,10 @@ def lobe_of(body: Body, target: Target) -> int:
 def held(material: Answer, target: Target, model: Model) -> DraggedStack | None:
     """A material that can be dragged, None if it does not have the form of the target."""
     try:
-        return DraggedStack.of(Stack.from_dict(material), target, model)
+        found = DraggedStack.of(Stack.from_dict(material), target, model)
     except InvalidInput:
         return None
+    return found and found.tinted()
 
 
 def dragged(body: Body, target: Target) -> DraggedStack | None:

@@ -92,10 +92,14 @@ def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None
                     most = members.held(**half).depths_1(axis)[1][channel]
                     axes.plot(axis, most, color=colour, linewidth=1, linestyle="--")
         which = "coat" if members.interfaces == 2 else "medium above"
-        axes.set(xlabel="eta", xlim=(1, eta_max), ylabel=f"optical depth of the {which}")
+        axes.set(
+            xlabel="eta of the coat" if members.interfaces == 2 else "eta",
+            xlim=(1, eta_max),
+            ylabel=f"optical depth of the {which}",
+        )
         axes.set_ylim(bottom=0)
     else:
-        tint = np.linspace(0, 1, 33)
+        tint = np.linspace(0, 1, 129)
         for channel, colour in enumerate(colours):
             eta, kappa = _conductor(members, tint, channel)
             axes.plot(eta, kappa, color=colour, label=CHANNELS[channel] if len(colours) > 1 else "all channels")

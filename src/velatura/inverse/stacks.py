@@ -31,7 +31,7 @@ from velatura.stack import Diffuse, MaterialLike, Stack, load
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
 GRAZING = (0.5, 0.4, 0.3, 0.2, 0.1)  # cosines at which members of a class may differ
 NARROWEST = 2 * ALPHA_MIN  # roughness of lobes below a rough interface
-DRAWS = 4  # times that alternatives are drawn
+DRAWS, ALIKE = 4, 1e-4  # times that alternatives are drawn, and by which their values differ at least
 ALPHA_APART, ENOUGH = 1e-4, 1e-6  # by which a roughness may miss the one that is fixed, and may where that is sought
 
 
@@ -69,6 +69,21 @@ class Solution:
         axes = [lobe.axes.rotation for lobe in self.target.lobes for _ in range(lobe.interfaces)]
         written = [layer for layers, axis in zip(self.layers, axes) for layer in layers.written(0, axis)]
         return Stack(written, name=self.target.name, exterior=self.target.exterior)
+
+    def alike(self, other: Solution) -> bool:
+        """Whether another stack of the same form has almost the same values."""
+        pairs = [
+            values
+            for one, two in zip(self.layers, other.layers)
+            for values in (
+                (one.eta, two.eta),
+                (one.kappa, two.kappa),
+                (one.tau, two.tau),
+                *zip(one.roughness[:2], two.roughness[:2]),
+            )
+            if values[0] is not None
+        ]
+        return all(np.allclose(*values, rtol=ALIKE, atol=ALIKE) for values in pairs)
 
     @cached_property
     def in_closed_form(self) -> Solution:
@@ -204,13 +219,15 @@ def alternatives(
     rng, found = np.random.default_rng(seed), [first]
     near = first.in_closed_form
     for _ in range(DRAWS):
-        paths = sampling.drawn(near, rng)
+        paths, known = sampling.drawn(near, rng), len(found)
         for drawn in solutions(near.target, near.model, paths, range(min(len(paths.cost), 2 * count))):
             if len(found) == count:
                 return found
             other = _met(drawn, first)
-            if other is not None and all(other.stack != each.stack for each in found):
+            if other is not None and not any(other.alike(each) for each in found):
                 found.append(other)
+        if len(found) == known:  # too much is fixed for another one
+            break
     return found
 
 
@@ -220,8 +237,10 @@ def _met(drawn: Solution, first: Solution) -> Solution | None:
         return drawn
     from velatura.inverse import refined
 
-    met = refined.moved(drawn, first.target, first.model)
-    return met if isinstance(met, Solution) else None
+    met = refined.moved(drawn, first.reached or first.target, first.model)
+    if not isinstance(met, Solution) or met.reached:
+        return None
+    return dataclasses.replace(met, target=first.target, reached=first.reached)
 
 
 def on_black(stack: MaterialLike) -> Stack:

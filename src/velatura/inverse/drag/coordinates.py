@@ -422,15 +422,11 @@ class Reader:
     def _conductor(self, k: int, ratio: Array, kappa: Array, values: dict[str, Any]) -> InterfaceCoordinates:
         """The last interface of a lobe, a conductor: all that absorbs is kept."""
         reflectance = np.broadcast_to(fresnel.normal_incidence(ratio, kappa), (3, 1))
-        tint = conductor_tint(ratio, kappa)
-        lobe = self.target.lobes[k]
-        if lobe.fixed.of("eta", lobe.interfaces - 1) is None and lobe.fixed.of("k", lobe.interfaces - 1) is None:
-            tint = retinted(tint, float(np.mean(tint)), lobe.tint)
         low, why = (ENERGY_MIN, "upper") if values["absorbs"] else (float(CONDUCTOR_MIN), "metal")
         reflectances = np.maximum(reflectance[:, 0], low).tolist()
         span = self._colour(k, reflectances, why, low, float(CONDUCTOR_MAX))
         depth = self._coordinate(k, 1.0, "absorption", 0.0, 1.0) if values["absorbs"] else None
-        values["tint"] = np.broadcast_to(tint, (3, 1))
+        values["tint"] = np.broadcast_to(conductor_tint(ratio, kappa), (3, 1))
         return InterfaceCoordinates(**values, depth=depth, reflectances=span)
 
     def _blur(self, lobe: int, roughness: Roughness) -> slice:

@@ -36,7 +36,7 @@ from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Layer, Stack, Varying, refuse_films
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
-ASIDE = 0.02  # by which free choices change to lead past a jump
+ASIDE = (0.02, 0.05, 0.1)  # by which free choices change, one after the other, to lead past a jump
 SAME = 1e-6  # energies and roughnesses that are as asked
 CHANGED = 0.01  # share of an energy or a roughness that a wish changes it by
 FAR = 0.1  # share of a wish that is a long way
@@ -126,6 +126,17 @@ class DraggedStack:
         factors = wanted / np.where(np.abs(read) > ENERGY_MIN, read, np.inf)
         factors = np.where(factors > 0, factors, 1.0)
         return dataclasses.replace(self, point=Point(dataclasses.replace(self.space, factors=factors), self.point.x))
+
+    def tinted(self) -> DraggedStack:
+        """With the tints that its target asks for, where that fixes no index of the conductor."""
+        interfaces = list(self.interfaces)
+        for n, own in enumerate(interfaces):
+            lobe = self.target.lobes[own.lobe]
+            if own.kind == "conductor" and all(lobe.fixed.of(key, lobe.interfaces - 1) is None for key in ("eta", "k")):
+                tint = retinted(own.tint, float(np.mean(own.tint)), lobe.tint)
+                interfaces[n] = dataclasses.replace(own, tint=tint)
+        space = dataclasses.replace(self.space, interfaces=tuple(interfaces))
+        return dataclasses.replace(self, point=Point(space, self.point.x))
 
     # What it is, and what the model reads ----------------------------------------------------------------------------
 
@@ -237,22 +248,23 @@ class DraggedStack:
         if isinstance(found, Bound):
             return found
         met = self._at(found).renamed(wish)
-        if self.model.recursion.closed_form or met.missed(wish) < SAME:
-            return met
-        beside = met._beside()
-        other = beside and beside._problem(problem.goal).solve()
-        if beside is None or not isinstance(other, Solution):
-            return met
-        return min(met, beside._at(other).renamed(wish), key=lambda stack: stack.missed(wish))
+        for aside in () if self.model.recursion.closed_form else ASIDE:
+            beside = None if met.missed(wish) < SAME else met._beside(aside)
+            if beside is None:
+                break
+            other = beside._problem(problem.goal).solve()
+            if isinstance(other, Solution):
+                met = min(met, beside._at(other).renamed(wish), key=lambda stack: stack.missed(wish))
+        return met
 
-    def _beside(self) -> DraggedStack | None:
-        """The stack with free choices a little off, which leads past a jump of readings; None without any."""
+    def _beside(self, aside: float) -> DraggedStack | None:
+        """The stack with free choices off by a little, which leads past a jump of readings; None without any."""
         x = self.point.x.copy()
         for own in self.interfaces:
             if own.depth is not None:
-                x[own.depth] += ASIDE
+                x[own.depth] += aside
             if own.log_index is not None and self.target.lobes[own.lobe].fixed.of("eta", 0) is None:
-                x[own.log_index] += ASIDE if x[own.log_index] < ASIDE else -ASIDE
+                x[own.log_index] += aside if x[own.log_index] < aside else -aside
         x = self.space.clipped(x)
         return None if np.array_equal(x, self.point.x) else dataclasses.replace(self, point=Point(self.space, x))
 
