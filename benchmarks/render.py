@@ -4,8 +4,9 @@ The material ball fills over 60 % of a 512x512 picture under an environment map,
 defaults with tables and total internal reflection on. Beside it: `eval_pdf` alone, and textured parameters.
 
 With `--solids`: solids of rough glass (index 1.5) instead, beside `roughdielectric`: the light of a sphere in a white
-furnace, path depth 40, and the noise of a block in the studio at equal samples, as a ratio; so of spheres of opaque
-presets, beside `belcour2018`.
+furnace, path depth 40, and the noise of a block in the studio at equal samples, as a ratio. Where facets are met often,
+beside a `roughdielectric` that is divided by its albedo, which keeps light as well. So of spheres of opaque presets,
+beside `belcour2018`; the light of pictures is another ratio.
 
     python benchmarks/render.py [--rounds 9] [--spp 64] [--variant llvm_ad_rgb] [--model NAME] [--solids]
 """
@@ -108,32 +109,84 @@ def furnace(mi, bsdf, spp: int = 1024) -> tuple[float, float]:
     return float(np.mean(means)), float(np.std(means) / np.sqrt(8))
 
 
-def noise(mi, bsdf, shape: str, spp: int = 16, rounds: int = 16) -> float:
-    """Standard deviation of pixels over rounds, root mean square, of a shape in the studio."""
+def noise(mi, bsdf, shape: str, spp: int = 16, rounds: int = 16) -> tuple[float, float]:
+    """Standard deviation of pixels over rounds, root mean square, of a shape in the studio, and their mean."""
     description = scene_dict("sphere", "studio", bsdf, (96, 96), ZOOM)
     if shape == "cube":
         turn = mi.ScalarTransform4f().translate([0, 0.9, 0]).rotate([0, 1, 0], 30).scale(0.7)
         description["object"] = {"type": "cube", "to_world": turn, "bsdf": bsdf}
     scene = mi.load_dict({**description, "integrator": {"type": "path", "max_depth": 16, "rr_depth": 16}})
     pictures = [np.minimum(np.array(mi.render(scene, spp=spp, seed=seed)), 20) for seed in range(rounds)]
-    return float(np.sqrt(np.mean(np.var(pictures, axis=0, ddof=1))))
+    return float(np.sqrt(np.mean(np.var(pictures, axis=0, ddof=1)))), float(np.mean(pictures))
+
+
+def noisier(mi, bsdf, other, shape: str) -> str:
+    """Ratios of noise and of light."""
+    (more, light), (less, light_of_other) = noise(mi, bsdf, shape), noise(mi, other, shape)
+    return f"{more / less:.2f} (light {light / light_of_other:.2f})"
+
+
+def lossless(mi, glass, nodes: int = 256, samples: int = 4096):
+    """A BSDF of two sides over its albedo, which is sampled at so many cosines."""
+    import drjit as dr
+
+    z = np.repeat(np.linspace(-1, 1, nodes), samples)
+    si, rng = dr.zeros(mi.SurfaceInteraction3f, len(z)), mi.PCG32(len(z))
+    si.wi = mi.Vector3f(mi.Float(np.sqrt(1 - z * z)), 0, mi.Float(z))
+    numbers = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    bs, weight = glass.sample(mi.BSDFContext(), si, *numbers)
+    weight = np.nan_to_num(np.array(weight.x * dr.select(bs.wo.z * si.wi.z < 0, bs.eta * bs.eta, 1)))
+    table = mi.Texture1f(
+        mi.TensorXf(1 / weight.reshape(nodes, samples).mean(axis=1)[:, None]), wrap_mode=dr.WrapMode.Clamp
+    )
+
+    class Lossless(mi.BSDF):
+        def __init__(self, props):
+            super().__init__(props)
+            self.m_components = [glass.flags(k) for k in range(glass.component_count())]
+            self.m_flags = glass.flags()
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            bs, weight = glass.sample(ctx, si, sample1, sample2, active)
+            return bs, weight * self._scale(si)
+
+        def eval(self, ctx, si, wo, active=True):
+            return glass.eval(ctx, si, wo, active) * self._scale(si)
+
+        def pdf(self, ctx, si, wo, active=True):
+            return glass.pdf(ctx, si, wo, active)
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            value, pdf = glass.eval_pdf(ctx, si, wo, active)
+            return value * self._scale(si), pdf
+
+        def _scale(self, si):
+            return table.eval((si.wi.z * (nodes - 1) / nodes + 1) / 2)[0]
+
+    return Lossless(mi.Properties("lossless"))
 
 
 def solids(mi, model: str) -> None:
     for alpha in ROUGH:
         glass = mi.load_dict({"type": "roughdielectric", "distribution": "ggx", "int_ior": 1.5, "alpha": alpha})
-        stack = vt.Stack([vt.Interface(eta=1.5, alpha=alpha)])
+        stack, kept = vt.Stack([vt.Interface(eta=1.5, alpha=alpha)]), lossless(mi, glass)
         once, often = (vt.bsdf(stack, model=model, reflectance=name) for name in ("fgd", "fgd-multi"))
-        whites = [furnace(mi, each) for each in (often, once, glass)]
-        ratio = noise(mi, once, "cube") / noise(mi, glass, "cube")
-        lights = ", ".join(f"{name} {x:.4f}" for name, (x, _) in zip(("fgd-multi", "fgd", "roughdielectric"), whites))
+        whites = [furnace(mi, each) for each in (often, once, glass, kept)]
+        names = "fgd-multi", "fgd", "roughdielectric", "over its albedo"
         error = max(e for _, e in whites)
-        print(f"glass, alpha {alpha}: furnace {lights} (+- {error:.4f}); noise of a block {ratio:.2f}", flush=True)
+        lights = ", ".join(f"{name} {x:.4f}" for name, (x, _) in zip(names, whites))
+        print(f"glass, alpha {alpha}: furnace {lights} (+- {error:.4f})", flush=True)
+        for form in ("forward", "symmetric"):
+            once, often = (vt.bsdf(stack, model=model, form=form, reflectance=name) for name in ("fgd", "fgd-multi"))
+            ratios = noisier(mi, once, glass, "cube"), noisier(mi, often, kept, "cube")
+            print(f"    {form}: noise of a block fgd {ratios[0]}, fgd-multi {ratios[1]}", flush=True)
     for name in OPAQUE:
-        ratio = noise(mi, vt.bsdf(name, model=model), "sphere") / noise(
-            mi, vt.bsdf(name, model="belcour2018"), "sphere"
-        )
-        print(f"{name}: noise {ratio:.2f}", flush=True)
+        other = vt.bsdf(name, model="belcour2018")
+        for form in ("forward", "symmetric"):
+            print(
+                f"{name}, {form}: noise {noisier(mi, vt.bsdf(name, model=model, form=form), other, 'sphere')}",
+                flush=True,
+            )
 
 
 def main() -> None:

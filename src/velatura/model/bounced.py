@@ -43,7 +43,6 @@ THIN = 1e-4  # optical depth of scattering that no light meets twice
 NO_LOBE = 1e-6  # asymmetry
 GRAZING = 1e-4  # cosine
 WIDE = 0.05  # roughness of bounced light of which a lobe holds half
-TILT_MAX = 0.8  # of samples of diffuse light
 
 Array = NDArray[np.floating]
 
@@ -170,7 +169,7 @@ def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value
     within = found.within(o)
     even = found.diffuse * ops.maximum(o[2], 0.0) / (found.bound * found.bound)
     value = ops.select(within[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, within), 0.0)
-    density = even / ops.maximum(within[2], GRAZING) * found.samples.density(i, within) * (1 + _tilt(found, i, within))
+    density = even / ops.maximum(within[2], GRAZING) * found.samples.density(i, within)
     if found.lobe:
         also, density_of_lobe = own_medium.eval_pdf(found.lobe, i, o)
         value, density = (1 - found.diffuse) * also + value, (1 - found.diffuse) * density_of_lobe + density
@@ -179,20 +178,14 @@ def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value
 
 def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
     """A direction, in the frame of `seen_below`, from uniform numbers."""
-    even = found.samples.sample(i, u1, u2)
-    side = found.bound * ops.select(2 * u < 1 + _tilt(found, i, even), 1.0, -1.0)
-    x, y = side * even[0], side * even[1]
+    even = found.samples.sample(i, u, u1, u2)
+    x, y = found.bound * even[0], found.bound * even[1]
     even = x, y, ops.sqrt(1 - x * x - y * y)
     if not found.lobe:
         return even
     other = own_medium.sample(found.lobe, i, u1, u2)
     x, y, z = (ops.select(u < found.diffuse, a, b) for a, b in zip(even, other))
     return x, y, z
-
-
-def _tilt(found: Rest, i: Direction, o: Direction) -> Value:
-    """By how much more diffuse light is sampled than on the opposite side, over both."""
-    return ops.clip(found.numbers[3] * -(i[0] * o[0] + i[1] * o[1]), -TILT_MAX, TILT_MAX)
 
 
 def diffuse(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:

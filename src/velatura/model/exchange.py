@@ -70,7 +70,7 @@ def factors(
         result.append([])
         found = []
         for k, energy in enumerate(at_nodes.energies):
-            wo = of.out_of(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else of.samples.sample(i, *u[1:])
+            wo = of.out_of(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else of.samples.sample(i, *u)
             up = wo[0], wo[1], np.maximum(wo[2], 0.0)
             value = _weight(of.part(k, i, wo), side.seen(up).part(k, up, i)[0], i, wo)
             most = MOST if k < len(of.lobes) else MOST_REST

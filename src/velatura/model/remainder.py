@@ -33,6 +33,7 @@ EXACT = 3.0  # weight of the energy of a direction beside that of nodes
 DARK = 1e-6  # albedo
 KEPT = 16  # sets of nodes whose deposits are kept
 BRIGHT = 0.5  # share of samples by the root of the cosine, for a horizon that is twice as bright as all
+TILT = 0.5  # by how much more light is sampled on one side than on the opposite one, over both, at most
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,9 @@ class Remainder(ops.Named):
         """Density of `sample`, of directions above."""
         return self.samples.density(wi, wo)
 
-    def sample(self, wi: Direction, u1: Value, u2: Value) -> Direction:
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
         """A direction wo from uniform numbers."""
-        return self.samples.sample(wi, u1, u2)
+        return self.samples.sample(wi, u, u1, u2)
 
     def _at(self, z: Value) -> tuple[Value, Value, Value]:
         """Coefficients of u at the other cosine."""
@@ -109,27 +110,36 @@ class Samples:
 
     def density(self, wi: Direction, wo: Direction) -> Value:
         """Density of `sample`, of directions above."""
-        z, low = ops.maximum(wo[2], 0.0), self._low(wi)
-        return ((1 - low) * z + 0.75 * low * ops.sqrt(z)) * (1 / pi)
+        z, (low, tilt) = ops.maximum(wo[2], 0.0), self._bright(wi)
+        even = ((1 - low) * z + 0.75 * low * ops.sqrt(z)) * (1 / pi)
+        return even * (1 + _tilted(tilt, wi, wo))
 
-    def sample(self, wi: Direction, u1: Value, u2: Value) -> Direction:
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
         """A direction wo from uniform numbers, with a density proportional to the cosine or, where most light leaves at
-        grazing directions, to its root."""
-        low = self._low(wi)
+        grazing directions, to its root; more of them on the side to which light tilts."""
+        low, tilt = self._bright(wi)
         grazing = u1 < low
         u1 = ops.clip(ops.divide(ops.select(grazing, u1, u1 - low), ops.select(grazing, low, 1 - low)), 0.0, 1.0)
         z = ops.power(ops.maximum(u1, ops.TINY), ops.select(grazing, 2 / 3, 0.5))
         radius, phi = ops.sqrt(1 - z * z), 2 * pi * u2
-        return radius * ops.cos(phi), radius * ops.sin(phi), z
+        x, y = radius * ops.cos(phi), radius * ops.sin(phi)
+        side = ops.select(2 * u < 1 + _tilted(tilt, wi, (x, y, z)), 1.0, -1.0)
+        return side * x, side * y, z
 
-    def _low(self, wi: Direction) -> Value:
+    def _bright(self, wi: Direction) -> tuple[Value, Value]:
         """Share of samples by the root of the cosine: by how bright the horizon is, on the side of the mirror
-        direction, beside the mean of all directions."""
+        direction, beside the mean of all directions; and B over that mean."""
         z, p2 = wi[2], 1 - wi[2] * wi[2]
         w = grazing(z)
         horizon, everywhere = (c[0] + z * c[1] + w * c[2] for c in (self.horizon, self.everywhere))
         horizon = horizon + self.b * ops.sqrt(p2) + self.a * p2
-        return ops.clip(BRIGHT * (ops.divide(horizon, everywhere) - 1), 0.0, 1.0)
+        inverse = ops.divide(1.0, everywhere)
+        return ops.clip(BRIGHT * (horizon * inverse - 1), 0.0, 1.0), self.b * inverse
+
+
+def _tilted(tilt: Value, wi: Direction, wo: Direction) -> Value:
+    """By how much more light is sampled than on the opposite side, over both."""
+    return ops.clip(-1 * tilt * (wi[0] * wo[0] + wi[1] * wo[1]), -TILT, TILT)
 
 
 def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remainder:
