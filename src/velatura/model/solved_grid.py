@@ -94,7 +94,8 @@ class Grid:
 
     def along(self, values: Array, count: int) -> Array:
         """Values at the cosines, (..., cosines), interpolated by splines at as many places."""
-        return np.asarray(PchipInterpolator(self.nodes, values, axis=-1)(np.linspace(0, 1, count)))
+        with np.errstate(over="ignore"):  # of inverse slopes, where values are hardly above 0
+            return np.asarray(PchipInterpolator(self.nodes, values, axis=-1)(np.linspace(0, 1, count)))
 
 
 @dataclass(frozen=True)
