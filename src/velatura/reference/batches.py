@@ -14,7 +14,7 @@ from velatura.errors import InvalidInput
 from velatura.optics.polarisation import horizontal
 from velatura.reference.layers import Layers, from_material, zeros
 from velatura.reference.walk import walk
-from velatura.stack import RGB, Address, Material, Stack, refuse_films
+from velatura.stack import RGB, Address, Material, Stack
 
 Array = NDArray[np.floating]
 
@@ -60,8 +60,6 @@ def trace(
     """
     if paths < 1:
         raise InvalidInput(f"paths: must be at least 1, got {paths}")
-    if polarised:
-        refuse_films(stack, "the walk with polarisation has")
     kernel.require_llvm()
     layers = _layers(stack, microsurface)
     for start in range(0, paths, _AT_ONCE):

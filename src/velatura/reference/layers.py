@@ -18,6 +18,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
 from velatura.sampling.coated import Coated, coated
+from velatura.sampling.polarised_films import PolarisedFilms, polarised_films
 from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
 from velatura.stack.values import Pair
 
@@ -159,7 +160,7 @@ class Layers:
         if any(self.films[:-1]) or (self.transmits and self.films[-1]):
             rarer = ops.select(eta > 1, cosine, cos_t)
             each = [dielectric if films is None else films.at(rarer, n_in) for films in self.films]
-            dielectric = _choose(self.flipped, pick(each[::-1], j), pick(each, j))
+            dielectric = self._of_interface(each, j)
         dielectric = ops.select(cos_t > 0, dielectric, 1.0)
         return dielectric if base is None else ops.select(self.is_base(j), base, dielectric)
 
@@ -172,13 +173,28 @@ class Layers:
         total = mueller(*fresnel.total_amplitudes(cosine, eta))
         reflection = _of_either(passes, between, replace(total, s=1.0, p=1.0))
         refraction = complement(reflection)
+        polarised = [films and _polarised(films) for films in self.films]
+        if any(polarised[:-1]) or (self.transmits and polarised[-1]):
+            bare = reflection, refraction
+            each = [x.dielectric(cosine, cos_t, eta, n_in) if x and x.total else bare for x in polarised]
+            reflection, refraction = (self._picked(matrices, j) for matrices in zip(*each))
         if self.base == "mirror":
             base = Mueller(1.0, 1.0, -1.0, 0.0)
+        elif self.base == "conductor" and (films := polarised[-1]):
+            base = films.opaque(cosine, n_in)
         elif self.base == "conductor":
             base = mueller(*fresnel.conductor_amplitudes(cosine, self.index[-1] / n_in, self.extinction / n_in))
         else:
             return reflection, refraction
         return _of_either(self.is_base(j), base, reflection), refraction
+
+    def _picked(self, matrices: Sequence[Mueller], j: Value) -> Mueller:
+        columns = zip(*(vars(matrix).values() for matrix in matrices))
+        return Mueller(*(self._of_interface(column, j) for column in columns))
+
+    def _of_interface(self, items: Sequence[Value], j: Value) -> Value:
+        """Of values of the interfaces, as they are listed, that of surface j."""
+        return _choose(self.flipped, pick(items[::-1], j), pick(items, j))
 
     def meet(
         self, j: Value, i: Direction, h: Direction, n_in: Value, n_out: Value, light: Polarisation | None
@@ -226,6 +242,11 @@ def from_material(material: Material, microsurface: bool) -> Layers:
         microsurface,
         tuple(films),
     )
+
+
+def _polarised(films: Coated) -> PolarisedFilms:
+    assert films.coating
+    return polarised_films(films.coating, films.n12 is None, srgb_sensitivity)
 
 
 def zeros(material: Material) -> set[Address]:

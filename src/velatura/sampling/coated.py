@@ -38,12 +38,18 @@ class Sampled:
 
     def fetched(self, like: Value, *coordinates: Value) -> Value:
         """A colour of the kind of `like`."""
+        (colour,) = self.colours(like, *coordinates)
+        return colour
+
+    def colours(self, like: Value, *coordinates: Value) -> list[Value]:
+        """Colours of the kind of `like`, of three channels each."""
         channels = ops.interpolate(self, *coordinates)
+        each = [channels[k : k + 3] for k in range(0, len(channels), 3)]
         if not isinstance(like, float | np.ndarray):
-            kind: Any = type(like)
-            return _colour(kind)(channels)
-        colour = np.stack(channels)
-        return colour if colour.ndim > 1 else colour[:, None]
+            of: Any = type(like)
+            kind = _colour(of)
+            return [kind(colour) for colour in each]
+        return [colour if colour.ndim > 1 else colour[:, None] for colour in map(np.stack, each)]
 
 
 class Coated(Sampled):
@@ -52,14 +58,15 @@ class Coated(Sampled):
     Where it transmits it absorbs nothing, so that light of one tangential momentum is reflected alike from both sides:
     it is sampled over the cosine on the `rarer` side, beyond which light is totally reflected. That is 1 above the
     interface, and 2 below it; above, where it is opaque. `data` are the values at the nodes, (NODES, 3), and `n12` the
-    relative index for all colours, None where it is opaque.
+    relative index for all colours, None where it is opaque. `coating` is what they are the reflectance of, from the
+    rarer side.
     """
 
     known = True  # whether the data may be looked at now
 
-    def __init__(self, data: Array, rarer: int, n12: float | None = None) -> None:
+    def __init__(self, data: Array, rarer: int, n12: float | None = None, coating: Coating | None = None) -> None:
         super().__init__(data)
-        self.rarer, self.n12 = rarer, n12
+        self.rarer, self.n12, self.coating = rarer, n12, coating
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         """For cosines above and below, 0 where light cannot be; a colour of the kind of `like`."""
@@ -128,4 +135,4 @@ def _coated(described: Any, sensitivity: Sensitivity) -> Coated:
     if rarer == 2:
         coating = Coating(films[::-1], described.eta_2, described.eta_1)
     n12 = None if described.opaque else sum(described.eta_2) / sum(described.eta_1)
-    return Coated(coating.reflectance(np.linspace(0, 1, NODES), sensitivity).T.copy(), rarer, n12)
+    return Coated(coating.reflectance(np.linspace(0, 1, NODES), sensitivity).T.copy(), rarer, n12, coating)
