@@ -100,8 +100,8 @@ def modelled(stack: Stack, cosines: Array, often: bool) -> Array:
 def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> OwnMediumLobe:
     """The lobe of an interface, for the mean over colours."""
 
-    def reflected(cosine: Array) -> Array:
-        return np.asarray(facets[k].reflectance(cosine).mean(axis=0))
+    def reflected(cos2: Array) -> Array:
+        return np.asarray(facets[k].reflectance(np.sqrt(cos2)).mean(axis=0))
 
     def leaving(cosine: Array) -> Array:
         assert first is not None

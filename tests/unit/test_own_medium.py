@@ -12,7 +12,7 @@ from evaluation import evaluate
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from velatura import kernel
+from velatura import kernel, ops
 from velatura.model import mixture, own_medium
 from velatura.model.adding import Lobe
 from velatura.model.own_medium import OwnMediumLobe
@@ -25,7 +25,7 @@ Direction = tuple[Any, Any, Any]
 
 
 def reflectance(eta: Any) -> Callable[[Any], Any]:
-    return lambda cosine: fresnel.dielectric(cosine, eta)
+    return lambda cos2: fresnel.dielectric(ops.sqrt(cos2), eta)
 
 
 def leaving(eta: float) -> Callable[[Any], Any]:

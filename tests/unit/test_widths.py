@@ -149,8 +149,8 @@ def test_lobes_are_as_wide_as_walks(name: str) -> None:
         for k, (layer, shape) in enumerate(zip(layers, shapes)):
             eta = float(np.mean(layer.eta)) / n
 
-            def facets(c: Any, eta: float = eta) -> Any:
-                return fresnel.dielectric(c, eta)
+            def facets(cos2: Any, eta: float = eta) -> Any:
+                return fresnel.dielectric(np.sqrt(cos2), eta)
 
             def leaving(c: Any) -> Any:
                 return 1 - fresnel.dielectric(c, layers[0].eta)

@@ -63,9 +63,9 @@ class OwnMediumLobe(ops.Named):
     """A lobe of `weight` (a colour) times a GGX reflection of `roughness` in a medium of index `n`, a number or an
     `Index`, refracted out.
 
-    `facets` is the Fresnel reflectance of the facets at a cosine, and `leaving` the share of light at a cosine outside
-    that the first interface lets out; None where the weight has all of it, or nothing lies above. With the energy over
-    the `integral` as weight, the lobe has that energy.
+    `facets` is the Fresnel reflectance of the facets by the square of a cosine, and `leaving` the share of light at a
+    cosine outside that the first interface lets out; None where the weight has all of it, or nothing lies above. With
+    the energy over the `integral` as weight, the lobe has that energy.
     """
 
     weight: Value
@@ -81,29 +81,28 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     p = _in_frame(lobe, wo)
     cos_o = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
     # Reflect in the medium
-    z2 = n.ring2 + wo[2] * wo[2]
-    o = p[0], p[1], ops.maximum(cos_o, COS_MIN) if n.is_outside else ops.sqrt(z2, COS_MIN * COS_MIN)
-    squares, area = (alpha_u * alpha_u, alpha_v * alpha_v), alpha_u * alpha_v
+    o, area = (p[0], p[1], _height(n, wo[2])), alpha_u * alpha_v
+    squares = alpha_u * alpha_u, alpha_v * alpha_v, area * area
     m = _squares((i[0] + o[0], i[1] + o[1], i[2] + o[2]))
-    shown, facing = _shown(o, squares), _facing(m, squares)
+    shown, facing = _shown(o, _height2(n, wo[2]), squares), _facing(m, squares)
     ops.names(i=i, o=o, m=m, area=area, shown=shown, facing=facing)
-    seen = cos_o * (1 / pi) * (area * area * area) / (_shown(i, squares) * shown * o[2])
+    seen = cos_o * (0.5 / pi) * (area * squares[2]) / (_shown(i, _height2(n, wi[2]), squares) * shown * o[2])
     if not n.is_outside:
-        seen = ops.select(z2 > 0, seen, 0.0)
-    light = seen * o[2] * facing
+        seen = ops.select(n.ring2 + wo[2] * wo[2] > 0, seen, 0.0)
+    light = seen * (o[2] + o[2]) * facing
     if lobe.facets:
-        # The cosine of half the angle between i and o
-        light = light * lobe.facets(ops.sqrt(m[0] + m[1] + m[2], None) * (0.5 * n.inverse))
+        # Half the angle between i and o
+        light = light * lobe.facets((m[0] + m[1] + m[2]) * (0.25 * n.inverse * n.inverse))
     if lobe.leaving:
         light = light * lobe.leaving(cos_o)
-    density = 0.5 * facing
+    density = facing
     # Add what falls outside the cone, and is spread over it
     if not n.is_outside:
         p2 = ops.maximum(wo[0] * wo[0] + wo[1] * wo[1], ops.TINY)
         far, stretch = _far(i, (p[0], p[1]), p2, n)
         m = _squares(far)
         ops.names(p2=p2, stretch=stretch, m_far=m)
-        density = density + n.ring * o[2] * _facing(m, squares)
+        density = density + 2 * n.ring * o[2] * _facing(m, squares)
     return lobe.weight * light, seen * shown * density
 
 
@@ -165,7 +164,7 @@ def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value,
     value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
     # Of reflectances, colours are the leading axis, and light the last one
     if lobe.facets:
-        value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0))
+        value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0) ** 2)
     if lobe.leaving:
         value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
     few = value[..., ::SPARSE]
@@ -173,7 +172,7 @@ def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value,
     if not n.is_outside:
         # The light from outside the cone is spread over samples
         x, y, z, p2 = (each[..., ::SPARSE] for each in (*o, p2))
-        squares = alpha_u * alpha_u, alpha_v * alpha_v
+        squares = alpha_u * alpha_u, alpha_v * alpha_v, (alpha_u * alpha_v) ** 2
         near = 0.5 * _facing(_squares((i[0] + x, i[1] + y, i[2] + z)), squares)
         far = n.ring * z * _facing(_squares(_far(i, (x, y), ops.maximum(p2, ops.TINY), n)[0]), squares)
         weights = few * near / (near + ops.maximum(far, 0.0))
@@ -195,14 +194,26 @@ def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Index, Di
     """Roughnesses, the index, and the momentum of light from wi in the medium, in the frame of the lobe."""
     alpha_u, alpha_v = ops.maximum(lobe.roughness.alpha_u, ALPHA_MIN), ops.maximum(lobe.roughness.alpha_v, ALPHA_MIN)
     x, y, z = _in_frame(lobe, wi)
-    n, z = Index.of(lobe.n), ops.maximum(z, 0.0)
+    n = Index.of(lobe.n)
     if n.is_outside:
-        return alpha_u, alpha_v, n, (x, y, ops.maximum(z, COS_MIN))
+        return alpha_u, alpha_v, n, (x, y, _height(n, z))
     inverse = 1 / ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY)
     scale = ops.minimum(n.n * ((1 - 0.5 * COS_MIN * COS_MIN) * inverse), 1.0)
-    height = ops.sqrt(n.ring2 + z * z, COS_MIN * COS_MIN)
+    height = _height(n, z)
     ops.names(scale=scale, height=height)
     return alpha_u, alpha_v, n, (scale * x, scale * y, height)
+
+
+def _height(n: Index, z: Value) -> Value:
+    """Along the normal of the momentum inside, of light with a cosine outside."""
+    return ops.maximum(z, COS_MIN) if n.is_outside else ops.sqrt(_height2(n, z), None)
+
+
+def _height2(n: Index, z: Value) -> Value:
+    """Its square."""
+    if n.is_outside:
+        return _height(n, z) * _height(n, z)
+    return ops.maximum(n.ring2 + z * z, COS_MIN * COS_MIN)
 
 
 def _squares(w: Direction) -> Direction:
@@ -215,15 +226,15 @@ def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: Index) -> tuple[Dir
     return (i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2), stretch
 
 
-def _shown(w: Direction, squares: tuple[Value, Value]) -> Value:
-    """2 w_z over Smith's G1(w), which does not vanish at grazing directions, by squares of roughnesses."""
-    return w[2] + ops.sqrt(ggx.dot(_squares(w), (*squares, 1.0)), None)
+def _shown(w: Direction, z2: Value, squares: Direction) -> Value:
+    """2 w_z over Smith's G1(w), which does not vanish at grazing directions, by the square of w_z."""
+    return w[2] + ops.sqrt(w[0] * w[0] * squares[0] + w[1] * w[1] * squares[1] + z2, None)
 
 
-def _facing(m: Direction, squares: tuple[Value, Value]) -> Value:
-    """pi D / (alpha_u alpha_v)^3, of GGX's density D of normals along a vector of any length, by squares of both."""
-    u, v = squares
-    q = (m[0] + m[1] + m[2]) / ggx.dot((v, u, u * v), m)
+def _facing(m: Direction, squares: Direction) -> Value:
+    """pi D / (alpha_u alpha_v)^3, of GGX's density D of normals along a vector of any length, by its squares, those of
+    roughnesses, and that of their product."""
+    q = (m[0] + m[1] + m[2]) / ggx.dot((squares[1], squares[0], squares[2]), m)
     ops.names(q=q)
     return q * q
 

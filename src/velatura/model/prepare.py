@@ -59,11 +59,12 @@ class PreparedInterface(ops.Named):
             return fresnel.dielectric(cos_theta, self.eta)
         return fresnel.conductor(cos_theta, self.eta, self.kappa)
 
-    def reflect_together(self, cos_theta: Value) -> Value:
-        """As `reflect`, with the one refracted direction: all colours are totally reflected from the same angle on."""
+    def reflect_together(self, cos2: Value) -> Value:
+        """As `reflect`, by the square of the cosine, with the one refracted direction: all colours are totally
+        reflected from the same angle on."""
         if self.eta is None or self.kappa is not None or self.films:
-            return self.reflect(cos_theta)
-        return fresnel.dielectric_between(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
+            return self.reflect(ops.sqrt(cos2))
+        return fresnel.dielectric_together(cos2, self.n12, self.eta)
 
 
 @dataclass(frozen=True)

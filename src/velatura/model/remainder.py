@@ -52,21 +52,21 @@ class Remainder(ops.Named):
     def value(self, wi: Direction, wo: Direction) -> Value:
         """f(wi, wo) |cos theta_o|, a colour; 0 unless both are above the surface."""
         z = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
-        mean, tilt = self.apart(wi, wo)
-        mean = ops.maximum(mean, 0.0)
+        mean, unclipped = self.unclipped(wi, wo)
         ops.names(mean=mean)
-        return (mean + ops.clip(tilt, -1 * mean, mean)) * (z * (1 / pi))
+        return ops.maximum(ops.minimum(unclipped, mean + mean), 0.0) * (z * (1 / pi))
 
-    def apart(self, wi: Direction, wo: Direction) -> tuple[Value, Value]:
-        """The mean of pi f(wi, wo) over azimuths, and what it has beside, colours, of directions above, unclipped."""
+    def unclipped(self, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+        """The mean of pi f(wi, wo) over azimuths, and pi f(wi, wo), colours, of directions above."""
         z_i, z_o = wi[2], wo[2]
         w_i, w_o = grazing(z_i), grazing(z_o)
         s = -1 * (wi[0] * wo[0] + wi[1] * wo[1])
         twice = 2 * s * s - (1 - z_i * z_i) * (1 - z_o * z_o)
         once = self.c_01 * (z_i + z_o) + self.c_02 * (w_i + w_o)
         both = self.c_11 * (z_i * z_o) + self.c_12 * (z_i * w_o + w_i * z_o) + self.c_22 * (w_i * w_o)
+        mean = self.c_00 + once + both
         ops.names(s=s, twice=twice, once=once, both=both)
-        return self.c_00 + once + both, self.b * s + self.a * twice
+        return mean, mean + self.b * s + self.a * twice
 
     def albedo(self, cos_theta: Value) -> Value:
         """Energy for light from a cosine, a colour, without clipping."""

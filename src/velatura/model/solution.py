@@ -503,7 +503,7 @@ def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
     x, y, z = (each[:, None] for each in wi)
     wo = numbers.sample((x, y, z), *low_discrepancy.at_nodes(1, EVENLY, None))
     density = numbers.density((x, y, z), wo)
-    value, unclipped = numbers.value((x, y, z), wo) / density, sum(numbers.apart((x, y, z), wo)) * wo[2]
+    value, unclipped = numbers.value((x, y, z), wo) / density, numbers.unclipped((x, y, z), wo)[1] * wo[2]
     return (value - unclipped / (np.pi * density)).mean(axis=-1), value.max(axis=-1)
 
 

@@ -64,10 +64,10 @@ class Shape:
 
     def _leaving(self, cosine: Value) -> Value:
         assert self.first
-        n = self.n_first
+        n, cos2 = self.n_first, cosine * cosine
         if not n.is_outside:
-            cosine = ops.sqrt((n.ring2 + cosine * cosine) * (n.inverse * n.inverse))
-        return 1 - self.first.reflect_together(cosine)
+            cos2 = ops.maximum((n.ring2 + cos2) * (n.inverse * n.inverse), 0.0)
+        return 1 - self.first.reflect_together(cos2)
 
 
 @dataclass(frozen=True)

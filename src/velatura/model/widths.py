@@ -249,7 +249,8 @@ def features(
         assert part.below is not None
         below = float(ops.mean(part.below)) / n
 
-        def facets(c: Array) -> Array:
+        def facets(cos2: Array) -> Array:
+            c = np.sqrt(cos2)
             if part.films is not None:
                 return np.asarray(ops.mean(part.reflectance(c)))
             return np.asarray(fresnel.dielectric(c, below))

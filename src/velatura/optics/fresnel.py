@@ -13,6 +13,8 @@ from velatura.ops import Value
 
 Complex = tuple[Value, Value]
 
+SMALL = 1e-18  # fourth power of cosines at which all is reflected
+
 
 def cos_transmitted(cos_theta: Value, eta: Value) -> Value:
     """Cosine of the refracted direction by Snell's law; 0 where light is totally reflected."""
@@ -21,8 +23,9 @@ def cos_transmitted(cos_theta: Value, eta: Value) -> Value:
 
 def dielectric(cos_theta: Value, eta: Value) -> Value:
     """Reflectance of a dielectric of relative index eta > 0 at cos_theta in [0, 1]; 1 under total reflection."""
-    eta2 = eta * eta
-    return _dielectric(cos_theta, ops.sqrt(eta2 - 1 + cos_theta * cos_theta), eta2)
+    eta2, cos2 = eta * eta, cos_theta * cos_theta
+    inside2 = ops.maximum(eta2 - 1 + cos2, 0.0)
+    return _dielectric(cos2, inside2, cos_theta * ops.sqrt(inside2), eta2)
 
 
 def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
@@ -30,15 +33,24 @@ def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
 
     This lets all colour channels share one refracted direction; the reflectance is the same from either side.
     """
-    return _dielectric(cos_theta, eta * cos_t, eta * eta)
+    inside = eta * cos_t
+    return _dielectric(cos_theta * cos_theta, inside * inside, cos_theta * inside, eta * eta)
 
 
-def _dielectric(cos_theta: Value, inside: Value, eta2: Value) -> Value:
-    """As `dielectric_between`, by eta cos_t inside and the square of eta; both polarisations by one division."""
-    s, p = cos_theta + inside, eta2 * cos_theta + inside
-    twice = ops.divide(2 * inside, s * p)
-    r_s, r_p = 1 - twice * p, 1 - twice * s
-    ops.names(inside=inside, r_s=r_s, r_p=r_p)
+def dielectric_together(cos2: Value, n12: Value, eta: Value) -> Value:
+    """As `dielectric_between`, by the square of the cosine and the relative index n12 that refracts all colours."""
+    ratio2 = (eta / n12) * (eta / n12)
+    inside2 = ops.maximum(eta * eta - ratio2 + ratio2 * cos2, 0.0)
+    return _dielectric(cos2, inside2, ops.sqrt(cos2 * inside2), eta * eta)
+
+
+def _dielectric(cos2: Value, inside2: Value, both: Value, eta2: Value) -> Value:
+    """By the squares of cos_theta, of eta cos_t inside and of eta, and the product of the former two before they are
+    squared; both polarisations by one root and one division."""
+    s, p = cos2 + inside2 + 2 * both, eta2 * (eta2 * cos2 + 2 * both) + inside2
+    twice = 2 / ops.maximum(s * p, SMALL)
+    r_s, r_p = 1 - (inside2 + both) * p * twice, 1 - (inside2 + eta2 * both) * s * twice
+    ops.names(s=s, p=p, r_s=r_s, r_p=r_p)
     return 0.5 * (r_s * r_s + r_p * r_p)
 
 
