@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from velatura.sampling import directional_grid
-from velatura.sampling.directional_grid import Packing
+from velatura.sampling.directional_grid import Packing, Summed
 
 RNG = np.random.default_rng(0)
 SHAPE = (7,)
@@ -24,3 +24,12 @@ def test_packed_functions_are_those_that_were_given(shared: bool, sizes: list[in
     expected = directional_grid.curves(list(rows), SHAPE, None)(w)
     np.testing.assert_allclose(packed(w), expected, rtol=1e-12)
     np.testing.assert_allclose(packed.at(np.sqrt(w[2])), expected, rtol=1e-12)
+
+
+def test_functions_that_are_sums_of_few() -> None:
+    few, shares = RNG.uniform(size=(2, *SHAPE)), RNG.uniform(size=(2, 5))
+    packing = Packing.of(few, [0, 0])
+    packed = packing.curves(directional_grid.curves(list(x), SHAPE, None) for x in packing.split(few))
+    w = directional_grid.direction(RNG.uniform(size=50), np.zeros(50))
+    expected = directional_grid.curves(list(shares.T @ few), SHAPE, None)(w)
+    np.testing.assert_allclose(Summed(packed, shares.tolist()).at(np.sqrt(w[2])), expected, rtol=1e-12)

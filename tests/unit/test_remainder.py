@@ -41,6 +41,11 @@ def incident(cosine: float, count: int) -> Direction:
     return np.full(count, np.sqrt(1 - cosine**2)), np.zeros(count), np.full(count, cosine)
 
 
+def sample_disc(rng: np.random.Generator, count: int) -> Direction:
+    p, phi = np.sqrt(rng.uniform(size=count)), 2 * np.pi * rng.uniform(size=count)
+    return p * np.cos(phi), p * np.sin(phi), np.sqrt(1 - p * p)
+
+
 def measures(
     f: Callable[[Direction, Direction], Array], count: int = 2000, nodes: Nodes = NODES, n: float = 1.0
 ) -> Array:
@@ -72,6 +77,23 @@ def test_what_is_a_polynomial_is_found_again() -> None:
         light = measures(polynomial)
         found = remainder.fit(NODES, light, COSINES, np.ones((1, 8)))
         np.testing.assert_allclose(np.concatenate(list(vars(found).values())), numbers, atol=2e-3)
+
+
+def test_polynomials_that_few_span_are_sums_of_these() -> None:
+    """Exactly, in their order, and approximately to the error that is allowed, in the root mean square."""
+    rng = np.random.default_rng(3)
+    few, shares = rng.normal(size=(3, 24)), rng.normal(size=(50, 3))
+    numbers = shares @ few + 1e-5 * rng.normal(size=(50, 24))
+    found = remainder.of_few(numbers, 8)
+    assert found and found[1].shape == (3, 24)
+    wi, wo = incident(0.6, 500), sample_disc(rng, 500)
+    errors = []
+    for made, given in zip(found[0] @ found[1], numbers):
+        for channel in range(3):
+            values = (Remainder(*x.reshape(8, 3)[:, channel]).unclipped(wi, wo)[1] for x in (made, given))
+            errors.append(np.subtract(*values))
+    assert np.sqrt(np.mean(np.square(errors))) < remainder.ALIKE
+    assert remainder.of_few(rng.normal(size=(50, 24)), 8) is None
 
 
 def test_a_diffuse_base_under_a_smooth_coat_is_close_to_a_polynomial() -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import pi
 
 import numpy as np
@@ -31,6 +31,8 @@ PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # a and b, of C_ab
 EVEN = (1.0, 0.0, 0.0, 0.0, 0.0)  # numbers of light that passes evenly
 EXACT = 3.0  # weight of the energy of a direction beside that of nodes
 DARK = 1e-6  # albedo
+ALIKE = 3e-4  # error of pi f
+LATTICE = 12  # directions along each axis that errors are of
 KEPT = 16  # sets of nodes whose deposits are kept
 BRIGHT = 0.5  # share of samples by the root of the cosine, for a horizon that is twice as bright as all
 TILT = 0.5  # by how much more light is sampled on one side than on the opposite one, over both, at most
@@ -190,6 +192,31 @@ def passing(nodes: Nodes, measures: Array, n: float, sines: Array) -> Array:
         numbers.append(2 / sine * ((even * even * deposit) @ mode) / np.sum((even * deposit) ** 2))
     numbers += [0 * sines] * (5 - len(numbers))
     return np.where(energy > DARK, numbers, np.reshape(EVEN, (-1, 1)))
+
+
+def of_few(numbers: Array, most: int) -> tuple[Array, Array] | None:
+    """Shares (M, K) and numbers (K, 8 C) of few polynomials, whose sums are those of `numbers` (M, 8 C), but for an
+    error of `ALIKE` in pi f, root mean square over directions; None where that takes more than `most`."""
+    lengths = _lengths()
+    functions = np.einsum("fk,mkc->mfc", lengths, numbers.reshape(len(numbers), len(lengths), -1))
+    sides, sizes, rows = np.linalg.svd(functions.reshape(numbers.shape), full_matrices=False)
+    errors = np.sqrt(np.cumsum(sizes[::-1] ** 2)[::-1] / (len(numbers) * functions.shape[-1]))
+    count = max(int(np.sum(errors > ALIKE)), 1)
+    if count > most:
+        return None
+    few = np.linalg.solve(lengths, rows[:count].reshape(count, len(lengths), -1))
+    return sides[:, :count] * sizes[:count], few.reshape(count, -1)
+
+
+@functools.cache
+def _lengths() -> Array:
+    """A matrix (8, 8) by which the length of the numbers of a polynomial is the root mean square of pi f."""
+    each = (np.arange(LATTICE) + 0.5) / LATTICE
+    p2_i, p2_o, turn = (x.ravel() for x in np.meshgrid(each, each, each))
+    wi = np.sqrt(p2_i), 0 * p2_i, np.sqrt(1 - p2_i)
+    wo = np.sqrt(p2_o) * np.cos(np.pi * turn), np.sqrt(p2_o) * np.sin(np.pi * turn), np.sqrt(1 - p2_o)
+    functions = [Remainder(*row).unclipped(wi, wo)[1] + 0 * turn for row in np.eye(len(fields(Remainder))).tolist()]
+    return np.asarray(np.linalg.qr(np.transpose(functions) / np.sqrt(len(turn)), mode="r"))
 
 
 @functools.lru_cache(KEPT)

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import axes, solution
+from velatura.model import axes, remainder, solution
 from velatura.model.axes import BESIDE, COARSE, Axis, Range, Wavelengths
 from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
@@ -35,7 +35,8 @@ from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import differences, directional_grid
-from velatura.sampling.directional_grid import Packed, Packing
+from velatura.sampling.directional_grid import Packed, Packing, Summed
+from velatura.sampling.packets import WIDTH, aligned
 from velatura.stack import Material
 
 Array = NDArray[np.floating]
@@ -95,7 +96,7 @@ class Term:
 
     axes: tuple[Axis | Wavelengths, ...]
     columns: tuple[Packed, ...]
-    polynomials: tuple[Packed, ...]
+    polynomials: tuple[Packed | Summed, ...]
 
     def places(self, material: Material, place: Value) -> list[Value]:
         return [axis.at(material) if isinstance(axis, Axis) else place for axis in self.axes]
@@ -252,6 +253,7 @@ def _tabulated(
 
     adds: list[Array] = []
     packings: dict[tuple[int, int], tuple[Packing, ...]] = {}  # of columns and polynomials, by group and side
+    few: dict[tuple[int, int], Array] = {}  # polynomials that others are sums of
 
     def tables(numbers: list[float]) -> list[Array]:
         made, found = given.replaced(start, numbers), []
@@ -266,6 +268,8 @@ def _tabulated(
                     scaled = np.exp(np.minimum(by, np.log(MOST)))
                     columns = np.where(add[:, None], _beyond(columns, group, known), scaled)
                     polynomials = _beyond(polynomials, group, known)
+                if summed := None if given.given else _of_few(polynomials):
+                    polynomials, few[k, side] = summed
                 if (k, side) not in packings:
                     packings[k, side] = tuple(
                         Packing.of(values.swapaxes(0, 1), each, shared=not given.given)
@@ -275,6 +279,11 @@ def _tabulated(
                 found += [_flat(x, group) for x in packing.split(columns, 1)]
                 found += [_flat(x, group) for x in of_polynomial.split(polynomials, 1)]
         return found
+
+    def constants(rows: Array) -> list[list[Value]]:
+        kept = rows.ravel() if context.number is None else context.number(aligned(rows.ravel()))
+        values = context.settle(differences.numbers(kept, context.number))
+        return [values[k : k + rows.shape[1]] for k in range(0, rows.size, rows.shape[1])]
 
     flat = iter(differences.differentiable(tables, given.given, given.around, context.number))
     terms = []
@@ -287,12 +296,22 @@ def _tabulated(
             for side in range(len(layouts))
             for packing, directions in zip(packings[k, side], (solver.shape, ()))
         ]
-        terms.append(Term(group, tuple(made[::2]), tuple(made[1::2])))
+        polynomials = [
+            Summed(curves, constants(few[k, side])) if (k, side) in few else curves
+            for side, curves in enumerate(made[1::2])
+        ]
+        terms.append(Term(group, tuple(made[::2]), tuple(polynomials)))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)
     return Tables(tuple(spanned), tuple(terms), tuple(adds), layouts, solver, point, fixed)
 
 
 Group = tuple[Axis | Wavelengths, ...]
+
+
+def _of_few(polynomials: Array) -> tuple[Array, Array] | None:
+    """Polynomials (nodes, 8 C) as sums of few, where that spares a fetch."""
+    alike = len(np.unique(polynomials.astype(np.float32), axis=1).T) <= WIDTH
+    return None if alike else remainder.of_few(polynomials, WIDTH)
 
 
 def _groups(spanned: Sequence[Axis | Wavelengths], together: int) -> list[tuple[Group, Sequence[int]]]:

@@ -89,6 +89,22 @@ class Packed:
         return [read[k] for k in self.places]
 
 
+@dataclass(frozen=True, eq=False)
+class Summed:
+    """Functions that are sums of a few, which are `packed`: for each of these, its share of every function."""
+
+    packed: Packed
+    shares: Sequence[Sequence[Value]]
+
+    def at(self, *coordinates: Value) -> list[Value]:
+        """As `Packed`."""
+        first, *others = zip(self.packed.at(*coordinates), self.shares)
+        found = [first[0] * share for share in first[1]]
+        for x, shares in others:
+            found = [total + x * share for share, total in zip(shares, found)]
+        return found
+
+
 def directions(shape: tuple[int, ...], number: type | None) -> Direction:
     """Those at the nodes, for Dr.Jit's type of numbers (None for NumPy). Shape: (cosines,) or (cosines, azimuths)."""
     index, real = integers(prod(shape), number)
