@@ -519,6 +519,20 @@ def test_a_member_outside_snaps_to_the_class() -> None:
     assert Stack.from_dict(found["material"]).interfaces[0].eta == pytest.approx(x)
 
 
+@pytest.mark.parametrize("point", [(1.195, 2.364), (1.31, 2.645), (1.265, 3.207)])
+def test_a_member_that_absorbs_is_found_from_a_clear_one(point: tuple[float, float]) -> None:
+    """By the default model; the first point is so near to clear members that hardly anything absorbs."""
+    etas = ({"eta": 1.8778618213234128}, {"eta": 1.3935834785724517})
+    metal = {"eta": 0.8122738976499411, "k": 1.1323806899389746, "alpha": 0.2861869729463316}
+    layers = [*({"interface": values} for values in etas), {"medium": {"sigma_a": 0.4864}}, {"interface": metal}]
+    body = {"material": {"layers": layers}}
+    target = appearance.appearance(body)["target"]
+    assert [lobe["interfaces"] for lobe in target["lobes"]] == [2, 1]
+    found = class_maps.member({**body, "target": target, "lobe": 0, "point": point})
+    assert found["snapped"] is None
+    assert [part.eta for part in Stack.from_dict(found["material"]).interfaces[:2]] == pytest.approx(point, rel=1e-6)
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_a_conductor_moves_along_its_curves(model: str) -> None:
     state = appearance.invert({"target": saved("bati2021-19-b")["target"], "model": model})

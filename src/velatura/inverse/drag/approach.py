@@ -151,11 +151,9 @@ class Approach:
             if broken is None or broken in kept:
                 break
             kept.append(broken)
-            points = space.points(x, free)
-            (margins,) = space.margins([broken], points)
-            change = (margins[1:] - margins[0]) / (points[free, 1 + np.arange(len(free))] - x[free])
+            margin, change = space.margin_slopes(broken, x, free)
             a = np.vstack([a, ON_BOUND * change * size])
-            b = np.r_[b, -ON_BOUND * margins[0]]
+            b = np.r_[b, -ON_BOUND * margin]
         for _ in range(HALVINGS):
             tried = x.copy()
             tried[free] += step

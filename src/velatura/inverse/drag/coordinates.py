@@ -288,6 +288,22 @@ class Space:
             found[n] = bound.sign * (value - bound.at)
         return found
 
+    def margin_slopes(self, bound: Bound, x: Array, free: Array) -> tuple[float, Array]:
+        """Distance of a point (D,) from a bound, and its derivatives along some coordinates, (free,).
+
+        An index follows the largest of an interface's reflectances: where some are equal, they share its derivative.
+        """
+        tied = np.eye(len(x), dtype=bool)
+        for own in self.interfaces:
+            if own.kind == "dielectric" and own.reflectances is not None:
+                span = x[own.reflectances]
+                largest = span > span.max() - SLACK
+                tied[own.reflectances, own.reflectances] |= largest[:, None] & largest
+        together = tied[:, free]
+        steps = STEP * (np.abs(x[free]) + 0.01)
+        (margins,) = self.margins([bound], np.c_[x, x[:, None] + steps * together])
+        return float(margins[0]), (margins[1:] - margins[0]) / (steps * together.sum(axis=0))
+
     def broken(self, x: Array, met: Bound | None) -> Bound | None:
         """The bound that a point violates most, except the one that it lies on; None if all hold."""
         others = [bound for bound in self.bounds if bound != met]

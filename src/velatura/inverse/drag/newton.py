@@ -97,7 +97,7 @@ class Problem:
             before = x, reading
             missing, slopes = self._missing(reading, part), self._scaled(reading.slopes)
             if compromise:
-                missing, slopes = self._on_bound(compromise, missing, slopes, space.points(x, free), free)
+                missing, slopes = self._on_bound(compromise, missing, slopes, x, free)
             if not np.all(np.isfinite(slopes)) or not np.all(np.isfinite(missing)):
                 break
             nearest.keep(x, missing[: len(space.free)])
@@ -167,14 +167,13 @@ class Problem:
         return self._scaled(self.goal - self.start.reading.value)
 
     def _on_bound(
-        self, compromise: Compromise, missing: Array, slopes: Array, points: Array, free: Array
+        self, compromise: Compromise, missing: Array, slopes: Array, x: Array, free: Array
     ) -> tuple[Array, Array]:
         """The equations with one more, that the point lies on a bound, and one more unknown if the goal gives way."""
-        (margins,) = self.start.space.margins([compromise.bound], points)
-        change = (margins[1:] - margins[0]) / (points[free, 1 + np.arange(len(free))] - points[free, 0])
+        margin, change = self.start.space.margin_slopes(compromise.bound, x, free)
         if compromise.of_goal:
             slopes, change = np.c_[slopes, -self.way], np.r_[change, 0.0]
-        return np.r_[missing, margins[0]], np.vstack([slopes, change])
+        return np.r_[missing, margin], np.vstack([slopes, change])
 
     def _on_the_way(self, part: float) -> Array:
         """The reading after a part of the way."""
