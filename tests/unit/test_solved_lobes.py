@@ -81,6 +81,15 @@ def test_an_interface_without_a_step_changes_nothing(where: int, reflectance: st
     np.testing.assert_allclose(after.remainder, before.remainder, rtol=1e-9)
 
 
+def test_a_last_interface_without_a_step_has_its_own_roughness() -> None:
+    found = vt.lobes(Stack([Interface(eta=1.5, alpha=0.2), Interface(eta=1.5, alpha=1e-4)]), COSINES)
+    alone = vt.lobes(Stack([Interface(eta=1.5, alpha=0.2)]), COSINES)
+    np.testing.assert_array_equal(found.alpha[1], 1e-4)
+    assert not found.energy[1].any()
+    np.testing.assert_allclose(found.energy[0], alone.energy[0], rtol=1e-12)
+    np.testing.assert_allclose(found.passed, alone.passed, rtol=1e-12)
+
+
 def test_models_that_draw_lobes_outside_say_so() -> None:
     found = vt.lobes("glossy-plastic", COSINES, model="bati2021")
     np.testing.assert_array_equal(found.own_alpha, found.alpha)

@@ -22,7 +22,7 @@ from velatura.model.transport.interfaces import Facets
 from velatura.model.transport.media import Slab
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.optics.ggx import Direction
-from velatura.stack import InterfaceValues, Material
+from velatura.stack import InterfaceValues, Material, MediumValues
 
 Array = NDArray[np.floating]
 
@@ -78,14 +78,18 @@ def _lobe(energy: Array, own: Roughness, seen: Roughness, model: Model) -> LobeS
 
 
 def _without_steps(material: Material) -> list[int]:
-    """Places of interfaces between media of one index: nothing reflects there, nor changes for what lies below."""
+    """Places of interfaces between media of one index: nothing reflects there, nor changes for what lies below.
+
+    Not of one that ends a medium; and one layer stays.
+    """
     found, above = [], material.exterior
-    for place, layer in enumerate(material.layers[:-1]):
+    ends_medium = any(isinstance(layer, MediumValues) for layer in material.layers[-2:-1])
+    for place, layer in enumerate(material.layers[: -1 if ends_medium else None]):
         if isinstance(layer, InterfaceValues) and layer.kind == "dielectric":
             if np.all(layer.eta == above):
                 found.append(place)
             above = layer.eta
-    return found
+    return found if len(found) < len(material.layers) else found[:-1]
 
 
 def _with_dark(found: StackLobes, material: Material, model: Model, places: list[int], phi: Array) -> StackLobes:
