@@ -19,24 +19,21 @@ from typing import Any
 import numpy as np
 
 from velatura.errors import InvalidInput
+from velatura.sampling import coated
 from velatura.stack import (
-    RGB,
     Address,
     Brushing,
-    CoatingValues,
     Material,
     Measured,
     Stack,
     Texture,
     addressed,
-    is_of_film,
     load,
     loads,
     refuse_films,
     spectrum,
     srgb_weights,
 )
-from velatura.stack import coatings as films_of
 from velatura.stack.spectra import VISIBLE_NM
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
@@ -184,7 +181,7 @@ class Binding:
         for name, value in given.items():
             if isinstance(value, mi.Object):
                 found = addressed(name)
-                if not all(address.declared.texturable for address in found) or is_of_film(name):
+                if not all(address.declared.texturable for address in found):
                     raise InvalidInput(
                         f"{name}: must be a number, which is the same everywhere and for all wavelengths"
                     )
@@ -210,8 +207,8 @@ class Binding:
                 self._bind(address, value)
         self.steering: dict[str, Any] = {}
         self.clamped: set[str] = set()
-        self.coatings: tuple[CoatingValues | None, ...] = ()
-        if not mi.is_rgb:
+        self.coatings: Sequence[Any] = ()
+        if mi.is_spectral:
             refuse_films(self.stack, f"{mi.variant()} has")
         self.update()
 
@@ -231,7 +228,7 @@ class Binding:
 
         self.constants = {name: self._within_range(name, value) for name, value in self.parameters.items()}
         dr.make_opaque(self.constants)  # a changed value needs no new kernel
-        self.coatings = films_of.of(self.stack, self._index)
+        self.coatings = self._coatings()
         if self.mi.is_spectral:
             si = self._at_fixed_wavelengths(dr.zeros(self.mi.SurfaceInteraction3f))
             flat = [name for name, image in self.images.items() if image.colour and not image.varies]
@@ -261,26 +258,36 @@ class Binding:
             return dr.replace_grad(dr.clip(value, *declared.within), value)
         return value
 
-    def _index(self, name: str, described: Any) -> RGB:
-        """The colour of an index now.
+    def _coatings(self) -> Sequence[Any]:
+        """The films on each layer, worked out.
 
         Raises:
-            InvalidInput: it comes from a texture, or is being differentiated: films are worked out once.
+            InvalidInput: several of one layer have thicknesses from textures.
         """
-        if name in self.images:
-            raise InvalidInput(f"{name}: must be a number or a colour beside thin films")
         import drjit as dr
 
-        if name not in self.constants:
-            return films_of.as_written(name, described)
-        if dr.grad_enabled(self.constants[name]):
-            raise InvalidInput(f"{name}: has no gradient beside thin films")
-        channels = np.array(dr.detach(self.constants[name]), float).reshape(-1).tolist()
-        return (channels[0], channels[1], channels[2]) if len(channels) >= 3 else (channels[0],) * 3
+        mi = self.mi
+        if not any(self.stack.films):
+            return ()
+        spans: dict[int, tuple[int, int, float, float]] = {}
+        for name in self.images:
+            address = self.addresses[name]
+            if address.film is not None and address.layer is not None:
+                if address.layer in spans:
+                    raise InvalidInput(f"{name}: only one of the films on an interface may have a texture")
+                texels = self._texels(address, {address.role: coated.UNKNOWN_NM})
+                spans[address.layer] = address.layer, address.film, float(texels.min()), float(texels.max())
+        number = mi.Float if dr.is_jit_v(mi.Float) else None
+        some = {**dict.fromkeys(self.images, 0.0), **self._colours()}
+        return coated.constant(Material.from_flat(self.stack, some, self._light), list(spans.values()), number)
+
+    @property
+    def _light(self) -> str:
+        return "luminance" if self.mi.is_monochromatic else "srgb"
 
     def material(self, values: Mapping[str, Any]) -> Material:
         """The material with these values by flat name."""
-        return Material.from_flat(self.stack.kinds, values, self.stack.thin, self.coatings)
+        return Material.from_flat(self.stack, values, self._light).coated(self.coatings)
 
     def at(self, si: Any, active: Any) -> Material:
         """The material at a surface point."""
@@ -335,7 +342,7 @@ class Binding:
             return np.array([[-180.0, 180.0]])
         channels = len(mi.UnpolarizedSpectrum()) if image.colour else 1
         if mi.is_spectral and image.colour:
-            return np.tile([unknown.get(address.key, address.declared.within)], (channels, 1))
+            return np.tile([unknown.get(address.role, address.declared.within)], (channels, 1))
         read = mi.traverse(image.texture)
         found = []
         for value in [value for name, value in read if name.split(".")[-1] in _TEXELS]:
@@ -347,7 +354,7 @@ class Binding:
             moved = [texels * (1 + MOVED) + MOVED] if dr.grad_enabled(value) else []
             found += [np.broadcast_to(each, (channels, each.shape[-1])) for each in (texels, *moved)]
         if not found:
-            return np.tile([unknown.get(address.key, address.declared.within)], (channels, 1))
+            return np.tile([unknown.get(address.role, address.declared.within)], (channels, 1))
         texels = np.concatenate(found, axis=1)
         return np.clip(texels * image.scale + image.offset, image.low, image.high)
 

@@ -16,13 +16,13 @@ from velatura.editor import messages
 from velatura.model import Model, bsdf, solution, turned
 from velatura.model.context import Context, at_a_point
 from velatura.optics import ggx
+from velatura.sampling import coated as interfaces
 from velatura.sampling.coated import Coated
-from velatura.sampling.coated import coated as coated_interface
 from velatura.shader import Recording, Shader, constant, record, shader, variance
 from velatura.shader.bake import Bake
 from velatura.shader.films import beside
 from velatura.shader.solved import Tabulated
-from velatura.stack import Film, Interface, Kind, Material, Stack, coatings, srgb_sensitivity
+from velatura.stack import Film, Interface, Kind, Material, Stack
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]
 
@@ -133,8 +133,9 @@ def in_numpy(case: Case, recording: Recording) -> Results:
     wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
     if isinstance(recording.baked, Tabulated):
         return _solved(stack, recording.model, wi, wo, u)
-    films: Any = [x and InTables(coated_interface(x, srgb_sensitivity)) for x in coatings.of(stack)]
-    material = Material.from_flat(stack.kinds, case.values, stack.thin, films)
+    alone = Material.of(stack)
+    films = [x and InTables(x) for x in interfaces.of(alone)]
+    material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(films)
     body = bsdf.body(material, recording.model, variance(stack), at_a_point())
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]

@@ -304,14 +304,7 @@ def test_models_of_the_papers_have_none_over_a_diffuse_base() -> None:
         vt.lobes(loads(OVER_DIFFUSE), 1.0, model="belcour2018")
 
 
-def test_an_index_beside_films_has_no_gradient_and_no_texture(mi: Any, tmp_path: Path) -> None:
-    import drjit as dr
-
-    parameters = mi.traverse(vt.bsdf(loads(COATED), model="belcour2018"))
-    dr.enable_grad(parameters["layer0_eta"])
-    parameters.set_dirty("layer0_eta")
-    with pytest.raises(vt.InvalidInput, match="layer0_eta: has no gradient beside thin films"):
-        parameters.update()
+def test_an_index_beside_films_has_no_texture(mi: Any, tmp_path: Path) -> None:
     mi.util.write_bitmap(str(tmp_path / "index.png"), np.full((2, 2, 3), 0.5), write_async=False)
     texture = {"texture": str(tmp_path / "index.png")}
     with pytest.raises(vt.InvalidInput, match="films: not over an index from a texture"):

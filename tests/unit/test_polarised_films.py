@@ -110,7 +110,7 @@ def random_stack(rng: np.random.Generator) -> tuple[list[Layer], list[complex], 
         ]
         layers.append(Interface(eta=n.real, k=n.imag if metal else None, films=films))
         indices += [complex(film.eta, film.k) for film in films]
-        lengths += [film.thickness_nm for film in films]
+        lengths += [float(film.thickness_nm) for film in films]
         tau = 0.0
         if k < count - 1 and rng.uniform() < 0.5:
             tau = rng.uniform(0, 0.5)

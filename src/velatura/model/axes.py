@@ -13,15 +13,19 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from velatura import ops
 from velatura.ops import Value
+from velatura.sampling import coated
 from velatura.stack import Address, Material
 
 Array = NDArray[np.floating]
 Range = tuple[Sequence[Address], float, float]  # values that one texture gives, its least and its greatest
 
+WAVING = "film_thickness_nm"  # a thickness, over which colours are waves: no table of it is coarser than others
+WAVES_MAX = {1: 161, 2: 81}  # nodes of it, likewise
 NODES_MAX = {1: 17, 2: 7, 3: 7}  # by the number of axes of a table
 BESIDE = 9  # nodes of an axis in a table beside one that others resolve
 COARSE = 5  # nodes of an axis in a table that another one resolves
 FINE = {1: 3, 2: 3, 3: 2}  # likewise, places of a table from one node to the next
+FINE_WAVES = 4
 ROOTS = frozenset({"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k"})  # of which nodes are even in the root
 STEPS = {"rotation": 22.5}
 STEP = 0.1
@@ -29,7 +33,10 @@ COARSER = 1.2  # times, where there would be too many nodes
 QUARTER = 90.0  # of a turn, to either side
 
 #: What textures span that cannot be looked at, by key; values beyond take the nearest.
-UNKNOWN = {"eta": (1.0, 2.5), "k": (0.0, 6.25), "depth": (0.0, 6.25), "sigma_a": (0.0, 6.25), "sigma_s": (0.0, 6.25)}
+UNKNOWN = {
+    **{"eta": (1.0, 2.5), "k": (0.0, 6.25), "depth": (0.0, 6.25), "sigma_a": (0.0, 6.25), "sigma_s": (0.0, 6.25)},
+    WAVING: coated.UNKNOWN_NM,
+}
 
 
 @dataclass(frozen=True)
@@ -47,22 +54,26 @@ class Axis:
     fine: int = FINE[2]
 
     @classmethod
-    def of(cls, given: Range, together: int) -> Axis:
-        """The axis of a texture, in a table of so many axes."""
+    def of(cls, given: Range, together: int, step: float | None = None) -> Axis:
+        """The axis of a texture, in a table of so many axes; `step` is that between nodes where it is no usual one."""
         addresses, *ends = given
         first = addresses[0]
         if first.key == "rotation":
             return cls(tuple(addresses), -QUARTER, QUARTER, round(2 * QUARTER / STEPS["rotation"]) + 1)
         least, most = (_coordinate(first, end) for end in first.declared.within)
         low, high = (_coordinate(first, end) for end in ends)
-        step = STEPS.get(first.key, STEP)
-        while (nodes := _around(low, high, step))[1] - nodes[0] >= NODES_MAX[together]:
+        step = step or STEPS.get(first.key, STEP)
+        waving = first.role == WAVING
+        nodes_max = (WAVES_MAX if waving else NODES_MAX)[together]
+        while (nodes := _around(low, high, step))[1] - nodes[0] >= nodes_max:
             step *= COARSER
-        begin, end = (node * step for node in nodes)
+        # Slopes of waves are those of splines at either end, too
+        begin, end = ((node + more * waving) * step for node, more in zip(nodes, (-1, 1)))
         if end > most:
             begin, end = min(begin, most - step), most
         begin = max(begin, least)
-        return cls(tuple(addresses), float(begin), float(end), max(2, round((end - begin) / step) + 1), FINE[together])
+        fine = FINE_WAVES if waving else FINE[together]
+        return cls(tuple(addresses), float(begin), float(end), max(2, round((end - begin) / step) + 1), fine)
 
     @property
     def middle(self) -> float:
@@ -75,7 +86,14 @@ class Axis:
 
     def with_middle(self, most: int) -> Axis:
         """With as many nodes at most, an odd number of them."""
+        if self.waves:
+            return replace(self, count=self.count | 1)
         return replace(self, count=min(self.count | 1, most), fine=FINE[2])
+
+    @property
+    def waves(self) -> bool:
+        """Whether it is a thickness of films."""
+        return self.addresses[0].role == WAVING
 
     def covers(self, other: Axis | Wavelengths) -> bool:
         return (

@@ -17,8 +17,9 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.sampling.coated import Coated, Films, coated, dielectric_between
-from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
+from velatura.sampling import coated
+from velatura.sampling.coated import Coated, Films, dielectric_between
+from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.tables import Average, Row, Tables
 
 COS_MIN = 1e-4  # keeps ways through media, and Snell's factors, finite at grazing
@@ -136,9 +137,9 @@ def prepare(
     layers: list[PreparedInterface | PreparedMedium] = []
     eta_1, n_leaving, base = material.exterior, None, None
     n: Value = 1.0  # index so far, over that outside
-    for layer in material.layers:
+    for layer, films in zip(material.layers, coated.of(material)):
         if isinstance(layer, InterfaceValues):
-            layers.append(_interface(layer, eta_1, n_leaving, averages, variance))
+            layers.append(_interface(layer, eta_1, n_leaving, averages, variance, films))
             if layer.kind == "dielectric":
                 n = n * ops.mean(layer.eta / eta_1)
                 n_leaving = ops.mean(eta_1 / layer.eta)
@@ -158,14 +159,18 @@ def _medium(layer: MediumValues) -> PreparedMedium:
 
 
 def _interface(
-    layer: InterfaceValues, eta_1: Value, n_leaving: Value | None, averages: _Averages, variance: type[Variance]
+    layer: InterfaceValues,
+    eta_1: Value,
+    n_leaving: Value | None,
+    averages: _Averages,
+    variance: type[Variance],
+    films: Films,
 ) -> PreparedInterface:
     roughness = Roughness(layer.alpha_u, layer.alpha_v, layer.rotation * (pi / 180))
     s_r = variance.of(roughness, MAPS[averages.model.map])
     eta = layer.eta / eta_1 if layer.kind != "mirror" else None
     kappa = layer.k / eta_1 if layer.kind == "conductor" else None
     n12 = ops.mean(layer.eta) / ops.mean(eta_1) if layer.kind == "dielectric" else 1.0
-    films = coated(layer.coating, srgb_sensitivity) if layer.coating else None
     facets = PreparedInterface(eta, kappa, n12, roughness, s_r, None, averages.leaving(n_leaving), films)
     return replace(facets, reflectance=averages.reflectance(facets))
 

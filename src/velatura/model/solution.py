@@ -25,13 +25,14 @@ from velatura.model.solved_grid import COS_MIN, Folded, Grid
 from velatura.model.straight_through import Passage
 from velatura.model.transport.adding import Made, Part, interfaces, parts
 from velatura.model.transport.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
-from velatura.model.variables import Variables
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.model.widths import Tensor
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import differences, directional_grid, low_discrepancy
 from velatura.sampling.directional_grid import Packing
+from velatura.sampling.variables import Variables
+from velatura.sampling.variables import plain as plain
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.tables import Tables
 
@@ -474,16 +475,6 @@ def _reflects_all(found: Sequence[Part]) -> bool:
 def geometry(model: Model) -> Model:
     """A model by which layers are prepared for no more than the laws of Snell and Fresnel."""
     return replace(model.in_closed_form, reflectance="fresnel")
-
-
-def plain(material: Material) -> Material:
-    """A material of a renderer's constants with values of NumPy: floats, and colours (C, 1)."""
-
-    def value(found: Value, colour: bool) -> Any:
-        channels = np.asarray(found, float).reshape(-1)
-        return channels[:, None] if colour else float(channels[0])
-
-    return material.each(lambda address, found: value(found, address.colour))
 
 
 def _slim(material: Material) -> Material:

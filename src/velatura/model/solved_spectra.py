@@ -24,12 +24,12 @@ from velatura.model.solution import Layout, SolvedSide, Solver, plain, sides
 from velatura.model.transport.adding import Lambert, Part, parts
 from velatura.model.transport.interfaces import Facets
 from velatura.model.turned import Frame, frame
-from velatura.model.variables import Variables
 from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import differences, directional_grid
 from velatura.sampling.directional_grid import Curves
+from velatura.sampling.variables import Variables
 from velatura.stack import Material
 
 Array = NDArray[np.floating]

@@ -42,9 +42,9 @@ from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling import low_discrepancy
-from velatura.sampling.coated import Films, coated, dielectric_between
-from velatura.stack import InterfaceValues, Material, MediumValues, srgb_sensitivity
+from velatura.sampling import coated, low_discrepancy
+from velatura.sampling.coated import Films, dielectric_between
+from velatura.stack import InterfaceValues, Material, MediumValues
 
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
 WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
@@ -139,14 +139,14 @@ def passage(
     above, n = material.exterior, 1.0
     crossings: list[Crossing] = []
     slabs = [Slab()]
-    for layer in material.solid().layers:
+    for layer, films in zip(material.solid().layers, coated.of(material)):
         if isinstance(layer, MediumValues):
             tau_s = layer.sigma_s * layer.depth
             clear = is_none(tau_s) if cloudy is None else len(crossings) not in cloudy
             slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
-        crossings.append(_crossing(layer, above, n, kind))
+        crossings.append(_crossing(layer, above, n, kind, films))
         slabs.append(Slab())
         above, n = layer.eta, crossings[-1].n_2
     count = len(crossings)
@@ -164,7 +164,7 @@ def is_none(x: Value) -> bool:
     return isinstance(x, float | np.ndarray) and not np.any(x)
 
 
-def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance]) -> Crossing:
+def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance], films: Films) -> Crossing:
     eta = layer.eta / above
     ratio = ops.mean(layer.eta) / ops.mean(above)  # and so its inverse from the other side
     u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
@@ -176,7 +176,6 @@ def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Varia
     least = n_1 * ops.sqrt(ratio) * WIDTH_MIN / ops.sqrt(u * v)
     turns = step > least
     sign, least = ops.select(turns, ops.select(ratio < 1, 1.0, -1.0), 0.0), ops.select(turns, FLAT, least)
-    films = coated(layer.coating, srgb_sensitivity) if layer.coating else None
     return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least, films)
 
 

@@ -30,14 +30,14 @@ from velatura.model.passed import Parts
 from velatura.model.solution import Layout, SolvedSide, Solver
 from velatura.model.solved import FAINT, Columns, Side, Solved
 from velatura.model.turned import Frame
-from velatura.model.variables import Variables
 from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import differences, directional_grid
+from velatura.sampling import coated, differences, directional_grid
 from velatura.sampling.directional_grid import Packed, Packing, Summed
 from velatura.sampling.packets import WIDTH, aligned
-from velatura.stack import Material
+from velatura.sampling.variables import Variables
+from velatura.stack import InterfaceValues, Material
 
 Array = NDArray[np.floating]
 
@@ -217,10 +217,14 @@ def _tabulated(
         return Same(solution.solve(material, model, variance, context))
     isotropic = variance is Isotropic
     spectral = any(isinstance(x, Wavelengths) for x in ranges)
-    together = min(len(ranges), TOGETHER if isotropic and not spectral else 2)
-    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together) for x in ranges]
+    films = [x for x in ranges if not isinstance(x, Wavelengths) and x[0][0].role == axes.WAVING]
+    # Waves are resolved by the first table
+    ranges = [*films, *(x for x in ranges if x not in films)]
+    together = min(len(ranges), TOGETHER if isotropic and not spectral and not films else 2)
     material = material.solid()
-    start = axes.placed(solution.plain(material), spanned, [axis.middle for axis in spanned])
+    numbers = solution.plain(material)
+    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together, _waves(numbers, x)) for x in ranges]
+    start = axes.placed(numbers, spanned, [axis.middle for axis in spanned])
     solver = Solver.of(model, variance, context)
     grid = replace(solver.grid, cosines=COSINES[isotropic])
     solver = replace(solver, grid=grid, shape=SHAPES[isotropic], samples=SAMPLES)
@@ -303,6 +307,16 @@ def _tabulated(
         terms.append(Term(group, tuple(made[::2]), tuple(polynomials)))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)
     return Tables(tuple(spanned), tuple(terms), tuple(adds), layouts, solver, point, fixed)
+
+
+def _waves(material: Material, given: Range) -> float | None:
+    """The step of an axis of thicknesses; None of others."""
+    address = given[0][0]
+    if address.film is None or address.layer is None:
+        return None
+    layer = material.layers[address.layer]
+    assert isinstance(layer, InterfaceValues)
+    return coated.step_nm(layer.films[address.film])
 
 
 Group = tuple[Axis | Wavelengths, ...]

@@ -12,13 +12,12 @@ from math import pi
 
 from velatura.model.bsdf import Asked, Body
 from velatura.model.prepare import is_same
-from velatura.model.solution import plain
 from velatura.model.solved import ALL
-from velatura.model.variables import Variables
 from velatura.model.variance import PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
+from velatura.sampling.variables import Variables, plain
 from velatura.stack import Address, InterfaceValues, Material
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from velatura.optics.films import Film, coherent
 
 Array: TypeAlias = NDArray[np.floating]
-RGB: TypeAlias = tuple[float, float, float]
+Channels: TypeAlias = tuple[float, ...]
 
-#: Sensitivities (3, N) of the channels at wavelengths (N,) in nanometres, up to a factor each.
+#: Sensitivities (C, N) of the channels at wavelengths (N,) in nanometres, up to a factor each.
 Sensitivity: TypeAlias = Callable[[Array], Array]
 
 RANGE_NM = (360.0, 830.0)  # beyond it, sensitivities are 0
@@ -37,33 +37,44 @@ BLOCK = 1 << 16  # cosines times wavenumbers at a time
 
 @dataclass(frozen=True)
 class ColouredFilm:
-    """A film by the colours of its index eta + i k, and its thickness."""
+    """A film by the channels of its index eta + i k, and its thickness."""
 
-    eta: RGB
-    k: RGB
+    eta: Channels
+    k: Channels
     thickness_nm: float
 
 
 @dataclass(frozen=True)
 class Coating:
-    """Films, from the top, between media of indices eta_1 and eta_2 + i k_2 (colours)."""
+    """Films, from the top, between media of indices eta_1 and eta_2 + i k_2, by channel."""
 
     films: tuple[ColouredFilm, ...]
-    eta_1: RGB
-    eta_2: RGB
-    k_2: RGB = (0.0, 0.0, 0.0)
+    eta_1: Channels
+    eta_2: Channels
+    k_2: Channels = (0.0, 0.0, 0.0)
 
     def reflectance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
-        """Reflectance (3, N) of unpolarised light at cosines (N,) above, in [0, 1]."""
+        """Reflectance (C, N) of unpolarised light at cosines (N,) above, in [0, 1]."""
         return np.clip(self._integrated("reflected", cos_theta, sensitivity), 0.0, 1.0)
+
+    def at(self, wavelengths_nm: Array, cos_theta: Array) -> Array:
+        """As `reflectance`, of channels of one wavelength each (C,)."""
+        eta_1, eta_2, k_2 = (np.reshape(x, (-1, 1)) for x in (self.eta_1, self.eta_2, self.k_2))
+        films = [Film(np.reshape(x.eta, (-1, 1)), np.reshape(x.k, (-1, 1)), x.thickness_nm) for x in self.films]
+        found = coherent(cos_theta, wavelengths_nm[:, None], eta_1, films, eta_2, k_2).reflected
+        return np.asarray(np.clip(found, 0.0, 1.0))
+
+    def reversed(self) -> Coating:
+        """As seen from below, between media that do not absorb."""
+        return replace(self, films=self.films[::-1], eta_1=self.eta_2, eta_2=self.eta_1)
 
     def share(self, name: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
         """A property of `optics.films.Response`, by its name, as `reflectance`, with colours outside sRGB."""
         return self._integrated(name, cos_theta, sensitivity)
 
     def _integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
-        channels = [self._channel(c) for c in range(3)]
-        if channels[0] == channels[1] == channels[2]:
+        channels = [self._channel(c) for c in range(len(self.eta_1))]
+        if len({*channels}) == 1:
             return channels[0].integrated(share, cos_theta, sensitivity)
         each = (functools.partial(_only, sensitivity, c) for c in range(3))
         return np.concatenate([channel.integrated(share, cos_theta, own) for channel, own in zip(channels, each)])

@@ -17,7 +17,8 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
-from velatura.sampling.coated import Coated, coated
+from velatura.sampling import coated
+from velatura.sampling.coated import Coated
 from velatura.sampling.polarised_films import PolarisedFilms, polarised_films
 from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
 from velatura.stack.values import Pair
@@ -216,21 +217,20 @@ def from_material(material: Material, microsurface: bool) -> Layers:
     index: list[Value] = [material.exterior]
     films: list[Coated | None] = []
     medium, last = Slab(), material.layers[-1]
-    for layer in material.solid().layers:
+    for layer, on_it in zip(material.solid().layers, coated.of(material)):
         if isinstance(layer, MediumValues):
             medium = Slab(_product(layer.sigma_a, layer.depth), _product(layer.sigma_s, layer.depth), layer.g)
             continue
         slabs.append(medium)
+        films.append(on_it)
         medium = Slab()
         if isinstance(layer, DiffuseValues):
             index.append(1.0)
             surfaces.append(Surface(1.0, 1.0, 0.0, False))
-            films.append(None)
         else:
             index.append(1.0 if layer.eta is None else layer.eta)
             matched = layer.kind == "dielectric" and ops.absolute(relative_index(*index[-2:]) - 1) < _MATCHED
             surfaces.append(_surface(layer, matched))
-            films.append(coated(layer.coating, srgb_sensitivity) if layer.coating else None)
     extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
     return Layers(
         material.kinds[-1],

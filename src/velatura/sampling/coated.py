@@ -1,10 +1,14 @@
-"""Fresnel's reflectance of an interface with thin films, sampled once over the cosine, so that it is one fetch."""
+"""Fresnel's reflectance of interfaces with thin films: sampled over the cosine, so that it is one fetch, for colours;
+at the wavelengths of a ray, worked out."""
 
 from __future__ import annotations
 
+import copy
 import functools
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil, floor
 from threading import Lock
 from typing import Any, TypeAlias
 
@@ -14,12 +18,18 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.optics.coatings import Coating, ColouredFilm, Sensitivity
+from velatura.optics.coatings import Coating, ColouredFilm
+from velatura.sampling.differences import differentiable
 from velatura.sampling.packets import Packets, packets
+from velatura.sampling.variables import Variables, plain
+from velatura.stack import FilmValues, InterfaceValues, Material, luminance_sensitivity, srgb_sensitivity
 
 Array = NDArray[np.floating]
 
 NODES = 257  # even over the cosine; between them no reflectance bends by more than 3e-4
+STEP_NM = 15.0  # optical, between thicknesses that are worked out,
+UNKNOWN_NM = (0.0, 1000.0)  # spanned by thicknesses that cannot be looked at
+FINE = 4  # and how many are interpolated, by splines, from one to the next
 
 
 class Sampled:
@@ -28,6 +38,7 @@ class Sampled:
     def __init__(self, data: Array) -> None:
         self.data, self.shape = data, data.shape[:-1]
         self._packets: dict[Any, Packets] = {}
+        self._number: Any = None
 
     def packets(self, dialect: Any) -> Packets:
         """The values for a Dr.Jit module, made at first use."""
@@ -38,18 +49,17 @@ class Sampled:
 
     def fetched(self, like: Value, *coordinates: Value) -> Value:
         """A colour of the kind of `like`."""
-        (colour,) = self.colours(like, *coordinates)
-        return colour
+        return _joined(like, self._read(*coordinates))
 
     def colours(self, like: Value, *coordinates: Value) -> list[Value]:
         """Colours of the kind of `like`, of three channels each."""
-        channels = ops.interpolate(self, *coordinates)
-        each = [channels[k : k + 3] for k in range(0, len(channels), 3)]
-        if not isinstance(like, float | np.ndarray):
-            of: Any = type(like)
-            kind = _colour(of)
-            return [kind(colour) for colour in each]
-        return [colour if colour.ndim > 1 else colour[:, None] for colour in map(np.stack, each)]
+        channels = self._read(*coordinates)
+        return [_joined(like, channels[k : k + 3]) for k in range(0, len(channels), 3)]
+
+    def _read(self, *coordinates: Value) -> list[Value]:
+        if self._number:
+            coordinates = tuple(self._number(x) if isinstance(x, float) else x for x in coordinates)
+        return ops.interpolate(self, *coordinates)
 
 
 class Coated(Sampled):
@@ -57,16 +67,50 @@ class Coated(Sampled):
 
     Where it transmits it absorbs nothing, so that light of one tangential momentum is reflected alike from both sides:
     it is sampled over the cosine on the `rarer` side, beyond which light is totally reflected. That is 1 above the
-    interface, and 2 below it; above, where it is opaque. `data` are the values at the nodes, (NODES, 3), and `n12` the
-    relative index for all colours, None where it is opaque. `coating` is what they are the reflectance of, from the
-    rarer side.
+    interface, and 2 below it; above, where it is opaque. `data` are the values at the nodes, (NODES, C), of what was
+    `found` those in 0 to 1, and `n12` the relative index for all colours, None where it is opaque. `coating` is what
+    they are the reflectance of, from the rarer side.
+
+    Of a film whose thickness varies, `axis` are some thicknesses: data are (places, NODES, C), and `place` is that of
+    the thickness.
     """
 
     known = True  # whether the data may be looked at now
 
-    def __init__(self, data: Array, rarer: int, n12: float | None = None, coating: Coating | None = None) -> None:
-        super().__init__(data)
-        self.rarer, self.n12, self.coating = rarer, n12, coating
+    def __init__(
+        self,
+        found: Array,
+        rarer: int,
+        n12: float | None = None,
+        coating: Coating | None = None,
+        axis: Axis | None = None,
+    ) -> None:
+        super().__init__(np.clip(found, 0, 1))
+        self.found, self.rarer, self.n12, self.coating, self.axis = found, rarer, n12, coating, axis
+        self.place: tuple[Value, ...] = ()
+        self._reversed: Coated | None = None
+        if axis:
+            self.known = False
+
+    def reading(self, flat: Any) -> Coated:
+        """With values of Dr.Jit, flat; differentiable."""
+        found = copy.copy(self)
+        found._number, found._reversed, found.known = type(flat), None, False
+        dialect = sys.modules[type(flat).__module__]
+        found._packets = {dialect: packets(flat, self.data.shape[-1], dialect)}
+        return found
+
+    def of(self, layer: InterfaceValues) -> Coated:
+        """For the thickness that a layer has."""
+        return self._at(self.axis.place(layer.films[self.axis.film].thickness_nm)) if self.axis else self
+
+    def reversed(self) -> Coated:
+        """As seen from below."""
+        if self._reversed is None:
+            found = copy.copy(self)
+            found.rarer, found.n12 = 3 - self.rarer, 1 / self.n12 if self.n12 else None
+            self._reversed = found
+        return self._reversed._at(*self.place)
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         """For cosines above and below, 0 where light cannot be; a colour of the kind of `like`."""
@@ -74,7 +118,44 @@ class Coated(Sampled):
 
     def at(self, cosine: Value, like: Value) -> Value:
         """For the cosine on the rarer side."""
-        return self.fetched(like, cosine)
+        return self.fetched(like, *self.place, cosine)
+
+    def _at(self, *place: Value) -> Coated:
+        if not place:
+            return self
+        found = copy.copy(self)
+        found.place = place
+        return found
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Thicknesses of a film, by its number, on a fixed lattice."""
+
+    film: int
+    low_nm: float
+    high_nm: float
+    count: int
+
+    @classmethod
+    def around(cls, film: int, low_nm: float, high_nm: float, step_nm: float) -> Axis:
+        # One node more at either end, so that slopes are those of splines
+        begin, end = max(floor(low_nm / step_nm) - 1, 0), ceil(high_nm / step_nm) + 1
+        return cls(film, begin * step_nm, end * step_nm, end - begin + 1)
+
+    @property
+    def nodes(self) -> Array:
+        return np.linspace(self.low_nm, self.high_nm, self.count)
+
+    def place(self, thickness_nm: Value) -> Value:
+        return (thickness_nm - self.low_nm) / (self.high_nm - self.low_nm)
+
+    def refined(self, values: Array) -> Array:
+        """Values at the nodes, (nodes, ...), and at others between."""
+        from scipy.interpolate import CubicSpline  # slow to import
+
+        fine = np.linspace(self.low_nm, self.high_nm, FINE * (len(values) - 1) + 1)
+        return np.asarray(CubicSpline(self.nodes, values)(fine))
 
 
 @dataclass(frozen=True)
@@ -103,6 +184,15 @@ def dielectric_between(films: Films, cos_1: Value, cos_2: Value, eta: Value) -> 
     return films.between(cos_1, cos_2, eta)
 
 
+def _joined(like: Value, channels: list[Value]) -> Value:
+    """A colour of the kind of `like`, or a number of one channel."""
+    if not isinstance(like, float | np.ndarray):
+        kind: Any = type(like)
+        return channels[0] if len(channels) == 1 else _colour(kind)(channels)
+    colour = np.stack(channels)
+    return colour if colour.ndim > 1 else colour[:, None]
+
+
 @functools.cache
 def _colour(kind: Any) -> Any:
     """A renderer's type of colours, for one of colours, or of numbers."""
@@ -112,27 +202,111 @@ def _colour(kind: Any) -> Any:
     return sys.modules[kind.__module__].Array3f if is_number else kind
 
 
-_uploading = Lock()
+def of(material: Material) -> list[Coated | None]:
+    """The films on each layer, None on those without: as a renderer has them, or from values of NumPy. There a
+    thickness of 0 is no film."""
+    layers = [
+        replace(layer, films=tuple(x for x in layer.films if x.thickness_nm > 0))
+        if isinstance(layer, InterfaceValues) and layer.films and not layer.coating
+        else layer
+        for layer in material.layers
+    ]
+    return _of(replace(material, layers=tuple(layers)))
 
 
-def coated(described: Any, sensitivity: Sensitivity) -> Coated:
-    """The interface described by `velatura.stack.CoatingValues`, as `sensitivity` sees it; made once. What is read
-    elsewhere stays."""
-    if isinstance(described, Coated):
-        return described
+def _of(material: Material) -> list[Coated | None]:
+    found: list[Coated | None] = []
+    above = material.exterior
+    for layer in material.solid().layers:
+        films = None
+        if isinstance(layer, InterfaceValues):
+            if layer.films:
+                films = layer.coating.of(layer) if layer.coating else _worked_out(layer, above, material.light)
+            above = layer.eta
+        found.append(films)
+    return found
+
+
+def constant(material: Material, spans: Sequence[tuple[int, int, float, float]], number: Any) -> list[Coated | None]:
+    """The films on each layer of a renderer's constants; differentiable.
+
+    Args:
+        spans: layers and films with thicknesses from textures, and the least and the greatest of these.
+        number: Dr.Jit's type of numbers, None in scalar variants.
+    """
+    given, start = Variables.of(material), plain(material)
+    axes: dict[int, Axis] = {}
+    for k, film, low, high in spans:
+        layer = start.layers[k]
+        assert isinstance(layer, InterfaceValues)
+        axes[k] = Axis.around(film, low, high, step_nm(layer.films[film]))
+
+    def made(numbers: list[float]) -> list[Coated | None]:
+        changed = given.replaced(start, numbers)
+        found = _of(changed)
+        for k, axis in axes.items():
+            found[k] = _over_thickness(changed, k, axis)
+        return found
+
+    found = made([])
+    if not given.given or not any(found):
+        return found
+
+    def arrays(numbers: list[float]) -> list[Array]:
+        return [films.data.ravel() for films in made(numbers) if films]
+
+    flat = iter(differentiable(arrays, given.given, given.around, number))
+    return [films and films.reading(next(flat)) for films in found]
+
+
+def _over_thickness(material: Material, k: int, axis: Axis) -> Coated:
+    """The films on the k-th layer, over thicknesses of one of them."""
+    name = f"layer{k}_film{axis.film}_thickness_nm"
+
+    def at(x: float) -> Coated:
+        found = _of(material.each(lambda address, old: x if address.name == name else old))[k]
+        assert found
+        return found
+
+    each = [at(x) for x in axis.nodes.tolist()]
+    found = axis.refined(np.array([films.found for films in each]))
+    return Coated(found, each[0].rarer, each[0].n12, None, axis)
+
+
+def step_nm(film: FilmValues) -> float:
+    """Between thicknesses of a film, of values of NumPy, at which what it reflects is worked out."""
+    return STEP_NM / float(np.max(film.eta))
+
+
+def _worked_out(layer: InterfaceValues, above: Value, light: Any) -> Coated:
+    """The films on a layer, from values of NumPy; made once."""
+    count = {"srgb": 3, "luminance": 1}[light] if isinstance(light, str) else len(light)
+
+    def channels(value: Value) -> tuple[float, ...]:
+        # In single precision, so that values that were rounded are others no more
+        return tuple(np.broadcast_to(np.asarray(value, np.float32).ravel(), count).tolist())
+
+    films = tuple(ColouredFilm(channels(x.eta), channels(x.k), channels(x.thickness_nm)[0]) for x in layer.films)
+    opaque = layer.kind == "conductor"
+    k_2 = channels(layer.k) if opaque else channels(0.0)
+    coating = Coating(films, channels(above), channels(layer.eta), k_2)
     with _making:
-        return _coated(described, sensitivity)
+        return _coated(coating, opaque, light if isinstance(light, str) else tuple(light.tolist()))
 
 
-_making = Lock()
+_uploading, _making = Lock(), Lock()
+_SENSITIVITIES = {"srgb": srgb_sensitivity, "luminance": luminance_sensitivity}
 
 
-@functools.lru_cache(64)
-def _coated(described: Any, sensitivity: Sensitivity) -> Coated:
-    films = tuple(ColouredFilm(film.eta, film.k, film.thickness_nm) for film in described.films)
-    coating = Coating(films, described.eta_1, described.eta_2, described.k_2)
-    rarer = 1 if described.opaque or sum(described.eta_1) < sum(described.eta_2) else 2
+@functools.lru_cache(512)
+def _coated(coating: Coating, opaque: bool, light: str | tuple[float, ...]) -> Coated:
+    n12 = None if opaque else sum(coating.eta_2) / sum(coating.eta_1)
+    rarer = 1 if n12 is None or n12 > 1 else 2
     if rarer == 2:
-        coating = Coating(films[::-1], described.eta_2, described.eta_1)
-    n12 = None if described.opaque else sum(described.eta_2) / sum(described.eta_1)
-    return Coated(coating.reflectance(np.linspace(0, 1, NODES), sensitivity).T.copy(), rarer, n12, coating)
+        coating = coating.reversed()
+    cosines = np.linspace(0, 1, NODES)
+    if isinstance(light, str):
+        found = coating.share("reflected", cosines, _SENSITIVITIES[light])
+    else:
+        found = coating.at(np.array(light), cosines)
+    return Coated(found.T.copy(), rarer, n12, coating)

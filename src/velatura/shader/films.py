@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.ops import Value
-from velatura.sampling.coated import NODES, Coated, coated
+from velatura.sampling import coated
+from velatura.sampling.coated import NODES, Coated
 from velatura.shader.symbol import Symbol, operand
-from velatura.stack import InterfaceValues, Material, Stack, coatings, srgb_sensitivity
+from velatura.stack import Address, InterfaceValues, Material, Stack, Varying, number
 
 Array = NDArray[np.floating]
 
@@ -29,7 +30,7 @@ class Read(Coated):
     `from_above` is whether the medium above is the rarer one, a condition where values change; then there are no data.
     """
 
-    known = False
+    known = False  # the texture may change
 
     def __init__(self, line: int, from_above: Value, data: Array | None) -> None:
         super().__init__(np.empty((0, 0)) if data is None else data, 1)
@@ -48,21 +49,22 @@ class Read(Coated):
         return Symbol(FILM, (operand(cosine),), "colour", self.line)
 
 
-def recorded(material: Material, general: bool) -> Material:
-    """A material whose films are read, of any values in `general`."""
+def recorded(material: Material, stack: Stack, general: bool) -> Material:
+    """A material of a stack whose films are read, of any values in `general`."""
     lines = iter(range(len(material.layers)))
     above, layers = material.exterior, material.layers
-    for n, layer in enumerate(layers):
+    for n, (layer, known) in enumerate(zip(layers, _of(stack))):
         if not isinstance(layer, InterfaceValues):
             continue
-        if coating := layer.coating:
-            known = coated(coating, srgb_sensitivity)
+        if known:
             from_above: Value = known.rarer == 1
-            if general and not coating.opaque:
+            if general and known.n12 is not None:
                 below = material.exterior if material.thin and layer is layers[-1] else layer.eta
                 from_above = ops.mean(above) < ops.mean(below)
             read: Any = Read(next(lines), from_above, None if general else known.data)
             material = material.with_layer(n, coating=read)
+        elif layer.films:
+            material = material.with_layer(n, films=())
         above = layer.eta
     return material
 
@@ -70,16 +72,25 @@ def recorded(material: Material, general: bool) -> Material:
 def beside(stack: Stack) -> set[str]:
     """Flat names of the indices that the films of a stack are worked out from."""
     found, above = set[str](), "exterior"
-    for n, coating in enumerate(coatings.of(stack)):
-        if coating:
-            found |= {above, f"layer{n}_eta", *([f"layer{n}_k"] if coating.opaque else [])}
+    for n, films in enumerate(_of(stack)):
+        if films:
+            found |= {above, f"layer{n}_eta", *([f"layer{n}_k"] if films.n12 is None else [])}
         above = f"layer{n}_eta" if n in stack.surfaces else above
     return found | ({"exterior"} if found and stack.thin else set())
 
 
+def _of(stack: Stack) -> list[Coated | None]:
+    """The films on each layer. Other values may come from textures."""
+
+    def value(address: Address, described: Any) -> Value:
+        return 0.0 if isinstance(described, Varying) and address.film is None else number(address, described)
+
+    return coated.of(Material.of(stack, value))
+
+
 def texture(stack: Stack) -> Array | None:
     """The films of a stack as a texture, float32 of shape (interfaces with films, NODES, 4); None without any."""
-    lines: Sequence[Array] = [coated(x, srgb_sensitivity).data for x in coatings.of(stack) if x]
+    lines: Sequence[Array] = [films.data for films in _of(stack) if films]
     return np.pad(np.array(lines, np.float32), ((0, 0), (0, 0), (0, 1))) if lines else None
 
 

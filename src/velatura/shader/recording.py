@@ -114,7 +114,7 @@ def record(
     recorded = Material.of(
         stack, lambda at, value: material.constant(at, value) if at.name in constants else _input(at)
     )
-    recorded = films.recorded(recorded, parameters)
+    recorded = films.recorded(recorded, stack, parameters)
     kind = structure(stack) if parameters else variance(stack)
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     baked: Bake | Tabulated | None = None

@@ -2,12 +2,12 @@
 
 from velatura.stack.coatings import refuse as refuse_films
 from velatura.stack.describe import json_schema, parameter_table
-from velatura.stack.flat_names import Address, addressed, is_of_film
+from velatura.stack.flat_names import Address, addressed
 from velatura.stack.io import MaterialLike, dumps, load, loads, preset, presets, save
 from velatura.stack.layers import (
-    CoatingValues,
     Diffuse,
     DiffuseValues,
+    FilmValues,
     Interface,
     InterfaceValues,
     Kind,
@@ -18,7 +18,16 @@ from velatura.stack.layers import (
     Value,
 )
 from velatura.stack.material import Material, as_described, number
-from velatura.stack.spectra import Measured, Named, names, rgb, spectrum, srgb_sensitivity, srgb_weights
+from velatura.stack.spectra import (
+    Measured,
+    Named,
+    luminance_sensitivity,
+    names,
+    rgb,
+    spectrum,
+    srgb_sensitivity,
+    srgb_weights,
+)
 from velatura.stack.stack import Stack
 from velatura.stack.values import RGB, Brushing, Film, Spectrum, Texture, Varying
 
@@ -26,10 +35,10 @@ __all__ = [
     "RGB",
     "Address",
     "Brushing",
-    "CoatingValues",
     "Diffuse",
     "DiffuseValues",
     "Film",
+    "FilmValues",
     "Interface",
     "InterfaceValues",
     "Kind",
@@ -49,10 +58,10 @@ __all__ = [
     "addressed",
     "as_described",
     "dumps",
-    "is_of_film",
     "json_schema",
     "load",
     "loads",
+    "luminance_sensitivity",
     "names",
     "number",
     "parameter_table",

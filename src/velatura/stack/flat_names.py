@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from velatura.errors import InvalidInput
-from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, has
+from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, film_key, has
 from velatura.stack.schema import parameters, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named
-from velatura.stack.values import RGB, Colour, Scalar, Varying
+from velatura.stack.values import RGB, Colour, Film, Scalar, Varying
 
 _OPTIONS = ("name", "source", "exterior", "thin")
 _LAYER = re.compile(r"layer(\d{1,9})_(\w+)")
 _FILM = re.compile(r"film(\d)_(\w+)")
+_OF_FILMS = {key: declared for key, declared in parameters(Film).items() if isinstance(declared, Scalar)}
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,17 @@ class Address:
     def name(self) -> str:
         """The flat name."""
         return self.key if self.layer is None else f"layer{self.layer}_{self.key}"
+
+    @property
+    def film(self) -> int | None:
+        """The number of its film; None of a value of none."""
+        parts = _FILM.fullmatch(self.key)
+        return int(parts[1]) if parts else None
+
+    @property
+    def role(self) -> str:
+        """Its key; those of all films are the same, `film_eta`, `film_k` and `film_thickness_nm`."""
+        return self.key if self.film is None else self.key.replace(str(self.film), "", 1)
 
     @property
     def colour(self) -> bool:
@@ -53,13 +65,15 @@ class Address:
 
 
 @functools.lru_cache(256)
-def addresses(kinds: tuple[str, ...]) -> tuple[Address, ...]:
-    """All values of a stack of these kinds of layers."""
+def addresses(kinds: tuple[str, ...], films: tuple[int, ...] = ()) -> tuple[Address, ...]:
+    """All values of a stack of these kinds of layers, each with as many films; none unless given."""
     found = [Address(None, "exterior", EXTERIOR)]
     for index, kind in enumerate(kinds):
         for key, declared in has(kind).items():
             if isinstance(declared, Scalar):
                 found += [Address(index, part, declared) for part in declared.parts(key)]
+        for k in range(films[index] if films else 0):
+            found += [Address(index, film_key(k, key), declared) for key, declared in _OF_FILMS.items()]
     return tuple(found)
 
 
@@ -68,18 +82,15 @@ def addressed(name: str) -> tuple[Address, ...]:
     parts = _LAYER.fullmatch(name)
     if not parts:
         return (Address(None, name, EXTERIOR),) if name == "exterior" else ()
+    of_film = _FILM.fullmatch(parts[2])
+    if of_film and of_film[2] in _OF_FILMS:
+        return (Address(int(parts[1]), parts[2], _OF_FILMS[of_film[2]]),)
     for layer in LAYERS.values():
         for key, declared in parameters(layer).items():
             if isinstance(declared, Scalar) and parts[2] in (key, *declared.parts(key)):
                 wanted = declared.parts(key) if parts[2] == key else (parts[2],)
                 return tuple(Address(int(parts[1]), part, declared) for part in wanted)
     return ()
-
-
-def is_of_film(name: str) -> bool:
-    """Whether a flat name is that of a value of a film, which is always a number."""
-    parts = _LAYER.fullmatch(name)
-    return bool(parts and _FILM.fullmatch(parts[2]))
 
 
 def _keys(kind: str) -> list[str]:

@@ -38,34 +38,19 @@ Value: TypeAlias = float | RGB | Named | Spectrum | Texture | Brushing
 
 
 @dataclass(frozen=True)
-class CoatingValues:
-    """Thin films, from the top, between media of indices eta_1 and eta_2 + i k_2: plain numbers, by channel."""
-
-    films: tuple[FilmValues, ...]
-    eta_1: RGB
-    eta_2: RGB
-    k_2: RGB
-    opaque: bool
-
-    def reversed(self) -> CoatingValues:
-        """As seen from below."""
-        return CoatingValues(self.films[::-1], self.eta_2, self.eta_1, self.k_2, self.opaque)
-
-
-@dataclass(frozen=True)
 class FilmValues:
-    """A film of index eta + i k."""
+    """A thin film of index eta + i k."""
 
-    eta: RGB
-    k: RGB
-    thickness_nm: float
+    eta: Any
+    k: Any
+    thickness_nm: Any
 
 
 @dataclass(frozen=True)
 class InterfaceValues:
     """A dielectric, a conductor or a mirror: GGX roughness along two axes, turned by `rotation` (degrees), and absolute
-    indices of the medium below; a mirror has none, and a dielectric no extinction `k`. Thin films are numbers in every
-    dialect.
+    indices of the medium below; a mirror has none, and a dielectric no extinction `k`. Thin films are listed from the
+    top; `coating` is their reflectance as a renderer has it, None where it follows from the values.
     """
 
     kind: Kind
@@ -74,7 +59,8 @@ class InterfaceValues:
     rotation: Any
     eta: Any = None
     k: Any = None
-    coating: CoatingValues | None = None
+    films: tuple[FilmValues, ...] = ()
+    coating: Any = None
 
     @property
     def spreads(self) -> bool:
@@ -226,7 +212,7 @@ class Interface(LayerRecord):
         if self.films and isinstance(self.eta, Texture) | isinstance(self.k, Texture):
             raise ValueError("films: not over an index from a texture")
         for k, film in enumerate(self.films):
-            if not self.opaque and any(film.colour("k")):
+            if not self.opaque and film.absorbs:
                 raise ValueError(f"films: film {k}: k: only over a metal, an interface with k or conductor")
         return self
 
@@ -241,6 +227,15 @@ class Interface(LayerRecord):
         if self.conductor == MIRROR:
             return "mirror"
         return "conductor" if self.opaque else "dielectric"
+
+    def flat(self) -> dict[str, Value]:
+        """Every value under its own key, those of films included."""
+        values = super().flat()
+        for k, film in enumerate(self.films):
+            for key, declared in parameters(Film).items():
+                assert isinstance(declared, Scalar)
+                values[film_key(k, key)] = declared.single(getattr(film, key))[0]
+        return values
 
     @property
     def lossless(self) -> bool:
@@ -316,6 +311,11 @@ def has(kind: str) -> dict[str, Parameter]:
     layer = KINDS[kind]
     lacks = next(keys for name, keys in layer.lacks.items() if name == kind)
     return {key: declared for key, declared in parameters(layer).items() if key not in lacks}
+
+
+def film_key(k: int, key: str) -> str:
+    """The key of a value of the k-th film of an interface."""
+    return f"film{k}_{key}"
 
 
 def entry_name(layer: Layer) -> str:

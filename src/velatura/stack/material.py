@@ -6,12 +6,12 @@ Files, command lines, renderers and shaders address single values by flat names 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from itertools import islice
 from typing import Any, TypeAlias
 
-from velatura.stack import coatings
 from velatura.stack.flat_names import Address, addresses
-from velatura.stack.layers import KINDS, CoatingValues, InterfaceValues, Kind, LayerValues
+from velatura.stack.layers import KINDS, FilmValues, InterfaceValues, Kind, LayerValues
 from velatura.stack.stack import Stack
 
 Value: TypeAlias = Any
@@ -36,57 +36,65 @@ def as_described(address: Address, value: Any) -> Value:
 
 @dataclass(frozen=True)
 class Material:
-    """Layers from the top, and the index of the medium above them; `thin` for a pane with that medium below it, too."""
+    """Layers from the top, and the index of the medium above them; `thin` for a pane with that medium below it, too.
+
+    `light` is what channels of colours are of: those of "srgb", "luminance" alone, or wavelengths in nm.
+    """
 
     layers: tuple[LayerValues, ...]
     exterior: Value
     thin: bool = False
+    light: Value = "srgb"
 
     @classmethod
     def of(cls, stack: Stack, value: Callable[[Address, Any], Value] = number) -> Material:
         """The values of a stack, each as `value` converts it: in NumPy unless given."""
-        values = iter([value(address, described) for address, described in stack.values()])
-        return cls._of(stack.kinds, values, stack.thin, coatings.of(stack))
+        return cls.from_flat(stack, {address.name: value(address, described) for address, described in stack.values()})
 
     @classmethod
-    def from_flat(
-        cls,
-        kinds: Sequence[Kind],
-        values: Mapping[str, Value],
-        thin: bool = False,
-        films: Sequence[CoatingValues | None] = (),
-    ) -> Material:
-        """Values by flat name, as `Stack.flat` has them, and the films of each layer."""
-        return cls._of(kinds, (values[address.name] for address in addresses(tuple(kinds))), thin, films)
-
-    @classmethod
-    def _of(
-        cls, kinds: Sequence[Kind], values: Iterator[Value], thin: bool, films: Sequence[CoatingValues | None]
-    ) -> Material:
-        exterior, layers = next(values), []
-        of_layers = addresses(tuple(kinds))[1:]
-        for index, kind in enumerate(kinds):
-            own: dict[str, Any] = {address.key: next(values) for address in of_layers if address.layer == index}
+    def from_flat(cls, like: Stack | Material, values: Mapping[str, Value], light: Value = "srgb") -> Material:
+        """Values by flat name, as `Stack.flat` has them, of layers of the same kinds as others."""
+        exterior, *others = (values[address.name] for address in addresses(like.kinds, like.films))
+        each, layers = iter(others), []
+        for kind, films in zip(like.kinds, like.films):
+            own: dict[str, Any] = {address.key: next(each) for address in addresses((kind,))[1:]}
             several: dict[str, Any] = {"kind": kind} if len(KINDS[kind].lacks) > 1 else {}
-            if films and films[index]:
-                own["coating"] = films[index]
+            if films:
+                own["films"] = tuple(FilmValues(*islice(each, len(fields(FilmValues)))) for _ in range(films))
             layers.append(KINDS[kind].record(**several, **own))
-        return cls(tuple(layers), exterior, thin)
+        return cls(tuple(layers), exterior, like.thin, light)
 
     def values(self) -> Iterator[tuple[Address, Value]]:
         """The exterior index, and every value of every layer."""
-        for address in addresses(self.kinds):
-            owner = self if address.layer is None else self.layers[address.layer]
-            yield address, getattr(owner, address.key)
+        described: list[Value] = [self.exterior]
+        for layer, kind in zip(self.layers, self.kinds):
+            described += [getattr(layer, address.key) for address in addresses((kind,))[1:]]
+            if isinstance(layer, InterfaceValues):
+                described += [value for film in layer.films for value in vars(film).values()]
+        return zip(addresses(self.kinds, self.films), described)
 
     def each(self, change: Callable[[Address, Value], Value]) -> Material:
         """The material with every value changed."""
-        return self._of(self.kinds, (change(*pair) for pair in self.values()), self.thin, self.coatings)
+        changed = {address.name: change(address, value) for address, value in self.values()}
+        return self.from_flat(self, changed, self.light).coated(self.coatings)
+
+    def coated(self, coatings: Sequence[Any]) -> Material:
+        """The material with films on its layers as a renderer has them, None for those without."""
+        if not any(coatings) and not any(self.coatings):
+            return self
+        pairs = zip(self.layers, coatings)
+        layers = [replace(layer, coating=x) if isinstance(layer, InterfaceValues) else layer for layer, x in pairs]
+        return replace(self, layers=tuple(layers))
 
     @property
-    def coatings(self) -> tuple[CoatingValues | None, ...]:
-        """The films of each layer; None of those without."""
+    def coatings(self) -> tuple[Any, ...]:
+        """The films on each layer as a renderer has them."""
         return tuple(layer.coating if isinstance(layer, InterfaceValues) else None for layer in self.layers)
+
+    @property
+    def films(self) -> tuple[int, ...]:
+        """The number of films on each layer."""
+        return tuple(len(layer.films) if isinstance(layer, InterfaceValues) else 0 for layer in self.layers)
 
     def flat(self) -> dict[str, Value]:
         """All values by flat name."""
@@ -139,6 +147,6 @@ class Material:
         for layer in solid.layers:
             if isinstance(layer, InterfaceValues):
                 coating = layer.coating and layer.coating.reversed()
-                layer, above = replace(layer, eta=above, coating=coating), layer.eta
+                layer, above = replace(layer, eta=above, films=layer.films[::-1], coating=coating), layer.eta
             layers.append(layer)
-        return Material(tuple(reversed(layers)), above)
+        return Material(tuple(reversed(layers)), above, light=solid.light)

@@ -33,6 +33,7 @@ _BROKEN = ("AlAs", "AlSb", "SnTe")
 
 _LARGEST = 2**20  # characters of a table
 VISIBLE_NM = (360.0, 830.0)  # that Mitsuba renders
+LUMINANCE = (0.212671, 0.715160, 0.072169)  # of linear sRGB (ITU-R BT.709), as in Mitsuba
 
 SRGB_FROM_XYZ = (  # ITU-R BT.709 primaries
     (3.240479, -1.537150, -0.498535),
@@ -265,6 +266,14 @@ def srgb_sensitivity(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.float64
 
     at, weights = srgb_weights()
     return np.stack([np.interp(wavelengths_nm, at, each, 0.0, 0.0) for each in weights])
+
+
+def luminance_sensitivity(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.float64]:
+    """As `srgb_sensitivity`, that of luminance (1, N)."""
+    import numpy as np
+
+    shares: NDArray[np.float64] = np.array([LUMINANCE]) @ srgb_sensitivity(wavelengths_nm)
+    return shares
 
 
 def _sellmeier(dispersion: Dispersion, wavelength_um: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -61,6 +61,11 @@ class Stack(Record):
         return tuple(layer.kind for layer in self.layers)
 
     @property
+    def films(self) -> tuple[int, ...]:
+        """The number of thin films on every layer."""
+        return tuple(len(layer.films) if isinstance(layer, Interface) else 0 for layer in self.layers)
+
+    @property
     def interfaces(self) -> tuple[Interface, ...]:
         """The interfaces alone, from the top."""
         return tuple(layer for layer in self.layers if isinstance(layer, Interface))
@@ -116,7 +121,7 @@ class Stack(Record):
     def values(self) -> Iterator[tuple[Address, Value]]:
         """The exterior index, and every value of every layer."""
         described = [self.exterior, *(value for layer in self.layers for value in layer.flat().values())]
-        return zip(flat_names.addresses(self.kinds), described)
+        return zip(flat_names.addresses(self.kinds, self.films), described)
 
     # As flat names ---------------------------------------------------------------------------------------------------
 

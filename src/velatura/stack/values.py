@@ -341,71 +341,6 @@ class Pair(Scalar):
         return [number, {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}]
 
 
-class Film(Record):
-    """A thin film: it changes what its interface reflects, by interference, and nothing else."""
-
-    eta: Annotated[
-        float | RGB | str,
-        Index(
-            "absolute index of refraction",
-            low=INDEX_LOW,
-            high=INDEX_HIGH,
-            part="eta",
-            typical=1.5,
-            texturable=False,
-            differentiable=False,
-        ),
-    ]
-    k: Annotated[
-        float | RGB | str,
-        Index(
-            "absolute extinction; only over metals",
-            low=0,
-            high=INDEX_HIGH,
-            part="k",
-            texturable=False,
-            differentiable=False,
-        ),
-    ] = 0.0
-    thickness_nm: Annotated[
-        float, Scalar("thickness", unit="nm", low=0, high=5000, texturable=False, differentiable=False)
-    ]
-
-    def colour(self, key: str) -> RGB:
-        """Its index or extinction, by channel."""
-        value = getattr(self, key)
-        if isinstance(value, str):
-            return rgb(Named(value, "eta" if key == "eta" else "k"))
-        return value if isinstance(value, tuple) else (value, value, value)
-
-
-class Films(Parameter):
-    """Thin films, from the top."""
-
-    what = "a list of films"
-    most: ClassVar[int] = 8
-
-    def check(self, value: Any) -> tuple[Film, ...]:
-        if isinstance(value, str | Mapping) or not isinstance(value, list | tuple):
-            raise self.refuse(value)
-        if len(value) > self.most:
-            raise ValueError(f"must be at most {self.most} films, got {len(value)}")
-        return tuple(self._film(k, entry) for k, entry in enumerate(value))
-
-    def _film(self, k: int, entry: Any) -> Film:
-        if isinstance(entry, Film):
-            return entry
-        if not isinstance(entry, Mapping):
-            raise ValueError(f"film {k}: must hold eta and thickness_nm, got {show(entry)}")
-        try:
-            return Film.from_dict(entry)
-        except ValueError as error:
-            raise ValueError(f"film {k}: {error}") from None
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "array", "items": {"$ref": "#/$defs/film"}, "maxItems": self.most}
-
-
 class Spectrum(Record, Measured):
     """A value for every wavelength, read from a table; files and the plugins use it as they do a measured name.
 
@@ -466,3 +401,62 @@ class Brushing(Varying):
     u: Annotated[float, Scalar("centre, in texture coordinates", texturable=False, differentiable=False)] = 0.5
     v: Annotated[float, Scalar("centre, in texture coordinates", texturable=False, differentiable=False)] = 0.5
     offset: Annotated[float, Scalar("added to the angle", unit="degrees", texturable=False, differentiable=False)] = 0.0
+
+
+class Film(Record):
+    """A thin film: it changes what its interface reflects, by interference, and nothing else."""
+
+    eta: Annotated[
+        float | RGB | str,
+        Index(
+            "absolute index of refraction",
+            low=INDEX_LOW,
+            high=INDEX_HIGH,
+            part="eta",
+            typical=1.5,
+            texturable=False,
+        ),
+    ]
+    k: Annotated[
+        float | RGB | str,
+        Index(
+            "absolute extinction; only over metals",
+            low=0,
+            high=INDEX_HIGH,
+            part="k",
+            texturable=False,
+        ),
+    ] = 0.0
+    thickness_nm: Annotated[float | Texture, Scalar("thickness", unit="nm", low=0, high=5000, typical=300.0)]
+
+    @property
+    def absorbs(self) -> bool:
+        """Whether it may absorb light."""
+        return self.k not in (0.0, (0.0, 0.0, 0.0))
+
+
+class Films(Parameter):
+    """Thin films, from the top."""
+
+    what = "a list of films"
+    most: ClassVar[int] = 8
+
+    def check(self, value: Any) -> tuple[Film, ...]:
+        if isinstance(value, str | Mapping) or not isinstance(value, list | tuple):
+            raise self.refuse(value)
+        if len(value) > self.most:
+            raise ValueError(f"must be at most {self.most} films, got {len(value)}")
+        return tuple(self._film(k, entry) for k, entry in enumerate(value))
+
+    def _film(self, k: int, entry: Any) -> Film:
+        if isinstance(entry, Film):
+            return entry
+        if not isinstance(entry, Mapping):
+            raise ValueError(f"film {k}: must hold eta and thickness_nm, got {show(entry)}")
+        try:
+            return Film.from_dict(entry)
+        except ValueError as error:
+            raise ValueError(f"film {k}: {error}") from None
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "array", "items": {"$ref": "#/$defs/film"}, "maxItems": self.most}

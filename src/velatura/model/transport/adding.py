@@ -20,8 +20,8 @@ from velatura import ops
 from velatura.model.transport.interfaces import Facets, Setting, interface
 from velatura.model.transport.media import Slab, medium
 from velatura.model.transport.operators import Layer, Operator
-from velatura.sampling.coated import coated
-from velatura.stack import DiffuseValues, Material, MediumValues, srgb_sensitivity
+from velatura.sampling import coated
+from velatura.stack import DiffuseValues, Material, MediumValues
 
 Array = NDArray[np.floating]
 
@@ -111,7 +111,7 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
     outside = float(ops.mean(_colours(material.exterior)))
     found: list[Part] = []
     above = _colours(material.exterior) / outside
-    for each in material.solid().layers:
+    for each, films in zip(material.solid().layers, coated.of(material)):
         if isinstance(each, MediumValues):
             tau_a, tau_s = (_colours(each.depth * sigma) for sigma in (each.sigma_a, each.sigma_s))
             g = _colours(each.g)
@@ -124,8 +124,7 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
             k = _colours(each.k) / outside if each.kind == "conductor" else None
             angle = float(np.radians(each.rotation))
             facets = Facets(above, below, k, float(each.alpha_u), float(each.alpha_v), angle)
-            if each.coating:
-                films = coated(each.coating, srgb_sensitivity)
+            if films:
                 facets = replace(facets, films=films.data, rarer=films.rarer)
             found.append(facets)
             if each.kind == "dielectric" and below is not None:

@@ -1,19 +1,26 @@
-"""Numbers of a material that are being differentiated, and the steps over which differences are taken."""
+"""A renderer's constants as numbers; those that are being differentiated, and steps over which to take differences."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from velatura.ops import Value
 from velatura.sampling import differences
 from velatura.stack import Address, Material
 
-RELATIVES = {"alpha_u": 0.04, "alpha_v": 0.04, "rotation": 0.0}  # steps over a value
+# Steps over a value; those of films are small to phases
+RELATIVES = {"alpha_u": 0.04, "alpha_v": 0.04, "rotation": 0.0, "film_thickness_nm": 0.0, "film_eta": 0.004}
 RELATIVE = 0.02
-STEPS = {"alpha_u": 0.004, "alpha_v": 0.004, "rotation": 1.0}  # least steps; rotations are in degrees
+STEPS = {
+    "alpha_u": 0.004,
+    "alpha_v": 0.004,
+    "rotation": 1.0,
+    "film_thickness_nm": 3.0,
+}  # least; rotations are in degrees
 STEP = 0.005
 
 
@@ -34,7 +41,7 @@ class Variables:
         """Numbers a step below and above that of the k-th variable, x, within the range."""
         address = self.addresses[self.given[k].places[0][0]]
         low, high = address.declared.within
-        step = max(RELATIVES.get(address.key, RELATIVE) * abs(x), STEPS.get(address.key, STEP))
+        step = max(RELATIVES.get(address.role, RELATIVE) * abs(x), STEPS.get(address.role, STEP))
         return max(x - step, low), min(x + step, high)
 
     def replaced(self, material: Material, numbers: Sequence[float]) -> Material:
@@ -56,3 +63,14 @@ class Variables:
             return colour
 
         return material.each(value)
+
+
+def plain(material: Material) -> Material:
+    """A material of a renderer's constants with values of NumPy: floats, and colours (C, 1)."""
+
+    def value(found: Value, colour: bool) -> Any:
+        channels = np.asarray(found, float).reshape(-1)
+        return channels[:, None] if colour else float(channels[0])
+
+    numbers = material.each(lambda address, found: value(found, address.colour)).coated([None] * len(material.layers))
+    return numbers if isinstance(material.light, str) else replace(numbers, light=np.ravel(np.array(material.light)))

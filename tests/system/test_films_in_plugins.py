@@ -1,0 +1,169 @@
+"""Thin films of values that change in a renderer: gradients, textures of thickness, and other variants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+from velatura.optics.films import Film, coherent
+from velatura.stack import luminance_sensitivity
+
+COATED = vt.Stack(
+    [
+        vt.Interface(eta=1.5, alpha=0.05, films=[vt.Film(eta=2.0, thickness_nm=200)]),
+        vt.Medium(sigma_a=(0.1, 0.2, 0.3)),
+        vt.Interface(conductor="Al", alpha=0.15, films=[vt.Film(eta=1.46, thickness_nm=320)]),
+    ]
+)
+PANE = vt.Stack(
+    [
+        vt.Interface(eta=1.5, alpha=0.1, films=[vt.Film(eta=1.38, thickness_nm=100)]),
+        vt.Interface(eta=1, alpha=0.05, films=[vt.Film(eta=2.2, thickness_nm=150), vt.Film(eta=1.38, thickness_nm=90)]),
+    ],
+    thin=True,
+)
+OXIDE = vt.Stack([vt.Interface(conductor="Al", alpha=0.2, films=[vt.Film(eta=1.7, thickness_nm=300)])])
+
+
+@pytest.fixture(scope="module", autouse=True)
+def mi() -> Iterator[Any]:
+    yield kernel.mitsuba("llvm_ad_rgb")
+    kernel.mitsuba("llvm_ad_rgb")
+
+
+def lit(mi: Any, cosine: float, u: Any = 0.5) -> Any:
+    import drjit as dr
+
+    si = dr.zeros(mi.SurfaceInteraction3f, np.size(u))
+    si.wi = mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0.0, cosine)
+    si.uv = mi.Point2f(mi.Float(np.atleast_1d(u).astype(np.float32)), 0.5)
+    return si
+
+
+def albedo(mi: Any, bsdf: Any, cosine: float, u: Any = 0.5) -> np.ndarray:
+    return np.array(bsdf.eval_diffuse_reflectance(lit(mi, cosine, u)))
+
+
+def value(mi: Any, bsdf: Any, u: Any = 0.5) -> Any:
+    return bsdf.eval(mi.BSDFContext(), lit(mi, 0.8, u), mi.Vector3f(-0.55, 0.1, float(np.sqrt(0.6875))))
+
+
+def test_films_are_listed_by_flat_names(mi: Any) -> None:
+    parameters = mi.traverse(vt.bsdf(OXIDE))
+    assert float(parameters["layer0_film0_thickness_nm"][0]) == 300
+    assert "layer0_film0_eta" in parameters and "layer0_film0_k" in parameters
+
+
+@pytest.mark.parametrize(
+    ("model", "stack", "name", "step"),
+    [
+        ("velatura", COATED, "layer0_film0_thickness_nm", 1.0),
+        ("velatura", COATED, "layer0_film0_eta", 0.005),
+        ("velatura", COATED, "layer0_eta", 0.02),
+        ("velatura", PANE, "layer1_film1_thickness_nm", 1.0),
+        ("belcour2018", COATED, "layer0_film0_thickness_nm", 1.0),
+        ("belcour2018", OXIDE, "layer0_film0_eta", 0.005),
+    ],
+)
+def test_gradients_are_finite_differences(mi: Any, model: str, stack: vt.Stack, name: str, step: float) -> None:
+    import drjit as dr
+
+    bsdf = vt.bsdf(stack, model=model, reflectance="fgd")
+    parameters = mi.traverse(bsdf)
+    start = np.ravel(np.array(parameters[name])).tolist()[0]
+
+    def at(x: Any) -> Any:
+        parameters[name] = mi.Float(x)
+        parameters.update()
+        return value(mi, bsdf)
+
+    low, high = (np.array(at(start + side * step)).ravel() for side in (-1, 1))
+    variable = mi.Float(start)
+    dr.enable_grad(variable)
+    found = at(variable)
+    dr.forward(variable)
+    assert np.ravel(dr.grad(found)) == pytest.approx((high - low) / (2 * step), rel=0.06, abs=4e-4)
+
+
+def grey(mi: Any, path: Path, ends: tuple[float, float]) -> str:
+    """An image from one value to another, which a texture interpolates between a quarter and three of its width."""
+    mi.util.write_bitmap(str(path), np.array([[[ends[0]], [ends[1]]]] * 2, np.float32), write_async=False)
+    return str(path)
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018"])
+def test_a_texture_of_thickness_is_the_material_of_each_thickness(mi: Any, model: str, tmp_path: Path) -> None:
+    """Of four fringes; energies and values within .003 of what is reflected the most."""
+    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.0, 1.0)), "scale": 500.0, "offset": 100.0}
+    textured = vt.bsdf(OXIDE.replace(layer0_film0_thickness_nm=texture), model=model, reflectance="fgd")
+    thicknesses = np.array([103.0, 264.0, 555.5])
+    u = 0.25 + 0.5 * (thicknesses - 100) / 500
+    albedos, values = [albedo(mi, textured, cosine, u) for cosine in (1.0, 0.4)], np.array(value(mi, textured, u))
+    for k, thickness in enumerate(thicknesses.tolist()):
+        uniform = vt.bsdf(OXIDE.replace(layer0_film0_thickness_nm=thickness), model=model, reflectance="fgd")
+        for cosine, found in zip((1.0, 0.4), albedos):
+            assert found[:, k] == pytest.approx(albedo(mi, uniform, cosine)[:, 0], abs=3e-3)
+        assert values[:, k] == pytest.approx(np.array(value(mi, uniform))[:, 0], abs=3e-3 * float(values.max()))
+
+
+def test_the_walk_has_textures_of_thickness(mi: Any, tmp_path: Path) -> None:
+    """Its paths are the same as those of the uniform material, to rounding."""
+    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.0, 1.0)), "scale": 500.0, "offset": 100.0}
+    reference = {"layer2_film0_thickness_nm": 350.0}, {"layer2_film0_thickness_nm": texture}
+    uniform, textured = (vt.bsdf(COATED.replace(**values), model="reference") for values in reference)
+    count, found = 20_000, []
+    for bsdf in (uniform, textured):
+        rng = mi.PCG32(count)
+        u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        found.append(np.mean(np.array(bsdf.sample(mi.BSDFContext(), lit(mi, 0.8, np.full(count, 0.5)), *u)[1]), axis=1))
+    assert found[0] == pytest.approx(found[1], abs=1e-3)
+
+
+def test_texels_of_thickness_have_gradients(mi: Any, tmp_path: Path) -> None:
+    import drjit as dr
+
+    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.45, 0.55)), "scale": 300.0, "offset": 100.0}
+    bsdf = vt.bsdf(OXIDE.replace(layer0_film0_thickness_nm=texture))
+    parameters = mi.traverse(bsdf)
+    name = "layer0_film0_thickness_nm.data"
+    texels = np.array(parameters[name])
+
+    def at(step: float) -> np.ndarray:
+        parameters[name] = mi.TensorXf((texels + step).astype(np.float32))
+        parameters.update()
+        return np.array(value(mi, bsdf)).ravel()
+
+    expected = (at(0.01) - at(-0.01)) / 0.02
+    step = mi.Float(0.0)
+    dr.enable_grad(step)
+    parameters[name] = mi.TensorXf(mi.Float(texels.ravel()) + step, texels.shape)
+    parameters.update()
+    found = value(mi, bsdf)
+    dr.forward(step)
+    assert np.ravel(dr.grad(found)) == pytest.approx(expected, rel=0.05, abs=5e-3)
+
+
+def test_one_film_of_an_interface_has_a_texture(mi: Any, tmp_path: Path) -> None:
+    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.0, 1.0))}
+    with pytest.raises(vt.InvalidInput, match=r"layer1_film1_thickness_nm: only one of the films on an interface"):
+        vt.bsdf(PANE.replace(layer1_film0_thickness_nm=texture, layer1_film1_thickness_nm=texture))
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018", "reference"])
+def test_monochromatic_variants_have_the_luminance_of_films(model: str) -> None:
+    """Of one index for all colours; the noise of the walk is a third of what is allowed."""
+    mono = kernel.mitsuba("llvm_ad_mono")
+    stack = vt.Stack([vt.Interface(eta=2.0, k=1.0, alpha=0.02, films=[vt.Film(eta=1.5, thickness_nm=400)])])
+    nm = np.arange(360.0, 831.0)
+    weights = luminance_sensitivity(nm)[0]
+    exact = coherent(np.array(0.8), nm, 1.0, [Film(1.5, 0.0, 400.0)], 2.0, 1.0).reflected
+    rng = mono.PCG32(40_000)
+    u = rng.next_float32(), mono.Point2f(rng.next_float32(), rng.next_float32())
+    _, weight = vt.bsdf(stack, model=model).sample(mono.BSDFContext(), lit(mono, 0.8, np.full(40_000, 0.5)), *u)
+    assert np.mean(np.array(weight)) == pytest.approx(float(weights @ exact / weights.sum()), abs=3e-3)
