@@ -15,7 +15,7 @@ from scipy.stats import chi2
 from velatura import kernel, ops
 from velatura.model import mixture, own_medium
 from velatura.model.adding import Lobe
-from velatura.model.own_medium import OwnMediumLobe
+from velatura.model.own_medium import Index, OwnMediumLobe
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
 from velatura.shader import symbol
@@ -168,6 +168,17 @@ def test_the_lobe_is_reciprocal_but_for_what_lets_it_out(name: str) -> None:
     there = own_medium.eval_pdf(lobe, wi, wo)[0] / (wo[2] * out(wo[2]))
     back = own_medium.eval_pdf(lobe, wo, wi)[0] / (wi[2] * out(wi[2]))
     np.testing.assert_allclose(there, back, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["narrow", "brushed", "very rough", "dielectric"])
+def test_a_denser_medium_needs_no_bounds(name: str) -> None:
+    """What is known to be denser than outside is as it is without that, grazing directions included."""
+    lobe, known = LOBES[name], replace(LOBES[name], n=Index.of(LOBES[name].n, denser=True))
+    wi, wo = random_directions(500, 20), random_directions(500, 21)
+    wi[2][:5] = wo[2][5:10] = 1e-4
+    u = np.random.default_rng(22).random((2, 500))
+    np.testing.assert_allclose(own_medium.eval_pdf(known, wi, wo), own_medium.eval_pdf(lobe, wi, wo), rtol=1e-5)
+    np.testing.assert_allclose(own_medium.sample(known, wi, *u), own_medium.sample(lobe, wi, *u), atol=1e-5)
 
 
 @pytest.mark.parametrize("cosine", [1.0, 0.6, 0.3])

@@ -38,19 +38,21 @@ Reflectance = Callable[[Value], Value]
 @dataclass(frozen=True)
 class Index:
     """An index n relative to the medium outside, and what lobes take of it: its inverse, and the radius of the ring of
-    momenta beyond those that can leave, from 1 to n, in squares and as it is."""
+    momenta beyond those that can leave, from 1 to n, in squares and as it is. `denser`: whether n is known to be 1 at
+    least, so that light from any direction gets in."""
 
     n: Value
     inverse: Value
     ring2: Value
     ring: Value
+    denser: bool = False
 
     @classmethod
-    def of(cls, n: Value) -> Index:
+    def of(cls, n: Value, denser: bool = False) -> Index:
         if isinstance(n, Index):
             return n
         ring2 = n * n - 1
-        return cls(n, 1 / n, ring2, ops.sqrt(ops.maximum(ring2, 0.0)))
+        return cls(n, 1 / n, ring2, ops.sqrt(ops.maximum(ring2, 0.0)), denser)
 
     @property
     def is_outside(self) -> bool:
@@ -87,7 +89,7 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     shown, facing = _shown(o, _height2(n, wo[2]), squares), _facing(m, squares)
     ops.names(i=i, o=o, m=m, area=area, shown=shown, facing=facing)
     seen = cos_o * (0.5 / pi) * (area * squares[2]) / (_shown(i, _height2(n, wi[2]), squares) * shown * o[2])
-    if not n.is_outside:
+    if not (n.is_outside or n.denser):
         seen = ops.select(n.ring2 + wo[2] * wo[2] > 0, seen, 0.0)
     light = seen * (o[2] + o[2]) * facing
     if lobe.facets:
@@ -195,7 +197,7 @@ def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Index, Di
     alpha_u, alpha_v = ops.maximum(lobe.roughness.alpha_u, ALPHA_MIN), ops.maximum(lobe.roughness.alpha_v, ALPHA_MIN)
     x, y, z = _in_frame(lobe, wi)
     n = Index.of(lobe.n)
-    if n.is_outside:
+    if n.is_outside or n.denser:
         return alpha_u, alpha_v, n, (x, y, _height(n, z))
     inverse = 1 / ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY)
     scale = ops.minimum(n.n * ((1 - 0.5 * COS_MIN * COS_MIN) * inverse), 1.0)
@@ -222,7 +224,7 @@ def _squares(w: Direction) -> Direction:
 
 def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: Index) -> tuple[Direction, Value]:
     """Along the normal of light from outside the cone that is spread to a momentum p inside, and what scales that."""
-    stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
+    stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2, None if n.denser else 0.0)
     return (i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2), stretch
 
 
@@ -255,4 +257,8 @@ def _chosen(where: Value, a: Value, b: Value) -> Value:
     """Of two indices."""
     if a is b:
         return a
-    return Index(*(ops.select(where, x, y) for x, y in zip(*(vars(Index.of(n)).values() for n in (a, b)))))
+    a, b = Index.of(a), Index.of(b)
+    n, inverse, ring2, ring = (
+        ops.select(where, getattr(a, x), getattr(b, x)) for x in ("n", "inverse", "ring2", "ring")
+    )
+    return Index(n, inverse, ring2, ring, a.denser and b.denser)

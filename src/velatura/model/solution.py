@@ -53,11 +53,12 @@ EVEN = 0.2  # share of samples of the symmetric form that the remainder has at l
 @dataclass(frozen=True)
 class Drawn:
     """A lobe: the number of its interface from the top, that of the one that shapes its light on the way out, None
-    where none does, and whether it is the veil of one."""
+    where none does, whether it is the veil of one, and whether its medium is nowhere of a lower index than outside."""
 
     interface: int
     first: int | None
     veil: bool
+    denser: bool
 
 
 @dataclass(frozen=True)
@@ -446,7 +447,9 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     turns = np.max([[facets.step * max(facets.alpha_u, facets.alpha_v) for facets in found] for found in each], axis=0)
     both = [(k, veil) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
     rough = widths.stepped(turns, widths.LEAST_TURN)
-    lobes = [Drawn(k, widths.first_step(steps[:k]), veil) for k, veil in both]
+    above = np.array([[np.mean(facets.above) / np.mean(found[0].above) for facets in found] for found in each])
+    denser = np.all(above >= 1, axis=0).tolist()
+    lobes = [Drawn(k, widths.first_step(steps[:k]), veil, denser[k]) for k, veil in both]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy, media_of(materials[0]))
 
@@ -563,5 +566,6 @@ def shapes_of(prepared: Prepared, drawn: Sequence[Drawn]) -> list[Shape]:
         own, k = found[lobe.interface], lobe.first
         facets = own if k is None or not own.opaque else None
         out = (indices[0], None) if k is None else (indices[k], found[k])
-        shapes.append(Shape(lobe.interface, indices[lobe.interface], facets, *out))
+        n = replace(indices[lobe.interface], denser=lobe.denser)
+        shapes.append(Shape(lobe.interface, n, facets, *out))
     return shapes

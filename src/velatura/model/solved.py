@@ -414,7 +414,7 @@ def _of_either(where: Value, a: PreparedInterface | None, b: PreparedInterface |
 
 
 def select(where: Value, a: Any, b: Any) -> Any:
-    """Records of values, value by value."""
+    """Records of values, value by value; what is known of a record holds where it does of both."""
     if isinstance(a, Coated) or isinstance(b, Coated):
         return either(where, a, b)
     if is_dataclass(a) and not isinstance(a, type):
@@ -423,6 +423,8 @@ def select(where: Value, a: Any, b: Any) -> Any:
         return type(a)(*(select(where, x, y) for x, y in zip(a, b)))
     if isinstance(a, (list, tuple)):
         return type(a)(select(where, x, y) for x, y in zip(a, b))
-    if a is None or (isinstance(a, (bool, float)) and isinstance(b, (bool, float)) and a == b):
+    if isinstance(a, bool) and isinstance(b, bool):
+        return a and b
+    if a is None or (isinstance(a, float) and isinstance(b, float) and a == b):
         return a
     return ops.select(where, a, b)
