@@ -1,0 +1,209 @@
+"""Thin films: smooth stacks against `tmm`, rough ones against the walk, and what they cost in a render.
+
+- smooth: random stacks of coherent films between thick media, absorbing or clear, s and p apart: the largest error.
+- rough: energies of a model minus those of walks, for random stacks with films and for the same ones without, by kind.
+- cost: CPU time of a render, of `eval_pdf` and of preparation with films over those without, interleaved.
+
+    python benchmarks/films.py [--smooth 10000] [--stacks 12] [--paths 300000] [--rounds 7] [--seed 0] [--model NAME]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
+
+from mixed_films import random_mixed
+from render import picture
+
+import velatura as vt
+from velatura import kernel
+from velatura.model import DEFAULT, named
+from velatura.stack import Film, Interface, Layer, Medium, Stack
+
+COSINES = (1.0, 0.7, 0.35)
+
+
+def smooth(count: int, seed: int) -> float:
+    """The largest error of reflectance or transmittance."""
+    rng, worst = np.random.default_rng(seed), 0.0
+    for _ in range(count):
+        mixed, cosine = random_mixed(rng)
+        for kind in "sp":
+            worst = max(worst, float(np.abs(np.subtract(mixed.summed(kind, cosine), mixed.exact(kind, cosine))).max()))
+    return worst
+
+
+# Rough stacks --------------------------------------------------------------------------------------------------------
+
+
+def films(rng: np.random.Generator, absorbs: bool = False) -> tuple[Film, ...]:
+    """One or two, of any thickness, half of them below 500 nm."""
+    return tuple(
+        Film(
+            eta=float(rng.uniform(1.2, 2.6)),
+            k=float(rng.uniform(0, 0.5)) if absorbs and rng.random() < 0.5 else 0.0,
+            thickness_nm=float(rng.uniform(0, 500) if rng.random() < 0.5 else rng.uniform(0, 5000)),
+        )
+        for _ in range(rng.integers(1, 3))
+    )
+
+
+def alpha(rng: np.random.Generator) -> float:
+    return float(rng.uniform(0.02, 0.55))
+
+
+def metal(rng: np.random.Generator) -> Interface:
+    eta, k = (tuple(map(float, rng.uniform(*span, 3))) for span in ((0.2, 2.0), (1.5, 5.0)))
+    return Interface(eta=eta, k=k, alpha=alpha(rng), films=films(rng, absorbs=True))
+
+
+def glass(rng: np.random.Generator) -> Interface:
+    return Interface(eta=float(rng.uniform(1.2, 2.2)), alpha=alpha(rng), films=films(rng))
+
+
+def coated(rng: np.random.Generator) -> list[Layer]:
+    medium = [Medium(sigma_a=tuple(map(float, rng.uniform(0, 0.5, 3))))] if rng.random() < 0.5 else []
+    return [glass(rng), *medium, metal(rng)]
+
+
+def pane(rng: np.random.Generator) -> list[Layer]:
+    return [glass(rng), Interface(eta=1.0, alpha=alpha(rng), films=films(rng))]
+
+
+def many(rng: np.random.Generator) -> list[Layer]:
+    return [glass(rng), glass(rng), metal(rng)]
+
+
+KINDS: dict[str, Callable[[np.random.Generator], list[Layer]]] = {
+    "metal": lambda rng: [metal(rng)],
+    "brushed metal": lambda rng: [metal(rng).model_copy(update={"alpha": (alpha(rng), alpha(rng))})],
+    "glass": lambda rng: [glass(rng)],
+    "coated metal": coated,
+    "pane": pane,
+    "two coats over metal": many,
+}
+
+
+def without(stack: Stack) -> Stack:
+    """The stack without its films."""
+    return Stack([x.model_copy(update={"films": ()}) if isinstance(x, Interface) else x for x in stack.layers])
+
+
+def errors(stack: Stack, model: str, often: bool, paths: int, seed: int) -> list[float]:
+    """Energies by colour of all that is reflected, and of all that passes, minus those of walks."""
+    chosen = named(model, reflectance="fgd-multi" if often else "fgd")
+    truth = vt.reference.statistics(stack, COSINES, paths=paths, seed=seed, microsurface=often)
+    found = vt.lobes(stack, COSINES, model=chosen)
+    off = [np.sum(found.energy, axis=0) + found.remainder - np.sum(truth.energy, axis=0)]
+    if truth.transmitted:
+        off.append(found.passed - truth.transmitted.energy)
+    return [float(x) for x in np.ravel(off)]
+
+
+def rough(model: str, stacks: int, paths: int, seed: int) -> Iterator[tuple[str, bool, list[list[float]]]]:
+    """By kind, and whether facets are met often: errors with films, and without."""
+    for number, (kind, make) in enumerate(KINDS.items()):
+        for often in (False, True):
+            rng, found = np.random.default_rng([seed, number]), list[list[float]]([[], []])
+            for k in range(stacks):
+                stack = Stack(make(rng))
+                for column, each in zip(found, (stack, without(stack))):
+                    column += errors(each, model, often, paths, seed + k)
+            yield kind, often, found
+
+
+# Cost ----------------------------------------------------------------------------------------------------------------
+
+
+COSTS = {
+    "metal": Stack([Interface(conductor="Al", alpha=0.15, films=[Film(eta=1.46, thickness_nm=320)])]),
+    "glass": Stack([Interface(eta=1.5, alpha=0.1, films=[Film(eta=2.0, thickness_nm=200)])]),
+    "coated metal": Stack(
+        [
+            Interface(eta=1.5, alpha=0.05, films=[Film(eta=2.0, thickness_nm=200)]),
+            Interface(conductor="Al", alpha=0.15, films=[Film(eta=1.46, thickness_nm=320)]),
+        ]
+    ),
+    "pane": Stack(
+        [
+            Interface(eta=1.5, alpha=0.1, films=[Film(eta=2.0, thickness_nm=200)]),
+            Interface(eta=1.0, alpha=0.05, films=[Film(eta=2.0, thickness_nm=200)]),
+        ]
+    ),
+}
+
+
+def evaluation(mi: Any, bsdf: Any, count: int = 1 << 21) -> Callable[[int], None]:
+    """What evaluates random pairs of directions on the sphere."""
+    import drjit as dr
+
+    rng = mi.PCG32(count)
+
+    def job(_: int) -> None:
+        si = dr.zeros(mi.SurfaceInteraction3f, count)
+        si.wi, wo = (
+            mi.warp.square_to_uniform_sphere(mi.Point2f(rng.next_float32(), rng.next_float32())) for _ in range(2)
+        )
+        dr.eval(bsdf.eval_pdf(mi.BSDFContext(), si, wo), rng)
+        dr.sync_thread()
+
+    return job
+
+
+def ratio(jobs: list[Callable[[int], None]], rounds: int) -> float:
+    """Median over rounds of the CPU time of the first job over that of the second, interleaved."""
+    ratios = []
+    for number in range(rounds + 1):
+        seconds = []
+        for job in jobs:
+            start = time.process_time()
+            job(number)
+            seconds.append(time.process_time() - start)
+        ratios.append(seconds[0] / seconds[1])
+    return median(ratios[1:])  # the first one compiles
+
+
+def cost(model: str, rounds: int) -> None:
+    mi = kernel.mitsuba("llvm_ad_rgb")
+    for name, stack in COSTS.items():
+        both = [stack, without(stack)]
+        bsdfs = [vt.bsdf(each, model=model) for each in both]
+        render = ratio([picture(mi, bsdf, 256, 32) for bsdf in bsdfs], rounds)
+        evaluated = ratio([evaluation(mi, bsdf) for bsdf in bsdfs], rounds)
+        print(f"cost, {name:22s} render {render:.2f}  eval_pdf {evaluated:.2f}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--smooth", type=int, default=10_000)
+    parser.add_argument("--stacks", type=int, default=12)
+    parser.add_argument("--paths", type=int, default=300_000)
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--model", default=DEFAULT)
+    options = parser.parse_args()
+    warnings.filterwarnings("ignore", category=RuntimeWarning)  # of tmm, where nothing passes
+    if options.smooth:
+        print(f"smooth: {options.smooth} stacks, s and p: error {smooth(options.smooth, options.seed):.1e}", flush=True)
+    if options.stacks:
+        print(f"{'rough, model minus walk':42s}{'with films':>24s}{'without':>24s}")
+        for kind, often, found in rough(options.model, options.stacks, options.paths, options.seed):
+            cells = (f"mean {np.abs(x).mean():.4f} worst {np.abs(x).max():.4f}" for x in found)
+            name = f"{kind}, facets met {'often' if often else 'once'}"
+            print(f"{name:42s}" + "".join(f"{cell:>24s}" for cell in cells), flush=True)
+    if options.rounds:
+        cost(options.model, options.rounds)
+
+
+if __name__ == "__main__":
+    main()
