@@ -13,6 +13,7 @@ from velatura.optics import films, fresnel
 from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.films import Film
 from velatura.stack.spectra import srgb_sensitivity, srgb_weights
+from velatura.tables.microsurface_walks import reflected_share
 
 COSINES = np.linspace(0.01, 1, 34)
 
@@ -192,3 +193,19 @@ def test_colours_change_with_thickness_as_they_do_with_fine_integration() -> Non
     found = np.array([x.reflectance(at, srgb_sensitivity)[:, 0] for x in coatings])
     exact = np.array([finely(x, at)[:, 0] for x in coatings])
     assert np.abs(np.diff(found, axis=0) - np.diff(exact, axis=0)).max() < 1e-3
+
+
+# Between facets
+
+
+def test_of_light_between_facets_a_mirror_reflects_all_and_a_black_film_nothing() -> None:
+    """A channel may be clipped to 0 at some angles."""
+    cosines, alphas = np.array([0.2, 0.6, 1.0]), np.full(3, 0.4)
+
+    def metal(cosine: np.ndarray) -> np.ndarray:
+        return np.stack([0 * cosine, cosine > 0.5, 0 * cosine + 1])
+
+    black, half, mirror = reflected_share((metal, None), 1.0, cosines, alphas, 512)
+    assert black == pytest.approx(np.zeros(3))
+    assert np.all((half > 0.05) & (half < 0.95))
+    assert mirror == pytest.approx(np.ones(3), abs=0.02)

@@ -157,13 +157,12 @@ def reflected_share(
         else:
             walks.scatter(i, h, np.full(count, eta), (above, below))
         leaving = walks.leave()
+        if walks.meetings == 1:
+            again = _by_point(np.atleast_2d(walks.weight), walks, count)
         if below is None:
             reflectance = above(np.clip(ggx.dot(i, h), 0, 1))
             leaving, walks.weight = leaving * reflectance, walks.weight * reflectance
-        if walks.meetings == 1:
-            met = walks.weight if below else walks.weight / reflectance
-            again = _by_point(met, walks, count)
-        else:
+        if walks.meetings > 1:
             energy = energy + _by_point(np.where(walks.outside, leaving, 0), walks, count)
         walks.end_faint()
     return energy / np.maximum(again, np.finfo(float).tiny)
