@@ -840,6 +840,8 @@ def test_what_is_exported_is_seen_before_it_is_taken(visit: Open, tmp_path: Path
     assert Path(download.value.path()).read_text() == written.input_value()
     page.page.get_by_label("Format", exact=True).select_option("glsl")
     page.page.get_by_role("button", name="Download .tables.bin").wait_for()
+    costs = page.page.get_by_role("table", name="What a call costs")
+    assert "texels read" in costs.get_by_role("row", name="vt_lobes").inner_text()
     assert "vt_eval_pdf" in written.input_value()
 
 

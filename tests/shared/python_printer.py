@@ -13,6 +13,7 @@ from velatura import ops
 from velatura.shader import Printer
 from velatura.shader.atlas import Layout
 from velatura.shader.bake import Bake, Group
+from velatura.shader.cost import Cost
 from velatura.shader.material import Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Output, Struct
 from velatura.shader.solved import Solution, Tabulated
@@ -104,7 +105,7 @@ class PythonPrinter(Printer):
 
     # Programs
 
-    def header(self, name: str, model: str, fixed: bool) -> str:
+    def header(self, name: str, model: str, fixed: bool, costs: Mapping[str, Cost]) -> str:
         return f"# {name} as the model {model} has it\n"
 
     def structs(self, structs: Sequence[Struct]) -> str:

@@ -62,6 +62,7 @@ def test_a_material_is_exported_as_the_command_line_does(to: str) -> None:
         assert answer["text"] == made.text
         assert {ending: decoded(data).tobytes() for ending, data in answer["beside"].items()} == dict(made.beside)
         assert answer["ending"] == FORMATS[to].endings[0]
+        assert answer["costs"] == made.costs
 
 
 def test_a_session_is_json_and_names_all_there_is() -> None:

@@ -20,7 +20,9 @@ import velatura as vt
 from velatura import ops, tables
 from velatura.errors import InvalidInput
 from velatura.shader import Recording, constant, record, shader
+from velatura.shader.atlas import texels
 from velatura.shader.bake import Bake, Group
+from velatura.shader.cost import Cost, cost
 from velatura.shader.films import texture
 from velatura.shader.glsl import GLSL
 from velatura.shader.graph import Graph
@@ -284,7 +286,8 @@ def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
     assert isinstance(made.baked, Tabulated)
     columns, energies = made.baked.groups
     assert (columns.name, energies.name) == ("columns", "energies")
-    assert columns.texels * 2 ** len(made.baked.nodes) == fetches
+    assert columns.texels * 2 ** len(made.baked.nodes) == made.costs["vt_lobes"].texels == fetches
+    assert f"vt_lobes: {made.costs['vt_lobes'].operations} operations, {fetches} texels read" in made.text
     assert made.uniforms == {}
     assert "vt_tables" not in made.text
     assert made.columns is not None
@@ -422,6 +425,18 @@ def test_what_is_read_has_loops_and_what_is_run_has_none() -> None:
     assert "for" not in unrolled
     (found,) = evaluate([sum(powers(number("x")))], {"x": X})
     np.testing.assert_allclose(found, 0.75 * X + 2 + 5 * X)
+
+
+def test_costs_count_channels_rounds_of_loops_and_nodes_between_which_tables_are_read() -> None:
+    x, c = number("x"), colour("c")
+    assert cost([(x + 1.0) * c], 0) == Cost(1 + 3, 0)
+    assert cost([ops.exp(c)], 0) == Cost(12, 0)
+    with ops.readable():
+        (last,) = ops.repeat(lambda a: [a * x + 1.0], 5, x)
+    assert cost([last], 0).operations >= 5 * 2
+    name, table = next((name, table) for name, table in tables.load().items() if len(table.shape) == 2)
+    (first, *_) = ops.interpolate(table, x, x)
+    assert cost([first], 0).texels == 4 * texels(name)
 
 
 @pytest.mark.parametrize(

@@ -210,7 +210,8 @@ def environment(body: Body) -> Answer:
 
 
 def export(body: Body) -> Answer:
-    """A material for other programs: the text, what lies beside it by ending, and the first ending of the text.
+    """A material for other programs: the text, what lies beside it by ending, the first ending of the text, and what
+    calls of its functions cost.
 
     Values are worked in where they are `fixed` and the format allows that.
     """
@@ -218,7 +219,7 @@ def export(body: Body) -> Answer:
     constant = ["all"] if body.get("fixed") and to in exports.with_constants() else []
     made = exports.export(material_of(body), to, model_of(body), constant=constant, folder=Path.cwd())
     beside = {ending: array(np.frombuffer(data, np.uint8), "uint8") for ending, data in made.beside.items()}
-    return {"text": made.text, "beside": beside, "ending": exports.FORMATS[to].endings[0]}
+    return {"text": made.text, "beside": beside, "ending": exports.FORMATS[to].endings[0], "costs": made.costs}
 
 
 _VERBS: dict[str, Verb] = {

@@ -53,10 +53,14 @@ class Request:
 
 @dataclass(frozen=True)
 class Export:
-    """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`."""
+    """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
+
+    costs: of code, what a call of each function costs, in words.
+    """
 
     text: str
     beside: Mapping[str, bytes] = field(default_factory=dict)
+    costs: Mapping[str, str] = field(default_factory=dict)
 
     def save(self, path: str | Path) -> list[Path]:
         """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.

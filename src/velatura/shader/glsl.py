@@ -12,6 +12,7 @@ import numpy as np
 
 from velatura.shader.atlas import WIDTH, Layout, height
 from velatura.shader.bake import Bake, Group
+from velatura.shader.cost import Cost, described
 from velatura.shader.films import NODES
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Field, Output, Printer, Struct
@@ -143,9 +144,10 @@ class Glsl(Printer):
 
     # Programs
 
-    def header(self, name: str, model: str, fixed: bool) -> str:
+    def header(self, name: str, model: str, fixed: bool, costs: Mapping[str, Cost]) -> str:
         filled = "" if fixed else "        // or from uniforms, or your own textures"
-        return _HEADER.format(name=name, model=model, filled=filled)
+        spent = [f"//     {function}: {described(cost)}" for function, cost in costs.items()]
+        return _HEADER.format(name=name, model=model, filled=filled, costs="\n".join(spent))
 
     def structs(self, structs: Sequence[Struct]) -> str:
         return "".join(
@@ -266,6 +268,9 @@ _HEADER = """\
 //
 // Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
 // `velatura export -o` writes the textures that are read beside this text, row by row.
+//
+// What a call costs, colours being three numbers and elementary functions four operations:
+{costs}
 
 precision highp float;
 precision highp int;

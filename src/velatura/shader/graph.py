@@ -62,11 +62,11 @@ def known_before(
     found = dict.fromkeys(given)
     for x in order:
         known = x in read and x not in depend and not bound[x] and x.kind in ("number", "colour")
-        if known and x not in found and sum(_work(y) for y in in_order([x], found) if y not in found) >= least:
+        if known and x not in found and sum(work(y) for y in in_order([x], found) if y not in found) >= least:
             found[x] = None
     return [x for x in found if x not in given]
 
 
-def _work(x: Symbol) -> int:
+def work(x: Symbol) -> int:
     """Operations that a value takes."""
     return 0 if x.op in ("input", "component", "item") else DEAR.get(x.op, 1)

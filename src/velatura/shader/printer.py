@@ -15,6 +15,7 @@ from velatura.shader.symbol import Kind, Operand
 if TYPE_CHECKING:
     from velatura.shader.atlas import Layout
     from velatura.shader.bake import Bake, Group
+    from velatura.shader.cost import Cost
     from velatura.shader.material import Filled
     from velatura.shader.solved import Tabulated
 
@@ -150,9 +151,9 @@ class Printer(ABC):
     # Programs
 
     @abstractmethod
-    def header(self, name: str, model: str, fixed: bool) -> str:
-        """Comments that describe the material, whose values may be `fixed`, and how the code is called, and the
-        required first lines."""
+    def header(self, name: str, model: str, fixed: bool, costs: Mapping[str, Cost]) -> str:
+        """Comments that describe the material, whose values may be `fixed`, how the code is called and what each
+        function costs, and the required first lines."""
 
     @abstractmethod
     def structs(self, structs: Sequence[Struct]) -> str:

@@ -14,6 +14,7 @@ from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.lobe_merging import merging
 from velatura.shader import atlas, films, material
 from velatura.shader.bake import Bake
+from velatura.shader.cost import Cost, cost
 from velatura.shader.glsl import GLSL
 from velatura.shader.printer import Field, Printer, Struct
 from velatura.shader.recording import Recording, part, record
@@ -37,6 +38,7 @@ class Shader:
     None where it reads none.
     `lobes` are the layers whose light each reflected lobe is, seen from above; `shares` names the energies or chances,
     fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
+    `costs` are those of `vt_lobes`, `vt_eval_pdf` and `vt_sample`, each called once.
     """
 
     text: str
@@ -48,6 +50,7 @@ class Shader:
     shares: Sequence[str]
     baked: Bake | Tabulated | None
     films: np.ndarray | None
+    costs: Mapping[str, Cost]
 
     @property
     def tables(self) -> np.ndarray:
@@ -97,8 +100,9 @@ def shader(
     layouts, filled = atlas.layouts(looked_up), material.filled(stack, read, bool(shown))
     read_films = films.texture(stack) if recording.films else None
     name = "A material" if shown else " ".join(stack.name.split()) or "A material"
+    costs = _costs(recording)
     parts = [
-        printer.header(name, _described(recording.model), bool(recording.energies)),
+        printer.header(name, _described(recording.model), bool(recording.energies), costs),
         printer.structs(material.structs(stack, read)),
         *([printer.parameters(len(shown), *_changing(baked))] if shown else []),
         printer.material(filled),
@@ -122,7 +126,19 @@ def shader(
         shares=_shares(recording),
         baked=baked,
         films=read_films,
+        costs=costs,
     )
+
+
+def _costs(recording: Recording) -> dict[str, Cost]:
+    """By function; lobes that are read from a texture of one or two axes."""
+    functions = {
+        "vt_lobes": list(recording.lobes.values()),
+        "vt_eval_pdf": [recording.value, recording.density],
+        "vt_sample": recording.drawn,
+    }
+    axes = len(recording.baked.nodes) if recording.baked else 0
+    return {name: cost(outputs, axes) for name, outputs in functions.items()}
 
 
 def _changing(baked: Bake | Tabulated | None) -> tuple[int, int]:

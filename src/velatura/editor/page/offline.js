@@ -68,11 +68,12 @@ export async function connectFiles(folder) {
 
   /** The shader in closed form, with the values of the material in the place of those that it was printed with. */
   async function written({ material, model, to }) {
-    const { text, tables: key } = await load(`${to}/${model}/${orderOf(material)}`);
+    const { text, tables: key, costs } = await load(`${to}/${model}/${orderOf(material)}`);
     const values = flat(read(material), session);
     const put = (line, begin, place) => `${begin}${literal(values[place.replace('.', '_')], line.includes('vec3'))};`;
     const beside = key && { '.tables.bin': (await tables({ key })).texture };
-    return { text: text.replace(/^( *m\.([\w.]+) = ).*;$/gm, put), ending: `.${to}`, beside: beside ?? {} };
+    const filled = text.replace(/^( *m\.([\w.]+) = ).*;$/gm, put);
+    return { text: filled, ending: `.${to}`, beside: beside ?? {}, costs };
   }
 
   const file = (verb) => ({ name }) => load(`${verb}/${name}`);

@@ -62,11 +62,18 @@ export function createExports({ store, session, call, lacks, files, messages, up
     </dialog>`;
   }
 
-  function content({ text, ending, beside }) {
+  function content({ text, ending, beside, costs }) {
     const file = (size, name, data) =>
       html`<button type="button" @click=${() => files.give(data, name.slice(1))}>Download ${name} (${bytes(size)})</button>`;
     const others = Object.entries(beside).map(([name, array]) => [name, decode(array).array]);
     return html`<p>${text.split('\n').length} lines</p>
+      ${
+        Object.keys(costs).length
+          ? html`<table class="costs" aria-label="What a call costs">
+              ${Object.entries(costs).map(([name, cost]) => html`<tr><th scope="row"><code>${name}</code></th><td>${cost}</td></tr>`)}
+            </table>`
+          : nothing
+      }
       <textarea readonly spellcheck="false" aria-label="What is written" .value=${text}></textarea>
       <div class="actions">
         ${file(new Blob([text]).size, ending, text)}

@@ -1,0 +1,54 @@
+"""What the functions of a shader cost for one point of a material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import prod
+
+from velatura import tables
+from velatura.shader import atlas
+from velatura.shader.films import FILM
+from velatura.shader.graph import work
+from velatura.shader.symbol import Operand, Symbol, in_order, inside, is_colour
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Operations on numbers, those on colours being three, and elementary functions as many as they take; and texels
+    that are read."""
+
+    operations: int
+    texels: int
+
+
+def described(cost: Cost) -> str:
+    """A cost in words."""
+    read = f", {cost.texels} texels read" if cost.texels else ""
+    return f"{cost.operations} operations{read}"
+
+
+def cost(outputs: Sequence[Operand], axes: int) -> Cost:
+    """The cost of working out values together; `axes` are those of the texture that lobes are read from."""
+    order = in_order(outputs)
+    bound = inside(order)
+    loop_of = {name: symbol for symbol in order if symbol.kind == "loop" for name in symbol.detail.bound}
+    operations = texels = 0
+    for symbol in order:
+        times = prod(loop.detail.times for loop in {loop_of[name] for name in bound[symbol]})
+        operations += times * work(symbol) * (3 if is_colour(symbol) else 1)
+        texels += times * _texels(symbol, axes)
+    return Cost(operations, texels)
+
+
+def _texels(symbol: Symbol, axes: int) -> int:
+    """How many a look-up reads: between two nodes along every axis."""
+    if symbol.op == FILM:
+        return 2
+    if symbol.op == "baked":
+        return int(symbol.detail.texels) << axes
+    if symbol.op not in ("texels", "value"):
+        return 0
+    table = getattr(tables.load(), symbol.detail)
+    times = 3 if is_colour(symbol) else 1
+    return times * atlas.texels(symbol.detail) << len(table.shape)
