@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 import tmm
 
+import velatura as vt
 from velatura import kernel
 from velatura.optics import films, fresnel
 from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.films import Film
+from velatura.sampling import coated
+from velatura.stack import Material
 from velatura.stack.spectra import srgb_sensitivity, srgb_weights
 from velatura.tables.microsurface_walks import reflected_share
 
@@ -185,14 +188,59 @@ def test_a_film_of_no_thickness_has_no_colour() -> None:
         assert found[c] == pytest.approx(fresnel.conductor(COSINES, media[1][c], media[2][c]), abs=1e-9)
 
 
-def test_colours_change_with_thickness_as_they_do_with_fine_integration() -> None:
+@pytest.mark.parametrize(
+    ("eta", "k", "others", "base", "cosine"),
+    [
+        (1.5, 0.0, (), (2.2, 0.0), 1.0),
+        (1.5, 0.0, (), (2.2, 0.0), 0.1),
+        (1.9, 0.02, (ColouredFilm(white(1.38), white(0.0), 600.0),), (0.9, 5.0), 0.4),
+    ],
+)
+def test_colours_change_with_thickness_as_they_do_with_fine_integration(
+    eta: float, k: float, others: tuple[ColouredFilm, ...], base: tuple[float, float], cosine: float
+) -> None:
     """No steps between numbers of wavelengths, and no ringing: of neighbours, differences are as they should be."""
-    thicknesses = np.linspace(0, 5000, 101)
-    at = np.array([1.0])
-    coatings = [Coating((ColouredFilm(white(1.5), white(0.0), float(x)),), white(1.0), white(2.2)) for x in thicknesses]
+    at = np.array([cosine])
+    coatings = [
+        Coating((ColouredFilm(white(eta), white(k), float(x)), *others), white(1.0), white(base[0]), white(base[1]))
+        for x in np.linspace(0, 5000, 101)
+    ]
     found = np.array([x.reflectance(at, srgb_sensitivity)[:, 0] for x in coatings])
     exact = np.array([finely(x, at)[:, 0] for x in coatings])
     assert np.abs(np.diff(found, axis=0) - np.diff(exact, axis=0)).max() < 1e-3
+
+
+def random_films(rng: np.random.Generator, absorb: bool) -> tuple[vt.Film, ...]:
+    """One to three, of any thickness; some coloured, and of those that absorb, two in three."""
+    return tuple(
+        vt.Film(
+            eta=tuple(map(float, rng.uniform(1.2, 2.6, 3))) if rng.random() < 0.3 else float(rng.uniform(1.2, 2.6)),
+            k=float(rng.uniform(0, 0.6)) if absorb and rng.random() < 0.7 else 0.0,
+            thickness_nm=float(rng.uniform(0, 5000)),
+        )
+        for _ in range(rng.integers(1, 4))
+    )
+
+
+@pytest.mark.parametrize("kind", ["metal", "glass", "glass from inside"])
+def test_what_is_sampled_is_a_fine_integration_at_any_angle(kind: str) -> None:
+    """Also between samples and at grazing incidence; from inside, light beyond the critical angle is all reflected."""
+    rng = np.random.default_rng([5, len(kind)])
+    for _ in range(5):
+        on_it = random_films(rng, kind == "metal")
+        n = float(rng.uniform(1.2, 2.2))
+        if kind == "metal":
+            layer = vt.Interface(eta=(0.3, 0.9, 1.1), k=(3.5, 2.5, 2.2), films=on_it)
+        else:
+            layer = vt.Interface(eta=n if kind == "glass" else 1.0, films=on_it)
+        stack = vt.Stack([layer], exterior=n if kind == "glass from inside" else 1.0)
+        (sampled,) = coated.of(Material.of(stack))
+        assert sampled and sampled.coating
+        cosines = np.array([*rng.uniform(0, 1, 8), *rng.uniform(1e-3, 0.05, 4), 1.0])
+        assert np.abs(sampled.at(cosines, 1.0) - finely(sampled.coating, cosines)).max() < 3e-3
+        if kind == "glass from inside":
+            beyond = sampled.between(np.linspace(0, np.sqrt(1 - 1 / n**2), 9), np.zeros(9), 1.0)
+            assert beyond == pytest.approx(np.ones((3, 9)), abs=1e-6)
 
 
 # Between facets
