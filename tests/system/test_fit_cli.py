@@ -79,7 +79,8 @@ def test_a_material_becomes_a_simpler_one(run: Run, folder: Path) -> None:
     assert report["error"] < 1e-4
     assert len(report["by_angle"]) == 5
     assert report["energies"][0]["after"] == pytest.approx(report["energies"][0]["before"], abs=1e-3)
-    assert "Energy that is reflected" in run(*arguments)[1]
+    assert "Energy that is reflected" in run(*arguments, "--plot")[1]
+    assert (folder / "pair.png").stat().st_size > 10_000
 
 
 def test_a_coat_tells_of_a_diffuse_base(run: Run, folder: Path) -> None:

@@ -12,7 +12,7 @@ from benchmarks import benchmark
 
 from velatura.errors import InvalidInput
 from velatura.inverse import Directions, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
-from velatura.inverse.fitting import _merged
+from velatura.inverse.fitting import _merged, compared
 from velatura.model import Model, named
 from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, load, loads
@@ -121,6 +121,29 @@ def test_more_interfaces_are_never_worse() -> None:
     two, one = (simplify(stack, count, "velatura") for count in (2, 1))
     assert two.error < 0.2 * one.error
     assert two.error == two.errors[0] and len(two.stack.interfaces) == 2
+
+
+def test_what_is_simplified_keeps_its_brushing() -> None:
+    """Expected: the rotation of the metal, and of a stack that is turned the result, turned."""
+    found = []
+    for turn in (0, 50):
+        metal = Interface(eta=(0.2, 0.9, 1.2), k=(3.5, 2.6, 2.3), alpha=(0.1, 0.3), rotation=30 + turn)
+        stack = Stack([Interface(eta=1.5, alpha=0.05), Medium(sigma_a=0.2), metal])
+        found.append(simplify(stack, 1, AVERAGED).stack.interfaces[0])
+    assert [one.rotation for one in found] == pytest.approx([30, 80])
+    assert found[0].alpha == pytest.approx(found[1].alpha, rel=1e-6)
+    assert found[0].alpha[0] < found[0].alpha[1]
+
+
+def test_the_error_of_a_simplification_is_what_descends() -> None:
+    """Expected: errors of log(1 + f cos), and ten times those of energies as shares of the mean of the colours."""
+    found, stack = simplify(COATED, 1, AVERAGED), COATED
+    table, own = (compared(each, AVERAGED) for each in (stack, found.stack))
+    cosine = table.directions.wo[2]
+    spread = np.mean((np.log1p(own.value * cosine) - np.log1p(table.value * cosine)) ** 2)
+    assert table.energy is not None and own.energy is not None
+    share = (own.energy - table.energy) / (table.energy.mean(axis=0) + 1e-3)
+    assert found.error == pytest.approx(np.sqrt(spread + 100 * np.mean(share**2)), rel=1e-6)
 
 
 @pytest.mark.parametrize("model", ["bati2021", "velatura"])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from velatura.cli import invert, options
+from velatura.cli import invert, options, progress
 
 if TYPE_CHECKING:
     from velatura.inverse import Fit, ReflectanceTable
@@ -54,12 +54,11 @@ def fit(
     rows = inverse.load_table(table)
     check(output)
     picture = invert.picture(table) if plot else None
-    found = inverse.fit_target(rows, wanted, starts, name, seed, **switches)
+    with progress.clock(f"Fitting {Path(table).name}"):
+        found = inverse.fit_target(rows, wanted, starts, name, seed, **switches)
     if picture:
-        _draw(rows, found, wanted.name or Path(table).name, picture)
-    show(found, output, as_json)
-    if picture and not as_json:
-        print(picture)
+        draw(rows, found, wanted.name or Path(table).name, picture)
+    show(found, output, picture, as_json)
 
 
 def check(output: Path | None) -> None:
@@ -70,8 +69,8 @@ def check(output: Path | None) -> None:
         files.check_writable(output, "a material file", invert.ENDINGS)
 
 
-def show(found: Fit, output: Path | None, as_json: bool) -> None:
-    """Write the material, and print it with its error."""
+def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool) -> None:
+    """Write the material, and print it with its error, and the name of a picture of it."""
     from velatura.stack import dumps, save
 
     if output:
@@ -82,6 +81,8 @@ def show(found: Fit, output: Path | None, as_json: bool) -> None:
     from rich.console import Console
 
     console = Console()
+    of = "log(1 + f cos), and ten times of energies" if found.energies else "log(1 + f cos)"
+    print(f"Error of {of}: {found.error:.2g} (from other starts: {_others(found)})")
     console.print(_table(found))
     if found.energies:
         console.print(_energies(found))
@@ -97,6 +98,8 @@ def show(found: Fit, output: Path | None, as_json: bool) -> None:
         print(f"Fits as well ({n}): error {other.error:.2g}, {count} interface{'s' * (count > 1)}: {layers}")
     invert.say_for_which(found.model)
     print(output if output else dumps(found.stack, "yaml"), end="\n" if output else "")
+    if picture:
+        print(picture)
 
 
 def _written(layer: Any) -> str:
@@ -111,7 +114,7 @@ def _written(layer: Any) -> str:
     )
 
 
-def _draw(rows: ReflectanceTable, found: Fit, title: str, path: Path) -> None:
+def draw(rows: ReflectanceTable, found: Fit, title: str, path: Path) -> None:
     """A picture of the table and the fit, written whole or not at all."""
     from matplotlib.figure import Figure
 
@@ -128,8 +131,7 @@ def _table(found: Fit) -> Any:
     """A row per angle of incidence."""
     from rich.table import Table
 
-    title = f"Error of log(1 + f cos): {found.error:.2g} (from other starts: {_others(found)})"
-    table = Table(title=title, title_justify="left")
+    table = Table()
     for column in ("angle of incidence", "f cos, rms", "error, rms", "relative"):
         table.add_column(column, justify="right")
     for row in found.by_angle:

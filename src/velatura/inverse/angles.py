@@ -46,6 +46,14 @@ class Directions:
         different, which = np.unique(self.wi, axis=1, return_inverse=True)
         return different, which.ravel()
 
+    @cached_property
+    def incidence(self) -> tuple[Array, Array]:
+        """The angles of incidence of the distinct wi, (A,), and the weights (M, A) that average over their azimuths."""
+        each = np.round(np.degrees(np.arccos(np.clip(self.lit[2], -1, 1))), 6)
+        theta_i, which = np.unique(each, return_inverse=True)
+        own = which.reshape(-1, 1) == np.arange(len(theta_i))
+        return theta_i, own / own.sum(axis=0)
+
     @classmethod
     def of(cls, theta_i: Array, theta_o: Array, phi: Array, azimuth: Array | float = 0.0) -> Directions:
         """From angles in degrees: phi is the azimuth from wi to wo, 180 for the mirror direction."""
@@ -186,12 +194,10 @@ def _direction(theta: Array, phi: Array | float) -> Array:
 
 def energies(before: ReflectanceTable, after: ReflectanceTable) -> list[dict[str, Any]]:
     """For every angle of incidence `theta_i` the energies of two tables, [r, g, b], of the mean azimuth."""
-    theta_i, rows = np.round(np.degrees(np.arccos(np.clip(before.directions.lit[2], -1, 1))), 6), []
     assert before.energy is not None and after.energy is not None
-    for angle in np.unique(theta_i):
-        one, other = (table[:, theta_i == angle].mean(axis=1).tolist() for table in (before.energy, after.energy))
-        rows.append({"theta_i": float(angle), "before": one, "after": other})
-    return rows
+    theta_i, mean = before.directions.incidence
+    rows = zip(theta_i.tolist(), (before.energy @ mean).T.tolist(), (after.energy @ mean).T.tolist())
+    return [{"theta_i": angle, "before": one, "after": other} for angle, one, other in rows]
 
 
 def grouped(theta_i: Array) -> Array:

@@ -80,7 +80,8 @@ class Other:
 class Fit:
     """A stack that approximates a table, and its error.
 
-    error: root mean square of the difference of log(1 + f cos theta_o). by_angle: as `angles.report` has it. errors:
+    error: root mean square of the difference of log(1 + f cos theta_o); of a simplification together with ten times
+    that of energies, as shares, which is what descends. by_angle: as `angles.report` has it. errors:
     the results of the descents from all starts, the best first. estimates: of the parameters that were free. trades:
     pairs of them with their correlation, where that is strong: one makes up for a change of the other. others: stacks
     outside these intervals, or of another form, that fit about as well. energies: of a simplification, for every angle
@@ -198,8 +199,8 @@ class End:
 
     @cached_property
     def error(self) -> float:
-        """The root mean square of the residuals, those of energies excepted."""
-        return float(np.sqrt(np.mean(self.residuals[: self.descent.wanted.size] ** 2)))
+        """The root mean square of errors of log(1 + f cos), together with FIRST times that of energies."""
+        return float(np.sqrt(self.cost / self.descent.wanted.size))
 
     @cached_property
     def stack(self) -> Stack:
@@ -394,8 +395,8 @@ class Descent:
     def missed(self, count: int, value: Value, energy: Value) -> Array:
         """Errors of log(1 + f cos), (P, 3 N), of a number P of points (Low et al. 2012).
 
-        Where energies count, their errors follow, (P, 3 M): as shares of the energy at that angle, so that the hue
-        counts in dark channels too, and weighted so that they come first.
+        Where energies count, their errors follow, (P, 3 A): those of every angle of incidence, of the mean azimuth, as
+        shares of the energy there, so that the hue counts in dark channels too, and weighted so that they come first.
         """
 
         def apart(value: Value, wanted: Array) -> Array:
@@ -405,9 +406,12 @@ class Descent:
         found = apart(np.log1p(value), self.wanted)
         if self.table.energy is None:
             return found
-        scale = np.mean(self.table.energy, axis=0) + DARK
-        weight = FIRST * np.sqrt(self.wanted.size / self.table.energy.size)
-        return np.concatenate([found, weight * apart(energy / scale, self.table.energy / scale)], axis=1)
+        _, mean = self.table.directions.incidence
+        wanted = self.table.energy @ mean
+        energy = np.broadcast_to(energy, (3, count, len(mean))) @ mean
+        scale = np.mean(wanted, axis=0) + DARK
+        weight = FIRST * np.sqrt(self.wanted.size / wanted.size)
+        return np.concatenate([found, weight * apart(energy / scale, wanted / scale)], axis=1)
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (3 N, free)."""

@@ -107,12 +107,20 @@ def simplify(
         raise InvalidInput(
             f"interfaces: must be at least 1, and fewer than the {count} that there are, got {interfaces}"
         )
-    turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
-    table = angles.table_of(stack, Directions.about_lobes(turned), chosen, with_energy=True)
-    best, *_ = ends = _simplest(stack, interfaces, table, chosen, eta_max)
+    # Along its first brushing, so that this stays, and where others are as they are to it
+    along = next((layer.rotation for layer in Material.of(stack).interfaces if layer.alpha_u != layer.alpha_v), 0.0)
+    straight = _turned(stack, -along)
+    table = compared(straight, chosen)
+    best, *_ = ends = _simplest(straight, interfaces, table, chosen, eta_max)
     found = angles.table_of(best.stack, table.directions, chosen, with_energy=True)
     errors, by_angle = [end.error for end in ends], angles.report(table, found)
-    return Fit(best.stack, chosen, best.error, by_angle, errors, energies=angles.energies(table, found))
+    return Fit(_turned(best.stack, along), chosen, best.error, by_angle, errors, energies=angles.energies(table, found))
+
+
+def compared(stack: Stack, model: Model) -> ReflectanceTable:
+    """What of a stack is compared where it is simplified: reflectance about its lobes, and all energies."""
+    turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
+    return angles.table_of(stack, Directions.about_lobes(turned), model, with_energy=True)
 
 
 def _simplest(stack: Stack, interfaces: int, table: ReflectanceTable, model: Model, eta_max: float) -> list[End]:
@@ -199,6 +207,13 @@ def _brushed(stack: Stack, angle: float) -> Stack:
             u, v = layer.alpha_u / BRUSHING, min(layer.alpha_v * BRUSHING, 1.0)
             changed |= {f"layer{n}_alpha_u": u, f"layer{n}_alpha_v": v, f"layer{n}_rotation": angle}
     return stack.replace(**changed)
+
+
+def _turned(stack: Stack, angle: float) -> Stack:
+    """The stack with all brushings turned by degrees."""
+    interfaces = [(n, layer) for n, layer in enumerate(Material.of(stack).layers) if isinstance(layer, InterfaceValues)]
+    turns = {f"layer{n}_rotation": at.rotation + angle for n, at in interfaces if at.alpha_u != at.alpha_v}
+    return stack.replace(**turns) if angle else stack
 
 
 def _with_one_less(stack: Stack) -> list[Stack]:

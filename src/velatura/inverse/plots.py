@@ -161,11 +161,13 @@ def _conductor(members: EquivalenceClass, tint: np.ndarray, channel: int) -> tup
 
 
 def draw_fit(figure: Any, table: ReflectanceTable, found: Fit, title: str) -> None:
-    """A table and its fit, a panel for each of up to six angles of incidence; below the intervals and correlations.
+    """A table and its fit, a panel for each of up to six angles of incidence; below the intervals and correlations, or
+    energies before and after.
 
     Over the tilt of the half-vector, f cos theta_o: of the table as points, of the stack as crosses.
     """
-    figure.suptitle(f"{title}: the closest stack, by {found.model.name}, error of log(1 + f cos) {found.error:.2g}")
+    figure.suptitle(f"{title}: the closest stack, by {found.model.name}, error {found.error:.2g}")
+    names = ("before", "after") if found.energies else ("table", "fit")
     theta_i, cosine = grouped(table.directions.theta_i), table.directions.wo[2]
     fitted = table_of(found.stack, table.directions, found.model).value * cosine
     tilt = table.directions.tilt
@@ -174,18 +176,35 @@ def draw_fit(figure: Any, table: ReflectanceTable, found: Fit, title: str) -> No
     above, below = figure.subfigures(2, 1, height_ratios=(3, 2))
     for n, angle in enumerate(shown):
         own = theta_i == angle
-        axes = above.add_subplot(-(-len(shown) // 3), min(len(shown), 3), n + 1, title=f"incidence at {angle:g}°")
+        across = 2 if len(shown) == 4 else 3
+        axes = above.add_subplot(-(-len(shown) // across), min(len(shown), across), n + 1)
+        axes.set_title(f"incidence at {angle:g}°")
         for c, colour in enumerate(FILLS):
             points = table.value[c, own] * cosine[own]
-            label = CHANNELS[c]
-            axes.plot(tilt[own], points, "o", color=colour, markersize=6, mfc="none", mew=0.7, label=f"{label}, table")
-            axes.plot(tilt[own], fitted[c, own], "x", color=colour, markersize=3, mew=0.7, label=f"{label}, fit")
+            one, other = (f"{CHANNELS[c]}, {name}" for name in names)
+            axes.plot(tilt[own], points, "o", color=colour, markersize=6, mfc="none", mew=0.7, label=one)
+            axes.plot(tilt[own], fitted[c, own], "x", color=colour, markersize=3, mew=0.7, label=other)
         least = np.quantile(np.abs(table.value[:, own] * cosine[own]), 0.05) + 1e-6
         axes.set_yscale("symlog", linthresh=float(least))
         axes.set(xlabel="tilt of the half-vector (degrees)", ylabel="f cos theta_o (1/sr)")
         if n == 0:
             axes.legend(fontsize="x-small", ncols=2)
-    _draw_estimates(below, found)
+    if found.energies:
+        _draw_energies(below.subplots(), found)
+    else:
+        _draw_estimates(below, found)
+
+
+def _draw_energies(axes: Any, found: Fit) -> None:
+    """All that is reflected, over the angle of incidence, before and after."""
+    theta_i = [row["theta_i"] for row in found.energies]
+    for c, colour in enumerate(FILLS):
+        for key, style in (("before", {"marker": "o", "mfc": "none"}), ("after", {"marker": "x", "linestyle": "--"})):
+            label = f"{CHANNELS[c]}, {key}"
+            axes.plot(theta_i, [row[key][c] for row in found.energies], color=colour, linewidth=1, label=label, **style)
+    axes.set(xlabel="angle of incidence (degrees)", ylabel="energy", title="energy that is reflected")
+    axes.set_ylim(bottom=0)
+    axes.legend(fontsize="x-small", ncols=3)
 
 
 def _draw_estimates(figure: Any, found: Fit) -> None:
