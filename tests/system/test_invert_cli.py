@@ -145,6 +145,7 @@ def test_what_is_no_target_exits_with_2(run: Run, folder: Path, text: str, line:
         ("invert", "hazy.yaml", "-o", "one.yaml", "--count", "2"),
         ("invert", "hazy.yaml", "-o", "no/folder/here"),
         ("invert", "hazy.yaml", "-o", ""),
+        ("invert", "hazy.yaml", "-o", "stack.txt"),
         ("check", "coated-gold", "--plots", ""),
         ("coat", "coated-gold", "--eta", "-1"),
         ("coat", "coated-gold", "-o", "coated.txt"),

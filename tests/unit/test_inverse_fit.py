@@ -151,7 +151,7 @@ def test_the_error_of_a_simplification_is_what_descends() -> None:
 def test_one_interface_keeps_energy_and_hue(model: str, stack: str) -> None:
     """Of a coated metal, whose blur one interface cannot have: the energies are those of the lobes, kept to .06.
 
-    Those of `velatura` are interpolated between directions, and scaled for all colours alike: within .5 % in one.
+    Those of `velatura` are interpolated between directions, and scaled for all colours alike: within 1 % in one.
     """
     copper = Stack([Interface(eta=1.5, alpha=0.02), Interface(conductor="Cu", alpha=0.25)])
     whole = copper if stack == "copper" else load(stack)
@@ -162,7 +162,7 @@ def test_one_interface_keeps_energy_and_hue(model: str, stack: str) -> None:
             if cosine == 1:
                 read = stack_lobes(one, 1.0, model=model)
                 reflected = np.sum([*read.energy, read.remainder], axis=0)[:, 0]
-                assert reflected == pytest.approx(energy, rel=5e-3 if model == "velatura" else 1e-6)
+                assert reflected == pytest.approx(energy, rel=1e-2 if model == "velatura" else 1e-6)
     head_on = found.energies[0]
     assert head_on["after"] == pytest.approx(head_on["before"], abs=0.06)
     before, after = (np.array([row[key] for row in found.energies]) for key in ("before", "after"))

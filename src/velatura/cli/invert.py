@@ -170,6 +170,8 @@ def _folder(output: Path | None, count: int) -> Path | None:
             raise InvalidInput(f"{output}: is one file; -o needs a folder for {count} stacks")
         files.check_writable(output, "a material file", ENDINGS)
         return None
+    if count == 1 and output.suffix and not output.is_dir():
+        raise InvalidInput(f"{output}: a material file ends in {' or '.join(ENDINGS)}; a folder has no ending")
     if output.exists() and not output.is_dir():
         raise InvalidInput(f"{output}: is a file; -o needs a folder, or a name that ends in {', '.join(ENDINGS)}")
     files.check_folder(output if output.is_dir() else output.parent, str(output))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura import ops
-from velatura.inverse.partial_stack import Above, Array, Batch, Layers
+from velatura.inverse.partial_stack import Above, Array, Batch, Layers, Mask
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import BLUR
 from velatura.model import Model, named
@@ -202,11 +202,12 @@ def _closed_form(
     roughness = floor(s_r).roughness(above.f)
 
     # Find its index, and what absorption must take away (Bati et al. 2021, Algorithm 4)
-    solver = _conductor if choice.kind == "conductor" else dielectric
     if choice.kind == "mirror":
         layers = Layers("mirror", 1.0, None, roughness, 0.0)
+    elif choice.kind == "conductor":
+        layers = _conductor(above, r, roughness, choice)
     else:
-        layers = solver(above, r, roughness, choice)
+        layers = dielectric(above, r, roughness, choice, nothing=np.all(energy <= ENERGY_MIN, axis=0))
     margins = {"blur": margin(least(s_r)), **layers.margins}
     reflectance = above.reflectance(layers)
     tau = 0.5 * np.log(np.maximum(reflectance, ops.TINY) / r)  # Bati et al. 2021, Eq. 13
@@ -244,8 +245,11 @@ def reflected(above: Above, variance: Variance, r: Array, bright: Array) -> Vari
     return ((variance + up * -1.0) * (1 / j) + down * -1.0 + inner * (-1.0 * m)) * (1 / (1 + m))
 
 
-def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
-    """The dielectric that reflects r in the channel that needs most, and no less in the others."""
+def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice, nothing: Mask | bool = False) -> Layers:
+    """The dielectric that reflects r in the channel that needs most, and no less in the others.
+
+    nothing: where none is to reflect; tables hold so little that no index is found by what they have.
+    """
 
     def layers(eta: Value) -> Layers:
         return Layers("dielectric", eta, None, roughness, 0.0)
@@ -271,7 +275,7 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     u_max = np.where(exists, ((ratio - 1) / (ratio + 1)) ** 2, 0.0)
     low, high = np.full_like(u_max, np.log(FAINT)), np.log(u_max + FAINT)
     most = np.where(u_max > 0, excess(high), -1.0)
-    least = np.min(np.log(FAINT / (r + FAINT)), axis=0) + 0.0 * u_max
+    least = np.where(nothing, 0.0, np.min(np.log(FAINT / (r + FAINT)), axis=0)) + 0.0 * u_max
     u = np.exp(false_position(excess, low, high, least, most)) - FAINT
     solved = np.where(most < 0, u_max, u)
     return layers(index(solved)).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))

@@ -222,7 +222,10 @@ def _draw_estimates(figure: Any, found: Fit) -> None:
     left.set(xlim=(-1.05, 1.05), xlabel="interval (95 %), as a share of the value, cut off at 1", title="parameters")
     left.invert_yaxis()
     pairs = found.trades[:PAIRS]
+    right.set_title("parameters that trade places" if pairs else "no parameters trade places")
+    if not pairs:
+        right.set_axis_off()
+        return
     right.barh(range(len(pairs)), [r for *_, r in pairs], color="0.5", height=0.5)
     right.set_yticks(range(len(pairs)), [f"{a}, {b}" for a, b, _ in pairs], fontsize="small")
     right.set(xlim=(-1, 1), ylim=(PAIRS, -1), xlabel="correlation")
-    right.set_title("parameters that trade places" if pairs else "no parameters trade places")
