@@ -179,6 +179,8 @@ def test_a_denser_medium_needs_no_bounds(name: str) -> None:
     u = np.random.default_rng(22).random((2, 500))
     np.testing.assert_allclose(own_medium.eval_pdf(known, wi, wo), own_medium.eval_pdf(lobe, wi, wo), rtol=1e-5)
     np.testing.assert_allclose(own_medium.sample(known, wi, *u), own_medium.sample(lobe, wi, *u), atol=1e-5)
+    lost = np.array([1.3, -0.9]), np.array([0.4, 1.2]), np.zeros(2)  # as a renderer has samples that leave nowhere
+    assert not np.any(own_medium.eval_pdf(known, incident(0.8, 2), lost))
 
 
 @pytest.mark.parametrize("cosine", [1.0, 0.6, 0.3])

@@ -224,7 +224,7 @@ def _squares(w: Direction) -> Direction:
 
 def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: Index) -> tuple[Direction, Value]:
     """Along the normal of light from outside the cone that is spread to a momentum p inside, and what scales that."""
-    stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2, None if n.denser else 0.0)
+    stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
     return (i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2), stretch
 
 
