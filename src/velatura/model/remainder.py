@@ -35,7 +35,7 @@ ALIKE = 3e-4  # error of pi f
 LATTICE = 12  # directions along each axis that errors are of
 KEPT = 16  # sets of nodes whose deposits are kept
 BRIGHT = 0.5  # share of samples by the root of the cosine, for a horizon that is twice as bright as all
-TILT = 0.5  # by how much more light is sampled on one side than on the opposite one, over both, at most
+TILT = 0.3  # by how much more light is sampled on one side than on the opposite one, over both, at most
 
 
 @dataclass(frozen=True)
