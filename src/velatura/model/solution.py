@@ -45,6 +45,7 @@ NARROW = 0.05  # roughness of lobes whose integrals have edges between direction
 EVENLY = 377  # directions over which the remainder is integrated
 DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
 BRIGHTEST = 4.0  # by how much it is scaled at most
+LITTLE = 0.05  # by which energies are scaled for their colour
 BRIGHTER = 1.5  # at most, where it takes light of lobes
 VEIL_MIN = 1e-3  # energy of veils that are drawn
 EVEN = 0.2  # share of samples of the symmetric form that the remainder has at least, and of those that pass
@@ -113,13 +114,13 @@ class SolvedSide:
         return self._places(self.columns.weights)
 
     @property
-    def light(self) -> tuple[list[int], list[int]]:
-        """The first rows of energies, and those of all else that is in proportion to them."""
+    def light(self) -> list[tuple[int, list[int]]]:
+        """The first rows of each energy, and of all else that is in proportion to it."""
         columns = self.columns
-        passes, through = columns.passes, [] if columns.passed is None else [columns.passed]
-        others = [passes.straight, passes.bounced, passes.rest] if passes else []
-        energies = self._places([*columns.energies, columns.rest, *through])
-        return energies, self._places([*columns.weights, columns.scale, *others])
+        found = [*zip(columns.energies, ([x] for x in columns.weights)), (columns.rest, [columns.scale])]
+        if columns.passes:
+            found.append((columns.passed, [columns.passes.straight, columns.passes.bounced, columns.passes.rest]))
+        return [(self._places([energy])[0], self._places(others)) for energy, others in found]
 
     @property
     def chances(self) -> list[int]:
@@ -358,12 +359,7 @@ class Solver:
             if shape:
                 there = slice(place, place + self.colours)
                 rows[there] = self._between(shape, weight, roughness, rows[there])
-        energies, others = ([slice(k, k + self.colours) for k in places] for places in side.light)
-        whole = self.grid.spread(np.sum([side.rows[each] for each in energies], axis=0), self.shape)
-        # One share for all colours, so that what is grey stays so
-        share = ops.divide(ops.mean(whole), ops.mean(np.sum([rows[each] for each in energies], axis=0)))
-        for each in (*energies, *others):
-            rows[each] *= np.where(share > 0, share, 1)
+        self._scale_energies(rows, side)
         left = self.grid.spread(side.columns.chance[None], self.shape)
         rows[side.chances] /= rows[side.chances].sum(axis=0) + left
         if self.model.form == "forward":
@@ -374,6 +370,22 @@ class Solver:
             scale, rest = (slice(k, k + self.colours) for k in side.places)
             rows[scale] = _scale(rows[rest], whole)
         return rows
+
+    def _scale_energies(self, rows: Array, side: SolvedSide) -> None:
+        """So that energies, and what is in proportion to them, have the sum that is interpolated. What is grey stays
+        so: other energies make up for the colours of the rest, as far as that is little."""
+        groups = [[slice(k, k + self.colours) for k in (energy, *others)] for energy, others in side.light]
+        whole = self.grid.spread(np.sum([side.rows[energy] for energy, *_ in groups], axis=0), self.shape)
+        found = np.sum([rows[energy] for energy, *_ in groups], axis=0)
+        share = ops.divide(ops.mean(whole), ops.mean(found))
+        share = np.where(share > 0, share, 1)
+        coloured = [group for group in groups if any(np.ptp(rows[each], axis=0).any() for each in group)]
+        light = share * sum((rows[energy] for energy, *_ in coloured), np.zeros_like(found))
+        rest = np.where(light > 0, ops.divide(whole - share * found + light, light), 1)
+        rest = np.clip(rest, 1 - LITTLE, 1 + LITTLE)
+        for group in groups:
+            for each in group:
+                rows[each] *= share * rest if group in coloured else share
 
     def _between(self, shape: Shape, weight: Array, roughness: Sequence[Array], spread: Array) -> Array:
         """Weights (C, prod(shape)) of a lobe with the light that is interpolated, instead of weights that are `spread`;
