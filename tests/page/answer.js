@@ -11,9 +11,9 @@ import { Tape } from '../../src/velatura/editor/page/render/tape.js';
 /** The outputs of a tape, a column each. */
 function run({ tape, tables, inputs }) {
   const decoded = Object.fromEntries(Object.entries(tables).map(([name, table]) => [name, decode(table)]));
-  const given = Object.fromEntries(
-    Object.entries(inputs).map(([name, value]) => [name, value.many ? Float64Array.from(value.many) : value]),
-  );
+  const films = (held) => Object.fromEntries(Object.entries(held).map(([name, table]) => [name, decode(table)]));
+  const read = (value) => (value.many ? Float64Array.from(value.many) : value.held ? films(value.held) : value);
+  const given = Object.fromEntries(Object.entries(inputs).map(([name, value]) => [name, read(value)]));
   const columns = tape.outputs.map(() => []);
   new Tape(tape, decoded, given).run(given, (found, first, end) =>
     found.forEach((column, k) => {

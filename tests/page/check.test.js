@@ -13,11 +13,14 @@ const SESSION = {
       eta: index,
       conductor: { kind: 'choice', options: ['mirror', 'Au'] },
       alpha: { kind: 'pair', low: 0, high: 1 },
+      films: { kind: 'films', most: 2 },
     },
+    film: { eta: index, k: index, thickness_nm: { kind: 'number', low: 0, high: 5000 } },
     medium: { sigma_a: { kind: 'colour', low: 0, high: null }, g: { kind: 'number', low: -1, high: 1, strict: true } },
   },
   names: { dielectrics: { bk7: 1.5 }, conductors: { Au: {} } },
 };
+const FILM = { eta: 1.4, thickness_nm: 100 };
 const of = (...layers) => ({ layers });
 
 test('materials of all kinds of values pass', () => {
@@ -25,6 +28,7 @@ test('materials of all kinds of values pass', () => {
   const medium = { medium: { sigma_a: [0, 1, 2], g: 0.9 } };
   check({ name: 'Gold', exterior: 1.33, thin: false, ...of(coat, medium, { interface: { conductor: 'Au' } }) }, SESSION);
   check(of({ interface: { eta: 'bk7', alpha: 0 } }, { medium: null }), SESSION);
+  check(of({ interface: { eta: 1.5, films: [{ eta: 'bk7', thickness_nm: 200 }] } }), SESSION);
 });
 
 for (const [material, why] of [
@@ -41,6 +45,12 @@ for (const [material, why] of [
   [of({ interface: { alpha: { texture: 'a.png' } } }), /alpha: textures and spectra need Python/],
   [of({ interface: { eta: 'glass' } }), /eta: glass is not a known name/],
   [of({ interface: { conductor: 'Fe' } }), /conductor: must be one of mirror, Au/],
+  [of({ interface: { films: 3 } }), /films: must be a list of films/],
+  [of({ interface: { films: [{}, {}, {}] } }), /films: must be at most 2 films/],
+  [of({ interface: { films: [3] } }), /films: film 0: eta: missing/],
+  [of({ interface: { films: [FILM, { eta: 1.5 }] } }), /films: film 1: thickness_nm: missing/],
+  [of({ interface: { films: [{ ...FILM, thickness_nm: 6000 }] } }), /film 0: thickness_nm: must lie in 0 to 5000/],
+  [of({ interface: { films: [{ ...FILM, thickness_nm: { texture: 'a.png' } }] } }), /textures and spectra need Python/],
   [{ ...of({ interface: {} }), thin: 1 }, /thin: must be true or false/],
 ])
   test(`${JSON.stringify(material)} is refused in words`, () => assert.throws(() => check(material, SESSION), why));

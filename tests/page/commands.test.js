@@ -287,3 +287,34 @@ test('pictures side by side lie within the canvas, and none over another', () =>
     assert.ok(seen.size > 0.9 * canvas.width * canvas.height || count === 3);
   }
 });
+
+test('films are added below the others, changed, moved and removed', () => {
+  const [film, other] = [{ eta: 2, thickness_nm: 250 }, { eta: 1.38, thickness_nm: 100 }];
+  const filmsOf = (state) => state.layers[0].keys.films;
+  let state = commands.addFilm(commands.addFilm(opened(), 1, film), 1, other);
+  assert.deepEqual(filmsOf(state), [film, other]);
+  state = commands.setFilm(state, 1, 1, 'thickness_nm', 320);
+  assert.deepEqual(filmsOf(state), [film, { ...other, thickness_nm: 320 }]);
+  assert.deepEqual(documentOf(state).layers[0].interface.films, filmsOf(state));
+  state = commands.moveFilm(state, 1, 1, 0);
+  assert.deepEqual(filmsOf(state), [{ ...other, thickness_nm: 320 }, film]);
+  assert.equal(commands.moveFilm(state, 1, 0, 0), state);
+  state = commands.removeFilm(commands.removeFilm(state, 1, 0), 1, 0);
+  assert.deepEqual(documentOf(state), MATERIAL, 'no films are no key');
+});
+
+test('no film absorbs on a dielectric, and none lies on a mirror', () => {
+  const film = { eta: 2, k: 0.1, thickness_nm: 250 };
+  const coated = commands.addFilm(opened(), 3, film);
+  const become = (variant) => commands.setVariant(coated, 3, variant, NAMES, FRESH).layers[2].keys.films;
+  assert.deepEqual(become('custom'), [film]);
+  assert.deepEqual(become('dielectric'), [{ eta: 2, thickness_nm: 250 }]);
+  assert.equal(become('mirror'), undefined);
+});
+
+test('code depends on whether there are films, and on nothing about them', () => {
+  const film = (thickness_nm) => ({ eta: 2, thickness_nm });
+  const shape = (...films) => pattern(films.reduce((state, next) => commands.addFilm(state, 1, next), opened()));
+  assert.equal(shape(film(100)), shape(film(900), film(50)));
+  assert.notEqual(shape(), shape(film(100)));
+});

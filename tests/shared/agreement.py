@@ -17,7 +17,6 @@ from velatura.model import Model, bsdf, solution, turned
 from velatura.model.context import Context, at_a_point
 from velatura.optics import ggx
 from velatura.sampling import coated as interfaces
-from velatura.sampling.coated import Coated
 from velatura.shader import Recording, Shader, constant, record, shader, variance
 from velatura.shader.bake import Bake
 from velatura.shader.films import beside
@@ -115,18 +114,6 @@ def coated(case: Case) -> Case:
     return replace(case, stack=stack, values=values)
 
 
-class InTables(Coated):
-    """Films whose averages are looked up in tables, as shaders do, instead of those that are worked out."""
-
-    known = False
-
-    def __init__(self, films: Coated) -> None:
-        super().__init__(films.data, films.rarer, films.n12)
-
-    def reversed(self) -> InTables:
-        return InTables(Coated(self.data, 3 - self.rarer, self.n12))
-
-
 def in_numpy(case: Case, recording: Recording) -> Results:
     """What the model says; where it solves materials, of the first stack for all directions."""
     stack = case.stack
@@ -134,8 +121,7 @@ def in_numpy(case: Case, recording: Recording) -> Results:
     if isinstance(recording.baked, Tabulated):
         return _solved(stack, recording.model, wi, wo, u)
     alone = Material.of(stack)
-    films = [x and InTables(x) for x in interfaces.of(alone)]
-    material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(films)
+    material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(interfaces.of(alone))
     body = bsdf.body(material, recording.model, variance(stack), at_a_point())
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]

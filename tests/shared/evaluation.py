@@ -29,7 +29,7 @@ _ARITHMETIC: dict[str, Callable[..., Any]] = {
 
 def evaluate(outputs: Sequence[Value], values: Mapping[str, Any]) -> list[Any]:
     """The outputs for values of the inputs: numbers (N,) and colours (3, N); `vt_baked` is what reads a group of texels
-    at a place, `vt_films` the texture of films."""
+    at a place, `vt_films` are tables of films by name."""
     done: dict[Symbol, Any] = {}
 
     def of(x: Operand) -> Any:
@@ -68,8 +68,8 @@ def _evaluated(symbol: Symbol, args: list[Any], values: Mapping[str, Any]) -> An
         channels = ops.interpolate(getattr(tables.load(), symbol.detail), *args)
         return channels if symbol.op == "texels" else channels[0]
     if symbol.op == "film":
-        line = SimpleNamespace(data=values["vt_films"][symbol.detail][:, :3])
-        return np.stack([np.ravel(x) for x in ops.interpolate(line, *args)])
+        table = SimpleNamespace(data=values["vt_films"][symbol.detail])
+        return np.stack([np.ravel(x) for x in ops.interpolate(table, *args)])
     if symbol.op == "baked":
         return values["vt_baked"](symbol.detail, args)
     function: Callable[..., Any] = _ARITHMETIC.get(symbol.op) or getattr(ops, symbol.op)

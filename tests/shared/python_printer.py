@@ -65,8 +65,8 @@ class PythonPrinter(Printer):
     def value(self, table: str, args: Sequence[str], wide: bool) -> str:
         return f"vt_{table}({', '.join(args)})[0]"
 
-    def film(self, line: int, cosine: str) -> str:
-        return f"vt_film(vt_films, {line}, {cosine})"
+    def film(self, table: str, args: Sequence[str]) -> str:
+        return f"vt_film({table!r}, {', '.join(args)})"
 
     # Statements
 
@@ -150,8 +150,10 @@ class PythonPrinter(Printer):
             for x in bake.groups
         )
 
-    def films(self, count: int) -> str:
-        return ""
+    def films(self, layouts: Sequence[Layout]) -> str:
+        each = (f"{x.name!r}: ({x.start}, {x.nodes})" for x in layouts)
+        look_up = "vt_film = lambda name, *at: vt_filmed(vt_films, *vt_placed[name], at)"
+        return f"vt_placed = {{{', '.join(each)}}}\n{look_up}\n"
 
     def helpers(self, called: Set[tuple[str, Kind]]) -> str:
         return ""
@@ -177,7 +179,7 @@ class PythonPrinter(Printer):
 def run(text: str, **given: Any) -> SimpleNamespace:
     """The functions of a program that was printed; textures and parameters are `given` by name."""
     names = {"np": np, "vt_colour": _colour, "vt_mean": _mean, "vt_sqrt": _sqrt}
-    program: dict[str, Any] = {**names, "vt_looked_up": _looked_up, "vt_read": _read, "vt_film": _film, **given}
+    program: dict[str, Any] = {**names, "vt_looked_up": _looked_up, "vt_read": _read, "vt_filmed": _filmed, **given}
     exec(compile(text, "<printed>", "exec"), program)
     return SimpleNamespace(**program)
 
@@ -225,9 +227,10 @@ def _looked_up(texture: np.ndarray, start: int, nodes: tuple[int, ...], channels
     return ops.interpolate(SimpleNamespace(data=data), *place)
 
 
-def _film(texture: np.ndarray, line: int, cosine: Any) -> np.ndarray:
-    """A line of the texture of films at a cosine."""
-    return _colour(*ops.interpolate(SimpleNamespace(data=texture[line, :, :3]), cosine))
+def _filmed(texture: np.ndarray, start: int, nodes: tuple[int, ...], place: Sequence[Any]) -> np.ndarray:
+    """A table of films, found in their texture where its layout says."""
+    data = texture.reshape(-1, 4)[start:][: int(np.prod(nodes)), :3].reshape(*nodes, 3)
+    return _colour(*ops.interpolate(SimpleNamespace(data=data), *place))
 
 
 def _read(texture: np.ndarray, nodes: tuple[int, ...], sides: int, group: tuple[int, int], place: Sequence[Any]) -> Any:

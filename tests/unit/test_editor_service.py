@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from velatura import tables
+from velatura import lobes, tables
 from velatura.editor import bundle, shading
 from velatura.editor.folder import Conflict, Folder
 from velatura.editor.messages import admitted, document
@@ -20,7 +20,7 @@ from velatura.errors import InvalidInput, MissingTool
 from velatura.exports import FORMATS, export
 from velatura.model import MODELS
 from velatura.scenes import OBJECTS
-from velatura.stack import Interface, Stack, loads, preset, presets
+from velatura.stack import Film, Interface, Stack, loads, preset, presets
 from velatura.stack.layers import LAYERS, entry_name
 from velatura.stack.schema import parameters
 
@@ -87,7 +87,9 @@ def test_a_new_layer_of_every_kind_is_as_declared() -> None:
 
 def test_parameters_are_those_that_are_declared() -> None:
     schema = VERBS["session"]({})["schema"]
-    assert [*schema["interface"], "films"] == list(parameters(Interface))
+    assert [*schema["interface"]] == list(parameters(Interface))
+    assert [*schema["film"]] == list(parameters(Film))
+    assert (schema["interface"]["films"]["kind"], schema["interface"]["films"]["most"]) == ("films", 8)
     alpha = schema["interface"]["alpha"]
     assert (alpha["kind"], alpha["low"], alpha["high"], alpha["default"], alpha["texturable"]) == (
         "pair",
@@ -166,7 +168,7 @@ def test_what_is_solved_comes_with_the_code_and_by_itself() -> None:
     assert made["shares"] == ["reflected[0].chance", "reflected[1].chance", "remainder_chance"]
     assert made["shown"] == ["reflected[0]", "reflected[1]", "remainder"]
     values = VERBS["values"]({"material": COAT})
-    assert values == {key: made[key] for key in ("values", "solution")}
+    assert values == {key: made[key] for key in ("values", "films", "solution")}
     coarse = VERBS["values"]({"material": COAT, "coarse": True})
     fine, quick = (decoded(each["solution"]["texels"]) for each in (values, coarse))
     assert fine.shape == quick.shape
@@ -208,6 +210,38 @@ def test_a_drag_takes_over_the_layers_that_it_leaves_alone() -> None:
         shading._lately.cache_clear()
         assert dragged(alpha) == answer
     assert 0 < max(kept) == kept[0]
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018"])
+def test_films_are_values(model: str) -> None:
+    """Code knows that an interface has films, and no more; their texture comes with the values."""
+    film, other = {"eta": 2.0, "thickness_nm": 200}, {"eta": "bk7", "thickness_nm": 900}
+    bare, one, two = (shader(changed(films=films), model=model) for films in ([], [film], [other, film]))
+    assert bare["films"] is None
+    assert bare["key"] != one["key"] == two["key"]
+    shapes = {"velatura": {"film0": (257, 3)}, "belcour2018": {"film0_above": (65, 33, 3)}}
+    assert {name: decoded(table).shape for name, table in one["films"].items()} == shapes[model]
+    (before,), (after,) = (each["films"].values() for each in (one, two))
+    assert np.abs(decoded(before) - decoded(after)).max() > 0.1
+    values = VERBS["values"]({"material": changed(films=[other, film]), "model": model, "coarse": True})
+    (coarse,) = values["films"].values()
+    assert np.abs(decoded(coarse) - decoded(after)).mean() < 0.01
+
+
+def test_a_film_has_its_colours_over_thickness() -> None:
+    """At the normal, at even steps from 0, where the interface is bare, to the thickness that is asked for."""
+    films = [{"eta": 2.0, "thickness_nm": 0}, {"eta": 1.38, "thickness_nm": 90}]
+    nothing = {"eta": 4.0, "thickness_nm": 0}
+    question = {"material": changed(films=[nothing, *films]), "layer": 0, "film": 1}
+    found = decoded(VERBS["film"]({**question, "thickness_nm": 254})["colours"])
+    assert found.shape == (128, 3)
+
+    def seen(thickness_nm: float) -> np.ndarray:
+        stack = Stack.from_dict(changed(films=[{**films[0], "thickness_nm": thickness_nm}, films[1]]))
+        return np.ravel(lobes(stack, 1.0, model="weier2020").energy[0])
+
+    for k in (0, 1, 60, 127):
+        np.testing.assert_allclose(found[k], seen(2.0 * k), atol=1e-5)
 
 
 def test_tables_are_those_that_are_read(here: Path) -> None:
@@ -286,6 +320,9 @@ def test_a_text_is_read_as_it_was_written(here: Path) -> None:
         ("shader", {"material": COAT, "model": "velatur"}, "did you mean velatura"),
         ("shader", {"material": COAT, "switches": {"tir": "often"}}, "tir: must be one of"),
         ("export", {"material": COAT, "to": "jsn"}, "did you mean json"),
+        ("film", {"material": COAT, "layer": 0, "film": 0, "thickness_nm": 9}, "layer 0: has no film 0"),
+        ("film", {"material": COAT, "layer": 7, "film": 0, "thickness_nm": 9}, "layer 7: has no film 0"),
+        ("film", {"material": COAT, "layer": 0, "film": 0}, "thickness_nm: must be a number, got nothing"),
         ("object", {"name": "bal"}, "did you mean ball"),
         ("environment", {"name": "moon"}, "unknown environment"),
     ],

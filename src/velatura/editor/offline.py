@@ -171,7 +171,9 @@ def _write(
 def _tasks(plain: Sequence[Order], models: Sequence[Model]) -> list[Callable[[], Made]]:
     brushed = [order._replace(brushed=True) for order in plain if order.stack.interfaces]
     solved = [model.name for model in models if model.adder is not model]
+    coated = [name for name in presets() if any(layer.films for layer in preset(name).interfaces)]
     return [
+        *(functools.partial(_coated, model, name) for model in models for name in coated),
         *(functools.partial(_shader, model.name, order) for model in models for order in [*plain, *brushed]),
         *(functools.partial(_solved, model, name) for model in solved for name in presets()),
     ]
@@ -249,6 +251,22 @@ def _solved(model: str, name: str) -> Made:
     """A preset as it is solved."""
     answer = VERBS["shader"]({"material": document(preset(name)), "model": model})
     return Made({f"{DATA}/solved/{model}/{name}.pack": packed(answer)})
+
+
+def _coated(model: Model, name: str) -> Made:
+    """A preset with thin films in closed form, for other values of all that its films do not depend on."""
+    found: dict[str, bytes] = {}
+    looked_up = set[str]()
+    for brushed in (False, True):
+        place = f"{DATA}/films/{model.name}/{name}{'-brushed' * brushed}.pack"
+        try:
+            drawn = in_closed_form(preset(name), model, brushed)
+        except InvalidInput as error:
+            found[place] = packed({"refused": str(error)})
+            continue
+        found[place] = packed(drawn)
+        looked_up |= {*(drawn["tables"] or "").split(","), *(drawn["baked"] or {}).get("tables", [])} - {""}
+    return Made(found, frozenset(looked_up))
 
 
 def _tables(names: Iterable[str]) -> dict[str, bytes]:

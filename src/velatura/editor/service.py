@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
 from velatura import __version__, exports, kernel
-from velatura.editor import appearance, class_maps, truth, validations
+from velatura.editor import appearance, class_maps, films, truth, validations
 from velatura.editor.messages import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
 from velatura.editor.shading import contents, shading
 from velatura.editor.shading import tables as kept_tables
@@ -29,7 +29,20 @@ from velatura.stack import Named, Stack, Texture, dumps, loads, names, preset, p
 from velatura.stack.layers import LAYERS, LayerRecord, has
 from velatura.stack.schema import Parameter, Record, parameters, unknown
 from velatura.stack.spectra import MIRROR
-from velatura.stack.values import Angle, Brushing, Choice, Colour, Conductor, Flag, Index, Pair, Scalar, Text
+from velatura.stack.values import (
+    Angle,
+    Brushing,
+    Choice,
+    Colour,
+    Conductor,
+    Film,
+    Films,
+    Flag,
+    Index,
+    Pair,
+    Scalar,
+    Text,
+)
 from velatura.tables import load as load_tables
 
 #: The control of the page for each type of parameter.
@@ -40,6 +53,7 @@ KINDS: dict[type[Parameter], str] = {
     Pair: "pair",
     Angle: "angle",
     Choice: "choice",
+    Films: "films",
     Conductor: "choice",
     Flag: "flag",
     Text: "text",
@@ -81,7 +95,13 @@ def _constants() -> Answer:
     }
 
 
-_RECORDS: dict[str, type[Record]] = {"material": Stack, **LAYERS, "texture": Texture, "brushing": Brushing}
+_RECORDS: dict[str, type[Record]] = {
+    "material": Stack,
+    **LAYERS,
+    "film": Film,
+    "texture": Texture,
+    "brushing": Brushing,
+}
 
 
 def _keys(model: type[Record]) -> Answer:
@@ -99,6 +119,8 @@ def _parameter(declared: Parameter, place: FieldInfo) -> Answer:
     known |= {"default": None if place.is_required() else place.default, "texturable": declared.texturable}
     if isinstance(declared, Scalar):
         known |= {"low": declared.low, "high": declared.high, "strict": declared.strict}
+    if isinstance(declared, Films):
+        known["most"] = declared.most
     if isinstance(declared, Choice):
         known["options"] = declared.options
     if isinstance(declared, Conductor):
@@ -233,6 +255,7 @@ _VERBS: dict[str, Verb] = {
     "object": object_,
     "environment": environment,
     "export": export,
+    **films.VERBS,
     **validations.VERBS,
     **appearance.VERBS,
     **class_maps.VERBS,

@@ -12,9 +12,9 @@ import numpy as np
 from velatura.editor.messages import array
 from velatura.errors import InvalidInput
 from velatura.model import Model
-from velatura.shader import Shader, atlas, constant, shader
+from velatura.shader import Shader, atlas, constant, films, shader
 from velatura.shader.bake import Bake
-from velatura.stack import Address, Stack, Varying, refuse_films
+from velatura.stack import Address, Stack, Varying
 from velatura.stack.schema import unknown
 from velatura.tables import load
 
@@ -23,6 +23,10 @@ if TYPE_CHECKING:  # it loads SciPy
 
 #: Of an interface with a roughness for each axis, in the material that stands for all of its pattern.
 _STRETCHED = {"alpha_v": 0.2, "rotation": 30.0}
+
+#: A film in that material; and indices of interfaces that have any, of which no two neighbours have the same.
+_FILM = {"eta": 1.4, "thickness_nm": 100.0}
+_LOWEST, _STEP = 1.6, 0.1
 
 KEPT = 4  # shaders
 
@@ -59,7 +63,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         "base": stack.base is not None,
         "thin": stack.thin,
         "closed_form": bool(stack.interfaces) and model.adder is not model and _tabulated(made) is None,
-        **_contents(stack, made),
+        **_contents(stack, made, model),
     }
 
 
@@ -72,16 +76,20 @@ def in_closed_form(stack: Stack, model: Model, stretched: bool) -> dict[str, Any
 def contents(stack: Stack, model: Model, stretched: bool, coarse: bool) -> dict[str, Any]:
     """The values alone, for the code of `shading`, and where a material is solved its `solution`; a `coarse` one has
     fewer directions, for what moves."""
-    return _contents(stack, _made(pattern(stack, stretched), model), coarse)
+    return _contents(stack, _made(pattern(stack, stretched), model), model, coarse)
 
 
-def _contents(stack: Stack, made: Shader, coarse: bool = False) -> dict[str, Any]:
-    values = {address.name: _plain(address, value) for address, value in _free(stack, made)}
+def _contents(stack: Stack, made: Shader, model: Model, coarse: bool = False) -> dict[str, Any]:
+    coated = films.tables(stack, made.film_tables, model, coarse)
+    given = {
+        "values": {address.name: _plain(address, value) for address, value in _free(stack, made)},
+        "films": {name: array(table) for name, table in coated.items()} or None,
+    }
     tabulated = _tabulated(made)
     if tabulated is None:
-        return {"values": values, "solution": None}
+        return {**given, "solution": None}
     found = tabulated.solve(stack, coarse, _lately(made.key))
-    return {"values": values, "solution": {name: array(x) for name, x in vars(found).items()}}
+    return {**given, "solution": {name: array(x) for name, x in vars(found).items()}}
 
 
 def _tabulated(made: Shader) -> Tabulated | None:
@@ -95,15 +103,20 @@ def _free(stack: Stack, made: Shader) -> list[tuple[Address, Any]]:
 
 def pattern(stack: Stack, stretched: bool) -> Stack:
     """The stack that stands for all with the same code: of the same layers and textures, stretched or not."""
-    refuse_films(stack, "the editor has")
     values: dict[str, Any] = {"thin": stack.thin}
     for address, value in stack.values():
+        if address.film is not None:
+            continue
         if isinstance(value, Varying):
             values[address.name] = value
         elif stretched and address.key in _STRETCHED:
             values[address.name] = _STRETCHED[address.key]
         elif address.declared.typical is not None:
             values[address.name] = address.declared.typical
+    for k, coated in enumerate(films.coated_layers(stack)):
+        if coated:
+            values |= {f"layer{k}_film0_{key}": value for key, value in _FILM.items()}
+            values[f"layer{k}_eta"] = _LOWEST + k * _STEP
     return Stack.from_flat(stack.kinds, values)
 
 

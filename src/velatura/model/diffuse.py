@@ -77,7 +77,8 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     if prepared.base is None:
         return prepared
     if any(isinstance(layer, PreparedInterface) and layer.films for layer in prepared.layers):
-        raise InvalidInput(f"films: {prepared.model.name} has none over a diffuse base; velatura and the reference do")
+        others = "velatura without textures and the reference do"
+        raise InvalidInput(f"films: {prepared.model.name} has none over a diffuse base; {others}")
     inside, nodes = _Inside.of(prepared), [node for node, _ in _NODES]
     measures = [2 * weight * node for node, weight in _NODES]
 

@@ -7,6 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
 from velatura.ops import Value
 from velatura.sampling.coated import Coated, Sampled
 from velatura.tables import coordinates
@@ -14,6 +15,7 @@ from velatura.tables import coordinates
 NODES = (65, 33)  # over direction and roughness
 SAMPLES, SAMPLES_INSIDE = 377, 610  # of normals
 WALKED = 4  # roughnesses for one at which light walks between facets
+COARSE, FEW = (33, 9), 144  # nodes, and normals, of coarse ones
 
 
 class FilmAverage(Sampled):
@@ -37,16 +39,16 @@ class FilmAverage(Sampled):
 
 
 @functools.lru_cache(32)
-def film_average(films: Coated, often: bool) -> FilmAverage:
-    """Of an interface whose facets are met once or often; made once."""
+def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverage:
+    """Of an interface whose facets are met once or often; made once. A `coarse` one is quicker, for what moves."""
     from velatura.model.transport.interfaces import Facets, of_first_events, share_of_films
 
     opaque, n12 = films.n12 is None, films.n12 or 1.0
     critical = None if opaque or n12 >= 1 else float(np.arcsin(n12))
-    x, y = (np.linspace(0, 1, n) for n in NODES)
+    x, y = (np.linspace(0, 1, n) for n in (COARSE if coarse else NODES))
     cosines = np.asarray(coordinates.to_cosine(x) if critical is None else coordinates.to_angle(x, critical))
     p = np.sqrt(np.maximum(1 - cosines * cosines, 0))
-    samples = SAMPLES if critical is None else SAMPLES_INSIDE
+    samples = FEW if coarse else SAMPLES if critical is None else SAMPLES_INSIDE
     one, below = np.ones(1), np.full(1, n12)
     each = [
         Facets(one, below, one if opaque else None, alpha, alpha, films=films.data, rarer=films.rarer)
@@ -56,8 +58,12 @@ def film_average(films: Coated, often: bool) -> FilmAverage:
     found = np.array(kept)
     if often:
         walked = np.array([share_of_films(facets, {}, p) for facets in each[::WALKED]])
-        place = np.arange(NODES[1]) / WALKED
+        place = np.arange(len(y)) / WALKED
         before = np.minimum(place.astype(int), len(walked) - 2)
         upper = (place - before)[:, None, None]
         found = found + np.array(blocked) * ((1 - upper) * walked[before] + upper * walked[before + 1])
-    return FilmAverage(found.transpose(2, 0, 1).copy(), critical)
+    found = found.transpose(2, 0, 1)
+    if coarse:
+        even = np.meshgrid(*(np.linspace(0, 1, n) for n in NODES), indexing="ij")
+        found = np.stack(ops.interpolate(Sampled(found), *(each.ravel() for each in even)), axis=-1)
+    return FilmAverage(found.reshape(*NODES, -1).copy(), critical)

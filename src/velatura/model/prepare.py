@@ -188,6 +188,8 @@ class _Averages:
             return None
         multiple = self.model.microsurface
         films = facets.films if self.model.reflectance != "split-sum" else None
+        if isinstance(films, Coated) and (own := films.averaged(multiple)):
+            return own
         if isinstance(films, Coated) and films.known:
             return lambda cos_theta, alpha: film_average(films, multiple)(cos_theta, alpha, eta)
         if self.model.reflectance == "split-sum":

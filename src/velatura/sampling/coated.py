@@ -6,7 +6,7 @@ from __future__ import annotations
 import copy
 import functools
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor
 from threading import Lock
@@ -111,6 +111,10 @@ class Coated(Sampled):
             found.rarer, found.n12 = 3 - self.rarer, 1 / self.n12 if self.n12 else None
             self._reversed = found
         return self._reversed._at(*self.place)
+
+    def averaged(self, often: bool) -> Callable[[Value, Value], Value] | None:
+        """A look-up of its albedo over the cosine and the roughness, where it brings one along."""
+        return None
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         """For cosines above and below, 0 where light cannot be; a colour of the kind of `like`."""

@@ -44,7 +44,7 @@ def cost(outputs: Sequence[Operand], axes: int) -> Cost:
 def _texels(symbol: Symbol, axes: int) -> int:
     """How many a look-up reads: between two nodes along every axis."""
     if symbol.op == FILM:
-        return 2
+        return 2 ** len(symbol.args)
     if symbol.op == "baked":
         return int(symbol.detail.texels) << axes
     if symbol.op not in ("texels", "value"):

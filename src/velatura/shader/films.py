@@ -1,67 +1,93 @@
-"""Thin films in a shader: the reflectance of each interface that has any, a line of a texture over the cosine.
+"""Thin films in a shader: reflectances and averages of each interface that has any, tables in a texture of their own.
 
-Where a user changes values, code knows none of the films but that there are some; else those that are read at
-constant cosines are numbers in the code.
+Code knows them by name: `film2` is the reflectance of the facets of layer 2 over the cosine, `film2_above` and
+`film2_below` its directional albedo for light from either side. Where a user changes values, code knows which
+interfaces have films, and no more; the texture changes with the values.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model import Model
+from velatura.model.film_average import NODES as AVERAGED
+from velatura.model.film_average import film_average
 from velatura.ops import Value
 from velatura.sampling import coated
 from velatura.sampling.coated import NODES, Coated
+from velatura.shader.atlas import Layout
 from velatura.shader.symbol import Symbol, operand
 from velatura.stack import Address, InterfaceValues, Material, Stack, Varying, number
+from velatura.tables import coordinates
 
 Array = NDArray[np.floating]
 
-FILM = "film"  # an operation: a line of the texture, looked up at a cosine
+FILM = "film"  # an operation: a table of films, looked up at a cosine, or at coordinates of direction and roughness
+WIDTH = NODES  # texels of a line of the texture; each table begins a line
+_NAME = re.compile(r"film(\d+)(_above|_below)?")
 
 
 class Read(Coated):
-    """Films that code reads in a line of the texture.
+    """Films that code reads by `name`, `turned` as seen from below.
 
-    `from_above` is whether the medium above is the rarer one, a condition where values change; then there are no data.
+    `data` are those of its facets, which are None where values change; `n12` is then recorded, too.
     """
 
-    known = False  # the texture may change
+    n12: Value
 
-    def __init__(self, line: int, from_above: Value, data: Array | None) -> None:
-        super().__init__(np.empty((0, 0)) if data is None else data, 1)
-        self.line, self.from_above = line, from_above
+    def __init__(self, name: str, data: Array | None, n12: Value | None, turned: bool = False) -> None:
+        super().__init__(np.empty((0, 3)) if data is None else data, 1)
+        self.name, self.n12, self.turned = name, n12, turned
 
     def reversed(self) -> Read:
         """As seen from below."""
-        return Read(self.line, ops.select(self.from_above, False, True), self.data if self.data.size else None)
+        return Read(self.name, self.data if len(self.data) else None, 1 / self.n12, not self.turned)
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
-        return self.at(ops.select(self.from_above, cos_1, cos_2), like)
+        return self.at(ops.select(self.n12 > 1, cos_1, cos_2), like)
 
     def at(self, cosine: Value, like: Value) -> Value:
-        if self.data.size and not isinstance(cosine, Symbol):
+        if len(self.data) and not isinstance(cosine, Symbol):
             return np.stack(ops.interpolate(self, float(cosine)))
-        return Symbol(FILM, (operand(cosine),), "colour", self.line)
+        return Symbol(FILM, (operand(cosine),), "colour", self.name)
+
+    def averaged(self, often: bool) -> Callable[[Value, Value], Value]:
+        name = f"{self.name}_{'below' if self.turned else 'above'}"
+
+        def average(cos_theta: Value, alpha: Value) -> Value:
+            at = operand(self._place(cos_theta)), operand(coordinates.from_roughness(alpha))
+            return Symbol(FILM, at, "colour", name)
+
+        return average
+
+    def _place(self, cos_theta: Value) -> Value:
+        """The coordinate of a direction, as a `FilmAverage` has it."""
+        even = coordinates.from_cosine(cos_theta)
+        if self.n12 is None:
+            return even
+        sine = ops.minimum(self.n12, 1.0)
+        around = coordinates.from_angle(cos_theta, ops.arctan2(sine, ops.sqrt(1 - sine * sine)))
+        return ops.select(self.n12 < 1, around, even)
 
 
 def recorded(material: Material, stack: Stack, general: bool) -> Material:
     """A material of a stack whose films are read, of any values in `general`."""
-    lines = iter(range(len(material.layers)))
     above, layers = material.exterior, material.layers
-    for n, (layer, known) in enumerate(zip(layers, _of(stack))):
+    for n, (layer, known) in enumerate(zip(layers, coated_layers(stack))):
         if not isinstance(layer, InterfaceValues):
             continue
         if known:
-            from_above: Value = known.rarer == 1
-            if general and known.n12 is not None:
+            data, n12 = (None, known.n12) if general else (known.data, known.n12)
+            if general and n12 is not None:
                 below = material.exterior if material.thin and layer is layers[-1] else layer.eta
-                from_above = ops.mean(above) < ops.mean(below)
-            read: Any = Read(next(lines), from_above, None if general else known.data)
+                n12 = ops.mean(below) / ops.mean(above)
+            read: Any = Read(f"film{n}", data, n12)
             material = material.with_layer(n, coating=read)
         elif layer.films:
             material = material.with_layer(n, films=())
@@ -69,29 +95,67 @@ def recorded(material: Material, stack: Stack, general: bool) -> Material:
     return material
 
 
+def coated_layers(stack: Stack) -> list[Coated | None]:
+    """The films on each layer; None of those without. Other values may come from textures.
+
+    Raises:
+        InvalidInput: a value of a film that comes from one.
+    """
+
+    def value(address: Address, described: Any) -> Value:
+        if isinstance(described, Varying) and address.film is None:
+            return 0.0
+        address.plain(described, "films of shaders have one thickness")
+        return number(address, described)
+
+    return coated.of(Material.of(stack, value))
+
+
 def beside(stack: Stack) -> set[str]:
     """Flat names of the indices that the films of a stack are worked out from."""
     found, above = set[str](), "exterior"
-    for n, films in enumerate(_of(stack)):
+    for n, films in enumerate(coated_layers(stack)):
         if films:
             found |= {above, f"layer{n}_eta", *([f"layer{n}_k"] if films.n12 is None else [])}
         above = f"layer{n}_eta" if n in stack.surfaces else above
     return found | ({"exterior"} if found and stack.thin else set())
 
 
-def _of(stack: Stack) -> list[Coated | None]:
-    """The films on each layer. Other values may come from textures."""
-
-    def value(address: Address, described: Any) -> Value:
-        return 0.0 if isinstance(described, Varying) and address.film is None else number(address, described)
-
-    return coated.of(Material.of(stack, value))
+def read_by(symbols: Iterable[Symbol]) -> set[str]:
+    """The names of the tables that are looked up."""
+    return {symbol.detail for symbol in symbols if symbol.op == FILM}
 
 
-def texture(stack: Stack) -> Array | None:
-    """The films of a stack as a texture, float32 of shape (interfaces with films, NODES, 4); None without any."""
-    lines: Sequence[Array] = [films.data for films in _of(stack) if films]
-    return np.pad(np.array(lines, np.float32), ((0, 0), (0, 0), (0, 1))) if lines else None
+def tables(stack: Stack, names: Collection[str], model: Model, coarse: bool = False) -> dict[str, Array]:
+    """The tables of a stack by name, each of the shape of its nodes and 3 colours; `coarse` ones are quicker."""
+    if not names:
+        return {}
+    films, found = coated_layers(stack), dict[str, Array]()
+    for name in sorted(names):
+        parts = _NAME.fullmatch(name)
+        assert parts
+        own = films[int(parts[1])]
+        assert own
+        seen = own.reversed() if parts[2] == "_below" else own
+        found[name] = film_average(seen, model.microsurface, coarse).data if parts[2] else own.data
+    return found
 
 
-__all__ = ["FILM", "NODES", "Read", "beside", "recorded", "texture"]
+def layouts(names: Iterable[str]) -> list[Layout]:
+    """Where each of the tables named lies in their texture."""
+    found: list[Layout] = []
+    start = 0
+    for name in sorted(names):
+        nodes = AVERAGED if "_" in name else (NODES,)
+        found.append(Layout(name, start, nodes, 3))
+        start = -(-found[-1].end // WIDTH) * WIDTH
+    return found
+
+
+def texture(found: dict[str, Array]) -> Array | None:
+    """Tables as their texture, float32 of shape (height, WIDTH, 4); None without any."""
+    lines = []
+    for table in found.values():
+        texels = np.pad(table.reshape(-1, 3).astype(np.float32), ((0, 0), (0, 1)))
+        lines.append(np.pad(texels, ((0, -len(texels) % WIDTH), (0, 0))).reshape(-1, WIDTH, 4))
+    return np.concatenate(lines) if lines else None

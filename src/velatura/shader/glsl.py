@@ -13,7 +13,7 @@ import numpy as np
 from velatura.shader.atlas import WIDTH, Layout, height
 from velatura.shader.bake import Bake, Group
 from velatura.shader.cost import Cost, described
-from velatura.shader.films import NODES
+from velatura.shader.films import WIDTH as LINE_OF_FILMS
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Field, Output, Printer, Struct
 from velatura.shader.statements import assignments, statements
@@ -100,8 +100,8 @@ class Glsl(Printer):
     def value(self, table: str, args: Sequence[str], wide: bool) -> str:
         return f"vt_{table}({', '.join(args)})"
 
-    def film(self, line: int, cosine: str) -> str:
-        return f"vt_film({line}, {cosine})"
+    def film(self, table: str, args: Sequence[str]) -> str:
+        return f"vt_{table}({', '.join(args)})"
 
     # Statements
 
@@ -187,8 +187,9 @@ class Glsl(Printer):
     def lookup(self, bake: Bake | Tabulated) -> str:
         return _BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides, height=bake.height)
 
-    def films(self, count: int) -> str:
-        return _FILMS.format(nodes=NODES, count=count)
+    def films(self, layouts: Sequence[Layout]) -> str:
+        height = -(-layouts[-1].end // LINE_OF_FILMS)
+        return _FILMS.format(LINE_OF_FILMS, height) + "".join(map(_film, layouts))
 
     def helpers(self, called: Set[tuple[str, Kind]]) -> str:
         parts = []
@@ -256,6 +257,13 @@ def _table(layout: Layout) -> str:
     read = f"vt_{'plane' if len(nodes) == 2 else 'space'}({start}, {size}, {count}, i, {at})"
     lines = [f"vec4 texels[{count}];", f"for (int i = 0; i < {count}; i++) texels[i] = {read};", "return texels;"]
     return described + _function(f"vec4[{count}] vt_{name}({arguments})", lines)
+
+
+def _film(layout: Layout) -> str:
+    name, start, nodes, _ = layout
+    if len(nodes) == 1:
+        return f"vec3 vt_{name}(float x) {{ return vt_film_line({start}, {nodes[0]}, x); }}\n"
+    return f"vec3 vt_{name}(float x, float y) {{ return vt_film_plane({start}, ivec2{nodes}, vec2(x, y)); }}\n"
 
 
 _HEADER = """\
@@ -371,15 +379,25 @@ vec4 vt_baked_texel(int texel, vec3 place) {{
 }
 
 _FILMS = """\
-// Reflectance of thin films over the cosine on the rarer side: RGBA32F, {nodes} x {count} texels, never filtered
+// Thin films: reflectances over the cosine, averages over direction and roughness.
+// RGBA32F, {0} x {1} texels, never filtered.
 uniform highp sampler2D vt_films;
 
-vec3 vt_film(int line, float cosine) {{
-    float position = clamp(cosine, 0.0, 1.0) * float({nodes} - 1);
-    int node = min(int(position), {nodes} - 2);
-    vec3 a = texelFetch(vt_films, ivec2(node, line), 0).rgb, b = texelFetch(vt_films, ivec2(node + 1, line), 0).rgb;
-    return mix(a, b, position - float(node));
+vec3 vt_film_texel(int i) {{ return texelFetch(vt_films, ivec2(i % {0}, i / {0}), 0).rgb; }}
+
+vec3 vt_film_line(int start, int nodes, float at) {{
+    float position = clamp(at, 0.0, 1.0) * float(nodes - 1);
+    int node = min(int(position), nodes - 2);
+    return mix(vt_film_texel(start + node), vt_film_texel(start + node + 1), position - float(node));
 }}
+
+vec3 vt_film_plane(int start, ivec2 nodes, vec2 at) {{
+    float position = clamp(at.x, 0.0, 1.0) * float(nodes.x - 1);
+    int node = min(int(position), nodes.x - 2);
+    vec3 a = vt_film_line(start + node * nodes.y, nodes.y, at.y);
+    return mix(a, vt_film_line(start + (node + 1) * nodes.y, nodes.y, at.y), position - float(node));
+}}
+
 """
 
 _SINE = """\

@@ -99,8 +99,8 @@ class Printer(ABC):
         """A table of a single channel, looked up at numbers, or for each channel of colours where it is `wide`."""
 
     @abstractmethod
-    def film(self, line: int, cosine: str) -> str:
-        """The reflectance of thin films at a cosine, a colour, in a line of their texture."""
+    def film(self, table: str, args: Sequence[str]) -> str:
+        """A table of thin films, looked up at one coordinate or two: a colour."""
 
     # Statements
 
@@ -177,8 +177,8 @@ class Printer(ABC):
         """The texture of lobes over direction, and functions that look up each group of its texels."""
 
     @abstractmethod
-    def films(self, count: int) -> str:
-        """The texture of thin films, a line for each interface that has any, and a function that looks it up."""
+    def films(self, layouts: Sequence[Layout]) -> str:
+        """The texture of tables of thin films, and functions that look up each of them in it."""
 
     @abstractmethod
     def helpers(self, called: Set[tuple[str, Kind]]) -> str:

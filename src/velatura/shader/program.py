@@ -34,8 +34,7 @@ class Shader:
     Where values are parameters: `shown` names the lobes that `vt_shown` weighs, in order, and `baked` is what works out
     the lobes for the texture `vt_baked`, None where a texture makes them differ from point to point. A solved material
     always has one; `columns` is the texture of a single one.
-    `films` is the texture of the thin films that the code reads, float32 of shape (interfaces with films, nodes, 4);
-    None where it reads none.
+    `film_tables` names the tables of thin films that the code, or `baked`, looks up in the texture `vt_films`.
     `lobes` are the layers whose light each reflected lobe is, seen from above; `shares` names the energies or chances,
     fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
     `costs` are those of `vt_lobes`, `vt_eval_pdf` and `vt_sample`, each called once.
@@ -49,7 +48,8 @@ class Shader:
     shown: Sequence[str]
     shares: Sequence[str]
     baked: Bake | Tabulated | None
-    films: np.ndarray | None
+    film_tables: Sequence[str]
+    films: np.ndarray | None  # their texture, float32 of shape (height, width, 4); None without any
     costs: Mapping[str, Cost]
 
     @property
@@ -98,7 +98,7 @@ def shader(
     baked, read, shown = recording.baked, list(recording.read), recording.shown
     looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
     layouts, filled = atlas.layouts(looked_up), material.filled(stack, read, bool(shown))
-    read_films = films.texture(stack) if recording.films else None
+    placed = films.layouts(recording.films)
     name = "A material" if shown else " ".join(stack.name.split()) or "A material"
     costs = _costs(recording)
     parts = [
@@ -109,7 +109,7 @@ def shader(
         printer.structs(_structs(recording)),
         *([printer.tables(layouts)] if layouts else []),
         *([printer.lookup(baked)] if baked else []),
-        *([printer.films(len(read_films))] if read_films is not None else []),
+        *([printer.films(placed)] if placed else []),
         printer.helpers({(symbol.op, symbol.kind) for symbol in recording.symbols}),
         printer.lobes({name: (value, recording.kinds[name]) for name, value in recording.lobes.items()}),
         *([printer.energies([(value, "colour") for value in recording.energies])] if recording.energies else []),
@@ -125,7 +125,8 @@ def shader(
         shown=shown,
         shares=_shares(recording),
         baked=baked,
-        films=read_films,
+        film_tables=[layout.name for layout in placed],
+        films=films.texture(films.tables(stack, recording.films, recording.model)),
         costs=costs,
     )
 

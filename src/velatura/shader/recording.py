@@ -66,9 +66,9 @@ class Recording:
         return self._places({s.detail for s in self.symbols if s.op == "input"})
 
     @property
-    def films(self) -> bool:
-        """Whether the code reads the texture of films."""
-        return any(symbol.op == films.FILM for symbol in self.symbols)
+    def films(self) -> set[str]:
+        """The tables of films that the code looks up, or a tape does."""
+        return films.read_by(self.symbols) | set(self.baked.tape.films if isinstance(self.baked, Bake) else ())
 
     @property
     def parameters(self) -> dict[str, str]:

@@ -154,7 +154,7 @@ class _Statements:
         if op == "value":
             return printer.value(symbol.detail, [self.of(x, wide=wide) for x in args], wide), ATOM
         if op == "film":
-            return printer.film(symbol.detail, self.of(args[0])), ATOM
+            return printer.film(symbol.detail, [self.of(x) for x in args]), ATOM
         if op == "item":
             return printer.item(self.of(args[0], ATOM), str(symbol.detail)), ATOM
         if op == "component":

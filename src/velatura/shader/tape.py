@@ -14,7 +14,7 @@ from typing import Any
 from velatura.shader.graph import COMMUTE
 from velatura.shader.symbol import Operand, Symbol, in_order
 
-#: Operations with a detail besides their name: a table, a channel, or a line of films.
+#: Operations with a detail besides their name: a table, or a channel.
 _DETAILED = ("texels", "value", "component", "film")
 
 
@@ -31,6 +31,11 @@ class Tape:
     def tables(self) -> list[str]:
         """The tables that are looked up."""
         return sorted({step[1] for step in self.steps if step[0] in ("texels", "value")})
+
+    @property
+    def films(self) -> list[str]:
+        """The tables of films that are looked up."""
+        return sorted({step[1] for step in self.steps if step[0] == "film"})
 
 
 def tape(outputs: Sequence[Operand]) -> Tape:

@@ -12,6 +12,7 @@ import { createMessages } from './state/messages.js';
 import { follow } from './state/picture.js';
 import { createSnapshots } from './state/snapshots.js';
 import { createStore } from './state/store.js';
+import { createStrips } from './state/strips.js';
 import { followTruth } from './state/truth.js';
 import { mountAppearance } from './views/appearance.js';
 import { chooseFile, offer } from './views/browser.js';
@@ -108,7 +109,10 @@ export function mount(root, { call, lacks = nothingLacks, live, session, storage
   });
   page = createPage({
     ...{ store, session, storage, edits, messages, picture, canvas, focus, update, lacks, toolbar: toolbar.view },
-    layers: createLayers({ store, session, lacks, edits, messages, choose, upload: files.upload, focus, update }),
+    layers: createLayers({
+      ...{ store, session, lacks, edits, messages, choose, upload: files.upload, focus, update },
+      strips: createStrips({ call, lacks, update }),
+    }),
     strip: createStrip({ store, snapshots, focus, update }),
     view: createView({ store, session, edits, picture, choose, takeEnvironment: files.takeEnvironment }),
     model: createModel({ store, session, lacks }),

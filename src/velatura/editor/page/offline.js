@@ -46,10 +46,19 @@ export async function connectFiles(folder) {
   /** The preset of a model that is solved, as it was solved; else the shader in closed form, as it is for `coarse`. */
   async function shader({ material, model, switches = {}, coarse = false }) {
     if (Object.keys(switches).length) throw refused('Switches of a model need Python: velatura edit.');
-    const found = await load(`shader/${model}/${orderOf(material)}`);
+    const order = orderOf(material), films = filmsOf(material);
+    const found = await load(films ? coated(model, films, order) : `shader/${model}/${order}`);
+    if (found.refused) throw refused(found.refused);
     const preset = session.presets.find((known) => isSame(known.material, material));
     if (found.closed_form && preset && !coarse) return load(`solved/${model}/${preset.name}`);
     return { ...found, values: contentsOf(found, read(material), session).values };
+  }
+
+  /** The name of a material in closed form that has the films of a preset. Raises Refused where none has them. */
+  function coated(model, films, order) {
+    const preset = session.presets.find((known) => filmsOf(known.material) === films);
+    if (!preset) throw refused('Films, and indices beside them, need Python: velatura edit.');
+    return `films/${model}/${preset.name}${order.includes('brushed') ? '-brushed' : ''}`;
   }
 
   /** Tables one after another, in the lines of a texture. */
@@ -68,6 +77,7 @@ export async function connectFiles(folder) {
 
   /** The shader in closed form, with the values of the material in the place of those that it was printed with. */
   async function written({ material, model, to }) {
+    if (filmsOf(material)) throw refused('Films need Python: velatura edit.');
     const { text, tables: key, costs } = await load(`${to}/${model}/${orderOf(material)}`);
     const values = flat(read(material), session);
     const put = (line, begin, place) => `${begin}${literal(values[place.replace('.', '_')], line.includes('vec3'))};`;
@@ -125,6 +135,15 @@ function parsed(text, file) {
 function isSame(a, b) {
   const what = ({ layers, exterior = 1, thin = false }) => JSON.stringify([layers, exterior, thin]);
   return what(a) === what(b);
+}
+
+/** All that the films of a material depend on, as text; '' without any. */
+function filmsOf({ layers, exterior = 1, thin = false }) {
+  const parts = layers.map((entry) => {
+    const [[kind, keys]] = Object.entries(entry), { eta, k, conductor, films } = keys ?? {};
+    return [kind, eta, k, conductor, films];
+  });
+  return parts.some(([, , , , films]) => films?.length) ? JSON.stringify([exterior, thin, parts]) : '';
 }
 
 /** A number, or a colour, as GLSL has it. */

@@ -27,15 +27,15 @@ export class Bake {
   }
 
   /**
-   * The texels for the values of a material, by their place in its struct: of each, all nodes side by side. A `coarse`
+   * The texels for the values of a material, by their place in its struct, and its `films`, if any: of each, all nodes side by side. A `coarse`
    * answer takes half of the cosines and of the azimuths, and what is between them from these.
    */
-  draw(values, coarse = false) {
+  draw(values, coarse = false, films = null) {
     const texels = this.#texels, nodes = this.width * this.#turns, { sides } = this.#baked;
     const { at, place } = coarse ? this.#coarse : this.#fine;
     const inputs = Object.fromEntries(Object.entries(values).map(([name, value]) => [`m.${name}`, value]));
     for (let side = 0; side < sides; side++) {
-      const given = { ...inputs, ...place, 'place.z': side };
+      const given = { ...inputs, ...place, 'place.z': side, ...(films && { vt_films: films }) };
       this.#tape ??= new Tape(this.#baked, this.#tables, given);
       this.#tape.run(given, (columns, first, end) => {
         columns.forEach((column, k) => {

@@ -7,10 +7,26 @@ import { lighting } from './glsl/preview.glsl.js';
 import { tracer } from './glsl/tracer.glsl.js';
 import { sobol } from './sobol.js';
 
+const FILM_WIDTH = 257; // texels of a line of films, as in Python; each table begins a line
+
+const linesOf = (shape) => Math.ceil(shape.slice(0, -1).reduce((a, b) => a * b) / FILM_WIDTH);
+
+/** Tables of films, three colours at each node, as the texels of their texture. */
+function texelsOf(films) {
+  const tables = Object.values(films);
+  const texels = new Float32Array(4 * FILM_WIDTH * tables.reduce((sum, { shape }) => sum + linesOf(shape), 0));
+  let begin = 0;
+  for (const { array, shape } of tables) {
+    for (let k = 0; k < array.length; k += 3) texels.set(array.subarray(k, k + 3), begin + (4 * k) / 3);
+    begin += 4 * FILM_WIDTH * linesOf(shape);
+  }
+  return texels;
+}
+
 export class Slot {
   device;
   shader = null; // the answer of call("shader")
-  contents = null; // {values by flat name, solution}, as call("values") has them; maybe `coarse`, for previews alone
+  contents = null; // {values by flat name, films, solution}, as call("values") has them; maybe `coarse`, for previews alone
   lobe = null; // the one that is shown alone, by its number
   samples = 0;
   preview = null; // the target that it is drawn to
@@ -24,6 +40,7 @@ export class Slot {
   #learning = null;
   #textures = {}; // by the names of their samplers
   #bake = null;
+  #films = null; // tables of thin films by name: {array, shape}
   #solved = null; // what Python has worked out: texels, colours of the remainder, numbers of the layout
   #placed = {}; // values by their places in the shader's struct
   #outdated = true; // whether the bake is of other values
@@ -59,7 +76,7 @@ export class Slot {
         this.compile(),
       ]);
       if (this.#asked !== shader) return;
-      device.free(this.#textures.vt_baked);
+      device.free(this.#textures.vt_baked, this.#textures.vt_films);
       this.shader = shader;
       this.#tracing = tracing;
       this.#lighting = lit;
@@ -75,10 +92,15 @@ export class Slot {
     this.#bake = shader.baked && new Bake(shader.baked, tables);
     const [height, width] = solved ?? [this.#bake?.height, this.#bake?.width];
     if (height) this.#textures.vt_baked = device.texture('RGBA32F', width, height);
+    if (shader.films) {
+      const lines = Object.values(shader.films).reduce((sum, { shape }) => sum + linesOf(shape), 0);
+      this.#textures.vt_films = device.texture('RGBA32F', FILM_WIDTH, lines);
+    }
   }
 
   setContents(contents) {
-    const { values, solution } = (this.contents = contents);
+    const { values, films = null, solution } = (this.contents = contents);
+    this.#films = films && Object.fromEntries(Object.entries(films).map(([name, table]) => [name, decode(table)]));
     this.#placed = {};
     for (const [name, place] of Object.entries(this.shader.uniforms)) {
       if (name in values) this.#placed[place] = values[name];
@@ -97,10 +119,11 @@ export class Slot {
   /** All that the code of the material reads; lobes are worked out anew where values have changed, maybe `coarse`. */
   uniforms(coarse = false) {
     if (this.#bake && (this.#outdated || (this.#coarse && !coarse))) {
-      this.device.fill(this.#textures.vt_baked, this.#bake.draw(this.#placed, coarse));
+      this.device.fill(this.#textures.vt_baked, this.#bake.draw(this.#placed, coarse, this.#films));
       this.#coarse = coarse;
     }
     if (this.#solved && this.#outdated) this.device.fill(this.#textures.vt_baked, this.#solved.texels);
+    if (this.#films && this.#outdated) this.device.fill(this.#textures.vt_films, texelsOf(this.#films));
     this.#outdated = false;
     const shown = this.shader.shown.map((_, k) => (this.lobe === null || this.lobe === k ? 1 : 0));
     const parameters = Object.entries(this.#placed).map(([place, value]) => [`vt_parameters.${place}`, value]);

@@ -76,17 +76,19 @@ const LOOPS = {
 };
 LOOPS.both = LOOPS.multiply; // of conditions, which are 1 where they hold, and else 0
 
-const DETAILED = ['component', 'texels', 'value']; // steps that have a detail before their arguments
+const DETAILED = ['component', 'texels', 'value', 'film']; // steps that have a detail before their arguments
 
 export class Tape {
   /**
    * @param {{inputs: string[], constants: Array, steps: Array, outputs: number[]}} tape as call("shader") has it
    * @param {object} tables by name, each {array, shape}
-   * @param {object} inputs by name: arrays of as many numbers each, numbers, or colours as arrays of three; later runs
-   *   have inputs of the same form
+   * @param {object} inputs by name: arrays of as many numbers each, numbers, or colours as arrays of three; as `vt_films`
+   *   tables of thin films by name, each {array, shape}; later runs have inputs of the same form
    */
   constructor({ inputs, constants, steps, outputs }, tables, given) {
     this.tables = tables;
+    const own = ([name, { array, shape }]) => [name, { array: Float64Array.from(array), shape }];
+    this.films = Object.fromEntries(Object.entries(given.vt_films ?? {}).map(own));
     this.spare = []; // arrays of a block that are no longer read
     this.inputs = inputs.map((name) => [name, valueOf(given[name])]);
     this.values = [...this.inputs.map(([, value]) => value), ...constants.map(valueOf)];
@@ -108,6 +110,7 @@ export class Tape {
    * a single number where it is the same for all of them.
    */
   run(inputs, take) {
+    for (const [name, { array }] of Object.entries(this.films)) array.set(inputs.vt_films[name].array);
     const lengths = Object.values(inputs).filter((x) => x instanceof Float64Array).map(({ length }) => length);
     const total = Math.max(1, ...lengths); // also where the tape reads none of these
     for (const [name, { channels, count }] of this.inputs) {
@@ -154,6 +157,7 @@ export class Tape {
     if (op === 'component') return made({ ...given[0], channels: [given[0].channels[detail]], wide: false }, []);
     const count = Math.max(...given.map((x) => x.count));
     if (op === 'texels' || op === 'value') return made(...this.lookedUp(this.tables[detail], given, count));
+    if (op === 'film') return made(...this.film(this.films[detail], given, count));
     if (op === 'mean') {
       const value = this.value(count, 1);
       return made(value, [loop(op, value, 0, [0, 1, 2].map((c) => [given[0], c]))]);
@@ -176,6 +180,12 @@ export class Tape {
       return { f: shape.length > 3 ? space : plane, o: channels, n: count, a: array, s: shape, b: axes };
     });
     return [value, calls];
+  }
+
+  /** A table of films at a cosine, or at coordinates of direction and roughness: a colour, and the call for it. */
+  film({ array, shape }, places, count) {
+    const value = this.value(count, 3, true), axes = places.map((x) => x.channels[0]);
+    return [value, [{ f: shape.length > 2 ? plane : line, o: value.channels, n: count, a: array, s: shape, b: axes }]];
   }
 
   value(count, channels, wide = false) {
@@ -219,6 +229,16 @@ const position = (x, nodes) => (x > 0 ? (x < 1 ? x : 1) : 0) * (nodes - 1);
 
 /** The node before a position, of which there is one after. */
 const before = (position, nodes) => (position < nodes - 1 ? position | 0 : nodes - 2);
+
+/** All channels of the nodes of a line, between the two around each place. */
+function line(channels, count, table, [nodes, width], [x]) {
+  const s = x.length > 1 ? 1 : 0;
+  for (let i = 0; i < count; i++) {
+    const u = position(x[s * i], nodes), node = before(u, nodes), a = node * width;
+    for (let c = 0; c < channels.length; c++)
+      channels[c][i] = table[a + c] + (u - node) * (table[a + width + c] - table[a + c]);
+  }
+}
 
 /** All channels of the nodes of a plane, between the four around each place. */
 function plane(channels, count, table, [rows, columns, width], [y, x]) {

@@ -170,6 +170,31 @@ export const setValue = titled('change a value', (state, id, key, value) =>
   changed(state, id, ({ keys }) => ({ keys: { ...keys, [key]: value } })),
 );
 
+// Films of an interface, by their number from the top -------------------------------------------------
+
+/** Changes the list of films of a layer; none is no key. */
+const withFilms = (state, id, change) =>
+  changed(state, id, ({ keys: { films = [], ...keys } }) => {
+    const next = change(films);
+    return { keys: next.length ? { ...keys, films: next } : keys };
+  });
+
+export const addFilm = titled('add a film', (state, id, film) => withFilms(state, id, (films) => [...films, film]));
+
+export const removeFilm = titled('remove a film', (state, id, n) =>
+  withFilms(state, id, (films) => films.filter((_, other) => other !== n)),
+);
+
+export const moveFilm = titled('move a film', (state, id, from, to) =>
+  from === to ? state : withFilms(state, id, (films) => films.toSpliced(from, 1).toSpliced(to, 0, films[from])),
+);
+
+export const setFilm = titled('change a film', (state, id, n, key, value) =>
+  withFilms(state, id, (films) => films.with(n, { ...films[n], [key]: value })),
+);
+
+// Kinds of layers ------------------------------------------------------------------------------------
+
 /**
  * Makes an interface or a base `diffuse`, `dielectric`, `metal`, `custom` or `mirror`; indices that it has are kept. What
  * another kind takes that it has not is `fresh`, by the names of layers.
@@ -181,7 +206,7 @@ export const setVariant = titled('change the kind of a layer', (state, id, varia
 function become(variant, kind, keys, names, fresh) {
   if (variantOf({ kind, keys }) === variant) return {};
   if (variant === 'diffuse') return { kind: 'diffuse', keys: fresh.diffuse };
-  const { eta, k, conductor, ...surface } = kind === 'interface' ? keys : fresh.interface;
+  const { eta, k, conductor, films = [], ...surface } = kind === 'interface' ? keys : fresh.interface;
   const metal = conductor === undefined || conductor === 'mirror' ? 'Al' : conductor;
   const index = {
     dielectric: () => ({ eta: typeof eta === 'string' && names.conductors[eta] ? 1.5 : (eta ?? 1.5) }),
@@ -192,7 +217,14 @@ function become(variant, kind, keys, names, fresh) {
     }),
     mirror: () => ({ conductor: 'mirror' }),
   };
-  return { kind: 'interface', keys: { ...index[variant](), ...surface } };
+  return { kind: 'interface', keys: { ...index[variant](), ...surface, ...filmsOn(variant, films) } };
+}
+
+/** The films that an interface keeps: none on a mirror, and those on a dielectric are clear. */
+function filmsOn(variant, films) {
+  if (variant === 'mirror' || !films.length) return {};
+  const clear = (film) => Object.fromEntries(Object.entries(film).filter(([key]) => key !== 'k'));
+  return { films: variant === 'dielectric' ? films.map(clear) : films };
 }
 
 const rounded = (colour) => colour.map((channel) => Number(channel.toPrecision(4)));

@@ -63,6 +63,7 @@ export function flat(state, { names, schema }) {
 function numbersOf(keys, parameters, names) {
   const found = Object.entries(parameters).flatMap(([key, { kind, default: standard }]) => {
     const value = keys[key] ?? standard;
+    if (kind === 'films') return [];
     if (kind === 'pair') return axes(value).map((one, axis) => [`${key}_${'uv'[axis]}`, one]);
     if (kind !== 'index') return [[key, value]];
     return keys.conductor === 'mirror' ? [] : [[key, indices(keys.conductor ?? value, key, names)]];
@@ -82,8 +83,9 @@ export function pattern(state) {
   const layers = enabled(state).map(({ kind, keys }) => [
     kind === 'interface' ? (isOpaque({ kind, keys }) ? keys.conductor === 'mirror' : 'dielectric') : kind,
     Object.entries(keys)
-      .filter(([, value]) => typeof shape(value) === 'object')
+      .filter(([key, value]) => key !== 'films' && typeof shape(value) === 'object')
       .map(([key, value]) => [key, shape(value)]),
+    Boolean(keys.films),
   ]);
   return JSON.stringify([state.thin, layers]);
 }

@@ -54,13 +54,13 @@ class Slot {
     this.#wanted = { material, model, switches, shape };
     clearTimeout(this.#timer);
     this.#timer = null;
-    const { viewport, session, lacks } = this.#services, isSolved = Boolean(this.shader?.solution);
-    if (!known || (isSolved && (!viewport.held || lacks('values')))) return this.#ask();
+    const { viewport, session, lacks } = this.#services, asks = isWorkedOut(this.shader);
+    if (!known || (asks && (!viewport.held || lacks('values')))) return this.#ask();
     this.#timer = setTimeout(() => {
       this.#timer = null;
       this.#ask();
     }, PAUSE);
-    if (!isSolved) return this.#setContents(contentsOf(this.shader, state, session), state);
+    if (!asks) return this.#setContents(contentsOf(this.shader, state, session), state);
     this.#moved = { state, shape, question: { material, model, switches, coarse: true } };
     return this.#move();
   }
@@ -120,7 +120,7 @@ class Slot {
 
   async #accept(shader, shape) {
     const { viewport, session, onShader, onProblem } = this.#services, state = this.#state;
-    const contentsNow = () => (shader.solution ? shader : contentsOf(shader, this.#state, session));
+    const contentsNow = () => (isWorkedOut(shader) ? shader : contentsOf(shader, this.#state, session));
     if (shader.key !== this.shader?.key) {
       this.stage = 'compiling';
       await viewport.setMaterial(this.#name, shader, contentsNow());
@@ -129,11 +129,14 @@ class Slot {
     }
     this.drawn = shape;
     this.#settled = !this.#wanted;
-    if (shape === this.#shape) this.#setContents(contentsNow(), shader.solution ? state : this.#state);
+    if (shape === this.#shape) this.#setContents(contentsNow(), isWorkedOut(shader) ? state : this.#state);
     onProblem(this.#name, null);
     onShader(this.#name, shader);
   }
 }
+
+/** Whether Python works out what a shader reads whenever a value changes: its lobes, or its films. */
+const isWorkedOut = (shader) => Boolean(shader?.solution || shader?.films);
 
 /** What a shader whose material is not solved takes of a state: values, three for what may be a colour. */
 export function contentsOf(shader, state, session) {
@@ -142,7 +145,7 @@ export function contentsOf(shader, state, session) {
     const value = values[key] ?? old;
     return [key, Array.isArray(old) && !Array.isArray(value) ? old.map(() => value) : value];
   };
-  return { values: Object.fromEntries(Object.entries(shader.values).map(shaped)), solution: null };
+  return { values: Object.fromEntries(Object.entries(shader.values).map(shaped)), films: null, solution: null };
 }
 
 const isSame = (a, b) => ['origin', 'target', 'fov'].every((key) => String(a[key]) === String(b[key]));

@@ -83,7 +83,7 @@ export function numberField({ label, value, spec = {}, edit, step = 0.01 }) {
 }
 
 /** A slider with its field. */
-export function number({ label, value, spec, edit, span = spanOf(spec), decades }) {
+export function number({ label, value, spec, edit, span = spanOf(spec), decades, step }) {
   const scale = scaleOf(span, decades);
   return html`<div class="number-row">
     <input
@@ -96,7 +96,7 @@ export function number({ label, value, spec, edit, span = spanOf(spec), decades 
       @input=${({ target }) => edit.move(scale.value(Number(target.value)))}
       @change=${edit.settle}
     />
-    ${numberField({ label, value, spec, edit })}
+    ${numberField({ label, value, spec, edit, step })}
   </div>`;
 }
 

@@ -18,6 +18,7 @@ import {
 import { enabled, isBase, layerName, variantOf } from '../state/material.js';
 import { capital, flag, iconButton, menu, numberField } from './controls.js';
 import { icons } from './icons.js';
+import { followGrip } from './moving.js';
 import { parameter, parametersOf, tintOf } from './parameter.js';
 import { text } from './typing.js';
 
@@ -209,31 +210,15 @@ function moveByKey(panel, event, layer, index) {
   panel.focus(`[data-layer="${layer.id}"] .grip`);
 }
 
-/** Follows a pointer over the list and shows where the layer would go; it moves when the pointer is let go. */
 function moveByHand(panel, event, layer) {
-  if (event.button !== 0) return;
-  const grip = event.currentTarget;
-  const cards = [...grip.closest('.layers').querySelectorAll('.layer')];
-  const over = ({ clientY }) => {
-    const index = cards.findIndex((card) => clientY < card.getBoundingClientRect().bottom);
-    return index < 0 ? cards.length - 1 : index;
-  };
-  const done = new AbortController();
-  const on = (name, act) => grip.addEventListener(name, act, { signal: done.signal });
-  const end = () => {
-    done.abort();
-    panel.dropAt = null;
-    panel.update();
-  };
-  grip.setPointerCapture(event.pointerId);
-  on('pointermove', (moved) => {
-    panel.dropAt = over(moved);
-    panel.update();
+  followGrip(event, '.layer', {
+    over(index) {
+      panel.dropAt = index;
+      panel.update();
+    },
+    drop(index) {
+      panel.store.run(moveLayer, layer.id, index);
+      panel.focus(`[data-layer="${layer.id}"] .grip`);
+    },
   });
-  on('pointerup', (moved) => {
-    end();
-    panel.store.run(moveLayer, layer.id, over(moved));
-    panel.focus(`[data-layer="${layer.id}"] .grip`);
-  });
-  on('pointercancel', end);
 }

@@ -5,6 +5,7 @@ import { axes, enabled, indices, isOpaque, variantOf } from '../state/material.j
 import { setValue } from '../state/commands.js';
 import { channelsOf, colour, tint } from './colour.js';
 import { dial, iconButton, menu, number, numberField, texture } from './controls.js';
+import { films } from './films.js';
 import { chosen, dielectrics, metals } from './names.js';
 
 const NAMES = {
@@ -18,6 +19,8 @@ const NAMES = {
   sigma_s: 'Scattering',
   g: 'Forward (g)',
   albedo: 'Albedo',
+  films: 'Thin films',
+  thickness_nm: 'Thickness',
 };
 const SPANS = { eta: [1, 4], k: [0, 10] }; // where sliders for indices end; fields take any
 const PLAIN = { number: 0, pair: 0.1, angle: 0, colour: 0.5, index: 1.5 }; // in place of a texture
@@ -33,7 +36,8 @@ export function parametersOf(layer, schema) {
   const all = Object.keys(schema[layer.kind]);
   if (layer.kind !== 'interface') return all;
   const hidden = Object.values(INDICES).flat();
-  return [...INDICES[variantOf(layer)], ...all.filter((key) => !hidden.includes(key))];
+  const lacks = variantOf(layer) === 'mirror' ? ['films'] : [];
+  return [...INDICES[variantOf(layer)], ...all.filter((key) => ![...hidden, ...lacks].includes(key))];
 }
 
 /** The colour of a medium, which is that of its absorption; nothing where an image or a table has it. */
@@ -52,15 +56,26 @@ export function tintOf({ store, session, edits }, layer) {
 
 const standards = (schema) => Object.fromEntries(Object.entries(schema).map(([key, spec]) => [key, spec.default]));
 
-/** `services` are {session, lacks, edits, messages, choose, upload, spaces}; `spaces` holds the colours that are shown by hue. */
+/**
+ * `services` are {store, session, lacks, edits, messages, choose, upload, spaces, strips}; `spaces` holds the colours that
+ * are shown by hue.
+ */
 export function parameter(services, layer, key) {
-  const { session, edits } = services;
-  const spec = session.schema[layer.kind][key];
+  const spec = services.session.schema[layer.kind][key];
   const value = layer.keys[key] ?? spec.default;
-  const label = NAMES[key] ?? key;
   const act = (next) => [setValue, layer.id, key, next];
-  const edit = edits.of(`${layer.id}.${key}`, act, `layer.${layer.id}`, layer.id);
-  const context = { services, layer, key, label, spec, value, edit, records: session.schema };
+  return row(services, { layer, key, label: '', value, spec, act });
+}
+
+/**
+ * The row of a value of a layer, or of a part of one whose cards are those of its `owner`: `label` says which; `act(value)`
+ * is [command, ...args]. `over` lies above the control.
+ */
+function row(services, { layer, key, label: part, value, spec, act, owner = layer, over = nothing, ...given }) {
+  const { session, edits } = services, name = NAMES[key] ?? key;
+  const label = part ? `${part}, ${name.toLowerCase()}` : name;
+  const edit = edits.of(`${layer.id}.${key}`, act, `layer.${owner.id}`, owner.id);
+  const context = { services, layer, key, label, spec, value, edit, records: session.schema, ...given };
   const { control, extras } = FORMS[spec.kind](context);
   const takes = spec.texturable && !services.lacks('texture') ? textureTarget(context) : {};
   return html`<div
@@ -69,9 +84,9 @@ export function parameter(services, layer, key) {
     @dragover=${takes.over}
     @drop=${takes.drop}
   >
-    <span class="name">${label} <span class="unit">${spec.kind === 'angle' ? '' : spec.unit}</span></span>
+    <span class="name">${name} <span class="unit">${spec.kind === 'angle' ? '' : spec.unit}</span></span>
     <span class="extras">${extras}</span>
-    <div class="control">${control}</div>
+    <div class="control">${over}${control}</div>
   </div>`;
 }
 
@@ -83,11 +98,12 @@ function explained(key, { doc, low = null, high = null, unit }) {
 // By kind --------------------------------------------------------------------------------------------
 
 const FORMS = {
-  number: (context) => simple(context, number),
+  number: (context) => simple(context, number, context.span),
   colour: (context) => simple(context, colour),
   index,
   pair,
   angle,
+  films: (context) => films({ ...context, row: (given) => row(context.services, given) }),
   choice: ({ services, label, value, edit }) => {
     const groups = metals(services.session.names);
     const options = [...chosen(value, groups), ...groups];
