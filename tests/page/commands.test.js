@@ -317,4 +317,5 @@ test('code depends on whether there are films, and on nothing about them', () =>
   const shape = (...films) => pattern(films.reduce((state, next) => commands.addFilm(state, 1, next), opened()));
   assert.equal(shape(film(100)), shape(film(900), film(50)));
   assert.notEqual(shape(), shape(film(100)));
+  assert.equal(shape(), shape(film(0)), 'a thickness of 0 is no film');
 });

@@ -85,7 +85,7 @@ export function pattern(state) {
     Object.entries(keys)
       .filter(([key, value]) => key !== 'films' && typeof shape(value) === 'object')
       .map(([key, value]) => [key, shape(value)]),
-    Boolean(keys.films),
+    keys.films?.some(({ thickness_nm: thickness }) => thickness !== 0) ?? false, // of which code knows no more
   ]);
   return JSON.stringify([state.thin, layers]);
 }

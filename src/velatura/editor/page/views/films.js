@@ -54,9 +54,9 @@ function card({ services, layer, value, film, n, row, spec }) {
   const keys = Object.keys(spec).filter((key) => key !== 'k' || isOpaque(layer));
   const part = (key) => {
     const act = (next) => [setFilm, layer.id, n, key, next];
-    const own = { layer: seen, key, label: name, value: film[key] ?? spec[key].default, spec: spec[key] };
+    const own = { layer: seen, key, label: name, value: film[key] ?? spec[key].default };
     const over = key === 'thickness_nm' ? strip({ services, layer, film, n, name, act }) : nothing;
-    return row({ ...own, act, owner: layer, span: key === 'thickness_nm' && [0, spanOf(film[key])], step: 1, over });
+    return row({ ...own, spec: { ...spec[key], texturable: false }, act, owner: layer, span: key === 'thickness_nm' && [0, spanOf(film[key])], step: 1, over });
   };
   return html`<li class="film" data-film=${n} aria-label=${name}>
     <div class="head">
@@ -87,7 +87,7 @@ function byKey(event, move) {
 /** What the interface reflects at the normal over the thickness of a film, the brightest of it as white; a click picks. */
 function strip({ services, layer, film, n, name, act }) {
   const { store, strips, edits } = services, state = store.get();
-  if (!layer.enabled) return nothing;
+  if (!layer.enabled || typeof film.thickness_nm !== 'number') return nothing;
   const end = spanOf(film.thickness_nm), neutral = setFilm(state, layer.id, n, 'thickness_nm', end);
   const { exterior = 1, thin = false, layers } = documentOf(neutral);
   const place = `${layer.id}.${n}`;
