@@ -30,7 +30,6 @@ from velatura.stack import (
     addressed,
     load,
     loads,
-    refuse_films,
     spectrum,
     srgb_weights,
 )
@@ -208,14 +207,12 @@ class Binding:
         self.steering: dict[str, Any] = {}
         self.clamped: set[str] = set()
         self.coatings: Sequence[Any] = ()
-        if mi.is_spectral:
-            refuse_films(self.stack, f"{mi.variant()} has")
         self.update()
 
     @property
     def uniform(self) -> bool:
         """Whether no value changes from point to point, or with the wavelengths of a ray."""
-        return not self.images
+        return not self.images and not self.interferes
 
     @property
     def varies(self) -> bool:
@@ -267,7 +264,7 @@ class Binding:
         import drjit as dr
 
         mi = self.mi
-        if not any(self.stack.films):
+        if not any(self.stack.films) or mi.is_spectral:
             return ()
         spans: dict[int, tuple[int, int, float, float]] = {}
         for name in self.images:
@@ -282,16 +279,25 @@ class Binding:
         return coated.constant(Material.from_flat(self.stack, some, self._light), list(spans.values()), number)
 
     @property
-    def _light(self) -> str:
+    def interferes(self) -> bool:
+        """Whether films change what is reflected from wavelength to wavelength of a ray."""
+        return self.mi.is_spectral and any(self.stack.films)
+
+    @property
+    def _light(self) -> Any:
+        """What the channels of constants are of."""
+        if self.mi.is_spectral:
+            return self.mi.UnpolarizedSpectrum(*STEERING_NM)
         return "luminance" if self.mi.is_monochromatic else "srgb"
 
-    def material(self, values: Mapping[str, Any]) -> Material:
-        """The material with these values by flat name."""
-        return Material.from_flat(self.stack, values, self._light).coated(self.coatings)
+    def material(self, values: Mapping[str, Any], wavelengths_nm: Any = None) -> Material:
+        """The material with these values by flat name; at the fixed wavelengths in spectral variants, unless given."""
+        light = self._light if wavelengths_nm is None else wavelengths_nm
+        return Material.from_flat(self.stack, values, light).coated(self.coatings)
 
     def at(self, si: Any, active: Any) -> Material:
         """The material at a surface point."""
-        return self.material(self._at(si, active))
+        return self.material(self._at(si, active), self._of_ray(si))
 
     def steered(self, si: Any, active: Any) -> Material:
         """As `at`, but spectra are at fixed wavelengths and then at those of the ray, as `velatura.ops` has them.
@@ -306,7 +312,10 @@ class Binding:
         for name, image in spectra.items():
             steering = self.steering[name] if name in self.steering else image.at(fixed, active)
             values[name] = self.mi.ArrayXf([*steering, *values[name]])
-        return self.material({**values, **self.constants})
+        return self.material({**values, **self.constants}, self.mi.ArrayXf([*STEERING_NM, *si.wavelengths]))
+
+    def _of_ray(self, si: Any) -> Any:
+        return self.mi.UnpolarizedSpectrum(si.wavelengths) if self.mi.is_spectral else None
 
     def uniform_material(self) -> Material:
         """The material of values that are the same everywhere; spectra are at fixed wavelengths."""
@@ -372,7 +381,8 @@ class Binding:
             for name, channels in spectra.items():
                 channels.extend(self.images[name].at(si, True))
         flat = material.flat() if material else {}
-        return self.material({**flat, **self.constants, **{name: self.mi.ArrayXf(x) for name, x in spectra.items()}})
+        at_nm = {name: self.mi.ArrayXf(x) for name, x in spectra.items()}
+        return self.material({**flat, **self.constants, **at_nm}, self.mi.ArrayXf(list(nm)))
 
     def looked_at(self) -> Material:
         """The material with its numeric constants as plain numbers, and its images unchanged."""

@@ -12,7 +12,7 @@ import pytest
 import velatura as vt
 from velatura import kernel
 from velatura.optics.films import Film, coherent
-from velatura.stack import luminance_sensitivity
+from velatura.stack import luminance_sensitivity, srgb_weights
 
 COATED = vt.Stack(
     [
@@ -167,3 +167,91 @@ def test_monochromatic_variants_have_the_luminance_of_films(model: str) -> None:
     u = rng.next_float32(), mono.Point2f(rng.next_float32(), rng.next_float32())
     _, weight = vt.bsdf(stack, model=model).sample(mono.BSDFContext(), lit(mono, 0.8, np.full(40_000, 0.5)), *u)
     assert np.mean(np.array(weight)) == pytest.approx(float(weights @ exact / weights.sum()), abs=3e-3)
+
+
+# At the wavelengths of a ray
+
+RAY = (405.0, 460.0, 530.0, 640.0)
+FGD = {"reflectance": "fgd"}
+
+
+@pytest.fixture()
+def spectral() -> Iterator[Any]:
+    yield kernel.mitsuba("llvm_ad_spectral")
+    kernel.mitsuba("llvm_ad_rgb")
+
+
+def at_wavelengths(mi: Any, cosine: float, nm: Any = RAY, count: int = 1) -> Any:
+    si = lit(mi, cosine, np.full(count, 0.5))
+    si.wavelengths = mi.UnpolarizedSpectrum(*nm)
+    return si
+
+
+def drawn(mi: Any, bsdf: Any, cosine: float, count: int = 60_000) -> np.ndarray:
+    """Mean weights of samples that are reflected, and of those that pass."""
+    import drjit as dr
+
+    rng = mi.PCG32(count)
+    u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    context = mi.BSDFContext(mi.TransportMode.Importance)
+    bs, weight = bsdf.sample(context, at_wavelengths(mi, cosine, count=count), *u)
+    reflected = bs.wo.z * cosine > 0
+    both = (dr.select(reflected, weight, 0), dr.select(reflected, 0, weight))
+    return np.array([np.mean(np.array(x), axis=1) for x in both])
+
+
+def test_films_reflect_each_wavelength_by_itself(spectral: Any) -> None:
+    """Queried energies and weights of samples of a metal that is almost smooth, which moves waves by little."""
+    stack = vt.Stack([vt.Interface(eta=2.0, k=1.0, alpha=0.004, films=[vt.Film(eta=1.5, thickness_nm=400)])])
+    exact = coherent(np.array(0.8), np.array(RAY), 1.0, [Film(1.5, 0.0, 400.0)], 2.0, 1.0).reflected
+    bsdf = vt.bsdf(stack)
+    energies = np.ravel(bsdf.eval_diffuse_reflectance(at_wavelengths(spectral, 0.8)))
+    assert energies == pytest.approx(exact, abs=3e-3)
+    assert drawn(spectral, bsdf, 0.8)[0] == pytest.approx(exact, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("stack", "cosine"),
+    [
+        (COATED, 0.4),
+        (PANE, 0.8),
+        (PANE, -0.6),
+        (COATED.replace(layer0_film0_thickness_nm=2000.0), 0.8),
+        (COATED.replace(layer0_alpha=0.0, layer2_alpha=0.0), 0.5),
+    ],
+)
+def test_the_model_has_the_spectrum_of_the_walk(spectral: Any, stack: vt.Stack, cosine: float) -> None:
+    """Within what lobes of colours differ by from those of the walk, whose noise is a sixth of that."""
+    found, expected = (drawn(spectral, vt.bsdf(stack, **which), cosine) for which in (FGD, {"model": "reference"}))
+    assert found == pytest.approx(expected, abs=6e-3)
+
+
+def test_spectra_of_films_add_up_to_their_colours(mi: Any) -> None:
+    """Under D65, of indices that are the same for all wavelengths and colours."""
+    stack = vt.Stack([vt.Interface(eta=2.5, k=2.0, alpha=0.1, films=[vt.Film(eta=1.6, thickness_nm=350)])])
+    colour = albedo(kernel.mitsuba("llvm_ad_rgb"), vt.bsdf(stack), 0.7)[:, 0]
+    spectral = kernel.mitsuba("llvm_ad_spectral")
+    nm, weights = srgb_weights()
+    si = lit(spectral, 0.7, np.full(len(nm), 0.5))
+    si.wavelengths = spectral.Spectrum(*[spectral.Float(nm)] * 4)
+    assert weights @ np.array(vt.bsdf(stack).eval_diffuse_reflectance(si))[0] == pytest.approx(colour, abs=3e-3)
+
+
+@pytest.mark.parametrize("name", ["layer0_film0_thickness_nm", "layer0_alpha"])
+def test_textures_beside_films_have_spectra(spectral: Any, name: str, tmp_path: Path) -> None:
+    low, step = (250.0, 100.0) if name.endswith("nm") else (0.1, 0.2)
+    texture = {"texture": grey(spectral, tmp_path / "t.exr", (0.0, 1.0)), "scale": step, "offset": low}
+    textured, uniform = (vt.bsdf(OXIDE.replace(**{name: x})) for x in (texture, low + 0.5 * step))
+    found, expected = (
+        np.ravel(bsdf.eval_diffuse_reflectance(at_wavelengths(spectral, 0.6))) for bsdf in (textured, uniform)
+    )
+    assert found == pytest.approx(expected, abs=3e-3)
+
+
+def test_polarised_variants_leave_light_unpolarised(spectral: Any) -> None:
+    wo = [-0.55, 0.1, float(np.sqrt(0.6875))]
+    plain = np.ravel(vt.bsdf(OXIDE).eval(spectral.BSDFContext(), at_wavelengths(spectral, 0.8), spectral.Vector3f(*wo)))
+    mi = kernel.mitsuba("llvm_ad_spectral_polarized")
+    found = np.array(vt.bsdf(OXIDE).eval(mi.BSDFContext(), at_wavelengths(mi, 0.8), mi.Vector3f(*wo)))
+    assert found[0, 0].ravel() == pytest.approx(plain, rel=1e-4)
+    assert np.abs(found).sum() == pytest.approx(np.abs(found[0, 0]).sum())

@@ -277,21 +277,12 @@ def test_a_scene_may_name_films(mi: Any) -> None:
 # What has no films yet
 
 
-def spectral(stack: vt.Stack) -> None:
-    try:
-        kernel.mitsuba("llvm_ad_spectral")
-        vt.bsdf(stack)
-    finally:
-        kernel.mitsuba("llvm_ad_rgb")
-
-
 @pytest.mark.parametrize(
     "use",
     [
         lambda stack: vt.bsdf(stack, model="weidlich_wilkie"),
         lambda stack: vt.inverse.coat(stack, 1.5, 0.1),
         lambda stack: vt.inverse.simplify(stack, 1),
-        spectral,
     ],
 )
 def test_what_has_no_films_says_so(mi: Any, use: Callable[[vt.Stack], Any]) -> None:

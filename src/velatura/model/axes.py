@@ -142,6 +142,7 @@ class Wavelengths:
     and None stands for all."""
 
     nodes: tuple[float, ...]
+    nm: tuple[float, ...]
     spectra: tuple[tuple[str, tuple[float, ...]], ...]
 
     addresses: ClassVar[tuple[Address, ...]] = ()
@@ -191,6 +192,8 @@ def placed(material: Material, axes: Sequence[Axis | Wavelengths], values: Itera
     changed: dict[str, Any] = {}
     for axis, x in zip(axes, values):
         changed.update(axis.changed(x))
+        if isinstance(axis, Wavelengths):
+            material = replace(material, light=np.array(axis.nm if x is None else [axis.nm[int(x)]]))
 
     def value(address: Address, old: Any) -> Any:
         new = changed.get(address.name)

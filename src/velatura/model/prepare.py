@@ -18,7 +18,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.sampling import coated
-from velatura.sampling.coated import Coated, Films, dielectric_between
+from velatura.sampling.coated import Coated, Either, Films, dielectric_between
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.tables import Average, Row, Tables
 
@@ -53,7 +53,7 @@ class PreparedInterface(ops.Named):
         if self.eta is None:
             return 1.0
         if self.films:
-            if isinstance(self.films, Coated) and self.opaque:
+            if self.opaque and not isinstance(self.films, Either):
                 return self.films.at(cos_theta, self.eta)
             return dielectric_between(self.films, cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
         if self.kappa is None:
@@ -194,7 +194,7 @@ class _Averages:
             return lambda cos_theta, alpha: film_average(films, multiple)(cos_theta, alpha, eta)
         if self.model.reflectance == "split-sum":
             r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
-            if isinstance(facets.films, Coated):
+            if facets.films and not isinstance(facets.films, Either):
                 r_0 = facets.films.at(1.0, eta)
             row = tables.schlick_row(self.context.tables, r_0)
         elif eta is None:

@@ -28,7 +28,7 @@ from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling.coated import Coated, either
+from velatura.sampling.coated import OfInterface, either
 
 ALL = Asked()
 FAINT = 1e-9  # energy of a part that is drawn even where it has none
@@ -415,7 +415,7 @@ def _of_either(where: Value, a: PreparedInterface | None, b: PreparedInterface |
 
 def select(where: Value, a: Any, b: Any) -> Any:
     """Records of values, value by value; what is known of a record holds where it does of both."""
-    if isinstance(a, Coated) or isinstance(b, Coated):
+    if isinstance(a, OfInterface) or isinstance(b, OfInterface):
         return either(where, a, b)
     if is_dataclass(a) and not isinstance(a, type):
         return type(a)(*(select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))

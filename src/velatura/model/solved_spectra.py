@@ -27,14 +27,16 @@ from velatura.model.turned import Frame, frame
 from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import differences, directional_grid
+from velatura.sampling import coated, differences, directional_grid
 from velatura.sampling.directional_grid import Curves
 from velatura.sampling.variables import Variables
 from velatura.stack import Material
 
 Array = NDArray[np.floating]
 
-NODES = 64  # even over the spectrum, between which colours are interpolated linearly
+NODES = 64  # even over the spectrum, between which colours are interpolated linearly;
+SLANTS = np.array([1.0, 0.75, 0.5, 0.25])  # cosines, with which the waves of films move
+PER_NM, NODES_MAX = 0.07, 256  # for thin films as many by optical thickness
 CLOSE = 0.002  # reflectances and transmittances between wavelengths for which the material is solved
 
 
@@ -96,13 +98,14 @@ class Spectra:
 def solve(material: Material, places: Array, model: Model, variance: type[Variance], context: Context) -> Spectra:
     """A material with constants of a renderer, solved over the spectrum; differentiable.
 
-    Colours have channels at `places` on the spectrum from 0 to 1 (C,): the fixed ones, and then `NODES` even ones.
+    Colours have channels at `places` on the spectrum from 0 to 1 (C,): the fixed ones, and then even ones.
     """
     material = material.solid()
     own = frame(material)
     material, variance = own.back(material), own.kind(variance)
-    chosen = _chosen(plain(material), places)
+    chosen, nodes = _chosen(plain(material), places), len(places) - ops.FIXED
     material, places = material.each(lambda _, value: _channels(value, chosen)), places[chosen]
+    material = replace(material, light=_channels(material.light, chosen))
     given, start = Variables.of(material), plain(material)
     solver = Solver.over(len(places), model, variance, context, start)
     layouts = solver.layouts([start])
@@ -111,10 +114,10 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     def arrays(numbers: list[float]) -> list[Array]:
         found = solver.solve(given.replaced(start, numbers), layouts)
         orders[:] = [[len(np.atleast_2d(each)) > 1 for each in side.columns.all] for side in found]
-        return [flat for side in found for flat in _flat(side, solver, places)]
+        return [flat for side in found for flat in _flat(side, solver, places, nodes)]
 
     flat = iter(differences.differentiable(arrays, given.given, given.around, context.number))
-    shapes = solver.shape, (*solver.shape, NODES), (NODES,)
+    shapes = solver.shape, (*solver.shape, nodes), (nodes,)
     made = []
     for order in orders:
         curves = (directional_grid.interleaved(next(flat), shape, context.number) for shape in shapes)
@@ -122,28 +125,35 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     return Spectra(own, solver, layouts, made)
 
 
+def nodes_of(material: Material) -> int:
+    """How many nodes resolve the spectra of a material of numbers."""
+    return int(min(max(NODES, PER_NM * coated.optical_nm(material)), NODES_MAX))
+
+
 def axis(material: Material, places: Array) -> Wavelengths:
     """As an axis of tables, for a material with channels at places on the spectrum as `solve` takes it."""
     start = plain(material.solid())
     chosen = _chosen(start, places)
     spectra = {address.name: np.ravel(x)[chosen].tolist() for address, x in start.values() if np.size(x) == len(places)}
-    return Wavelengths(tuple(places[chosen].tolist()), tuple((name, tuple(x)) for name, x in spectra.items()))
+    nm = np.asarray(start.light)[chosen]
+    named = tuple((name, tuple(x)) for name, x in spectra.items())
+    return Wavelengths(tuple(places[chosen].tolist()), tuple(nm.tolist()), named)
 
 
-def _flat(side: SolvedSide, solver: Solver, places: Array) -> list[Array]:
+def _flat(side: SolvedSide, solver: Solver, places: Array, nodes: int) -> list[Array]:
     """The numbers, the colours and the remainder of a side, at nodes, flat."""
     counts = [len(np.atleast_2d(each)) for each in side.columns.all]
     columns = np.split(solver.spread(side), np.cumsum(counts)[:-1])
     numbers = np.concatenate([each for each in columns if len(each) == 1])
-    colours = over_nodes(np.array([each.T for each in columns if len(each) > 1]), places)
+    colours = over_nodes(np.array([each.T for each in columns if len(each) > 1]), places, nodes)
     polynomial = np.array(list(vars(side.polynomial).values()))
-    return [numbers.T.ravel(), np.moveaxis(colours, 0, -1).ravel(), over_nodes(polynomial, places).T.ravel()]
+    return [numbers.T.ravel(), np.moveaxis(colours, 0, -1).ravel(), over_nodes(polynomial, places, nodes).T.ravel()]
 
 
-def over_nodes(values: Array, places: Array) -> Array:
-    """Values at places on the spectrum, (..., C), interpolated at the nodes, (..., NODES)."""
+def over_nodes(values: Array, places: Array, nodes: int) -> Array:
+    """Values at places on the spectrum, (..., C), interpolated at even nodes, (..., nodes)."""
     places, first = np.unique(places, return_index=True)
-    return np.asarray(PchipInterpolator(places, values[..., first], axis=-1)(np.linspace(0, 1, NODES)))
+    return np.asarray(PchipInterpolator(places, values[..., first], axis=-1)(np.linspace(0, 1, nodes)))
 
 
 def _channels(value: Value, chosen: Sequence[int]) -> Value:
@@ -159,16 +169,16 @@ def _chosen(material: Material, places: Array) -> list[int]:
     even = list(range(ops.FIXED, len(places)))
     chosen = [*range(ops.FIXED), even[0], even[-1]]
     while True:
-        error = np.abs(over_nodes(light[:, chosen], places[chosen]) - light[:, even]).max(axis=0)
+        error = np.abs(over_nodes(light[:, chosen], places[chosen], len(even)) - light[:, even]).max(axis=0)
         if error.max() < CLOSE:
             return chosen
         chosen.append(even[int(error.argmax())])
 
 
 def _seen(part: Part) -> list[Array]:
-    """Reflectances and transmittances (C,) along the normal."""
+    """Reflectances and transmittances (C,) along the normal, and of films from other directions, too."""
     if isinstance(part, Facets):
-        return [part.reflectance(np.ones(1))[:, 0]]
+        return list(part.reflectance(np.ones(1) if part.films is None else SLANTS).T)
     if isinstance(part, Lambert):
         return [part.albedo]
     return [np.exp(-part.tau_a), np.exp(-part.tau_s)]

@@ -217,9 +217,9 @@ def _tabulated(
         return Same(solution.solve(material, model, variance, context))
     isotropic = variance is Isotropic
     spectral = any(isinstance(x, Wavelengths) for x in ranges)
-    films = [x for x in ranges if not isinstance(x, Wavelengths) and x[0][0].role == axes.WAVING]
-    # Waves are resolved by the first table
-    ranges = [*films, *(x for x in ranges if x not in films)]
+    # Waves are resolved by the first table, in which wavelengths come first
+    order = {id(x): 0 if isinstance(x, Wavelengths) else 1 if x[0][0].role == axes.WAVING else 2 for x in ranges}
+    ranges, films = sorted(ranges, key=lambda x: order[id(x)]), 1 in order.values()
     together = min(len(ranges), TOGETHER if isotropic and not spectral and not films else 2)
     material = material.solid()
     numbers = solution.plain(material)

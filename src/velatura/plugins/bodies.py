@@ -17,6 +17,7 @@ from velatura.model.textured import Textured
 from velatura.model.variance import Variance
 from velatura.plugins import progress, spectral
 from velatura.plugins.spectral import Spectra
+from velatura.sampling.variables import plain
 
 
 class Bodies(Protocol):
@@ -144,7 +145,10 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     if binding.uniform:
         body = model.recursion.body(binding.uniform_material(), model, variance, context)
         return Uniform(settled(body))
-    nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, solved_spectra.NODES).tolist()]
+    nodes = solved_spectra.NODES
+    if binding.interferes and not binding.varies:
+        nodes = solved_spectra.nodes_of(plain(binding.uniform_material()))
+    nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, nodes).tolist()]
     places = np.array(spectral.places(nm))
     if not binding.varies and model.recursion.solves(binding.uniform_material()):
         solved = solved_spectra.solve(binding.at_wavelengths(nm), places, model, variance, context)
@@ -156,7 +160,8 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         if mi.is_spectral:
             context = replace(context, colour=partial(_spectrum, mi))
         material, ranges = binding.tabulated(axes.UNKNOWN)
-        spectra = [solved_spectra.axis(binding.at_wavelengths(nm, material), places)] if binding.steering else []
+        colours = binding.steering or binding.interferes
+        spectra = [solved_spectra.axis(binding.at_wavelengths(nm, material), places)] if colours else []
         known = before.textured if isinstance(before, Tabulated) else None
         symbolic = binding.symbolic(binding.looked_at())
         textured = model.recursion.textured(material, [*spectra, *ranges], symbolic, model, variance, context, known)
@@ -170,5 +175,6 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         si.wavelengths = wavelengths
         return prepared.lobed(si, True)
 
+    over = nodes + -nodes % len(mi.UnpolarizedSpectrum()) if binding.interferes else spectral.NODES
     fixed = settled(bsdf.body(binding.uniform_material(), model, variance, context))
-    return Prepared(binding, model, variance, settled(spectral.sample(mi, fixed, at_wavelengths)))
+    return Prepared(binding, model, variance, settled(spectral.sample(mi, fixed, at_wavelengths, over)))

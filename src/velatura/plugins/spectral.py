@@ -72,18 +72,21 @@ class Spectra:
         return replace(prepared, base=means)
 
 
-def sample(mi: Any, fixed: bsdf.Lobed, body_at: Callable[[Any], bsdf.Lobed]) -> Spectra:
-    """The spectra of a stack from its body for fixed wavelengths, and from that for those of rays."""
-    above = _side(mi, fixed.lobes_above, lambda nm: body_at(nm).lobes_above)
-    below = _side(mi, fixed.lobes_below, lambda nm: body_at(nm).lobes_below) if fixed.below else None
-    base, means = body_at(_all_wavelengths(mi)).above.base, None
+def sample(mi: Any, fixed: bsdf.Lobed, body_at: Callable[[Any], bsdf.Lobed], nodes: int) -> Spectra:
+    """The spectra of a stack from its body for fixed wavelengths, and from that for those of rays, over as many
+    wavelengths: a multiple of those of a ray."""
+    above = _side(mi, fixed.lobes_above, lambda nm: body_at(nm).lobes_above, nodes)
+    below = _side(mi, fixed.lobes_below, lambda nm: body_at(nm).lobes_below, nodes) if fixed.below else None
+    base, means = body_at(_all_wavelengths(mi, nodes)).above.base, None
     if base is not None:
-        columns = [_over_wavelengths(mi, x, 1) for x in base.means]
-        means = directional_grid.curves(columns, (NODES,), mi.Float)
+        columns = [_over_wavelengths(mi, x, 1, nodes) for x in base.means]
+        means = directional_grid.curves(columns, (nodes,), mi.Float)
     return Spectra(mi, fixed, above, below, means)
 
 
-def _side(mi: Any, fixed: precomputed_lobes.Lobes, lobes_at: Callable[[Any], precomputed_lobes.Lobes]) -> Side:
+def _side(
+    mi: Any, fixed: precomputed_lobes.Lobes, lobes_at: Callable[[Any], precomputed_lobes.Lobes], nodes: int
+) -> Side:
     import drjit as dr
 
     # See every direction at all wavelengths
@@ -91,33 +94,33 @@ def _side(mi: Any, fixed: precomputed_lobes.Lobes, lobes_at: Callable[[Any], pre
     shape = fixed.curves.shape
     w = directional_grid.directions(shape, mi.Float)
     count, none = dr.width(w[2]), dr.zeros(mi.Float, dr.width(w[2]))
-    wavelengths = _all_wavelengths(mi, count)
+    wavelengths = _all_wavelengths(mi, nodes, count)
     rays = dr.width(wavelengths) // count
     x, y, z = (low_discrepancy.repeated(c + none, rays) for c in w)
     reflected, passed = lobes_at(wavelengths)((x, y, z))
 
     # Keep what depends on them
     seen = [*reflected, *([passed] if fixed.transmits and passed else [])]
-    flat = [_over_wavelengths(mi, lobe.energy, count) for lobe in seen]
-    return Side(fixed, directional_grid.curves(flat, (*shape, NODES), mi.Float))
+    flat = [_over_wavelengths(mi, lobe.energy, count, nodes) for lobe in seen]
+    return Side(fixed, directional_grid.curves(flat, (*shape, nodes), mi.Float))
 
 
-def _all_wavelengths(mi: Any, times: int = 1) -> Any:
+def _all_wavelengths(mi: Any, nodes: int, times: int = 1) -> Any:
     """The nodes, several to a ray, for as many times."""
     import drjit as dr
 
     carries = len(mi.UnpolarizedSpectrum())
-    first = dr.tile(dr.arange(mi.Float, NODES // carries), times) * carries
-    step = (END_NM - BEGIN_NM) / (NODES - 1)
+    first = dr.tile(dr.arange(mi.Float, nodes // carries), times) * carries
+    step = (END_NM - BEGIN_NM) / (nodes - 1)
     return mi.UnpolarizedSpectrum([BEGIN_NM + step * (first + i) for i in range(carries)])
 
 
-def _over_wavelengths(mi: Any, colour: Value, times: int) -> Any:
+def _over_wavelengths(mi: Any, colour: Value, times: int, nodes: int) -> Any:
     """The values at all wavelengths in order, as many times."""
     import drjit as dr
 
     carries = len(mi.UnpolarizedSpectrum())
-    return dr.ravel(carried(mi, colour) + dr.zeros(mi.UnpolarizedSpectrum, times * NODES // carries))
+    return dr.ravel(carried(mi, colour) + dr.zeros(mi.UnpolarizedSpectrum, times * nodes // carries))
 
 
 def places(wavelengths_nm: Iterable[Value]) -> list[Value]:

@@ -19,6 +19,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.coatings import Coating, ColouredFilm
+from velatura.optics.films import Film, Response, coherent
 from velatura.sampling.differences import differentiable
 from velatura.sampling.packets import Packets, packets
 from velatura.sampling.variables import Variables, plain
@@ -163,6 +164,49 @@ class Axis:
 
 
 @dataclass(frozen=True)
+class AtWavelengths:
+    """As `Coated`, at the wavelengths of a ray; k_2 is None where the interface transmits."""
+
+    wavelengths_nm: Value
+    eta_1: Value
+    films: tuple[FilmValues, ...]
+    eta_2: Value
+    k_2: Value | None
+
+    known = False
+
+    def reversed(self) -> AtWavelengths:
+        """As seen from below."""
+        return replace(self, eta_1=self.eta_2, films=self.films[::-1], eta_2=self.eta_1)
+
+    def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
+        """For cosines above and below, 0 where light cannot be."""
+        return self.at(ops.select(self._rarer_above, cos_1, cos_2), like)
+
+    def at(self, cosine: Value, like: Value) -> Value:
+        """For the cosine on the rarer side."""
+        films = [Film(x.eta, x.k, x.thickness_nm) for x in self.films]
+        if self.k_2 is not None:
+            return self._colour(coherent(cosine, self.wavelengths_nm, self.eta_1, films, self.eta_2, self.k_2))
+        where = self._rarer_above
+        above, below = (ops.select(where, *pair) for pair in ((self.eta_1, self.eta_2), (self.eta_2, self.eta_1)))
+        turned = [
+            Film(*(ops.select(where, a, b) for a, b in zip(vars(x).values(), vars(y).values())))
+            for x, y in zip(films, films[::-1])
+        ]
+        return self._colour(coherent(cosine, self.wavelengths_nm, above, turned, below))
+
+    def _colour(self, found: Response) -> Value:
+        # Functions of Dr.Jit may have taken a colour of Mitsuba's for an array
+        kind: Any = type(self.wavelengths_nm)
+        return kind(found.reflected)
+
+    @property
+    def _rarer_above(self) -> Value:
+        return ops.mean(self.eta_1) < ops.mean(self.eta_2)
+
+
+@dataclass(frozen=True)
 class Either:
     """Films `a` where a condition holds, else `b`; None without any."""
 
@@ -171,7 +215,8 @@ class Either:
     b: Films
 
 
-Films: TypeAlias = Coated | Either | None
+OfInterface: TypeAlias = Coated | AtWavelengths
+Films: TypeAlias = OfInterface | Either | None
 
 
 def either(where: Value, a: Films, b: Films) -> Films:
@@ -206,23 +251,27 @@ def _colour(kind: Any) -> Any:
     return sys.modules[kind.__module__].Array3f if is_number else kind
 
 
-def of(material: Material) -> list[Coated | None]:
-    """The films on each layer, None on those without: as a renderer has them, or from values of NumPy. There a
-    thickness of 0 is no film."""
-    layers = [
-        replace(layer, films=tuple(x for x in layer.films if x.thickness_nm > 0))
-        if isinstance(layer, InterfaceValues) and layer.films and not layer.coating
-        else layer
-        for layer in material.layers
-    ]
-    return _of(replace(material, layers=tuple(layers)))
+def of(material: Material) -> list[Any]:
+    """The films on each layer, None on those without: in a renderer's numbers as it has them or, at the wavelengths of
+    a ray, `AtWavelengths`; in those of NumPy `Coated`, where a thickness of 0 is no film."""
+    if not any(material.films):
+        return [None] * len(material.layers)
+    if isinstance(material.light, str | np.ndarray):
+        layers = [
+            replace(layer, films=tuple(x for x in layer.films if x.thickness_nm > 0))
+            if isinstance(layer, InterfaceValues) and layer.films and not layer.coating
+            else layer
+            for layer in material.layers
+        ]
+        return _of(replace(material, layers=tuple(layers)))
+    return _of(material)
 
 
-def _of(material: Material) -> list[Coated | None]:
-    found: list[Coated | None] = []
+def _of(material: Material) -> list[Any]:
+    found: list[OfInterface | None] = []
     above = material.exterior
     for layer in material.solid().layers:
-        films = None
+        films: OfInterface | None = None
         if isinstance(layer, InterfaceValues):
             if layer.films:
                 films = layer.coating.of(layer) if layer.coating else _worked_out(layer, above, material.light)
@@ -282,13 +331,22 @@ def step_nm(film: FilmValues) -> float:
     return STEP_NM / float(np.max(film.eta))
 
 
-def _worked_out(layer: InterfaceValues, above: Value, light: Any) -> Coated:
-    """The films on a layer, from values of NumPy; made once."""
+def optical_nm(material: Material) -> float:
+    """The greatest optical thickness of the films on an interface, of values of NumPy."""
+    each = (sum(float(np.max(x.eta)) * x.thickness_nm for x in layer.films) for layer in material.interfaces)
+    return max(each, default=0.0)
+
+
+def _worked_out(layer: InterfaceValues, above: Value, light: Any) -> OfInterface:
+    """The films on a layer; from values of NumPy made once."""
+    if not isinstance(light, str | np.ndarray):
+        return AtWavelengths(light, above, layer.films, layer.eta, layer.k if layer.kind == "conductor" else None)
     count = {"srgb": 3, "luminance": 1}[light] if isinstance(light, str) else len(light)
 
     def channels(value: Value) -> tuple[float, ...]:
         # In single precision, so that values that were rounded are others no more
-        return tuple(np.broadcast_to(np.asarray(value, np.float32).ravel(), count).tolist())
+        each = np.asarray(value, np.float32).ravel()
+        return tuple(np.broadcast_to(each[:1] if (each == each[0]).all() else each, count).tolist())
 
     films = tuple(ColouredFilm(channels(x.eta), channels(x.k), channels(x.thickness_nm)[0]) for x in layer.films)
     opaque = layer.kind == "conductor"
