@@ -246,3 +246,10 @@ def test_cards_of_films_are_accessible_and_fit(
     assert page.page.evaluate(sticking) == []
     context.close()
     assert page.complaints == []
+
+
+def test_an_interface_with_films_is_fixed_in_appearance(visit: Open) -> None:
+    page = visit(COATED)
+    page.page.get_by_role("tab", name="Appearance").click()
+    page.page.get_by_text("layer 0: has thin films, and stays as it is").wait_for()
+    page.settled()

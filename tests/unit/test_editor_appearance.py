@@ -125,6 +125,21 @@ def test_lobes_have_their_own_base_also_where_they_are_only_shown() -> None:
     assert deviation(pane, answer["target"], "weier2020") < EXACT
 
 
+@pytest.mark.parametrize("model", MODELS)
+def test_an_interface_with_films_stays_and_says_so(model: str) -> None:
+    """Its lobes are shown as they are, and no wish takes films away."""
+    coat, medium, metal = copy.deepcopy(COATED["layers"])
+    metal["interface"]["films"] = [{"eta": 2.0, "thickness_nm": 120}]
+    material = {"layers": [coat, medium, metal]}
+    found = appearance.appearance({"material": material, "model": model})
+    why = "layer 2: has thin films, and stays as it is; change it under Layers, or take its films away"
+    assert found["says"] == why
+    read = vt.lobes(Stack.from_dict(material), 1.0, model=model).energy
+    np.testing.assert_allclose([lobe["energy"] for lobe in found["target"]["lobes"]], np.array(read)[..., 0], atol=1e-9)
+    answer = appearance.invert({"material": material, "target": found["target"], "model": model})
+    assert answer == {"feasible": False, "why": why}
+
+
 def test_a_pair_of_one_blur_is_one_lobe() -> None:
     state = saved("bati2021-17-red-over-blue")
     answer = appearance.appearance({"material": state["material"], "model": "bati2021"})

@@ -88,8 +88,8 @@ def described(target: Target) -> Answer:
 def appearance(body: Body) -> Answer:
     """A material as a target; if it is not one, `says` is the reason, and the target is for display only."""
     stack, model = material_of(body), model_of(body)
-    if varies := _varies(stack):
-        return _shown(stack, model, varies)
+    if why := _varies(stack) or _coated(stack):
+        return _shown(stack, model, why)
     try:
         parts = plain(stack)
     except InvalidInput as error:
@@ -123,6 +123,14 @@ def _varies(stack: Stack) -> str | None:
         if isinstance(value, Varying) and address.layer not in (None, last):
             own = "so that every point of the surface has lobes of its own; give it one value to drag them"
             return f"layer {address.layer}: has a {value.what}, {own}"
+    return None
+
+
+def _coated(stack: Stack) -> str | None:
+    """Why an interface stays as it is, if one does."""
+    for n, layer in enumerate(stack.layers):
+        if isinstance(layer, Interface) and layer.films:
+            return f"layer {n}: has thin films, and stays as it is; change it under Layers, or take its films away"
     return None
 
 
@@ -237,6 +245,8 @@ def invert(body: Body) -> Answer:
     model, material = reader_of(body, wish), body.get("material")
     near = dragged(body, wish) if material else None
     if near is None:
+        if material and (why := _coated(Stack.from_dict(material))):
+            return {"feasible": False, "why": why}
         if material and any(part.scatters for part in plain(Stack.from_dict(material))):
             return {"feasible": False, "why": "a medium that scatters stays where it is, and the interfaces around it"}
         return _fresh(wish, model)
