@@ -116,7 +116,7 @@ class _Numpy(Unrolled):
 
     @staticmethod
     def mean(x: Value) -> Value:
-        return np.mean(x[:FIXED], axis=0) if np.ndim(x) else x
+        return np.add.reduce(x[:FIXED], axis=0) / min(len(x), FIXED) if np.ndim(x) else x  # quicker than `np.mean`
 
     @staticmethod
     def interpolate(table: Any, coordinates: Sequence[Value], corners: Corners = _box) -> list[Value]:

@@ -159,7 +159,8 @@ def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value,
     u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     # Azimuths from the plane of incidence: the same normals for any axes of a round lobe
-    u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
+    if np.any(i[1]):
+        u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
     h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
     o = ggx.reflect(i, h)
     p2 = o[0] * o[0] + o[1] * o[1]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -85,7 +87,7 @@ class SolvedSide:
     clipped: Array
     edged: Sequence[Shape | None]
 
-    @property
+    @cached_property
     def rows(self) -> Array:
         """All columns, (rows, M), in the order in which `Columns.read` takes them."""
         return np.concatenate([np.atleast_2d(each) for each in self.columns.all])
@@ -130,9 +132,14 @@ class SolvedSide:
         return self._places([*self.columns.chances, *through])
 
     def _places(self, values: Sequence[Value]) -> list[int]:
-        of = [id(x) for x in self.columns.all]
-        rows = [len(np.atleast_2d(x)) for x in self.columns.all]
-        return [sum(rows[: of.index(id(x))]) for x in values]
+        return [self._first_rows[id(x)] for x in values]
+
+    @cached_property
+    def _first_rows(self) -> dict[int, int]:
+        """Of every column, by its identity."""
+        columns = self.columns.all
+        begins = accumulate((len(x) if np.ndim(x) > 1 else 1 for x in columns), initial=0)
+        return dict(zip(map(id, columns), begins))
 
     @property
     def numbers(self) -> Array:
@@ -352,15 +359,16 @@ class Solver:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
         energy there, too, and lobes where integrals have edges; energies have the sum that is interpolated, and shares
         of samples sum up to 1."""
-        rows = self.grid.spread(side.rows, self.shape)
+        light = np.sum([side.rows[k : k + self.colours] for k, _ in side.light], axis=0)
+        rows = self.grid.spread(np.concatenate([side.rows, light, side.columns.chance[None]]), self.shape)
+        rows, whole, left = np.split(rows, [-1 - self.colours, -1])
         for shape, place, weight, roughness in zip(
             side.edged, side.weights, side.columns.weights, side.columns.roughness
         ):
             if shape:
                 there = slice(place, place + self.colours)
                 rows[there] = self._between(shape, weight, roughness, rows[there])
-        self._scale_energies(rows, side)
-        left = self.grid.spread(side.columns.chance[None], self.shape)
+        self._scale_energies(rows, side, whole)
         rows[side.chances] /= rows[side.chances].sum(axis=0) + left
         if self.model.form == "forward":
             cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
@@ -371,11 +379,10 @@ class Solver:
             rows[scale] = _scale(rows[rest], whole)
         return rows
 
-    def _scale_energies(self, rows: Array, side: SolvedSide) -> None:
-        """So that energies, and what is in proportion to them, have the sum that is interpolated. What is grey stays
-        so: other energies make up for the colours of the rest, as far as that is little."""
+    def _scale_energies(self, rows: Array, side: SolvedSide, whole: Array) -> None:
+        """So that energies, and what is in proportion to them, have the sum that is interpolated, `whole`. What is grey
+        stays so: other energies make up for the colours of the rest, as far as that is little."""
         groups = [[slice(k, k + self.colours) for k in (energy, *others)] for energy, others in side.light]
-        whole = self.grid.spread(np.sum([side.rows[energy] for energy, *_ in groups], axis=0), self.shape)
         found = np.sum([rows[energy] for energy, *_ in groups], axis=0)
         share = ops.divide(ops.mean(whole), ops.mean(found))
         share = np.where(share > 0, share, 1)

@@ -249,7 +249,8 @@ def _tabulated(
             context.progress(done, len(nodes))
             sides = of_group.solve(node, layouts)
             solves.append([_of_channels(of_group, side, solver.colours, wavelengths) for side in sides])
-            reads[:] = [side.groups_of(solver.colours) for side in sides]
+            if not reads:
+                reads.extend(side.groups_of(solver.colours) for side in sides)
         context.progress(len(nodes), len(nodes))
         by_side = ([np.array(x) for x in zip(*side)] for side in zip(*solves))
         # Wavelengths are the leading axis of a group
