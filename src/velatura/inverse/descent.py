@@ -358,17 +358,18 @@ class Descent:
         bounds = np.transpose([free.bounds for free in self.free])
         first = self.start_end
         inset = 1e-9 * (bounds[1] - bounds[0])
-        found = least_squares(
-            lambda x: self.residuals(x[None])[0],
-            np.clip(first.x, bounds[0] + inset, bounds[1] - inset),
-            jac=self.jacobian,
-            bounds=bounds,
-            x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
-            xtol=TOLERANCE,
-            ftol=TOLERANCE if self.model.recursion.closed_form else COARSE,
-            gtol=None,
-            max_nfev=rounds,
-        )
+        with np.errstate(divide="ignore", invalid="ignore"):  # of SciPy's step where all coordinates lie on bounds
+            found = least_squares(
+                lambda x: self.residuals(x[None])[0],
+                np.clip(first.x, bounds[0] + inset, bounds[1] - inset),
+                jac=self.jacobian,
+                bounds=bounds,
+                x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
+                xtol=TOLERANCE,
+                ftol=TOLERANCE if self.model.recursion.closed_form else COARSE,
+                gtol=None,
+                max_nfev=rounds,
+            )
         # Keep the start where the descent has gained nothing
         best = first if first.cost <= found.cost else End(self, found.x, found.fun)
         return replace(best, x=self._smaller_first(best.x))
