@@ -12,7 +12,7 @@ from benchmarks import benchmark
 
 from velatura.errors import InvalidInput
 from velatura.inverse import Directions, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
-from velatura.inverse.fitting import _merged, compared
+from velatura.inverse.fitting import _merged, _turned, compared
 from velatura.model import Model, named
 from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, load, loads
@@ -151,7 +151,8 @@ def test_the_error_of_a_simplification_is_what_descends() -> None:
 def test_one_interface_keeps_energy_and_hue(model: str, stack: str) -> None:
     """Of a coated metal, whose blur one interface cannot have: the energies are those of the lobes, kept to .06.
 
-    Those of `velatura` are interpolated between directions, and scaled for all colours alike: within 1 % in one.
+    Those of `velatura` are interpolated between directions: within .5 %. They are read along the brushing, since at
+    the normal it is read with the azimuth of its axes.
     """
     copper = Stack([Interface(eta=1.5, alpha=0.02), Interface(conductor="Cu", alpha=0.25)])
     whole = copper if stack == "copper" else load(stack)
@@ -160,9 +161,9 @@ def test_one_interface_keeps_energy_and_hue(model: str, stack: str) -> None:
         cosine = float(np.cos(np.radians(row["theta_i"])))
         for one, energy in ((whole, row["before"]), (found.stack, row["after"])):
             if cosine == 1:
-                read = stack_lobes(one, 1.0, model=model)
+                read = stack_lobes(_turned(one, -30) if stack == "coated-gold" else one, 1.0, model=model)
                 reflected = np.sum([*read.energy, read.remainder], axis=0)[:, 0]
-                assert reflected == pytest.approx(energy, rel=1e-2 if model == "velatura" else 1e-6)
+                assert reflected == pytest.approx(energy, rel=5e-3 if model == "velatura" else 1e-6)
     head_on = found.energies[0]
     assert head_on["after"] == pytest.approx(head_on["before"], abs=0.06)
     before, after = (np.array([row[key] for row in found.energies]) for key in ("before", "after"))
