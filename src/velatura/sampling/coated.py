@@ -119,7 +119,11 @@ class Coated(Sampled):
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         """For cosines above and below, 0 where light cannot be; a colour of the kind of `like`."""
-        return self.at(cos_1 if self.rarer == 1 else cos_2, like)
+        return self.at(self.cosine(cos_1, cos_2), like)
+
+    def cosine(self, cos_1: Value, cos_2: Value) -> Value:
+        """Of the cosines above and below, that on the rarer side."""
+        return cos_1 if self.rarer == 1 else cos_2
 
     def at(self, cosine: Value, like: Value) -> Value:
         """For the cosine on the rarer side."""
@@ -214,6 +218,18 @@ class Either:
     a: Films
     b: Films
 
+    def between(self, cos_1: Value, cos_2: Value, eta: Value) -> Value:
+        """As `dielectric_between`: by one fetch where it can be."""
+        a, b = self.a, self.b
+        if isinstance(a, Coated) and isinstance(b, Coated):
+            cosine = ops.select(self.where, a.cosine(cos_1, cos_2), b.cosine(cos_1, cos_2))
+            if a.data is b.data and a.known == b.known and not a.place:
+                return a.at(cosine, eta)
+            if a.known and b.known and a.data.shape == b.data.shape:
+                place = ops.minimum(cosine, 1.0) * (NODES - 1) + ops.select(self.where, 0.0, float(NODES))
+                return _both(a, b).fetched(eta, place / (2 * NODES - 1))
+        return ops.select(self.where, *(dielectric_between(x, cos_1, cos_2, eta) for x in (a, b)))
+
 
 OfInterface: TypeAlias = Coated | AtWavelengths
 Films: TypeAlias = OfInterface | Either | None
@@ -224,12 +240,16 @@ def either(where: Value, a: Films, b: Films) -> Films:
     return a if a is b else Either(where, a, b)
 
 
+@functools.lru_cache(64)
+def _both(a: Coated, b: Coated) -> Sampled:
+    """The nodes of one after those of the other."""
+    return Sampled(np.concatenate([a.data, b.data]))
+
+
 def dielectric_between(films: Films, cos_1: Value, cos_2: Value, eta: Value) -> Value:
     """Reflectance of a dielectric with films, for cosines above and below: as `fresnel.dielectric_between`."""
     if films is None:
         return fresnel.dielectric_between(cos_1, cos_2, eta)
-    if isinstance(films, Either):
-        return ops.select(films.where, *(dielectric_between(x, cos_1, cos_2, eta) for x in (films.a, films.b)))
     return films.between(cos_1, cos_2, eta)
 
 

@@ -49,8 +49,8 @@ class Read(Coated):
         """As seen from below."""
         return Read(self.name, self.data if len(self.data) else None, 1 / self.n12, not self.turned)
 
-    def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
-        return self.at(ops.select(self.n12 > 1, cos_1, cos_2), like)
+    def cosine(self, cos_1: Value, cos_2: Value) -> Value:
+        return ops.select(self.n12 > 1, cos_1, cos_2)
 
     def at(self, cosine: Value, like: Value) -> Value:
         if len(self.data) and not isinstance(cosine, Symbol):
