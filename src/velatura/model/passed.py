@@ -117,6 +117,18 @@ def parts(
     return Parts(weight_straight, weight_bounced, weight_rest, *shares[:3], *numbers), shares[3:]
 
 
+def energy(passage: Passage, wi: tuple[Array, Array, Array], straight: Array, bounces: Array) -> Array:
+    """Of light that goes straight through and bounces, with such weights (C, N)."""
+    lobe, found = bounced.bounced(passage, wi), straight * straight_through.integrals(passage, wi)[0]
+    return found + bounces * own_medium.integral(lobe, bounced.seen_below(passage, wi)) if lobe else found
+
+
+def rest(passage: Passage, wi: tuple[Array, Array, Array], light: Array) -> Array:
+    """The weight of the rest that has an energy (C, N)."""
+    whole = bounced.integral_rest(bounced.rest(passage, wi), bounced.seen_below(passage, wi))
+    return np.asarray(np.maximum(light, 0) / whole)
+
+
 def eval_pdf(passage: Passage, of: Parts, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, of light that passes, and the density of `sample` times `Parts.share`, on both
     sides; wi lies above. Radiance is not scaled by the index."""

@@ -80,12 +80,13 @@ class Layout:
 class SolvedSide:
     """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; numbers of the remainder,
     (C,), and the albedo that it gains by being clipped at 0, (C, cosines); the shape of each lobe whose integral
-    has an edge between directions, else None."""
+    has an edge between directions, else None; and what passes, in a material that is drawn forward, else None."""
 
     columns: Columns
     polynomial: Remainder
     clipped: Array
     edged: Sequence[Shape | None]
+    passage: Passage | None = None
 
     @cached_property
     def rows(self) -> Array:
@@ -353,7 +354,8 @@ class Solver:
         sharp = self.normals is None and _reflects_all(found)  # edges are lost in the error of few normals
         narrow = [sharp and np.min(tensor.roughness(phi)[:2]) < NARROW for tensor in shown]
         edged = [shape if each else None for shape, each in zip(shapes, narrow)]
-        return SolvedSide(columns, numbers, self._colours(clipped), edged)
+        forward = self.model.form == "forward"
+        return SolvedSide(columns, numbers, self._colours(clipped), edged, passage if forward else None)
 
     def spread(self, side: SolvedSide) -> Array:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
@@ -369,6 +371,8 @@ class Solver:
                 there = slice(place, place + self.colours)
                 rows[there] = self._between(shape, weight, roughness, rows[there])
         self._scale_energies(rows, side, whole)
+        if side.passage:
+            self._pass_between(rows, side.passage, *side.light[-1])
         rows[side.chances] /= rows[side.chances].sum(axis=0) + left
         if self.model.form == "forward":
             cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
@@ -378,6 +382,22 @@ class Solver:
             scale, rest = (slice(k, k + self.colours) for k in side.places)
             rows[scale] = _scale(rows[rest], whole)
         return rows
+
+    def _pass_between(self, rows: Array, passage: Passage, energy: int, weights: Sequence[int]) -> None:
+        """With all light that passes about the critical angles of inner media, where weights jump from one node to the
+        next: diffuse light has what the other parts lack."""
+        inner = np.array([float(np.mean(n)) for n in passage.indices[1:-1]])
+        nodes = self.grid.cosines - 1
+        edges = np.floor((1 - inner[inner < 1] ** 2) ** 0.25 * nodes)
+        wi = directional_grid.directions(self.shape, None)
+        there = np.flatnonzero(np.isin(np.floor(np.sqrt(wi[2]) * nodes + 1e-9), edges))
+        if not len(there):
+            return
+        x, y, z = (w[there] for w in wi)
+        straight, bounces, light = (rows[k : k + self.colours, there] for k in (*weights[:2], energy))
+        left = light - passed.energy(passage, (x, y, z), straight, bounces)
+        rest = slice(weights[-1], weights[-1] + self.colours)
+        rows[rest, there] = passed.rest(passage, (x, y, z), left)
 
     def _scale_energies(self, rows: Array, side: SolvedSide, whole: Array) -> None:
         """So that energies, and what is in proportion to them, have the sum that is interpolated, `whole`. What is grey
