@@ -174,6 +174,7 @@ def test_what_needs_python_is_grey_and_says_why(visit: Open) -> None:
         assert found.is_disabled()
         assert "Python" in found.get_attribute("title")
     assert page.get_by_role("button", name="Roughness: take a texture").first.is_disabled()
+    assert page.get_by_role("button", name="Add a film below the others").first.is_disabled()
     page.get_by_label("Compare", exact=True).select_option("split")
     truth = page.get_by_label("With", exact=True).locator("option[value=truth]")
     assert truth.get_attribute("disabled") is not None
@@ -184,6 +185,16 @@ def test_what_needs_python_is_grey_and_says_why(visit: Open) -> None:
     open_preset(here, "Coated rough metal")
     page.get_by_role("button", name="Interface", exact=True).click()
     page.get_by_text("So many layers need Python").wait_for()
+
+
+def test_films_that_are_not_those_of_a_preset_are_refused_in_words(visit: Open, address: str, served: Server) -> None:
+    there = visit(served.entrance)
+    open_preset(there, "Gold")
+    there.page.get_by_role("button", name="Add a film below the others").click()
+    there.settled()
+    here = visit(address)
+    here.page.evaluate("(hash) => (location.hash = hash)", link(there))
+    here.page.get_by_text("Films, and indices beside them, need Python: velatura edit.").first.wait_for()
 
 
 def test_the_shader_that_is_exported_is_that_of_python(visit: Open) -> None:
