@@ -136,6 +136,22 @@ def _smooth(model: str) -> dict[str, str]:
     return {"tir": "off"} if model == "belcour2018" else {}
 
 
+@pytest.mark.parametrize(
+    "name", ["anodised-titanium", "coated-lens", "oil-on-wet-asphalt", "pearlescent-paint", "soap-on-varnish"]
+)
+def test_presets_with_films_have_the_light_of_the_walk(name: str) -> None:
+    """All reflected light within .002, and five times the noise of the walk; and each is coloured by its films."""
+    truth = vt.reference.statistics(name, 0.8, paths=100_000, seed=2, microsurface=True)
+    found = vt.lobes(name, 0.8)
+    of_model = (np.sum(found.energy, axis=0) + found.remainder)[:, 0]
+    assert truth.standard_error
+    noise = np.sqrt(np.sum(np.square(np.reshape(truth.standard_error.energy, (-1, 3))), axis=0))
+    assert np.all(np.abs(of_model - np.sum(np.reshape(truth.energy, (-1, 3)), axis=0)) < 2e-3 + 5 * noise)
+    bare = vt.lobes(of_thickness(vt.preset(name), None), 0.8)
+    without = (np.sum(bare.energy, axis=0) + bare.remainder)[:, 0]
+    assert np.ptp(of_model) / of_model.max() > 0.2 + np.ptp(without) / without.max()
+
+
 @pytest.mark.parametrize("material", [ANODISED, COATED, GLASS, OVER_DIFFUSE])
 @pytest.mark.parametrize("cosine", [1.0, 0.4])
 def test_the_model_has_the_light_of_the_walk(material: str, cosine: float) -> None:
