@@ -88,8 +88,8 @@ def test_flat_names_change_films_and_add_them() -> None:
         ("{conductor: mirror, films: [{eta: 2, thickness_nm: 9}]}", "films: not on a mirror, which reflects all light"),
         ("{eta: 1.5, films: 3}", "films: must be a list of films, got 3"),
         (
-            "{eta: 1, films: [{eta: 1.4, thickness_nm: 9}]}",
-            "films: only between media whose indices differ by more than 0.001",
+            "{eta: 1, alpha: 0.1, films: [{eta: 1.4, thickness_nm: 9}]}",
+            "films: between media whose indices differ by less than 0.001 only where alpha is 0",
         ),
     ],
 )
@@ -197,6 +197,31 @@ def test_averages_of_the_papers_are_those_of_the_films(name: str, reflectance: s
     truth = vt.reference.statistics(stack, cosines, paths=200_000, seed=4, microsurface=often)
     found = vt.lobes(stack, cosines, model="belcour2018", tir="off", reflectance=reflectance)
     assert found.energy[0] == pytest.approx(truth.energy[0], abs=4e-3)
+
+
+SOAP = """
+layers:
+  - interface: {eta: 1, films: [{eta: 1.33, thickness_nm: 400}]}
+"""
+BELOW_SOAP = SOAP + "  - interface: {conductor: Al, alpha: 0.2}"
+
+
+@pytest.mark.parametrize("model", [model.name for model in MODELS if model.reflectance != "split-sum"])
+def test_a_film_in_air_reflects_as_it_does_alone(model: str) -> None:
+    film = Coating((ColouredFilm(white(1.33), white(0.0), 400.0),), white(1.0), white(1.0))
+    exact = film.reflectance(np.array(COSINES), srgb_sensitivity)
+    found = vt.lobes(loads(SOAP), COSINES, model=model, **_smooth(model))
+    assert found.energy[0] == pytest.approx(exact, abs=1e-3)
+    assert found.passed == pytest.approx(1 - exact, abs=1e-3)
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.4])
+def test_a_film_in_air_lies_above_others(cosine: float) -> None:
+    """As the walk has it, whose noise is a fifth of what is allowed."""
+    truth = vt.reference.statistics(loads(BELOW_SOAP), cosine, paths=200_000, seed=5)
+    found = vt.lobes(loads(BELOW_SOAP), cosine, reflectance="fgd")
+    for mine, walked in zip(found.energy, truth.energy):
+        assert mine[:, 0] == pytest.approx(np.ravel(walked), abs=4e-3)
 
 
 def test_clear_films_keep_all_light() -> None:

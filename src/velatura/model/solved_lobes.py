@@ -78,7 +78,7 @@ def _lobe(energy: Array, own: Roughness, seen: Roughness, model: Model) -> LobeS
 
 
 def _without_steps(material: Material) -> list[int]:
-    """Places of interfaces between media of one index: nothing reflects there, nor changes for what lies below.
+    """Places of interfaces without films between media of one index: nothing reflects there, nor changes below.
 
     Not of one that ends a medium; and one layer stays.
     """
@@ -86,7 +86,7 @@ def _without_steps(material: Material) -> list[int]:
     ends_medium = any(isinstance(layer, MediumValues) for layer in material.layers[-2:-1])
     for place, layer in enumerate(material.layers[: -1 if ends_medium else None]):
         if isinstance(layer, InterfaceValues) and layer.kind == "dielectric":
-            if np.all(layer.eta == above):
+            if np.all(layer.eta == above) and not layer.films:
                 found.append(place)
             above = layer.eta
     return found if len(found) < len(material.layers) else found[:-1]

@@ -12,7 +12,7 @@ from velatura.stack.values import Varying
 if TYPE_CHECKING:
     from velatura.stack.stack import Stack
 
-STEP_MIN = 1e-3  # least step of the logarithm of the index across an interface with films
+STEP_MIN = 1e-3  # least step of the logarithm of the index across a rough interface: below, all take it for smooth
 
 
 def check(stack: Stack) -> None:
@@ -25,10 +25,12 @@ def check(stack: Stack) -> None:
             where = f"layer {index} (interface): films"
             if isinstance(above, Varying):
                 raise ValueError(f"{where}: not below an index from a texture")
-            if not layer.opaque:
+            if not layer.opaque and layer.alpha != 0:
                 below = stack.exterior if stack.thin and layer is stack.layers[-1] else layer.eta
                 if abs(_mean(below) / _mean(above) - 1) < STEP_MIN:
-                    raise ValueError(f"{where}: only between media whose indices differ by more than {STEP_MIN:g}")
+                    raise ValueError(
+                        f"{where}: between media whose indices differ by less than {STEP_MIN:g} only where alpha is 0"
+                    )
         above = layer.eta
 
 
