@@ -351,7 +351,8 @@ def test_no_stack_or_direction_gives_nan_or_negative_energy(precision) -> None:
         model = named("belcour2018", **VARIANTS[number % len(VARIANTS)])
         variance = (Isotropic, PerAxis, Covariance)[number % 3]
         kinds: Any = [KINDS[kind] for kind in pattern]
-        material = Material.from_flat(kinds, values)
+        one = Stack.from_flat(kinds, {name: float(np.ravel(value)[0]) for name, value in values.items()})
+        material = Material.from_flat(one, values)
         prepared = prepare(material, model, variance)
         cos_theta = np.where(rng.random(count) < 0.2, 10 ** rng.uniform(-7, -1, count), rng.uniform(0, 1, count))
         phi, sin_theta = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - cos_theta**2)
