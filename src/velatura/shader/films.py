@@ -39,6 +39,7 @@ class Read(Coated):
     `data` are those of its facets, which are None where values change; `n12` is then recorded, too.
     """
 
+    known = False  # code reads the texture
     n12: Value
 
     def __init__(self, name: str, data: Array | None, n12: Value | None, turned: bool = False) -> None:
