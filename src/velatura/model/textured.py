@@ -273,7 +273,8 @@ def _tabulated(
                     scaled = np.exp(np.minimum(by, np.log(MOST)))
                     columns = np.where(add[:, None], _beyond(columns, group, known), scaled)
                     polynomials = _beyond(polynomials, group, known)
-                if summed := None if given.given else _of_few(polynomials):
+                # Of two sides, sums take more of a step of an optimisation than fetches do
+                if summed := None if given.given or len(layouts) > 1 else _of_few(polynomials):
                     polynomials, few[k, side] = summed
                 if (k, side) not in packings:
                     packings[k, side] = tuple(
