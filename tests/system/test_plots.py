@@ -77,7 +77,7 @@ def test_a_fit_is_drawn_beside_its_table(run: Run, drawn: list[Figure]) -> None:
     status, out, err = run("fit", "table.csv", "one.yaml", "--plot", "--starts", "1", "--model", "bati2021")
     assert (status, err, out.splitlines()[-1]) == (0, "", "table.png")
     (figure,) = drawn
-    assert title(figure).startswith("Satin: the closest stack, by bati2021, error of log(1 + f cos)")
+    assert title(figure).startswith("Satin: the closest stack, by bati2021, error 0.0")
     titles = [axes.get_title() for axes in figure.axes]
     assert titles[:3] == ["incidence at 0°", "incidence at 40°", "parameters"] and "trade places" in titles[3]
     assert figure.axes[0].get_xlabel() == "tilt of the half-vector (degrees)"
