@@ -196,7 +196,7 @@ def test_what_cannot_be_is_refused_in_words(visit: Open) -> None:
     index = page.page.locator(".layer").nth(0).get_by_label("Index", exact=True)
     index.fill("1")
     index.press("Enter")
-    problem = "films: only between media whose indices differ by more than 0.001"
+    problem = "films: between media whose indices differ by less than 0.001 only where alpha is 0"
     page.page.locator(".layer .problem").get_by_text(problem).wait_for()
     page.page.keyboard.press("Control+z")
     page.settled()
