@@ -268,3 +268,19 @@ def test_bad_options_are_refused(option: dict) -> None:
     (name,) = option
     with pytest.raises(RuntimeError, match=f"{name}: must be"):
         reference(STACKS["coated metal"], **option)
+
+
+def test_media_that_scatter_are_walked_in_monochromatic_variants() -> None:
+    """Expected: what the walk of three equal channels reflects and transmits."""
+    medium = Medium(depth=0.5, sigma_a=0.2, sigma_s=2.0, g=0.3)
+    layers = [Interface(eta=1.5, alpha=0.2), medium, Interface(eta=1.0)]
+    found = []
+    try:
+        for variant in ("llvm_ad_mono", "llvm_ad_rgb"):
+            kernel.mitsuba(variant)
+            kernel.register()
+            found.append(albedos(reference(layers), direction(0.8, 0.0), 100_000))
+    finally:
+        kernel.mitsuba("llvm_ad_rgb")
+    (mono, mono_error), (rgb, rgb_error) = found
+    assert np.all(np.abs(mono - rgb) < SIGMAS * np.hypot(mono_error, rgb_error))

@@ -208,7 +208,7 @@ def _of_one_channel(u: Value, carried: Value, colour: Value) -> Value:
     """The channel of `colour` that u falls on, the channels being as likely as the path carries them."""
     import drjit as dr
 
-    if dr.size_v(colour) <= 1:
+    if dr.depth_v(colour) < 2:  # a number for all channels
         return colour
     chosen, end = colour[0], carried[0]
     for i in range(1, len(colour)):
