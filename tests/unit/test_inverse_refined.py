@@ -86,18 +86,35 @@ def test_a_start_that_has_the_lobes_keeps_its_tint() -> None:
     assert invert_stack({"lobes": lobes, "start": stack.to_dict()}, MODEL).stack == stack
 
 
-def test_the_search_leads_past_a_jump_of_readings() -> None:
-    target = Target(
-        [
-            {"energy": 0.11543720020443492},
-            {"energy": (0.031517551462987764, 0.03836517364447956, 0.032928344274168846), "alpha": 0.1512762717479406},
-            {
-                "energy": (0.2713277971252697, 0.22636485975841017, 0.23873940843396405),
-                "alpha": 0.34743004489989143,
-                "base": "conductor",
-            },
-        ]
-    )
+JUMPS = {
+    "index": [
+        {"energy": 0.11543720020443492},
+        {"energy": (0.031517551462987764, 0.03836517364447956, 0.032928344274168846), "alpha": 0.1512762717479406},
+        {
+            "energy": (0.2713277971252697, 0.22636485975841017, 0.23873940843396405),
+            "alpha": 0.34743004489989143,
+            "base": "conductor",
+        },
+    ],
+    "pair": [
+        {"energy": 0.10074278493622979, "alpha": 0.13738015393440114},
+        {
+            "energy": (0.02953765270632777, 0.03810921715032311, 0.03834429923487833),
+            "alpha": 0.37782201995356396,
+            "interfaces": 2,
+        },
+        {
+            "energy": (0.028134647059087945, 0.027175565298252272, 0.029049491367064178),
+            "alpha": 0.6092743051118422,
+            "base": "conductor",
+        },
+    ],
+}
+
+
+@pytest.mark.parametrize("name", JUMPS)
+def test_the_search_leads_past_a_jump_of_readings(name: str) -> None:
+    target = Target(JUMPS[name])
     assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
 
 

@@ -36,7 +36,7 @@ from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Layer, Stack, Varying, refuse_films
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
-ASIDE = (0.02, 0.05, 0.1)  # by which free choices change, one after the other, to lead past a jump
+ASIDE = (-0.02, 0.05, -0.1, 0.2)  # by which free choices change, one after the other, to lead past a jump
 SAME = 1e-6  # energies and roughnesses that are as asked
 CHANGED = 0.01  # share of an energy or a roughness that a wish changes it by
 FAR = 0.1  # share of a wish that is a long way
@@ -262,9 +262,9 @@ class DraggedStack:
         x = self.point.x.copy()
         for own in self.interfaces:
             if own.depth is not None:
-                x[own.depth] += aside
+                x[own.depth] += abs(aside)
             if own.log_index is not None and self.target.lobes[own.lobe].fixed.of("eta", 0) is None:
-                x[own.log_index] += aside if x[own.log_index] < aside else -aside
+                x[own.log_index] += abs(aside) if x[own.log_index] < abs(aside) else aside
         x = self.space.clipped(x)
         return None if np.array_equal(x, self.point.x) else dataclasses.replace(self, point=Point(self.space, x))
 
