@@ -84,17 +84,17 @@ def _sides(target: Target, paths: Partial) -> Array:
     return sides
 
 
-def moved(found: Solution, target: Target, model: Model, giving: bool = True) -> Solution | Bound:
+def moved(found: Solution, target: Target, model: Model, giving: bool = True, closely: bool = True) -> Solution | Bound:
     """A stack near one that is found, with the lobes of a target; the bound that is in the way if there is none.
 
-    giving: whether kept coordinates may change at bounds, which takes longer.
+    giving: whether kept coordinates may change at bounds, which takes longer. closely: as `DraggedStack.met`.
     """
     if any(pinned(lobe, first=n == 0) for n, lobe in enumerate(target.lobes)):
         return _requested(found, target, model)
     dragged = _dragged(found, target, model)
     if dragged is None or dragged.achromatic(target) is not target:
         return GREY
-    there = dragged.met(target, giving)
+    there = dragged.met(target, giving, closely)
     if isinstance(there, Bound):
         return there
     missed = there.missed(target) > MISSED
@@ -132,7 +132,7 @@ def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
     found = stacks.search(target, model.adder, EFFORT)
     if found is None:
         return None
-    there = moved(found, target, model, giving=False)
+    there = moved(found, target, model, giving=False, closely=False)
     return there if isinstance(there, Bound) else GREY, found
 
 

@@ -238,17 +238,17 @@ class DraggedStack:
             return found, None
         return self._part_of_the_way(wish, self._problem(self._wanted(wish)), found)
 
-    def met(self, wish: Target, giving: bool = True) -> DraggedStack | Bound:
+    def met(self, wish: Target, giving: bool = True, closely: bool = True) -> DraggedStack | Bound:
         """The stack with the lobes of a target of the same form, or the bound that is in the way.
 
-        giving: whether kept coordinates may change at bounds.
+        giving: whether kept coordinates may change at bounds. closely: whether all is tried where little is missing.
         """
         problem = self._problem(self._wanted(wish))
-        found = self._met(problem) if giving else problem.solve()
+        found = self._met(problem) if giving else problem.solve(closely=closely)
         if isinstance(found, Bound):
             return found
         met = self._at(found).renamed(wish)
-        for aside in () if self.model.recursion.closed_form else ASIDE:
+        for aside in () if self.model.recursion.closed_form or not closely else ASIDE:
             beside = None if met.missed(wish) < SAME else met._beside(aside)
             if beside is None:
                 break

@@ -65,12 +65,16 @@ class Problem:
     start: Point
     goal: Array
 
-    def solve(self, compromise: Compromise | None = None) -> Solution | Bound:
-        """The stack that meets the goal; the violated bound if there is none."""
+    def solve(self, compromise: Compromise | None = None, closely: bool = True) -> Solution | Bound:
+        """The stack that meets the goal; the violated bound if there is none.
+
+        closely: whether a model that is slow is asked for differences where the search ends near the goal.
+        """
         nearest = Nearest()
         found = self._searched(compromise, nearest)
         space = self.start.space
-        if isinstance(found, Bound) and compromise is None and not space.model.recursion.closed_form:
+        slow = not space.model.recursion.closed_form
+        if isinstance(found, Bound) and compromise is None and closely and slow:
             # Near, one step ends the search; from further off, where readings wind, the way leads on: once at a bound,
             # and not where what misses most is at its own
             stopped = space.winds and found.coordinate is not None
