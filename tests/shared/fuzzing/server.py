@@ -169,12 +169,27 @@ class Outcome:
     failures: list[str] = field(default_factory=list)
 
 
+class AtOnce(http.client.HTTPConnection):
+    """Sends head and body together: a server that closes at the head would leave a body that comes later unread, and
+    the connection is then reset, at times before the answer is read."""
+
+    waiting = b""
+
+    def send(self, data: Any) -> None:
+        self.waiting += data
+
+    def getresponse(self) -> http.client.HTTPResponse:
+        waiting, self.waiting = self.waiting, b""
+        super().send(waiting)
+        return super().getresponse()
+
+
 class Client:
     """Asks a server on a port of this machine with its token, on a connection that is kept."""
 
     def __init__(self, port: int, token: str) -> None:
         self.cookie = f"{guard.cookie_name(port)}={token}"
-        self.connection = http.client.HTTPConnection("127.0.0.1", port, timeout=SLOW)
+        self.connection = AtOnce("127.0.0.1", port, timeout=SLOW)
 
     def ask(self, method: str, path: str, body: bytes, headers: dict[str, str]) -> tuple[int, bytes]:
         """Status and body of the answer."""
