@@ -18,7 +18,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Visit
+from editor import Server, Visit, unexpected
 
 import velatura as vt
 from velatura.editor import appearance
@@ -52,8 +52,7 @@ def visit(opened: Any, served: Server) -> Iterator[Open]:
 
     yield begin
     context.close()
-    complaints = [text for found in visits for text in found.complaints]
-    assert [text for text in complaints if not any(known in text for known in expected)] == []
+    assert unexpected(visits, expected) == []
 
 
 def open_material(visit: Visit, title: str) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Visit
+from editor import Server, Visit, difference, unexpected
 from matplotlib.image import imsave
 
 import velatura as vt
@@ -53,12 +53,7 @@ def visit(opened: Any, served: Server) -> Iterator[Open]:
 
     yield begin
     context.close()
-    complaints = [text for found in visits for text in found.complaints]
-    assert [text for text in complaints if not any(known in text for known in expected)] == []
-
-
-def difference(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.mean(np.abs(a - b)))
+    assert unexpected(visits, expected) == []
 
 
 def open_preset(visit: Visit, title: str) -> None:

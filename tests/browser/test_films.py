@@ -14,7 +14,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Visit
+from editor import Server, Visit, difference, unexpected
 
 import velatura as vt
 from velatura.stack import loads
@@ -59,12 +59,7 @@ def visit(opened: Any, served: Server) -> Iterator[Open]:
 
     yield begin
     context.close()
-    complaints = [text for found in visits for text in found.complaints]
-    assert [text for text in complaints if not any(known in text for known in expected)] == []
-
-
-def difference(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.mean(np.abs(a - b)))
+    assert unexpected(visits, expected) == []
 
 
 def choose_model(page: Visit, title: str) -> None:

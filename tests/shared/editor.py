@@ -7,7 +7,7 @@ import re
 import secrets
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -145,6 +145,17 @@ class Visit:
             }"""
         )
         return np.reshape(pixels, (48, 64, 4))[..., :3].astype(float)
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    """The mean difference of two pictures."""
+    return float(np.mean(np.abs(a - b)))
+
+
+def unexpected(visits: Iterable[Visit], expected: Iterable[str]) -> list[str]:
+    """What the consoles of pages have complained about, without messages that contain an expected text."""
+    known = list(expected)
+    return [text for found in visits for text in found.complaints if not any(part in text for part in known)]
 
 
 @contextmanager

@@ -276,7 +276,7 @@ def test_media_and_diffuse_bases_depolarise() -> None:
     base, error = found.reflected[1][:, 0, 0], found.standard_error.reflected[1][:, 0, 0]
     assert base[1] < -0.02 * base[0]
     near(base[2:], 0.0, error[2:])
-    # Whatever is unpolarised has the energies of the unpolarised walk
+    # All that is unpolarised has the energies of the unpolarised walk
     plain = statistics(Stack([COAT, Diffuse(albedo=0.5)]), 0.4, paths=200_000)
     assert plain.standard_error is not None
     np.testing.assert_allclose(base[0], plain.energy[1][0], atol=SIGMAS * 1.5 * plain.standard_error.energy[1][0, 0])

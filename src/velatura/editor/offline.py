@@ -30,7 +30,6 @@ from velatura.errors import InvalidInput
 from velatura.model import MODELS, Model, named
 from velatura.scenes.objects import OBJECTS
 from velatura.shader import atlas, shader
-from velatura.shader.cost import described
 from velatura.stack import Stack, preset, presets
 from velatura.stack.layers import KINDS
 
@@ -237,7 +236,7 @@ def _shader(model: str, order: Order) -> Made:
     chosen, stack = named(model), order.stack
     drawn = in_closed_form(stack, chosen, order.brushed)
     written = shader(pattern(stack, order.brushed), chosen.adder)
-    costs = {name: described(cost) for name, cost in written.costs.items()}
+    costs = {name: str(cost) for name, cost in written.costs.items()}
     exported = {"text": written.text, "tables": ",".join(written.looked_up) or None, "costs": costs}
     names = [*written.looked_up, *(drawn["tables"] or "").split(","), *(drawn["baked"] or {}).get("tables", [])]
     made = {"shader": drawn, "glsl": exported}

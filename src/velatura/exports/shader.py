@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from velatura.exports.formats import Export, Request
 from velatura.shader import shader
-from velatura.shader.cost import described
 from velatura.shader.glsl import GLSL
 from velatura.stack import Varying
 
@@ -20,4 +19,4 @@ def write(request: Request) -> Export:
     read = made.tables if made.looked_up else made.columns
     textures = {".tables.bin": read, ".films.bin": made.films}
     beside = {end: x.astype("<f4").tobytes() for end, x in textures.items() if x is not None}
-    return Export(made.text, beside, {name: described(cost) for name, cost in made.costs.items()})
+    return Export(made.text, beside, {name: str(cost) for name, cost in made.costs.items()})

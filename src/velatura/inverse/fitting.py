@@ -118,7 +118,7 @@ def simplify(
 
 
 def compared(stack: Stack, model: Model) -> ReflectanceTable:
-    """What of a stack is compared where it is simplified: reflectance about its lobes, and all energies."""
+    """The table of a stack that simplification compares: reflectance about its lobes, and all energies."""
     turned = variance_kind(Material.of(stack, as_described)) is not Isotropic
     return angles.table_of(stack, Directions.about_lobes(turned), model, with_energy=True)
 

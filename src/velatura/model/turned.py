@@ -1,7 +1,7 @@
 """Materials turned about the normal.
 
-Brushed ones are solved in the axes of their first brushed interface: so all turns exactly where all layers do, whatever
-azimuths they are solved at.
+Brushed ones are solved in the axes of their first brushed interface: so all turns exactly where all layers do, at any
+azimuths that they are solved at.
 """
 
 from __future__ import annotations

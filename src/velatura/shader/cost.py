@@ -21,11 +21,9 @@ class Cost:
     operations: int
     texels: int
 
-
-def described(cost: Cost) -> str:
-    """A cost in words."""
-    read = f", {cost.texels} texels read" if cost.texels else ""
-    return f"{cost.operations} operations{read}"
+    def __str__(self) -> str:
+        read = f", {self.texels} texels read" if self.texels else ""
+        return f"{self.operations} operations{read}"
 
 
 def cost(outputs: Sequence[Operand], axes: int) -> Cost:

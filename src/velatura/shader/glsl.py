@@ -12,7 +12,7 @@ import numpy as np
 
 from velatura.shader.atlas import WIDTH, Layout, height
 from velatura.shader.bake import Bake, Group
-from velatura.shader.cost import Cost, described
+from velatura.shader.cost import Cost
 from velatura.shader.films import WIDTH as LINE_OF_FILMS
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import ATOM, Field, Output, Printer, Struct
@@ -146,7 +146,7 @@ class Glsl(Printer):
 
     def header(self, name: str, model: str, fixed: bool, costs: Mapping[str, Cost]) -> str:
         filled = "" if fixed else "        // or from uniforms, or your own textures"
-        spent = [f"//     {function}: {described(cost)}" for function, cost in costs.items()]
+        spent = [f"//     {function}: {cost}" for function, cost in costs.items()]
         return _HEADER.format(name=name, model=model, filled=filled, costs="\n".join(spent))
 
     def structs(self, structs: Sequence[Struct]) -> str:
