@@ -1,0 +1,1 @@
+"""Materials of other programs: their parameters, and their formulas in NumPy."""
