@@ -1,7 +1,8 @@
 """A shader language: the spelling of values, statements and the parts of a program.
 
 `shader.statements` puts the values of a function in order and names them, `shader.program` puts the parts of a program
-in order; both take a printer, which gives each its text. A language is a class of its own with these methods.
+in order; both take a printer, which gives each its text. A language is a class of its own with these methods; one whose
+programs have other parts needs those of `Language` alone.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ class Struct(NamedTuple):
     comment: str
 
 
-class Printer(ABC):
-    """A shader language.
+class Language(ABC):
+    """A shader language: the spelling of values and statements.
 
     Arguments that are texts are expressions, in parentheses where they need any; in what takes colours, numbers among
     them have been made colours before.
@@ -148,7 +149,9 @@ class Printer(ABC):
     def advance(self, name: str, following: str) -> str:
         """An array takes the values of another."""
 
-    # Programs
+
+class Printer(Language):
+    """A shader language in which programs have the same parts as in GLSL."""
 
     @abstractmethod
     def header(self, name: str, model: str, fixed: bool, costs: Mapping[str, Cost]) -> str:

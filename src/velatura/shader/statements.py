@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 
 from velatura.shader import atlas
-from velatura.shader.printer import ATOM, CONDITION, NEGATIVE, Output, Printer
+from velatura.shader.printer import ATOM, CONDITION, NEGATIVE, Language, Output
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
 
 ARGUMENTS = frozenset({"m", "l", "wi", "wo", "u"})  # of the functions
@@ -15,13 +15,13 @@ _LONG = 104  # characters of an expression that gets a name of its own
 _COMPARE = ("less", "greater", "at_most", "at_least")
 
 
-def statements(outputs: Sequence[Output], printer: Printer) -> tuple[list[str], list[str]]:
+def statements(outputs: Sequence[Output], printer: Language) -> tuple[list[str], list[str]]:
     """Lines that work out the outputs, and an expression for each, of the kind given."""
     written = _Statements([value for value, _ in outputs], printer, {})
     return written.lines, [written.of(value, wide=kind == "colour") for value, kind in outputs]
 
 
-def assignments(outputs: Mapping[str, Output], printer: Printer) -> list[str]:
+def assignments(outputs: Mapping[str, Output], printer: Language) -> list[str]:
     """Lines that put outputs into places, as soon as they are worked out."""
     places: dict[Symbol, str] = {}
     for place, (value, kind) in outputs.items():
@@ -35,7 +35,7 @@ def assignments(outputs: Mapping[str, Output], printer: Printer) -> list[str]:
 class _Statements:
     """Names for values that are used more than once, that the model names, or that are long; some have `places`."""
 
-    def __init__(self, outputs: Sequence[Operand], printer: Printer, places: Mapping[Symbol, str]) -> None:
+    def __init__(self, outputs: Sequence[Operand], printer: Language, places: Mapping[Symbol, str]) -> None:
         order = in_order(outputs)
         self.printer = printer
         self.places = places
