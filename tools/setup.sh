@@ -61,6 +61,12 @@ if [ "${1:-}" = dev ] && ! command -v chromium chromium-browser google-chrome >/
   (apt_install chromium chromium-browser) || say "without Chromium, tests/browser is skipped"
 fi
 
+# Install a compiler of shaders and devices on the CPU that run them, which languages of shaders are tested on
+if [ "${1:-}" = dev ] && ! command -v glslangValidator >/dev/null; then
+  (apt_install glslang-tools && apt_install mesa-vulkan-drivers && apt_install libvulkan1 && apt_install libegl1) ||
+    say "without these, tests of shader languages other than GLSL ES are skipped"
+fi
+
 # Install LLVM; Mitsuba compiles its kernels with it
 llvm_works || apt_install libllvm19 libllvm{22,21,20} libllvm{18,17}{,t64}
 .venv/bin/velatura doctor >&2

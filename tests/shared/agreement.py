@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, TypeAlias
@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import viewport
 from chromium import Browser
+from machines import Machine
 
 from velatura import tables
 from velatura.editor import messages
@@ -19,7 +20,9 @@ from velatura.optics import ggx
 from velatura.sampling import coated as interfaces
 from velatura.shader import Recording, Shader, constant, record, shader, variance
 from velatura.shader.bake import Bake
+from velatura.shader.c_like import CLike
 from velatura.shader.films import beside
+from velatura.shader.glsl import GLSL
 from velatura.shader.solved import Tabulated
 from velatura.stack import Film, Interface, Kind, Material, Stack
 
@@ -158,51 +161,83 @@ def _solved(stack: Stack, model: Model, wi: Any, wo: Any, u: Any) -> Results:
     )
 
 
+@dataclass(frozen=True)
+class Program:
+    """Statements that call a shader for a row of `given` inputs, and the four numbers of each answer."""
+
+    given: np.ndarray
+    function: str
+    lines: Sequence[str]
+    answers: Sequence[str]
+    energies: int
+
+    def results(self, answers: np.ndarray) -> Results:
+        """Of answers (N, answers, 4)."""
+        found, n = np.moveaxis(answers.astype(float), 0, -1), self.energies
+        return Results(found[:n, :3], found[n:-2, :2], found[-2, :3], found[-2, 3], found[-1, :3])
+
+
+def program(case: Case, recording: Recording, made: Shader, printer: CLike = GLSL) -> Program:
+    """The calls of a shader in its language; they read the texture `vt_given`."""
+    energies = [f"l.{name}" for name in recording.lobes if name.endswith(".energy")]
+    energies = energies or [f"vt_energies(m, wi).parts[{k}]" for k in range(len(recording.energies))]
+    lobes = [f"l.{name.removesuffix('.alpha_u')}" for name in recording.lobes if name.endswith(".alpha_u")]
+    vec4 = printer.type("vec4")
+    answers = [f"{vec4}({energy}, 0.0)" for energy in energies]
+    answers += [f"{vec4}({lobe}.alpha_u, {lobe}.alpha_v, 0.0, 0.0)" for lobe in lobes]
+    answers += ["vt_eval_pdf(m, l, wi, wo)", f"{vec4}(vt_sample(m, l, wi, u), 0.0)"]
+    given, lines = _reading(case, made, printer)
+    begin = printer.declared("VtMaterial", "m")
+    called = printer.declared("VtLobes", "l", "vt_lobes(m, wi)")
+    return Program(given, printer.spelled(_READ), [begin, *lines, called], answers, len(energies))
+
+
+_READ = """
+float vt_read(int i, int row) {
+    ivec2 at = ivec2(i >> 2, row);
+    vec4 texel = texelFetch(vt_given, at, 0);
+    return texel[i & 3];
+}
+"""
+
+
+def textures(made: Shader) -> dict[str, np.ndarray]:
+    """What a shader reads, by name."""
+    read = {"vt_tables": made.tables if made.looked_up else None, "vt_baked": made.columns, "vt_films": made.films}
+    return {name: data for name, data in read.items() if data is not None}
+
+
 def in_browser(case: Case, recording: Recording, made: Shader, browser: Browser) -> tuple[Results, float, float]:
     """What the shader says, and milliseconds to compile and to draw; a row of pixels for each stack."""
-    energies = [f"l.{name}" for name in recording.lobes if name.endswith(".energy")]
-    energies = energies or [f"vt_energies(m, wi)[{k}]" for k in range(len(recording.energies))]
-    lobes = [f"l.{name.removesuffix('.alpha_u')}" for name in recording.lobes if name.endswith(".alpha_u")]
-    answers = [f"vec4({energy}, 0.0)" for energy in energies]
-    answers += [f"vec4({lobe}.alpha_u, {lobe}.alpha_v, 0.0, 0.0)" for lobe in lobes]
-    answers += ["vt_eval_pdf(m, l, wi, wo)", "vec4(vt_sample(m, l, wi, u), 0.0)"]
-    inputs, text = _reading(case, made)
-    cases = "\n".join(f"        case {j}: result = {answer}; break;" for j, answer in enumerate(answers))
+    called = program(case, recording, made)
+    cases = "\n".join(f"        case {j}: result = {answer}; break;" for j, answer in enumerate(called.answers))
+    lines = "\n".join(f"    {line}" for line in called.lines)
     main = f"""
-uniform highp sampler2D inputs;
+uniform highp sampler2D vt_given;
 out vec4 result;
-
-float read(int i) {{
-    vec4 texel = texelFetch(inputs, ivec2(i / 4, int(gl_FragCoord.y)), 0);
-    return texel[i % 4];
-}}
-
+{called.function}
 void main() {{
-    VtMaterial m;
-{text}
-    VtLobes l = vt_lobes(m, wi);
+    int row = int(gl_FragCoord.y);
+{lines}
     switch (int(gl_FragCoord.x)) {{
 {cases}
     }}
 }}
 """
-    textures = {"inputs": inputs, "vt_tables": made.tables}
-    if made.columns is not None:
-        textures["vt_baked"] = made.columns
-    if made.films is not None:
-        textures["vt_films"] = made.films
-    rows = inputs.shape[0]
-    drawn = browser.draw(f"#version 300 es\n{made.text}{main}", textures, len(answers), rows)
-    by_answer = np.moveaxis(drawn.pixels.astype(float), 0, -1)  # (answers, 4, N)
-    n = len(energies)
-    results = Results(
-        by_answer[:n, :3],
-        by_answer[n:-2, :2],
-        by_answer[-2, :3],
-        by_answer[-2, 3],
-        by_answer[-1, :3],
-    )
-    return results, drawn.linking, drawn.drawing
+    read = {"vt_given": called.given, **textures(made)}
+    drawn = browser.draw(f"#version 300 es\n{made.text}{main}", read, len(called.answers), len(called.given))
+    return called.results(drawn.pixels), drawn.linking, drawn.drawing
+
+
+def on_machine(case: Case, recording: Recording, made: Shader, machine: Machine) -> Results:
+    """What the shader says in the language of a machine."""
+    called = program(case, recording, made, machine.printer)
+    count, size = len(called.given), len(called.answers)
+    begin = machine.printer.declared("int", "first", f"{size} * row")
+    stored = [f"results[first + {k}] = {answer};" for k, answer in enumerate(called.answers)]
+    within = machine.main([f"if (row < {count}) {{", *called.lines, begin, *stored, "}"])
+    text = "\n".join([made.text, machine.declarations(count * size), called.function, within, ""])
+    return called.results(machine.run(text, count, size, {"vt_given": called.given, **textures(made)}))
 
 
 @dataclass(frozen=True)
@@ -236,13 +271,23 @@ def differences(truth: Results, found: Results) -> Differences:
 
 
 def compare(
-    pattern: Pattern, model: str, count: int, seed: int, browser: Browser, films: bool = False, **switches: Any
+    pattern: Pattern,
+    model: str,
+    count: int,
+    seed: int,
+    by: Browser | Machine,
+    films: bool = False,
+    **switches: Any,
 ) -> Differences:
     """Random stacks of a pattern through both, with `films` or without."""
     case = random_case(pattern, count, np.random.default_rng(seed))
     case = coated(case) if films else case
-    recording, made = record(case.stack, model, **switches), shader(case.stack, model, **switches)
-    found, _, _ = in_browser(case, recording, made, browser)
+    recording = record(case.stack, model, **switches)
+    printer = by.printer if isinstance(by, Machine) else GLSL
+    made = shader(case.stack, model, printer=printer, **switches)
+    found = (
+        on_machine(case, recording, made, by) if isinstance(by, Machine) else in_browser(case, recording, made, by)[0]
+    )
     return differences(in_numpy(case, recording), found)
 
 
@@ -347,14 +392,15 @@ def _mirrors(kinds: tuple[str, ...]) -> dict[str, str]:
     return {f"layer{i}_conductor": "mirror" for i, kind in enumerate(kinds) if kind == M}
 
 
-def _reading(case: Case, made: Shader) -> tuple[np.ndarray, str]:
+def _reading(case: Case, made: Shader, printer: CLike) -> tuple[np.ndarray, list[str]]:
     """A texture with all inputs of a stack in a row, and the statements that read them."""
     columns: list[np.ndarray] = []
     lines = []
     places = {f"m.{place}": case.values[name] for name, place in made.uniforms.items()}
-    for place, value in (places | {f"vec3 {name}": value for name, value in case.directions.items()}).items():
-        channels = [f"read({len(columns) + k})" for k in range(len(np.atleast_2d(value)))]
+    for place, value in {**places, **case.directions}.items():
+        channels = [f"vt_read({len(columns) + k}, row)" for k in range(len(np.atleast_2d(value)))]
         columns += list(np.atleast_2d(value))
-        lines.append(f"    {place} = {channels[0] if len(channels) == 1 else 'vec3(' + ', '.join(channels) + ')'};")
+        text = channels[0] if len(channels) == 1 else printer.colour(channels)
+        lines.append(printer.put(place, text) if place in places else printer.named(place, "colour", text))
     texels = np.stack([*columns, *[np.zeros_like(columns[0])] * (-len(columns) % 4)], axis=-1)
-    return texels.reshape(len(columns[0]), -1, 4), "\n".join(lines)
+    return texels.reshape(len(columns[0]), -1, 4), lines

@@ -234,9 +234,10 @@ def test_textures_become_samplers(tmp_path: Path) -> None:
     albedo = {"texture": str(wood), "encoding": "srgb"}
     stack = vt.Stack([vt.Interface(eta=1.5, alpha=alpha), vt.Diffuse(albedo=albedo)])
     text = shader(stack).text
-    assert f"uniform sampler2D vt_map_layer0_alpha_u; // {scratches}\n" in text
+    assert "// scratches.png\nuniform highp sampler2D vt_map_layer0_alpha_u;\n" in text
     assert "m.layer0.alpha_u = clamp(texture(vt_map_layer0_alpha_u, uv).g * 0.5 + 0.1, 0.0, 1.0);" in text
-    assert f"// {wood}, to be decoded from sRGB" in text
+    assert "// wood.png, to be decoded from sRGB\n" in text
+    assert str(tmp_path) not in text
     with pytest.raises(InvalidInput, match="layer0_alpha_u"):
         shader(stack, constant=["layer0_alpha_u"])
 
@@ -293,7 +294,7 @@ def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
     assert made.columns is not None
     assert made.columns.shape == (made.baked.height, made.baked.nodes[0], 4)
     if name.startswith("coated"):
-        assert made.text.count("\n") <= 300
+        assert made.text.count("\n") <= 310
 
 
 @pytest.mark.parametrize("films", [False, True])

@@ -14,7 +14,7 @@ from velatura.exports import FORMATS, check_writable, with_constants
 from velatura.exports import export as exported
 
 To = Enum("To", {name: name for name in FORMATS}, type=str)  # type: ignore[misc]
-_SHADERS = " and ".join(with_constants())
+_SHADERS = ", ".join(with_constants())
 
 
 def export(

@@ -28,8 +28,19 @@ class Format(NamedTuple):
     constants: bool = False
 
 
+_SHADERS = {
+    "glsl": (".glsl", ".frag"),
+    "glsl450": (".glsl", ".frag", ".comp"),
+    "vulkan": (".glsl", ".frag", ".comp"),
+    "hlsl": (".hlsl", ".hlsli"),
+    "slang": (".slang",),
+    "wgsl": (".wgsl",),
+}
 FORMATS: dict[str, Format] = {
-    "glsl": Format((".glsl", ".frag"), "velatura.exports.shader", beside=(".tables.bin", ".films.bin"), constants=True),
+    **{
+        name: Format(endings, "velatura.exports.shader", beside=(".tables.bin", ".films.bin"), constants=True)
+        for name, endings in _SHADERS.items()
+    },
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
@@ -90,10 +101,11 @@ def export(
 
     Args:
         material: a stack, a file, or a preset's name.
-        to: one of `FORMATS`: "glsl", a shader; "json", the material with its numbers; "mitsuba-xml", a scene to be
-            included; "python", a script that renders it.
+        to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl";
+            "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
+            renders it.
         model: a named model or its name (None for the default), its choices changed by `switches`.
-        constant: for glsl, flat names of values that never change (`layer0_eta`), or ["all"].
+        constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         folder: where the text will lie, so that a scene may name its textures relative to it.
 
     Raises:
@@ -107,7 +119,7 @@ def export(
     if to not in FORMATS:
         raise InvalidInput(unknown("format", to, FORMATS))
     if constant and not FORMATS[to].constants:
-        raise InvalidInput(f"constant: only for {' and '.join(with_constants())}, not for {to}")
+        raise InvalidInput(f"constant: only for {', '.join(with_constants())}, not for {to}")
     chosen = named(DEFAULT if model is None else model, **switches)
     request = Request(to, load(material), chosen, switches, constant, None if folder is None else Path(folder))
     written: Export = import_module(FORMATS[to].module).write(request)

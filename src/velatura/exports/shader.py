@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from velatura.exports.formats import Export, Request
 from velatura.shader import shader
-from velatura.shader.glsl import GLSL
+from velatura.shader.c_like import CLike
+from velatura.shader.glsl import GLSL, Desktop, Vulkan
+from velatura.shader.hlsl import Hlsl, Slang
+from velatura.shader.wgsl import Wgsl
 from velatura.stack import Varying
 
 #: The language of each format.
-PRINTERS = {"glsl": GLSL}
+PRINTERS: dict[str, CLike] = {
+    "glsl": GLSL,
+    "glsl450": Desktop(),
+    "vulkan": Vulkan(),
+    "hlsl": Hlsl(),
+    "slang": Slang(),
+    "wgsl": Wgsl(),
+}
 
 
 def write(request: Request) -> Export:

@@ -172,7 +172,7 @@ def _described(model: Model) -> str:
 
 
 def _structs(recording: Recording) -> list[Struct]:
-    """A lobe, and all that is known once wi is."""
+    """A lobe, all that is known once wi is, and energies of a solved material."""
     kinds = recording.kinds
     places = dict.fromkeys(name.rpartition(".")[0] for name in kinds if "." in name)
     count = sum(place.startswith("reflected") for place in places)
@@ -181,4 +181,7 @@ def _structs(recording: Recording) -> list[Struct]:
     members += [Field("transmitted", "VtLobe")] if "transmitted" in places else []
     members += [Field(name, kind) for name, kind in kinds.items() if "." not in name]
     lobe = Struct("VtLobe", [Field(name, kind) for name, kind in parts.items()], "rotation in radians")
-    return [*([lobe] if parts else []), Struct("VtLobes", members, "of light from one direction")]
+    lobes = Struct("VtLobes", members, "of light from one direction")
+    count = len(recording.energies)
+    energies = Struct("VtEnergies", [Field("parts", "colour", count)], "of interfaces, the remainder, what passes")
+    return [*([lobe] if parts else []), lobes, *([energies] if count else [])]

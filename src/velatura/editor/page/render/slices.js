@@ -218,7 +218,7 @@ void main() {
     vec3 wi = vec3(sin(angle) * vec2(cos(vt_azimuth), sin(vt_azimuth)), vt_side * cos(angle));
     VtMaterial m = vt_material(vec2(0.5));
     VtLobes l = vt_lobes(m, wi);
-    ${solution ? `vec3 energies[${shown.length}] = vt_energies(m, wi);` : ''}
+    ${solution ? `vec3 energies[${shown.length}] = vt_energies(m, wi).parts;` : ''}
     switch (int(gl_FragCoord.y)) {
 ${parts.map(cases).join('\n')}
     }

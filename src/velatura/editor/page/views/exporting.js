@@ -8,6 +8,11 @@ import { flag, menu } from './controls.js';
 
 const TITLES = {
   glsl: 'Shader, GLSL ES 3.00',
+  glsl450: 'Shader, GLSL 4.50',
+  vulkan: 'Shader, GLSL for Vulkan',
+  hlsl: 'Shader, HLSL',
+  slang: 'Shader, Slang',
+  wgsl: 'Shader, WGSL',
   json: 'Numbers, JSON',
   'mitsuba-xml': 'Scene of Mitsuba 3, XML',
   python: 'Script, Python',

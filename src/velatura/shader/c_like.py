@@ -1,0 +1,515 @@
+"""What shader languages of C's kind share: the text of a program, in the words of each.
+
+Text that is the same in all of them is written in GLSL here; `CLike.spelled` gives it in the words of another. So that
+this takes no parser, functions have names of their own for colours (`vt_sqrt3`), and return no arrays.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+from itertools import groupby
+from math import inf
+from textwrap import wrap
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from velatura.shader.atlas import WIDTH, Layout, height
+from velatura.shader.bake import Bake, Group
+from velatura.shader.cost import Cost
+from velatura.shader.films import WIDTH as LINE_OF_FILMS
+from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
+from velatura.shader.printer import Field, Output, Printer, Struct
+from velatura.shader.statements import assignments, statements
+from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
+
+if TYPE_CHECKING:  # it loads SciPy
+    from velatura.shader.solved import Tabulated
+
+#: Places of what a program is given, counted from the first binding.
+TABLES, FILMS, VALUES, SAMPLER, MAPS = range(5)
+
+LINE = 120  # characters of declarations
+
+_KINDS: dict[str, str] = {"number": "float", "colour": "vec3", "condition": "bool", "conditions": "bvec3"}
+_FUNCTIONS = {
+    "exp": "exp",
+    "log": "log",
+    "sin": "vt_sin",
+    "cos": "vt_cos",
+    "sqrt": "vt_sqrt",
+    "absolute": "abs",
+    "mean": "vt_mean",
+    "power": "pow",
+    "arctan2": "atan2",
+    "minimum": "min",
+    "maximum": "max",
+    "clip": "clamp",
+}
+_WITH_WIDE = ("sin", "cos", "sqrt")  # those of our own that colours have a function for
+_OPERATORS = {  # with how strongly they bind
+    "add": ("+", 5),
+    "subtract": ("-", 5),
+    "multiply": ("*", 6),
+    "divide": ("/", 6),
+    "less": ("<", 3),
+    "greater": (">", 3),
+    "at_most": ("<=", 3),
+    "at_least": (">=", 3),
+    "both": ("&&", 2),
+}
+# Words of GLSL, HLSL, Slang and WGSL, and functions that statements call
+_WORDS = """
+    abs abstract acos active alias all any array as asin asm associatedtype async atan atan2 attribute auto await
+    become bool break buffer case cast catch cbuffer centroid clamp class clip coherent column_major common compile
+    compile_fragment concept const const_assert const_cast consteval constexpr constinit constructor continue
+    continuing cos crate cross debugger decltype default defer degrees delete demote_to_helper diagnostic discard
+    distance do dot dword dynamic_cast each else enable enum exp expand explicit export extends extension extern
+    external fallthrough false far filter final finally fixed flat float floor fma fn for frac fract friend from
+    func get globallycoherent goto greaterThan greaterThanEqual groupshared half handle highp hlsl if impl
+    implements import in init inline inout input instanceof int interface internal invariant is layout lazy length
+    lerp lessThan lessThanEqual let line lineadj linear lod log long loop lowp macro macro_rules main match matrix
+    max mediump meta min mix mod module move mut mutable namespace near new nil no_diff noexcept noinline
+    nointerpolation noise none noperspective normalize not null nullptr of on operator optional out output override
+    package packoffset partition pass patch pixelfragment place point pow precise precision premerge priv private
+    property protected pub public radians ref reflect refract regardless register reinterpret_cast require requires
+    resource restrict return row row_major sample sampler saturate select self set shared short sign signed sin
+    sizeof smooth snorm sqrt static static_assert static_cast std step struct subroutine super superp switch sync
+    tan target tbuffer template texel texels texture this thread_local throw throwing trait triangle triangleadj
+    true try type typealias typedef typeid typename typeof uniform union unless unorm unsafe unsigned unsized use
+    using var varying vector virtual void volatile wgsl where while with writeonly yield
+"""
+
+
+@dataclass(frozen=True)
+class CLike(Printer):
+    """A language of C's kind; a dialect states its differences.
+
+    `group` and `binding` are where the first of what the program is given is bound, in languages that say so.
+
+    Attributes:
+        language: its name.
+        first_lines: required before all else.
+    """
+
+    group: int = 0
+    binding: int = 0
+
+    language: ClassVar[str]
+    first_lines: ClassVar[str] = ""
+    words = frozenset(_WORDS.split())
+    functions: ClassVar[Mapping[str, str]] = _FUNCTIONS
+    operators: ClassVar[Mapping[str, tuple[str, int]]] = _OPERATORS
+
+    # What a dialect states
+
+    def spelled(self, text: str) -> str:
+        """Text in GLSL, in this language."""
+        return text
+
+    @abstractmethod
+    def listed(self, kind: str, values: Sequence[str]) -> str:
+        """The values of an array."""
+
+    @abstractmethod
+    def texture(self, name: str, place: int) -> str:
+        """The declaration of a texture of four floats."""
+
+    def sampler(self) -> str:
+        """The declaration of what filters textures of a material, if that is not part of each."""
+        return ""
+
+    @abstractmethod
+    def filtered(self, name: str) -> str:
+        """A texture of a material at `uv`: four floats."""
+
+    @abstractmethod
+    def uniforms(self, material: str, arrays: Sequence[tuple[str, str, int]]) -> str:
+        """The declaration of values that change: a struct, and arrays of a type in GLSL, a name and a length."""
+
+    def declared(self, kind: str, name: str, text: str = "") -> str:
+        """A value, or a struct to be filled, gets a name; of a kind, or of a type in GLSL."""
+        return f"{self.type(kind)} {name} = {text};" if text else f"{self.type(kind)} {name};"
+
+    def array(self, kind: str, name: str, values: Sequence[str] | int, constant: bool = False) -> str:
+        """An array of values, or one that is filled later."""
+        if isinstance(values, int):
+            return f"{self.type(kind)} {name}[{values}];"
+        return f"{'const ' * constant}{self.type(kind)} {name}[{len(values)}] = {self.listed(kind, values)};"
+
+    def struct(self, struct: Struct) -> str:
+        return "\n".join([f"struct {struct.name} {{ // {struct.comment}", *self.members(struct.fields), "};", ""])
+
+    def members(self, fields: Sequence[Field]) -> list[str]:
+        """Declarations of fields; those of one type that follow one another share lines."""
+        lines = []
+        for kind, each in groupby(fields, lambda field: self.type(field.type)):
+            names = ", ".join(f"{name}[{length}]" if length else name for name, _, length in each)
+            lines += wrap(f"{kind} {names};", LINE, initial_indent="    ", subsequent_indent="        ")
+        return lines
+
+    def type(self, kind: str) -> str:
+        return self.spelled(_KINDS.get(kind, kind))
+
+    # Values
+
+    def literal(self, x: Operand) -> str:
+        if isinstance(x, tuple):
+            return self.colour([self.literal(channel) for channel in x])
+        if isinstance(x, bool):
+            return "true" if x else "false"
+        assert not isinstance(x, Symbol)
+        text = str(np.float32(x))
+        return text if "." in text or "e" in text else f"{text}.0"
+
+    def colour(self, channels: Sequence[str]) -> str:
+        return f"{self.type('colour')}({', '.join(channels)})"
+
+    def component(self, x: str, channel: int, kind: Kind) -> str:
+        texel, channel = divmod(channel, 4)
+        return f"{x}{f'[{texel}]' if kind == 'texels' else ''}.{'rgba'[channel]}"
+
+    def call(self, op: str, args: Sequence[str], wide: bool) -> str:
+        if wide and op == "clip":
+            args = [args[0], *(self.colour([x]) for x in args[1:])]
+        return f"{self.functions[op]}{'3' if wide and op in _WITH_WIDE else ''}({', '.join(args)})"
+
+    def each_channel(self, op: str, a: str, b: str) -> str:
+        return f"vt_both({a}, {b})" if op == "both" else f"({a} {self.operators[op][0]} {b})"
+
+    def value(self, table: str, args: Sequence[str], wide: bool) -> str:
+        return f"vt_{table}{'3' if wide else ''}({', '.join(args)})"
+
+    def film(self, table: str, args: Sequence[str]) -> str:
+        return f"vt_{table}({', '.join(args)})"
+
+    # Statements
+
+    def title(self, text: str) -> str:
+        return f"// {text}"
+
+    def named(self, name: str, kind: Kind, text: str) -> str:
+        return self.declared(kind, name, text)
+
+    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+        return self._filled(name, count, f"vt_{table}(texel, {', '.join(args)})")
+
+    def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
+        first = f"{group.begin} + texel" if group.begin else "texel"
+        return self._filled(name, group.texels, f"vt_baked_texel({first}, {self.colour(place)})")
+
+    def _filled(self, name: str, count: int, text: str) -> list[str]:
+        """In a loop, which compiles faster than reading texels one by one."""
+        head = self.spelled(f"for (int texel = 0; texel < {count}; texel++)")
+        return [self.array("vec4", name, count), f"{head} {{ {name}[texel] = {text}; }}"]
+
+    def nodes(self, name: str, nodes: Sequence[float]) -> list[str]:
+        return [self.array("number", name, list(map(self.literal, nodes)), constant=True)]
+
+    def results(self, name: str, kind: Kind, count: int) -> list[str]:
+        return [self.array(kind, name, count)]
+
+    def state(self, name: str, following: str, kind: Kind, begin: Sequence[str]) -> list[str]:
+        return [self.array(kind, name, begin), self.array(kind, following, len(begin))]
+
+    def loop(self, index: str, times: int, lines: Sequence[str]) -> list[str]:
+        return _block(self.spelled(f"for (int {index} = 0; {index} < {times}; {index}++)"), lines)
+
+    def store(self, array: str, place: str, text: str) -> str:
+        return f"{array}[{place}] = {text};"
+
+    def put(self, place: str, text: str) -> str:
+        return f"{place} = {text};"
+
+    def advance(self, name: str, following: str) -> str:
+        return f"{name} = {following};"
+
+    # Programs
+
+    def header(self, name: str, model: str, fixed: bool, costs: Mapping[str, Cost]) -> str:
+        filled = "" if fixed else "or from uniforms, or your own textures"
+        spent = [f"//     {function}: {cost}" for function, cost in costs.items()]
+        text = _HEADER.format(name=name, model=model, language=self.language)
+        calls = ((self.spelled(code), comment.format(filled=filled)) for code, comment in _USAGE.items())
+        usage = "".join(f"//     {code:38} // {comment}".rstrip(" /") + "\n" for code, comment in calls)
+        first = f"\n{self.first_lines}" if self.first_lines else ""
+        return "".join([text, usage, _COSTS.format(costs="\n".join(spent)), first])
+
+    def structs(self, structs: Sequence[Struct]) -> str:
+        return "".join(map(self.struct, structs))
+
+    def parameters(self, shown: int, remainder: int, layout: int) -> str:
+        arrays = ("float", SHOWN, shown), ("vec3", REMAINDER, remainder), ("float", LAYOUT, layout)
+        return self.uniforms(PARAMETERS, [each for each in arrays if each[2]])
+
+    def material(self, filled: Filled) -> str:
+        maps = [
+            f"// {image.texture.name}{', to be decoded from sRGB' * (image.encoding == 'srgb')}\n"
+            + self.texture(name, MAPS + k)
+            for k, (name, image) in enumerate(filled.samplers.items())
+        ]
+        begin = self.declared("VtMaterial", "m", PARAMETERS if filled.parameters else "")
+        lines = [f"m.{entry.place} = {self._entry(entry)};" for entry in filled.entries]
+        made = self._function("VtMaterial vt_material(vec2 uv)", [begin, *lines, "return m;"])
+        return "".join([*maps, self.sampler() if maps else "", made])
+
+    def _entry(self, entry: Entry) -> str:
+        value, literal = entry.value, self.literal
+        if isinstance(value, Brushed):
+            centre = f"uv.y - {literal(value.v)}, uv.x - {literal(value.u)}"
+            return f"degrees({self.functions['arctan2']}({centre})) + {literal(value.offset)}"
+        if not isinstance(value, Mapped):
+            return literal(value) if isinstance(value, tuple) or not entry.wide else self.colour([literal(value)])
+        texel = f"{self.filtered(value.sampler)}.{value.channel} * {literal(value.scale)} + {literal(value.offset)}"
+        wide = value.channel == "rgb"
+        low, high = (self.colour([x]) if wide else x for x in (literal(max(value.low, -1e6)), literal(value.high)))
+        bounded = f"max({texel}, {low})" if value.high == inf else f"clamp({texel}, {low}, {high})"
+        return self.colour([bounded]) if entry.wide and not wide else bounded
+
+    def tables(self, layouts: Sequence[Layout]) -> str:
+        declared = _TABLES.format(WIDTH, height(layouts)) + self.texture("vt_tables", TABLES)
+        return f"{declared}\n{self.spelled(_TEXELS + ''.join(map(_table, layouts)))}"
+
+    def lookup(self, bake: Bake | Tabulated) -> str:
+        comment = _LOBES.format(bake.nodes[0], bake.height) + self.texture("vt_baked", TABLES)
+        return f"{comment}\n{self.spelled(_BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides))}"
+
+    def films(self, layouts: Sequence[Layout]) -> str:
+        height = -(-layouts[-1].end // LINE_OF_FILMS)
+        declared = _FILMS.format(LINE_OF_FILMS, height) + self.texture("vt_films", FILMS)
+        return f"{declared}\n{self.spelled(_OF_FILMS.format(LINE_OF_FILMS) + ''.join(map(_film, layouts)))}"
+
+    #: Functions by the operations that call them, under a comment; in GLSL.
+    helping: ClassVar[Mapping[str, Mapping[tuple[tuple[str, Kind], ...], str]]]
+
+    def helpers(self, called: Set[tuple[str, Kind]]) -> str:
+        parts = []
+        for comment, helpers in {**_HELPERS, **self.helping}.items():
+            texts = [self.spelled(text) for ops, text in helpers.items() if any(op in called for op in ops)]
+            parts += ["".join([f"// {comment}\n" if comment else "", *texts])] if texts else []
+        return "\n".join(parts)
+
+    def lobes(self, outputs: Mapping[str, Output]) -> str:
+        lines = assignments({f"l.{name}": output for name, output in outputs.items()}, self)
+        begin = self.declared("VtLobes", "l")
+        return self._function("VtLobes vt_lobes(VtMaterial m, vec3 wi)", [begin, *lines, "return l;"])
+
+    def energies(self, found: Sequence[Output]) -> str:
+        lines, texts = statements(found, self)
+        put = [self.store("e.parts", str(k), text) for k, text in enumerate(texts)]
+        head = "VtEnergies vt_energies(VtMaterial m, vec3 wi)"
+        return self._function(head, [self.declared("VtEnergies", "e"), *lines, *put, "return e;"])
+
+    def eval_pdf(self, value: Output, density: Output) -> str:
+        lines, texts = statements([value, density], self)
+        head = "vec4 vt_eval_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo)"
+        function = self._function(head, [*lines, f"return {self.type('vec4')}({', '.join(texts)});"])
+        return f"{function}\n{self.spelled(_WRAPPERS)}"
+
+    def sample(self, drawn: Sequence[Output]) -> str:
+        lines, texts = statements(drawn, self)
+        head = "vec3 vt_sample(VtMaterial m, VtLobes l, vec3 wi, vec3 u)"
+        return self._function(head, [*lines, f"return {self.colour(texts)};"])
+
+    def _function(self, head: str, lines: Sequence[str]) -> str:
+        opening, *rest = _block(head, lines)
+        return "\n".join([self.spelled(opening), *rest, ""])
+
+
+def _block(head: str, lines: Sequence[str]) -> list[str]:
+    return [f"{head} {{", *(f"    {line}".rstrip() for line in lines), "}"]
+
+
+def _table(layout: Layout) -> str:
+    """A function of the coordinates, of one texel of several."""
+    name, start, nodes, channels = layout
+    axes = "xyz"[: len(nodes)]
+    size, at = f"ivec{len(nodes)}({', '.join(map(str, nodes))})", f"vec{len(nodes)}({', '.join(axes)})"
+    arguments = ", ".join(f"float {axis}" for axis in axes)
+    described = f"\n// {' x '.join(map(str, nodes))} nodes, {channels} channel{'s' * (channels > 1)}\n"
+    if channels == 1:
+        each = f"vt_{name}({', '.join(f'{axis}[c]' for axis in axes)})"
+        lines = ["vec3 colour = vec3(0.0, 0.0, 0.0);", f"for (int c = 0; c < 3; c++) {{ colour[c] = {each}; }}"]
+        single = _block(f"float vt_{name}({arguments})", [f"return vt_volume({start}, {size}, {at});"])
+        wide = _block(f"vec3 vt_{name}3({arguments.replace('float', 'vec3')})", [*lines, "return colour;"])
+        return described + "\n".join([*single, *wide, ""])
+    read = f"vt_{'plane' if len(nodes) == 2 else 'space'}({start}, {size}, {layout.texels}, texel, {at})"
+    return described + "\n".join([*_block(f"vec4 vt_{name}(int texel, {arguments})", [f"return {read};"]), ""])
+
+
+def _film(layout: Layout) -> str:
+    name, start, nodes, _ = layout
+    if len(nodes) == 1:
+        return f"vec3 vt_{name}(float x) {{ return vt_film_line({start}, {nodes[0]}, x); }}\n"
+    return f"vec3 vt_{name}(float x, float y) {{ return vt_film_plane({start}, ivec2{nodes}, vec2(x, y)); }}\n"
+
+
+_HEADER = """\
+// {name} as the model {model} has it; {language}, written by Velatura.
+//
+"""
+
+_USAGE = {
+    "VtMaterial m = vt_material(uv);": "{filled}",
+    "VtLobes l = vt_lobes(m, wi);": "once for a direction of view",
+    "vec4 f = vt_eval_pdf(m, l, wi, wo);": "f(wi, wo) |cos theta_o|, and the density of vt_sample",
+    "vec3 wo = vt_sample(m, l, wi, u);": "from three uniform numbers; f may be 0 there",
+}
+
+_COSTS = """\
+//
+// Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
+// `velatura export -o` writes the textures that are read beside this text, row by row.
+//
+// What a call costs, colours being three numbers and elementary functions four operations:
+{costs}
+"""
+
+_WRAPPERS = """\
+// f(wi, wo) |cos theta_o|, and the density of vt_sample per solid angle
+vec3 vt_eval(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) { return vt_eval_pdf(m, l, wi, wo).rgb; }
+float vt_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) { return vt_eval_pdf(m, l, wi, wo).a; }
+"""
+
+_TABLES = """\
+// Averages of Fresnel over rough interfaces: RGBA32F, {} x {} texels, never filtered.
+"""
+
+_TEXELS = f"""\
+vec4 vt_texel(int i) {{
+    return texelFetch(vt_tables, ivec2(i & {WIDTH - 1}, i >> {WIDTH.bit_length() - 1}), 0);
+}}
+
+float vt_float(int i) {{
+    vec4 texel = vt_texel(i >> 2);
+    return texel[i & 3];
+}}
+
+// One texel of the nodes of a plane, interpolated in single precision, which filters of textures do not have
+vec4 vt_plane(int start, ivec2 nodes, int texels, int texel, vec2 at) {{
+    vec2 position = clamp(at, vec2(0.0, 0.0), vec2(1.0, 1.0)) * vec2(nodes - 1);
+    ivec2 cell = min(ivec2(position), nodes - 2);
+    vec2 upper = position - vec2(cell);
+    vec4 sum = vec4(0.0, 0.0, 0.0, 0.0);
+    for (int k = 0; k < 4; k++) {{
+        ivec2 corner = ivec2(k >> 1, k & 1);
+        ivec2 node = cell + corner;
+        vec2 weight = mix(1.0 - upper, upper, vec2(corner));
+        sum += weight.x * weight.y * vt_texel(start + (node.x * nodes.y + node.y) * texels + texel);
+    }}
+    return sum;
+}}
+
+// The same in space
+vec4 vt_space(int start, ivec3 nodes, int texels, int texel, vec3 at) {{
+    vec3 position = clamp(at, vec3(0.0, 0.0, 0.0), vec3(1.0, 1.0, 1.0)) * vec3(nodes - 1);
+    ivec3 cell = min(ivec3(position), nodes - 2);
+    vec3 upper = position - vec3(cell);
+    vec4 sum = vec4(0.0, 0.0, 0.0, 0.0);
+    for (int k = 0; k < 8; k++) {{
+        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1);
+        ivec3 node = cell + corner;
+        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
+        int i = ((node.x * nodes.y + node.y) * nodes.z + node.z) * texels + texel;
+        sum += weight.x * weight.y * weight.z * vt_texel(start + i);
+    }}
+    return sum;
+}}
+
+// The same for one number a node, four of them in a texel
+float vt_volume(int start, ivec3 nodes, vec3 at) {{
+    vec3 position = clamp(at, vec3(0.0, 0.0, 0.0), vec3(1.0, 1.0, 1.0)) * vec3(nodes - 1);
+    ivec3 cell = min(ivec3(position), nodes - 2);
+    vec3 upper = position - vec3(cell);
+    float sum = 0.0;
+    for (int k = 0; k < 8; k++) {{
+        ivec3 corner = ivec3(k >> 2, (k >> 1) & 1, k & 1);
+        ivec3 node = cell + corner;
+        vec3 weight = mix(1.0 - upper, upper, vec3(corner));
+        int i = (node.x * nodes.y + node.y) * nodes.z + node.z;
+        sum += weight.x * weight.y * weight.z * vt_float(4 * start + i);
+    }}
+    return sum;
+}}
+"""
+
+_LOBES = """\
+// The lobes over direction: RGBA32F, {} x {} texels, never filtered
+"""
+
+_BAKED = {
+    1: """\
+vec4 vt_column(int node, int y) {{ return texelFetch(vt_baked, ivec2(node, y), 0); }}
+
+vec4 vt_baked_texel(int texel, vec3 place) {{
+    float position = clamp(place.x, 0.0, 1.0) * float({0} - 1);
+    int node = min(int(position), {0} - 2);
+    int y = {sides} * texel + int(place.z);
+    return mix(vt_column(node, y), vt_column(node + 1, y), position - float(node));
+}}
+""",
+    2: """\
+vec4 vt_column(int node, int y) {{ return texelFetch(vt_baked, ivec2(node, y), 0); }}
+
+vec4 vt_baked_texel(int texel, vec3 place) {{
+    vec2 position = clamp(place.xy, vec2(0.0, 0.0), vec2(1.0, 1.0)) * vec2({0} - 1, {1} - 1);
+    ivec2 node = min(ivec2(position), ivec2({0} - 2, {1} - 2));
+    vec2 upper = position - vec2(node);
+    int y = ({sides} * texel + int(place.z)) * {1} + node.y;
+    vec4 a = mix(vt_column(node.x, y), vt_column(node.x + 1, y), upper.x);
+    return mix(a, mix(vt_column(node.x, y + 1), vt_column(node.x + 1, y + 1), upper.x), upper.y);
+}}
+""",
+}
+
+_FILMS = """\
+// Thin films: reflectances over the cosine, averages over direction and roughness.
+// RGBA32F, {} x {} texels, never filtered.
+"""
+
+_OF_FILMS = """\
+vec3 vt_film_texel(int i) {{ return texelFetch(vt_films, ivec2(i % {0}, i / {0}), 0).rgb; }}
+
+vec3 vt_film_line(int start, int nodes, float at) {{
+    float position = clamp(at, 0.0, 1.0) * float(nodes - 1);
+    int node = min(int(position), nodes - 2);
+    return mix(vt_film_texel(start + node), vt_film_texel(start + node + 1), position - float(node));
+}}
+
+vec3 vt_film_plane(int start, ivec2 nodes, vec2 at) {{
+    float position = clamp(at.x, 0.0, 1.0) * float(nodes.x - 1);
+    int node = min(int(position), nodes.x - 2);
+    vec3 a = vt_film_line(start + node * nodes.y, nodes.y, at.y);
+    return mix(a, vt_film_line(start + (node + 1) * nodes.y, nodes.y, at.y), position - float(node));
+}}
+
+"""
+
+_SINE = """\
+{0} vt_sin{1}({0} x) {{
+    {0} turns = round(x / 3.14159265);
+    {0} y = (x - turns * 3.140625) - turns * 9.67653590e-4;
+    {0} z = y * y;
+    {0} series = 1.0 / 120.0 - z * (1.0 / 5040.0 - z * (1.0 / 362880.0 - z / 39916800.0));
+    return (1.0 - 2.0 * (turns - 2.0 * floor(0.5 * turns))) * (y - y * z * (1.0 / 6.0 - z * series));
+}}
+"""
+
+_HELPERS: dict[str, dict[tuple[tuple[str, Kind], ...], str]] = {
+    "": {
+        (("sqrt", "number"),): "float vt_sqrt(float x) { return sqrt(max(x, 0.0)); }\n",
+        (("sqrt", "colour"),): "vec3 vt_sqrt3(vec3 x) { return sqrt(max(x, vec3(0.0, 0.0, 0.0))); }\n",
+        (("mean", "number"),): "float vt_mean(vec3 x) { return (x.r + x.g + x.b) / 3.0; }\n",
+        (
+            ("both", "conditions"),
+        ): "bvec3 vt_both(bvec3 a, bvec3 b) { return bvec3(a.x && b.x, a.y && b.y, a.z && b.z); }\n",
+    },
+    "Drivers may leave sine and cosine with errors of 2e-4; this series is as good as single precision": {
+        (("sin", "number"), ("cos", "number")): _SINE.format("float", ""),
+        (("sin", "colour"), ("cos", "colour")): _SINE.format("vec3", "3"),
+        (("cos", "number"),): "float vt_cos(float x) { return vt_sin(x + 1.57079633); }\n",
+        (("cos", "colour"),): "vec3 vt_cos3(vec3 x) { return vt_sin3(x + 1.57079633); }\n",
+    },
+}
