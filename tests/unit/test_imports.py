@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "binding": "stack sampling",
     "plugins": "stack optics tables model ops kernel binding sampling",
     "shader": "stack optics tables model ops sampling",
-    "targets": "optics",
+    "targets": "optics sampling",
     "exports": "stack model shader",
     "inverse": "stack optics tables model ops kernel",
     "reference": "stack optics ops kernel binding sampling",

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from velatura.targets.parameters import GREATEST, Parameter
+import numpy as np
+
+from velatura.targets import closures
+from velatura.targets.closures import Array, Pair
+from velatura.targets.parameters import GREATEST, Parameter, Values, complete
 
 CORE = "pbrMetallicRoughness"
 CLEARCOAT = "KHR_materials_clearcoat"
@@ -34,3 +38,40 @@ PARAMETERS = (
     Parameter("iridescenceThicknessMinimum", 100.0, high=GREATEST, within=IRIDESCENCE),  # nanometres
     Parameter("iridescenceThicknessMaximum", 400.0, high=GREATEST, within=IRIDESCENCE),
 )
+
+COAT_F_0 = 0.04  # of an index of 1.5
+
+
+def alphas(roughness: float, strength: float) -> tuple[float, float]:
+    """GGX roughness along the direction of anisotropy and across it (KHR_materials_anisotropy)."""
+    return roughness**2 * (1 - strength**2) + strength**2, roughness**2
+
+
+def value(given: Values, pair: Pair, thin: bool = True) -> Array:
+    """f |cos theta_o| (3, N) of appendix B and the extensions; `thin`: no refraction, as without a volume."""
+    v = complete(PARAMETERS, given)
+    base, tint = (np.reshape(v[name], (3, 1)) for name in ("baseColorFactor", "specularColorFactor"))
+    au, av = closures.anisotropic(*alphas(v["roughnessFactor"], v["anisotropyStrength"]))
+    turn = v["anisotropyRotation"]
+    lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
+
+    # Fresnel reflectance of both bases, with the film's
+    f_0 = np.minimum(closures.f_0_of(v["ior"]) * tint, 1.0) * v["specularFactor"]
+    f_dielectric = closures.schlick(pair.cos_d, f_0, v["specularFactor"])
+    f_metal = closures.schlick(pair.cos_d, base)
+    if v["iridescenceFactor"] > 0 and v["iridescenceThicknessMaximum"] > 0:
+        share, n, nm = v["iridescenceFactor"], v["iridescenceIor"], v["iridescenceThicknessMaximum"]
+        f_dielectric = (1 - share) * f_dielectric + share * closures.film_by_schlick(pair.cos_d, n, nm, f_0)
+        f_metal = (1 - share) * f_metal + share * closures.film_by_schlick(pair.cos_d, n, nm, base)
+
+    # Diffuse or transmitting base below the dielectric, mixed with metal
+    clear = v["transmissionFactor"]
+    through = base * closures.refracted(pair, 1.0 if thin else v["ior"], au, av, turn)
+    below = (1 - clear) * base * closures.lambert(pair) + clear * through
+    dielectric = f_dielectric * lobe + (1 - np.clip(f_dielectric.max(axis=0), 0, 1)) * below
+    material = (1 - v["metallicFactor"]) * dielectric + v["metallicFactor"] * f_metal * lobe
+
+    # Clearcoat, by the Fresnel reflectance of the normal
+    alpha = max(v["clearcoatRoughnessFactor"] ** 2, closures.ALPHA_MIN)
+    share = v["clearcoatFactor"] * closures.schlick(pair.cos_i, COAT_F_0)
+    return np.asarray((1 - share) * material + share * pair.reflected * closures.microfacets(pair, alpha, alpha))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 RGB: TypeAlias = tuple[float, float, float]
 Values: TypeAlias = Mapping[str, "float | RGB"]
@@ -30,6 +30,6 @@ class Parameter:
         return isinstance(self.default, tuple)
 
 
-def complete(parameters: tuple[Parameter, ...], given: Values) -> dict[str, float | RGB]:
+def complete(parameters: tuple[Parameter, ...], given: Values) -> dict[str, Any]:
     """All values, the defaults where none is given."""
     return {each.name: given.get(each.name, each.default) for each in parameters}

@@ -1,0 +1,275 @@
+"""Closures that other programs' materials are made of: microfacets, diffuse reflection, and thin films, in NumPy.
+
+Directions are (3, N), `wi` above the surface. Values are f |cos theta_o| of energy, (N,) or (3, N) with colours.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.optics import fresnel, ggx
+from velatura.sampling.low_discrepancy import square
+
+Array: TypeAlias = NDArray[np.floating]
+Number: TypeAlias = Any  # a float or an array
+
+ALPHA_MIN = 1e-3  # as the models evaluate smooth lobes
+F82 = 1 / 7  # cosine at which the colour of a metal's edge is given
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Directions wi above, and wo; `straight` is wo turned up where it lies below."""
+
+    wi: Array
+    wo: Array
+
+    @functools.cached_property
+    def cos_i(self) -> Array:
+        return np.maximum(self.wi[2], 1e-6)
+
+    @functools.cached_property
+    def cos_o(self) -> Array:
+        return np.abs(self.wo[2])
+
+    @functools.cached_property
+    def reflected(self) -> Array:
+        """1 where wo lies above, else 0."""
+        return (self.wo[2] > 0).astype(float)
+
+    @functools.cached_property
+    def straight(self) -> Array:
+        return np.stack([self.wo[0], self.wo[1], self.cos_o])
+
+    @functools.cached_property
+    def h(self) -> Array:
+        """The half-vector of wi and `straight`."""
+        h = self.wi + self.straight
+        return np.asarray(h / np.sqrt(np.maximum(np.sum(h * h, axis=0), 1e-12)))
+
+    @functools.cached_property
+    def cos_d(self) -> Array:
+        """Cosine between wi and the half-vector."""
+        return np.clip(np.sum(self.wi * self.h, axis=0), 0, 1)
+
+
+def anisotropic(alpha_u: Number, alpha_v: Number) -> tuple[Number, Number]:
+    """Roughnesses that can be evaluated."""
+    return np.clip(alpha_u, ALPHA_MIN, 1), np.clip(alpha_v, ALPHA_MIN, 1)
+
+
+def microfacets(pair: Pair, alpha_u: Number, alpha_v: Number, turn: float = 0.0, correlated: bool = True) -> Array:
+    """D G / (4 cos theta_i), on the side of wi and, as in a mirror, on the other (Walter 2007, Eq. 20).
+
+    `turn`: of the first axis from the tangent, radians; `correlated`: in height (Heitz 2014, Eq. 99), or separable.
+    """
+    wi, wo, h = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, pair.h))
+    visible_i, visible_o = ggx.masking(wi, alpha_u, alpha_v), ggx.masking(wo, alpha_u, alpha_v)
+    both = visible_i * visible_o
+    if correlated:
+        both = both / np.maximum(visible_i + visible_o - both, 1e-12)
+    return np.asarray(ggx.ndf(h, alpha_u, alpha_v) * both / (4 * pair.cos_i))
+
+
+def refracted(pair: Pair, eta: float, alpha_u: Number, alpha_v: Number, turn: float = 0.0) -> Array:
+    """Light that rough facets refract, of transmittance 1, into a medium of relative index eta (Walter 2007, Eq. 21).
+
+    Where eta is 1, facets do not deflect light; it is then blurred as by a mirror.
+    """
+    below = 1 - pair.reflected
+    if abs(eta - 1) < 1e-3:
+        return np.asarray(below * microfacets(pair, alpha_u, alpha_v, turn))
+    h = pair.wi + eta * pair.wo
+    h = h / np.sqrt(np.maximum(np.sum(h * h, axis=0), 1e-12)) * np.where(h[2] < 0, -1.0, 1.0)
+    i_h, o_h = np.sum(pair.wi * h, axis=0), np.sum(pair.wo * h, axis=0)
+    wi, wo, turned = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, h))
+    visible_i, visible_o = ggx.masking(wi, alpha_u, alpha_v), ggx.masking(wo, alpha_u, alpha_v)
+    both = visible_i * visible_o / np.maximum(visible_i + visible_o - visible_i * visible_o, 1e-12)
+    scale = eta**2 * np.abs(i_h * o_h) / (pair.cos_i * np.maximum((i_h + eta * o_h) ** 2, 1e-12))
+    kept = below * (i_h > 0) * (o_h < 0)
+    return np.asarray(kept * ggx.ndf(turned, alpha_u, alpha_v) * both * scale)
+
+
+def lambert(pair: Pair) -> Array:
+    return np.asarray(pair.reflected * pair.cos_o / pi)
+
+
+def oren_nayar(pair: Pair, colour: Array, roughness: float) -> Array:
+    """Energy-preserving Oren-Nayar (Portsmouth et al. 2024, EON)."""
+    if roughness < 1e-6:
+        return np.asarray(colour * lambert(pair))
+    c_1, c_2 = 0.5 - 2 / (3 * pi), 2 / 3 - 28 / (15 * pi)
+    scale = 1 / (1 + c_1 * roughness)
+    s = np.sum(pair.wi * pair.wo, axis=0) - pair.cos_i * pair.cos_o
+    s = np.where(s > 0, s / np.maximum(np.maximum(pair.cos_i, pair.cos_o), 1e-6), s)
+    mean = scale * (1 + c_2 * roughness)
+
+    def lost(cosine: Array) -> Array:
+        sine = np.sqrt(np.maximum(1 - cosine**2, 0))
+        over = sine / np.maximum(cosine, 1e-6)
+        g = sine * (np.arccos(np.clip(cosine, -1, 1)) - sine * cosine) + 2 / 3 * (over * (1 - sine**3) - sine)
+        return np.asarray(1 - scale * (1 + roughness / pi * g))
+
+    again = colour**2 * mean / (1 - colour * (1 - mean)) * lost(pair.cos_o) * lost(pair.cos_i) / (1 - mean)
+    return np.asarray((colour * scale * (1 + roughness * s) + again) * lambert(pair))
+
+
+def schlick(cosine: Number, f_0: Number, f_90: Number = 1.0) -> Array:
+    """Schlick's Fresnel reflectance between those at 0 and 90 degrees."""
+    return np.asarray(f_0 + (f_90 - f_0) * (1 - np.clip(cosine, 0, 1)) ** 5)
+
+
+def tinted(cosine: Array, f_0: Array, f_82: Array) -> Array:
+    """Schlick's reflectance of a metal, times f_82 at about 82 degrees (Kutz et al. 2021)."""
+    at_82 = schlick(F82, f_0) * (1 - f_82) / (F82 * (1 - F82) ** 6)
+    return np.asarray(np.clip(schlick(cosine, f_0) - at_82 * cosine * (1 - cosine) ** 6, 0, 1))
+
+
+def f_0_of(eta: float) -> float:
+    return ((eta - 1) / (eta + 1)) ** 2
+
+
+NODES = 20  # of cosines, of roughnesses, and of indices
+INDEX_MAX = 4.0
+
+
+def _indices() -> Array:
+    return 1 + (INDEX_MAX - 1) * np.linspace(0, 1, NODES) ** 2
+
+
+@functools.cache
+def _albedos() -> Array:
+    """Albedos of microfacets (2 + NODES, cosines, alphas): for Schlick's Fresnel, the parts of F0 and of F90
+    (Karis 2013); for dielectrics of the indices.
+
+    Cosines and alphas stand at the squares of i / (NODES - 1), since albedos change fastest near 0.
+    """
+    grid = np.linspace(0, 1, NODES) ** 2
+    cosine, alpha = (np.maximum(x, ALPHA_MIN).reshape(-1, 1) for x in np.meshgrid(grid, grid, indexing="ij"))
+    u, v = square(377)
+    wi = (np.sqrt(1 - cosine**2), 0 * cosine, cosine)
+    h = ggx.sample_visible(wi, alpha, alpha, u, v)
+    wo = ggx.reflect(wi, h)
+    visible_i, visible_o = ggx.masking(wi, alpha, alpha), ggx.masking(wo, alpha, alpha)
+    seen = np.where(wo[2] > 0, visible_o / np.maximum(visible_i + visible_o - visible_i * visible_o, 1e-12), 0)
+    cos_d = np.clip(ggx.dot(wi, h), 0, 1)
+    grazing = (1 - cos_d) ** 5
+    parts = [seen * (1 - grazing), seen * grazing, *(seen * fresnel.dielectric(cos_d, eta) for eta in _indices())]
+    return np.array([part.mean(axis=1).reshape(NODES, NODES) for part in parts])
+
+
+def _at(grids: Array, cosine: Array, alpha: float) -> list[Array]:
+    """Grids over cosines and alphas, at some."""
+    x = np.sqrt(np.clip(cosine, 0, 1)) * (NODES - 1)
+    y = np.sqrt(np.clip(alpha, 0, 1)) * (NODES - 1)
+    j = int(min(y, NODES - 2))
+    return [np.interp(x, np.arange(NODES), grid[:, j] * (1 - (y - j)) + grid[:, j + 1] * (y - j)) for grid in grids]
+
+
+def albedo(cosine: Array, alpha: float, f_0: Number, f_90: Number = 1.0) -> Array:
+    """Directional albedo of microfacets with Schlick's Fresnel reflectance."""
+    of_0, of_90 = _at(_albedos()[:2], cosine, alpha)
+    return np.asarray(f_0 * of_0 + f_90 * of_90)
+
+
+def dielectric_albedo(cosine: Array, alpha: float, eta: float) -> Array:
+    """Directional albedo of a rough dielectric of relative index eta, or of its inverse."""
+    z = np.sqrt((min(max(eta, 1 / eta), INDEX_MAX) - 1) / (INDEX_MAX - 1)) * (NODES - 1)
+    k = int(min(z, NODES - 2))
+    below, above = _at(_albedos()[2 + k : 4 + k], cosine, alpha)
+    return np.asarray(below + (z - k) * (above - below))
+
+
+def compensation(cosine: Array, alpha: float, reflectance: Number) -> Array:
+    """The factor by which light that facets scatter many times raises their value (Turquin 2019)."""
+    once = albedo(cosine, alpha, 1.0)
+    return np.asarray(1 + reflectance * (1 - once) / once)
+
+
+# Thin films (Belcour & Barla 2017) ------------------------------------------------------------------------------------
+
+_TO_RGB = np.array(
+    [[3.2404542, -1.5371385, -0.4985314], [-0.969266, 1.8760108, 0.041556], [0.0556434, -0.2040259, 1.0572252]]
+)
+_TO_RGB_E = np.array(
+    [[2.3706743, -0.9000405, -0.4706338], [-0.513885, 1.4253036, 0.0885814], [0.0052982, -0.0146949, 1.0093968]]
+)
+
+
+def _sensitivity(path_nm: Array, shift: Array, to_rgb: Array) -> Array:
+    """Fourier transforms of the sensitivities of the eye, as Gaussians, in RGB (3, N)."""
+    phase = 2 * pi * path_nm * 1e-9
+    val, pos, var = np.array(
+        [[5.4856e-13, 4.4201e-13, 5.2481e-13], [1.681e6, 1.7953e6, 2.2084e6], [4.3278e9, 9.3046e9, 6.6121e9]]
+    )[:, :, None]
+    xyz = val * np.sqrt(2 * pi * var) * np.cos(pos * phase + shift) * np.exp(-var * phase**2)
+    second = np.cos(2.2399e6 * phase + shift[0]) * np.exp(-4.5282e9 * phase**2)
+    xyz[0] += 9.747e-14 * np.sqrt(2 * pi * 4.5282e9) * second
+    return np.asarray(to_rgb @ xyz / 1.0685e-7)
+
+
+def _interference(r_12: Array, r_23: Array, path_nm: Array, phase: Array, to_rgb: Array, least: float) -> Array:
+    """Light reflected by a film, of one polarisation (3, N)."""
+    both = np.clip(r_12 * r_23, least, 0.9999)
+    inside = (1 - r_12) ** 2 * r_23 / (1 - both)
+    total, order = r_12 + inside, inside - (1 - r_12)
+    for m in (1, 2):
+        order = order * np.sqrt(both)
+        total = total + order * 2 * _sensitivity(m * path_nm, m * phase, to_rgb)
+    return np.asarray(total)
+
+
+def film_by_schlick(cosine: Array, eta: float, thickness_nm: float, f_0: Array) -> Array:
+    """Reflectance (3, N) of a film over a base of reflectance f_0 in air, without polarisation.
+
+    (KHR_materials_iridescence, Iridescence Fresnel)
+    """
+    cos_2 = fresnel.cos_transmitted(cosine, eta)
+    root = np.sqrt(np.minimum(f_0 + 1e-4, 0.9999))
+    base = (1 + root) / (1 - root)
+    r_12 = np.broadcast_to(schlick(cosine, f_0_of(eta)), (3, *np.shape(cosine)))
+    r_23 = schlick(cos_2, ((base - eta) / (base + eta)) ** 2)
+    phase = pi + np.where(base < eta, pi, 0.0)
+    return np.maximum(_interference(r_12, r_23, 2 * eta * thickness_nm * cos_2, phase, _TO_RGB, 1e-5), 0)
+
+
+def film(
+    cosine: Array, eta: float, thickness_nm: float, below: Callable[[Array], tuple[Array, Array]], base: Array
+) -> Array:
+    """Reflectance (3, N) of a film: the mean of both polarisations.
+
+    `below` gives the reflectances of its lower side for s and p; `base` is the index below, by channel, which decides
+    on the phase.
+    """
+    cos_2 = fresnel.cos_transmitted(cosine, eta)
+    path = 2 * eta * thickness_nm * cos_2
+    first = _polarised(cosine, cos_2, eta)
+    phase_23 = np.where(base < eta, pi, 0.0)
+    tilted = np.where(cosine < np.cos(np.arctan(eta)), 0.0, pi)
+    total = [
+        _interference(np.broadcast_to(r_12, (3, len(r_12))), r_23, path, phase + phase_23, _TO_RGB_E, 0.0)
+        for r_12, r_23, phase in zip(first, below(cos_2), (pi, tilted))
+    ]
+    return np.clip(0.5 * (total[0] + total[1]), 0, 1)
+
+
+def dielectric_below(eta: Number) -> Callable[[Array], tuple[Array, Array]]:
+    """The lower side of a film over a dielectric of index eta over the film's."""
+
+    def reflectances(cosine: Array) -> tuple[Array, Array]:
+        s, p = _polarised(cosine, fresnel.cos_transmitted(cosine, eta), eta)
+        return np.broadcast_to(s, (3, len(cosine))), np.broadcast_to(p, (3, len(cosine)))
+
+    return reflectances
+
+
+def _polarised(cosine: Array, cos_t: Array, eta: Number) -> tuple[Array, Array]:
+    (s, _), (p, _) = fresnel.dielectric_amplitudes(cosine, cos_t, eta)
+    return s**2, p**2
