@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from velatura import checks as checks
     from velatura import comparison as comparison
+    from velatura import imports as imports
     from velatura import inverse as inverse
     from velatura import kernel as kernel
     from velatura import model as model
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from velatura.editor.widget import Editor as Editor
     from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
     from velatura.exports import export
+    from velatura.imports import from_openpbr
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Film, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
 
@@ -35,6 +37,7 @@ _HOMES = {
     "velatura.editor.widget": ("Editor",),
     "velatura.errors": ("InvalidInput", "LawBroken", "MissingTool", "NoSolution", "VelaturaError"),
     "velatura.exports": ("export",),
+    "velatura.imports": ("from_openpbr",),
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": (
         "Diffuse",
@@ -72,6 +75,7 @@ __all__ = [
     "check",
     "compare",
     "export",
+    "from_openpbr",
     "load",
     "lobes",
     "preset",
@@ -82,7 +86,19 @@ __all__ = [
 ]
 
 
-_PARTS = ("checks", "comparison", "inverse", "kernel", "model", "reference", "scenes", "shader", "stack", "tables")
+_PARTS = (
+    "checks",
+    "comparison",
+    "imports",
+    "inverse",
+    "kernel",
+    "model",
+    "reference",
+    "scenes",
+    "shader",
+    "stack",
+    "tables",
+)
 
 
 def __getattr__(name: str) -> Any:

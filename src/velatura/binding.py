@@ -33,6 +33,7 @@ from velatura.stack import (
     spectrum,
     srgb_weights,
 )
+from velatura.stack.io import foreign
 from velatura.stack.spectra import VISIBLE_NM
 
 #: Wavelengths (nm) that stand for all light where all colours share one number, as one refracted direction: each for a
@@ -536,12 +537,12 @@ class Binding:
 
     def _image(self, address: Address, image: Texture) -> Image:
         colour = address.colour and image.channel in (None, "rgb")
-        texels, scale = _texels(self.mi, address.name, image, colour), image.scale
-        upsampled = self.mi.is_spectral and texels.shape[-1] == 3
+        decoded, scale = texels(self.mi, address.name, image, colour), image.scale
+        upsampled = self.mi.is_spectral and decoded.shape[-1] == 3
         if upsampled:
-            peak = max(float(texels.max()), 1.0)
-            texels, scale = np.clip(texels / peak, 0, 1), scale * peak
-        texture = {"type": "bitmap", "bitmap": self.mi.Bitmap(texels), "raw": not upsampled}
+            peak = max(float(decoded.max()), 1.0)
+            decoded, scale = np.clip(decoded / peak, 0, 1), scale * peak
+        texture = {"type": "bitmap", "bitmap": self.mi.Bitmap(decoded), "raw": not upsampled}
         return Image(self.mi.load_dict(texture), colour, scale, image.offset, **_range(address))
 
     def _spectrum(self, address: Address, value: Any) -> Image:
@@ -559,7 +560,7 @@ class Binding:
         return Image(self.mi.load_dict({"type": "rgb", "value": scaled}), True, peak, **limits)
 
 
-def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
+def texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
     """Linear texels of an image, shape (height, width, 3), or 1 for numbers and grey."""
     try:
         read = mi.Bitmap(str(image.texture))
@@ -579,7 +580,10 @@ def _texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
     wanted = "r" if grey and wanted in "rgb" else wanted
     if not channels or not set(wanted) <= set(channels):
         raise InvalidInput(f"{name}: the texture {image.texture} has no channel {wanted}, only {channels or 'others'}")
-    return np.ascontiguousarray(texels[..., [channels.index(c) for c in wanted]])
+    texels = texels[..., [channels.index(c) for c in wanted]]
+    if image.curve:
+        texels = np.interp(texels, np.linspace(0, 1, len(image.curve)), image.curve).astype(texels.dtype)
+    return np.ascontiguousarray(texels)
 
 
 def _text(value: Any) -> str:
@@ -596,6 +600,9 @@ def _described(mi: Any, material: str) -> Stack:
 
     if material.lstrip().startswith("{"):
         return loads(material, "material.json", find=find)
+    file = foreign(material)
+    if file:
+        return load(find(file) + material[len(file) :])
     return load(find(material) if Path(material).suffix else material)
 
 

@@ -52,6 +52,10 @@ class MissingTool(VelaturaError):
     exit_status = 1
 
 
+class Incomplete(UserWarning):
+    """A material of another program of which a stack cannot carry all."""
+
+
 @contextlib.contextmanager
 def needs(extra: str) -> Iterator[None]:
     """Raises MissingTool where an import in the block fails since this extra of the package is not installed."""

@@ -29,6 +29,7 @@ MAY_IMPORT = {
     "shader": "stack optics tables model ops sampling",
     "targets": "optics sampling",
     "exports": "stack model shader",
+    "imports": "stack optics model kernel binding targets",
     "inverse": "stack optics tables model ops kernel",
     "reference": "stack optics ops kernel binding sampling",
     "checks": "kernel",
@@ -43,6 +44,7 @@ IMPORTED_BY = {
     "editor": "__init__ cli",
     "comparison": "__init__ figures cli",
     "exports": "__init__ cli editor",
+    "imports": "__init__ cli",
     "figures": "cli editor",
 }
 
@@ -63,6 +65,7 @@ LOADS_NO = {
     "velatura.kernel": "mitsuba drjit",
     "velatura.scenes": "mitsuba drjit",
     "velatura.exports": "mitsuba drjit numpy",
+    "velatura.imports": "mitsuba drjit numpy",
     "velatura.plugins": "mitsuba drjit",
     "velatura.comparison": "mitsuba drjit matplotlib",
     "velatura.figures": "mitsuba drjit matplotlib",

@@ -12,9 +12,10 @@ import os
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Iterator
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -29,6 +30,7 @@ from velatura.cli import (
     export,
     figure,
     fit,
+    imports,
     invert,
     lobes,
     presets,
@@ -37,7 +39,7 @@ from velatura.cli import (
     simplify,
     tables,
 )
-from velatura.errors import VelaturaError, one_line
+from velatura.errors import Incomplete, VelaturaError, one_line
 from velatura.files import reason
 
 INTERRUPTED = 130  # as a shell reports a process that ended by Ctrl-C
@@ -63,13 +65,14 @@ for verb in (
     simplify.simplify,
     edit.edit,
     export.export,
+    imports.import_,
     figure.figure,
     presets.presets,
     schema.schema,
     tables.tables,
     doctor.doctor,
 ):
-    app.command()(verb)
+    app.command(verb.__name__.rstrip("_"))(verb)
 
 
 def _print_version(wanted: bool) -> None:
@@ -93,7 +96,7 @@ def main() -> None:
     Invalid input, a missing tool, a full disk and the like end in one line on standard error; an error of Velatura
     itself is reported as such, before its traceback.
     """
-    with _interrupts() as interrupts:
+    with _interrupts() as interrupts, _warnings_in_one_line():
         try:
             _open_streams()
             status = app(sys.argv[1:] or ["--help"], prog_name="velatura", standalone_mode=False)
@@ -150,6 +153,22 @@ def _interrupts() -> Iterator[list[int]]:
         yield noted
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextlib.contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    """Prints what a stack cannot carry of a material as errors are printed; other warnings as Python has them."""
+    with warnings.catch_warnings():
+        usual = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if issubclass(category, Incomplete):
+                _complain(str(message))
+            else:
+                usual(message, category, *where)
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
 
 
 def _explain(error: BaseException) -> int:

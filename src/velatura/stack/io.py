@@ -8,7 +8,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterable
-from importlib import resources
+from importlib import import_module, resources
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -23,6 +23,7 @@ _PRESETS = resources.files("velatura.stack") / "presets"
 _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 _LARGEST = 100_000  # values in a file
 _PATHS = ("texture", "spectrum")  # keys
+_FOREIGN = (".mtlx", ".gltf", ".glb", ".xml")  # of other programs, which `velatura.imports` reads
 
 #: What names a material wherever one is asked for: a stack, a file, or the name of a preset.
 MaterialLike: TypeAlias = Stack | str | Path
@@ -34,7 +35,9 @@ MaterialLike: TypeAlias = Stack | str | Path
 def load(material: MaterialLike) -> Stack:
     """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack unchanged.
 
-    A bare word without an extension is a preset. Paths in it are relative to the file.
+    A bare word without an extension is a preset. Paths in it are relative to the file. A file of another program
+    (.mtlx, .gltf, .glb, or a scene of Mitsuba, .xml; FILE#NAME for one of its materials) is imported, with a warning
+    that lists what a stack cannot carry.
 
     Raises:
         InvalidInput: no such file or preset, or its content is not a material; one line that names the file.
@@ -48,8 +51,17 @@ def load(material: MaterialLike) -> Stack:
         return preset(str(material))
     if os.path.isdir(path):
         raise InvalidInput(f"{path}: is a folder, not a material file")
+    if foreign(str(material)):
+        imported: Stack = import_module("velatura.imports").load(str(material))  # by name, as it stands below
+        return imported
     _format(path)
     return loads(_text(path), name=str(path), folder=path.parent)
+
+
+def foreign(material: str) -> str:
+    """The file of another program in FILE or FILE#NAME; empty for what is none."""
+    file = material if os.path.exists(material) else material.rpartition("#")[0] or material
+    return file if Path(file).suffix.lower() in _FOREIGN else ""
 
 
 def loads(

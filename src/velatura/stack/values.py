@@ -369,8 +369,26 @@ class Varying(Record):
     what: ClassVar[str]
 
 
+@dataclass(frozen=True)
+class Curve(Parameter):
+    """Values at equal steps of a texel from 0 to 1, joined by straight lines; None: the texel itself."""
+
+    what = "a list of 2 to 1025 numbers"
+
+    def check(self, value: Any) -> tuple[float, ...] | None:
+        if value is None:
+            return None
+        if not isinstance(value, list | tuple) or not 2 <= len(value) <= 1025:
+            raise self.refuse(value)
+        entry = Scalar(self.doc, texturable=False)
+        return tuple(entry.check(number) for number in value)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 1025}
+
+
 class Texture(Varying):
-    """A number or colour read from an image: `scale * texel + offset`.
+    """A number or colour read from an image: `scale * texel + offset`, with the texel replaced by `curve` if given.
 
     Values outside the parameter's range after scale and offset are the reader's business to clamp: the image is not
     opened here.
@@ -385,6 +403,9 @@ class Texture(Varying):
     scale: Annotated[float, Scalar("factor on the texel", texturable=False, differentiable=False)] = 1.0
     offset: Annotated[float, Scalar("added after the factor", texturable=False, differentiable=False)] = 0.0
     encoding: Annotated[str, Choice("how the texel is stored", options=("linear", "srgb"))] = "linear"
+    curve: Annotated[
+        tuple[float, ...] | None, Curve("values for texels from 0 to 1, in equal steps, in place of the texel")
+    ] = None
 
 
 class Brushing(Varying):

@@ -1,0 +1,107 @@
+"""Files of other programs, by their endings; each format is a module with `materials(path)`, its materials by name."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from velatura.errors import Incomplete, InvalidInput
+from velatura.imports.result import Imported, Notes
+from velatura.stack import Stack
+from velatura.stack.io import foreign
+from velatura.stack.schema import show, unknown
+
+FORMATS = {
+    ".mtlx": "velatura.imports.materialx",
+    ".gltf": "velatura.imports.gltf_file",
+    ".glb": "velatura.imports.gltf_file",
+    ".xml": "velatura.imports.mitsuba_xml",
+}
+
+
+def read(path: str | Path, material: str | None = None) -> Imported:
+    """A material of a file of another program: MaterialX (.mtlx), glTF (.gltf, .glb), or a scene of Mitsuba (.xml).
+
+    Args:
+        material: its name, where the file has several; `FILE#NAME` names both.
+
+    Raises:
+        InvalidInput: the file cannot be read, has no such material, or several and none is named.
+    """
+    file = foreign(str(path)) or str(path)
+    material = material or str(path)[len(file) + 1 :] or None
+    ending = Path(file).suffix.lower()
+    if ending not in FORMATS:
+        raise InvalidInput(f"{file}: a file to import ends in {', '.join(FORMATS)}")
+    found: Mapping[str, Any] = import_module(FORMATS[ending]).materials(Path(file))
+    if not found:
+        raise InvalidInput(f"{file}: has no material that is read here")
+    if material is None and len(found) > 1:
+        names = ", ".join(list(found)[:12]) + (", ..." if len(found) > 12 else "")
+        raise InvalidInput(f"{file}: has {len(found)} materials; name one, as in {Path(file).name}#NAME: {names}")
+    name = next(iter(found)) if material is None else material
+    if name not in found:
+        raise InvalidInput(f"{file}: {unknown('material', name, found)}")
+    imported: Imported = found[name](Notes())
+    return imported
+
+
+def load(path: str) -> Stack:
+    """The stack nearest to a material of a file; one warning lists what that cannot carry.
+
+    Raises:
+        InvalidInput: as `read`.
+    """
+    found = read(path)
+    if found.left:
+        warnings.warn(f"{path}: {'; '.join(map(str, found.left))}", Incomplete, stacklevel=2)
+    return found.stack
+
+
+def from_openpbr(**parameters: Any) -> Imported:
+    """The stack nearest to a surface of OpenPBR 1.1, by the names of its parameters: numbers, colours, `vt.Texture`.
+
+    Raises:
+        InvalidInput: an unknown parameter, or a value of another kind.
+    """
+    return _by_parameters("openpbr", parameters)
+
+
+def from_standard_surface(**parameters: Any) -> Imported:
+    """As `from_openpbr`, of Autodesk's Standard Surface."""
+    return _by_parameters("standard_surface", parameters)
+
+
+def from_gltf(material: Mapping[str, Any]) -> Imported:
+    """The stack nearest to a material of glTF, an entry of `materials` in its JSON; for files see `read`.
+
+    Raises:
+        InvalidInput: it is none.
+    """
+    from velatura.imports.gltf_file import of_material
+
+    try:
+        return of_material(material, str(material.get("name", "")), Notes(), lambda _: "without a file")
+    except InvalidInput:
+        raise
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError):
+        raise InvalidInput(f"a material of glTF must hold its keys and values, got {show(material)}") from None
+
+
+def from_principled(described: Mapping[str, Any]) -> Imported:
+    """The stack nearest to Mitsuba's `principled`, described as `mi.load_dict` takes it.
+
+    Raises:
+        InvalidInput: another plugin, an unknown parameter, or a value of another kind.
+    """
+    from velatura.imports.mitsuba_xml import of_dict
+
+    return of_dict(described, Notes())
+
+
+def _by_parameters(source: str, parameters: Mapping[str, Any]) -> Imported:
+    found: Imported = import_module(f"velatura.imports.{source}").read(parameters)
+    return found

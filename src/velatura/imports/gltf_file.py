@@ -1,0 +1,179 @@
+"""Files of glTF, .gltf and .glb: their materials, with images that lie beside them."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from velatura.errors import InvalidInput
+from velatura.imports import gltf
+from velatura.imports.file import content
+from velatura.imports.result import Imported, Notes, shown
+from velatura.imports.values import Value, changed
+from velatura.stack import Texture
+from velatura.stack.schema import show
+from velatura.targets.gltf import PARAMETERS as FACTORS
+
+LARGEST = 2**28  # bytes of a file
+_MAGIC, _JSON = b"glTF", b"JSON"
+
+#: Images of a factor: where they stand, the factor, their channel, and whether they hold colours.
+_TEXTURES = (
+    ("pbrMetallicRoughness", "baseColorTexture", "baseColorFactor", "rgb"),
+    ("pbrMetallicRoughness", "metallicRoughnessTexture", "metallicFactor", "b"),
+    ("pbrMetallicRoughness", "metallicRoughnessTexture", "roughnessFactor", "g"),
+    ("KHR_materials_clearcoat", "clearcoatTexture", "clearcoatFactor", "r"),
+    ("KHR_materials_clearcoat", "clearcoatRoughnessTexture", "clearcoatRoughnessFactor", "g"),
+    ("KHR_materials_specular", "specularTexture", "specularFactor", "a"),
+    ("KHR_materials_specular", "specularColorTexture", "specularColorFactor", "rgb"),
+    ("KHR_materials_transmission", "transmissionTexture", "transmissionFactor", "r"),
+    ("KHR_materials_volume", "thicknessTexture", "thicknessFactor", "g"),
+    ("KHR_materials_iridescence", "iridescenceTexture", "iridescenceFactor", "r"),
+)
+_THICKNESS = ("KHR_materials_iridescence", "iridescenceThicknessTexture", "iridescenceThicknessMaximum", "g")
+_OTHERS = {
+    "KHR_materials_sheen": "sheenColorFactor",
+    "KHR_materials_dispersion": "dispersion",
+    "KHR_materials_diffuse_transmission": "diffuseTransmissionFactor",
+}
+
+
+def materials(path: Path) -> dict[str, Callable[[Notes], Imported]]:
+    """The materials of a file by name, those without one by their number, each as a function that reads it.
+
+    Raises:
+        InvalidInput: it cannot be read, or is no glTF.
+    """
+    document = _json(path, content(path, LARGEST))
+    found: dict[str, Callable[[Notes], Imported]] = {}
+    entries = document.get("materials", [])
+    if not isinstance(entries, list):
+        raise InvalidInput(f"{path}: materials: must be a list, got {show(entries)}")
+    for number, entry in enumerate(entries):
+        if not isinstance(entry, Mapping):
+            raise InvalidInput(f"{path}: material {number}: must hold keys and values, got {show(entry)}")
+        name = str(entry.get("name") or f"material {number}")
+        name = name if name not in found else f"{name} ({number})"
+        found[name] = _reader(entry, name, path, document)
+    return found
+
+
+def _reader(
+    entry: Mapping[str, Any], name: str, path: Path, document: Mapping[str, Any]
+) -> Callable[[Notes], Imported]:
+    def read(notes: Notes) -> Imported:
+        try:
+            return of_material(entry, name, notes, lambda reference: _file(reference, path, document))
+        except InvalidInput as error:
+            raise InvalidInput(f"{path}: {name}: {error}") from None
+        except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
+            raise InvalidInput(f"{path}: {name}: is no material of glTF: {error}") from None
+
+    return read
+
+
+def of_material(
+    material: Mapping[str, Any], name: str, notes: Notes, find: Callable[[Mapping[str, Any]], Path | str]
+) -> Imported:
+    """The stack of an entry of `materials`; `find` gives the file of an image, or the reason why it has none."""
+    extensions = dict(material.get("extensions", {}))
+    parts = {"pbrMetallicRoughness": material.get("pbrMetallicRoughness", {}), **extensions}
+    values: dict[str, Any] = {}
+
+    # Factors, by the parts that they stand in
+    for factor in FACTORS:
+        if factor.name in parts.get(factor.within, {}):
+            given = parts[factor.within][factor.name]
+            values[factor.name] = given[:3] if factor.is_colour else given
+    for part, factor_name in _OTHERS.items():
+        if factor_name in parts.get(part, {}):
+            values[factor_name] = parts[part][factor_name]
+    if values.get("ior") == 0:  # stands for an infinite one
+        values["ior"] = 1e3
+    strength = parts.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
+    if any(material.get("emissiveFactor", ())):
+        values["emissiveFactor"] = [strength * part for part in material["emissiveFactor"]]
+
+    # Images, times their factors
+    defaults = {each.name: each.default for each in gltf.PARAMETERS}
+    for part, key, factor_name, channel in (*_TEXTURES, _THICKNESS):
+        reference = parts.get(part, {}).get(key)
+        if reference is None:
+            continue
+        factor = values.get(factor_name, defaults[factor_name])
+        least = values.get("iridescenceThicknessMinimum", 100.0) if key == _THICKNESS[1] else 0.0
+        texture = _texture(reference, channel, key, notes, find)
+        if texture is not None:
+            values[factor_name] = _scaled(texture, factor, float(least), factor_name, notes)
+    for key in gltf.IGNORED:
+        if key in material or key in parts.get("KHR_materials_clearcoat", {}):
+            values[key] = "an image"
+    if "anisotropyTexture" in parts.get("KHR_materials_anisotropy", {}):
+        notes.add("anisotropyTexture", "an image", "the strength and the rotation beside it stand for it")
+
+    # Cover, and extensions that are not read
+    if material.get("alphaMode", "OPAQUE") != "OPAQUE":
+        base = parts["pbrMetallicRoughness"].get("baseColorFactor", (1, 1, 1, 1))
+        values["alpha"] = base[3] if len(base) > 3 and base[3] < 1 else 0.5
+    known = {each.within for each in FACTORS} | set(_OTHERS) | {"KHR_materials_emissive_strength"}
+    for part in sorted(set(extensions) - known):
+        notes.add(part, "", "not read")
+    return gltf.read(values, name, notes)
+
+
+def _texture(
+    reference: Mapping[str, Any],
+    channel: str,
+    key: str,
+    notes: Notes,
+    find: Callable[[Mapping[str, Any]], Path | str],
+) -> Texture | None:
+    file = find(reference)
+    if isinstance(file, str):
+        notes.add(key, "an image", f"{file}: left out")
+        return None
+    if reference.get("texCoord", 0) or "KHR_texture_transform" in reference.get("extensions", {}):
+        notes.add(f"{key}: coordinates", file.name, "the image lies on the texture coordinates as they are")
+    return Texture(texture=file, channel=channel, encoding="srgb" if channel == "rgb" else "linear")
+
+
+def _scaled(texture: Texture, factor: Any, least: float, name: str, notes: Notes) -> Value:
+    if isinstance(factor, list | tuple) and len(set(factor)) > 1:
+        notes.add(name, shown(tuple(factor)), "its mean is a factor on the image")
+    most = float(np.mean(factor))
+    return changed(texture, lambda x: least + (most - least) * x)
+
+
+def _file(reference: Mapping[str, Any], path: Path, document: Mapping[str, Any]) -> Path | str:
+    texture = document["textures"][reference["index"]]
+    if "source" not in texture:
+        return "in a format of an extension"
+    uri = document["images"][texture["source"]].get("uri")
+    if uri is None or uri.startswith("data:"):
+        return "inside the file"
+    return path.parent / unquote(uri)
+
+
+def _json(path: Path, data: bytes) -> Mapping[str, Any]:
+    if data[:4] == _MAGIC:
+        if len(data) < 20 or data[16:20] != _JSON:
+            raise InvalidInput(f"{path}: is no glTF: its first chunk is not JSON")
+        (length,) = struct.unpack("<I", data[12:16])
+        data = data[20 : 20 + length]
+    try:
+        document = json.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
+    except json.JSONDecodeError as error:
+        raise InvalidInput(f"{path}: line {error.lineno}: is not valid JSON: {error.msg}") from None
+    except (RecursionError, ValueError) as error:
+        raise InvalidInput(f"{path}: cannot be read: {error}") from None
+    if not isinstance(document, Mapping) or "asset" not in document:
+        raise InvalidInput(f"{path}: is no glTF: has no asset")
+    return document

@@ -1,0 +1,136 @@
+"""OpenPBR Surface 1.1, and what sources in its manner share with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from velatura.imports.given import Given
+from velatura.imports.metals import of_f82_tint
+from velatura.imports.parts import (
+    BELOW,
+    COVERS,
+    FIBRES,
+    FLAT,
+    LAMBERTIAN,
+    LIGHT,
+    OPAQUE,
+    TANGENT,
+    UNDISPERSED,
+    absorbed,
+    alphas,
+    blended,
+    coated,
+    index,
+    inside,
+    tinted,
+)
+from velatura.imports.result import Imported, Notes
+from velatura.imports.surface import WHITE, Coat, Metal, Surface, imported
+from velatura.imports.values import Value, changed, colour
+from velatura.targets import openpbr
+from velatura.targets.parameters import GREATEST, Parameter
+
+PARAMETERS = (
+    *openpbr.PARAMETERS,
+    Parameter("emission_luminance", 0.0, high=GREATEST),
+    Parameter("emission_color", WHITE),
+    Parameter("geometry_opacity", 1.0),
+    Parameter("geometry_thin_walled", 0.0),
+)
+IGNORED = {
+    "geometry_normal": FLAT,
+    "geometry_coat_normal": FLAT,
+    "geometry_tangent": TANGENT,
+    "geometry_coat_tangent": TANGENT,
+}
+
+
+def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) -> Imported:
+    """The stack nearest to a surface of OpenPBR.
+
+    Raises:
+        InvalidInput: an unknown parameter, or a value of another kind.
+    """
+    notes = Notes() if notes is None else notes
+    given = Given(values, PARAMETERS, IGNORED, notes)
+    metal, albedo, pane, specular = None, None, False, WHITE
+    tint: Value = WHITE
+    thin = given.number("geometry_thin_walled") > 0
+    if given.whole("base_metalness"):
+        metal = _metal(given)
+    else:
+        specular = tinted(given, "specular_color", given.number("specular_weight"), given.colour("specular_color"))
+        if given.whole("transmission_weight"):
+            tint, pane = _tint(given, thin), thin
+        else:
+            albedo = _albedo(given)
+            given.leave("geometry_thin_walled", OPAQUE)
+    weight, eta = given.number("coat_weight"), index(given, "coat_ior")
+    surface = Surface(
+        alpha=stretched(given["specular_roughness"], given.number("specular_roughness_anisotropy")),
+        metal=metal,
+        eta=index(given, "specular_ior"),
+        specular=specular,
+        albedo=albedo,
+        tint=tint,
+        pane=pane,
+        film=_film(given),
+        coat=coated(
+            notes,
+            "coat_weight",
+            weight,
+            Coat(
+                eta,
+                stretched(given["coat_roughness"], given.number("coat_roughness_anisotropy")) if weight else (0.0, 0.0),
+                colour=given["coat_color"] if weight else WHITE,
+                darkening=given.number("coat_darkening"),
+            ),
+        ),
+    )
+    given.leave("fuzz_weight", FIBRES)
+    given.leave("emission_luminance", LIGHT)
+    given.leave("geometry_opacity", COVERS)
+    return imported(surface, notes, name, "imported from OpenPBR")
+
+
+def stretched(roughness: Value, anisotropy: float) -> tuple[Value, Value]:
+    """GGX alpha along the tangent and the bitangent (OpenPBR 1.1, "Microfacet model")."""
+    longer = float(np.sqrt(2 / (1 + (1 - anisotropy) ** 2)))
+    return alphas(roughness, longer, (1 - anisotropy) * longer)
+
+
+def _metal(given: Given) -> Metal:
+    weight = given.number("base_weight") * given.number("specular_weight")
+    reflectance = changed(given["base_color"], lambda c: weight * c)
+    return Metal(reflectance, given.colour("specular_color"), of_f82_tint)
+
+
+def _tint(given: Given, pane: bool) -> Value:
+    """The transmittance of each crossing; what is absorbed over a length belongs to the inside of a shape."""
+    given.leave("transmission_dispersion_scale", UNDISPERSED)
+    length = given.number("transmission_depth")
+    if pane or not length:
+        given.leave("transmission_scatter", "without a depth it has no effect")
+        return given["transmission_color"]
+    scattered = np.array(given.colour("transmission_scatter")) / length
+    sigma_a = absorbed(given.colour("transmission_color"), length) - scattered
+    sigma_a -= min(sigma_a.min(), 0.0)
+    g = given.number("transmission_scatter_anisotropy")
+    inside(given, "transmission_color", sigma_a, colour(scattered), g)  # type: ignore[arg-type]
+    return WHITE
+
+
+def _albedo(given: Given) -> Value:
+    given.leave("base_diffuse_roughness", LAMBERTIAN)
+    given.leave("subsurface_weight", BELOW)
+    share = given.number("subsurface_weight")
+    return blended(given, "base_color", given.number("base_weight"), "subsurface_color", share)
+
+
+def _film(given: Given) -> tuple[float, Value] | None:
+    if not given.whole("thin_film_weight"):
+        return None
+    return index(given, "thin_film_ior"), changed(given["thin_film_thickness"], lambda um: 1000 * um)

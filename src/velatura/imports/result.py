@@ -1,0 +1,50 @@
+"""What an import gives: a stack, and a list of what the stack cannot carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from velatura.stack import Stack, Texture
+
+
+@dataclass(frozen=True)
+class Left:
+    """A parameter that a stack cannot carry, or not as it is: its value as text, and what was done."""
+
+    parameter: str
+    value: str
+    why: str
+
+    def __str__(self) -> str:
+        return f"{self.parameter} {self.value}: {self.why}"
+
+
+@dataclass(frozen=True)
+class Imported:
+    """The stack nearest to a material of another program, and what is left of that."""
+
+    stack: Stack
+    left: tuple[Left, ...] = ()
+
+
+@dataclass
+class Notes:
+    """A list of what is left, while a material is being read."""
+
+    left: list[Left] = field(default_factory=list)
+
+    def add(self, parameter: str, value: object, why: str) -> None:
+        """Note one parameter; a second note of the same one is dropped."""
+        if all(parameter != each.parameter for each in self.left):
+            self.left.append(Left(parameter, shown(value), why))
+
+
+def shown(value: object) -> str:
+    """A value in a list: numbers with four digits, and images by the name of their file."""
+    if isinstance(value, Texture):
+        return value.texture.name
+    if isinstance(value, bool) or not isinstance(value, int | float | tuple | list):
+        return str(value)
+    numbers = [value] if isinstance(value, int | float) else value
+    texts = [f"{number:.4g}" if isinstance(number, int | float) else str(number) for number in numbers]
+    return texts[0] if isinstance(value, int | float) else f"[{', '.join(texts)}]"

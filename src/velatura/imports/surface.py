@@ -1,0 +1,250 @@
+"""A surface of any program as optics describe it, and the stack that comes nearest to it.
+
+Sources differ in the names and ranges of their parameters. Each turns them into a `Surface`; here that becomes layers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from velatura.imports.metals import EDGE, MOST, of_edge
+from velatura.imports.result import Imported, Notes
+from velatura.imports.values import Array, Value, changed, middle, rounded
+from velatura.model.stack_lobes import stack_lobes
+from velatura.optics import fresnel
+from velatura.stack import RGB, Diffuse, Film, Interface, Layer, Medium, Stack, Texture
+from velatura.stack.coatings import STEP_MIN
+
+INDICES = (0.1, 10.0)  # of dielectrics
+SMOOTH = 1e-3  # roughness of a base that stands for one from a texture of roughness below it
+DARKEST = 1e-4  # transmittance in place of a smaller one
+THICKEST_NM = 5000.0  # of films, as `stack` has it
+WHITE = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Metal:
+    """A metal by its reflectance at the normal in air, and a tint (colours) that `index` takes with it."""
+
+    reflectance: Value
+    tint: RGB
+    index: Callable[[Array, Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True)
+class Coat:
+    """A coat.
+
+    colour: the square of its transmittance along the normal.
+    darkening: 1 where bounces below it may darken the base, 0 where its colour is that of the coated base.
+    """
+
+    eta: float
+    alpha: tuple[Value, Value]
+    rotation: float = 0.0
+    colour: Value = WHITE
+    darkening: float = 1.0
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A base, a metal or a dielectric over a diffuse one or over nothing, with a film on it and a coat above.
+
+    eta: index of a dielectric base; specular: a factor on its reflectance at the normal, by colours.
+    by_sight: whether the source knows nothing of what a coat does below it. Base and coat then keep what they reflect:
+        the index is relative to the coat's, and the coat does not darken.
+    albedo: of what passes a dielectric base, the share that comes back; None where that is clear.
+    tint: the transmittance of each crossing of a clear base, of a pane as a whole.
+    """
+
+    alpha: tuple[Value, Value]
+    rotation: float = 0.0
+    metal: Metal | None = None
+    eta: float = 1.5
+    specular: RGB = WHITE
+    albedo: Value | None = None
+    tint: Value = WHITE
+    pane: bool = False
+    by_sight: bool = False
+    film: tuple[float, Value] | None = None  # index, thickness in nanometres
+    coat: Coat | None = None
+
+
+def imported(surface: Surface, notes: Notes, name: str = "", source: str = "") -> Imported:
+    """The stack nearest to a surface; what had to be changed is added to the notes."""
+    coat = _coat(surface.coat)
+    above = [layer for layer in coat if isinstance(layer, Interface)]
+    outside = float(above[0].eta) if above else 1.0  # type: ignore[arg-type]
+    if surface.metal:
+        base: list[Layer] = [_metal(surface, surface.metal, outside if above else None, notes)]
+    else:
+        base = [*_dielectric(surface, outside, notes)]
+        if surface.albedo is None:
+            base = _clear(surface, base, outside)
+        else:
+            base.append(Diffuse(albedo=_diffuse(surface, surface.albedo, above, base)))
+    thin = surface.pane and not surface.metal and surface.albedo is None
+    return Imported(Stack([*coat, *base], name=name, source=source, thin=thin), tuple(notes.left))
+
+
+def weighed(eta: float, outside: float, weight: float) -> float:
+    """The index that reflects `weight` times as much at the normal, below a medium (OpenPBR 1.1, "Dielectric base")."""
+    ratio = eta / outside
+    epsilon = np.sign(ratio - 1) * np.sqrt(min(weight * fresnel.normal_incidence(ratio), MOST))
+    return rounded(float(outside * (1 + epsilon) / (1 - epsilon)))
+
+
+def _facets(alpha: tuple[Value, Value], rotation: float) -> dict[str, Any]:
+    u, v = alpha
+    return {"alpha": u} if u == v else {"alpha": (u, v), "rotation": rotation}
+
+
+# Layers --------------------------------------------------------------------------------------------------------------
+
+
+def _coat(coat: Coat | None) -> list[Layer]:
+    """A coat's interface and, where it absorbs, its medium."""
+    if coat is None or (abs(coat.eta - 1) < STEP_MIN and coat.colour == WHITE):
+        return []
+    layers: list[Layer] = [Interface(eta=coat.eta, **_facets(coat.alpha, coat.rotation))]
+    return layers + _medium(coat.colour, 0.5)
+
+
+def _medium(transmittance: Value, share: float = 1.0) -> list[Layer]:
+    """A medium of that transmittance along the normal, or of a power of it; none where it is clear."""
+    if transmittance == WHITE or transmittance == 1:
+        return []
+    return [Medium(depth=1.0, sigma_a=changed(transmittance, lambda t: share * np.log(1 / np.maximum(t, DARKEST))))]
+
+
+def _metal(surface: Surface, metal: Metal, outside: float | None, notes: Notes) -> Interface:
+    """The metal; below a coat of index `outside`, with the reflectance that makes up for what the coat does.
+
+    Light of a smooth metal that reflects r meets it again below a coat that reflects F: of what enters the coat,
+    r (1 - F) / (1 - r F) comes out. For no darkening that is to be the reflectance in air.
+    """
+    tint, delta = np.array(metal.tint), _darkening(surface)
+    film = _film(surface, notes)
+    if isinstance(metal.reflectance, Texture):
+        tint = np.array(np.mean(tint))
+        if np.ptp(metal.tint) > 1e-6:
+            notes.add("colour towards the edge", metal.tint, "its mean stands for it beside an image")
+        if film:
+            notes.add("thin film", surface.film[1] if surface.film else "", "none over the index of an image")
+            film = {}
+    elif np.min(metal.reflectance) >= MOST and not film:
+        return Interface(conductor="mirror", **_facets(surface.alpha, surface.rotation))
+
+    def index(reflectance: Array) -> tuple[Array, Array]:
+        n, k = metal.index(reflectance, tint)
+        if outside is None or delta == 1:
+            return n, k
+        below = [np.asarray(fresnel.conductor(c, n / outside, k / outside)) for c in (1.0, EDGE)]
+        inside = float(fresnel.normal_incidence(outside))
+        kept = [reflectance, np.asarray(fresnel.conductor(EDGE, n, k))]
+        kept = [r / (1 - inside + r * inside) for r in kept]
+        r, edge = (there + delta * (here - there) for here, there in zip(below, kept))
+        n, k = of_edge(r, edge)
+        return n * outside, k * outside
+
+    eta, k = (changed(metal.reflectance, lambda r, part=part: index(r)[part]) for part in (0, 1))  # type: ignore[misc]
+    return Interface(eta=eta, k=k, **_facets(surface.alpha, surface.rotation), **film)
+
+
+def _dielectric(surface: Surface, outside: float, notes: Notes) -> list[Interface]:
+    """The interface of a dielectric base; none where it has no step of the index, unless a film lies on it."""
+    film = _film(surface, notes)
+    index = surface.eta * outside if surface.by_sight else surface.eta
+    red, green, blue = (weighed(index, outside, weight) for weight in surface.specular)
+    eta: float | RGB = red if red == green == blue else (red, green, blue)
+    even = abs(float(np.mean(eta)) / outside - 1) < STEP_MIN
+    if even and not film:
+        return []
+    if even and surface.alpha != (0.0, 0.0):
+        notes.add("roughness", surface.alpha, "0 below a film between equal indices")
+    facets = {} if even else _facets(surface.alpha, surface.rotation)
+    return [Interface(eta=eta, **facets, **film)]
+
+
+def _clear(surface: Surface, base: list[Layer], outside: float) -> list[Layer]:
+    """A clear base: what lies below its interface. An interface without a step ends a tint, as no medium may be last.
+
+    A pane has the outside below it.
+    """
+    base = base or [Interface(eta=outside, alpha=0.0)]
+    eta, below = base[-1].eta, _medium(surface.tint)  # type: ignore[union-attr]
+    if surface.pane and abs(float(np.mean(eta)) - 1) >= STEP_MIN:  # type: ignore[arg-type]
+        return [*base, *below, Interface(eta=1.0, **_facets(surface.alpha, surface.rotation))]
+    return [*base, *below, Interface(eta=float(np.mean(eta)), alpha=0.0)] if below else base  # type: ignore[arg-type]
+
+
+def _darkening(surface: Surface) -> float:
+    return 0.0 if surface.by_sight else surface.coat.darkening if surface.coat else 1.0
+
+
+def _film(surface: Surface, notes: Notes) -> dict[str, Any]:
+    if surface.film is None:
+        return {}
+    eta, thickness_nm = surface.film
+    if not isinstance(thickness_nm, Texture):
+        thickness_nm = float(np.mean(thickness_nm))
+    if not isinstance(thickness_nm, Texture) and thickness_nm > THICKEST_NM:
+        notes.add("thin film", thickness_nm, f"beyond {THICKEST_NM:g} nm, where it has no colour: left out")
+        return {}
+    return {"films": (Film(eta=eta, thickness_nm=thickness_nm),)}
+
+
+# Colours of what lies below an interface -----------------------------------------------------------------------------
+
+
+def _diffuse(surface: Surface, albedo: Value, above: list[Interface], base: list[Layer]) -> Value:
+    """The albedo of the diffuse base that gives the colour seen.
+
+    Of the light that enters, (1 - K) rho / (1 - K rho) leaves, with K the share that interfaces send back down. The
+    colour is that share for the bare base at the normal (OpenPBR 1.1, "Glossy-diffuse"). Under a coat that does not
+    darken, the same shall be added to what the coat reflects (OpenPBR 1.1, "Coat"); between the two, rho is mixed.
+    """
+    bare = [_plain(each) for each in _dielectric(surface, 1.0, Notes())]
+    reflected, kept = _above_diffuse(bare)
+    delta = _darkening(surface) if above else 1.0
+    coated = [_plain(each) for each in (*above, *base) if isinstance(each, Interface)]
+    whole, inside = _above_diffuse(coated) if delta < 1 else (reflected, kept)
+    coat = float(fresnel.normal_incidence(float(above[0].eta))) if above else 0.0  # type: ignore[arg-type]
+
+    def rho(seen: Array) -> Array:
+        seen = np.clip(seen, 0, 1)
+        darkened = seen / (1 - kept + seen * kept)
+        if delta == 1:
+            return np.asarray(darkened)
+        shown = coat + (1 - coat) * (reflected + (1 - reflected) * seen)
+        entered = np.clip((shown - whole) / (1 - whole), 0, 1)
+        plain = entered / (1 - inside + entered * inside)
+        return np.asarray(plain + delta * (darkened - plain))
+
+    return changed(albedo, rho)
+
+
+def _above_diffuse(layers: list[Interface]) -> tuple[float, float]:
+    """What interfaces reflect at the normal, over a black base, and the share K of light from a diffuse one that they
+    send back down."""
+    if not layers:
+        return 0.0, 0.0
+
+    def total(albedo: float) -> float:
+        found = stack_lobes(Stack([*layers, Diffuse(albedo=albedo)]), 1.0)
+        return float(np.mean(np.sum([energy[:, 0] for energy in found.energy], axis=0) + found.remainder[:, 0]))
+
+    black = total(0.0)
+    share = (total(0.5) - black) / (1 - black)
+    return black, float(np.clip((1 - 2 * share) / (1 - share), 0, 1))
+
+
+def _plain(layer: Interface) -> Interface:
+    """The interface with numbers in place of images, without films."""
+    u, v = layer.alpha if isinstance(layer.alpha, tuple) else (layer.alpha, layer.alpha)
+    alpha = tuple(max(middle(each), SMOOTH) if isinstance(each, Texture) else each for each in (u, v))
+    return layer.model_copy(update={"alpha": alpha[0] if alpha[0] == alpha[1] else alpha, "films": ()})

@@ -1,0 +1,93 @@
+"""XML files as plain trees: without document types, so without entities, and of limited size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from velatura.errors import InvalidInput
+from velatura.imports.file import content
+
+LARGEST = 2**24  # bytes of a file
+MOST, DEEPEST = 200_000, 100  # elements in all, and within each other
+
+
+@dataclass
+class Element:
+    """An element: its tag with any prefix, its attributes, its parent, and the elements in it."""
+
+    tag: str
+    attributes: dict[str, str]
+    parent: Element | None = None
+    children: list[Element] = field(default_factory=list)
+
+    def get(self, key: str) -> str | None:
+        """An attribute; None without it."""
+        return self.attributes.get(key)
+
+    @property
+    def name(self) -> str:
+        """Its attribute `name`; empty without one."""
+        return self.attributes.get("name", "")
+
+    def of(self, *tags: str) -> Iterator[Element]:
+        """The elements in it of some tags."""
+        return (child for child in self.children if child.tag in tags)
+
+    def child(self, tag: str, name: str) -> Element | None:
+        """The element in it of a tag and a name."""
+        return next((child for child in self.of(tag) if child.name == name), None)
+
+    def all(self) -> Iterator[Element]:
+        """The element, and all in it, in their order."""
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += reversed(element.children)
+
+    def outwards(self) -> Iterator[Element]:
+        """The element, and those that it is in, outwards."""
+        element: Element | None = self
+        while element is not None:
+            yield element
+            element = element.parent
+
+
+def read(path: Path) -> Element:
+    """The root of a file.
+
+    Raises:
+        InvalidInput: it cannot be read, is no XML, too large, or has a document type; one line that names the file.
+    """
+    root, count = Element("", {}), 0
+    at = [root]
+    parser = expat.ParserCreate()
+
+    def refuse(what: str) -> InvalidInput:
+        return InvalidInput(f"{path}: line {parser.CurrentLineNumber}: {what}")
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > MOST or len(at) > DEEPEST:
+            raise refuse(f"holds more than {MOST} elements, or {DEEPEST} within each other")
+        at.append(Element(tag, attributes, at[-1]))
+        at[-2].children.append(at[-1])
+
+    def doctype(*_: object) -> None:
+        raise refuse("has a document type, which is not read")
+
+    parser.StartElementHandler, parser.StartDoctypeDeclHandler = begin, doctype
+    parser.EndElementHandler = lambda _: at.pop()
+    try:
+        parser.Parse(content(path, LARGEST), True)
+    except expat.ExpatError as error:
+        raise InvalidInput(f"{path}: line {error.lineno}: is not valid XML: {expat.ErrorString(error.code)}") from None
+    except (LookupError, ValueError) as error:  # an encoding that there is not
+        if isinstance(error, InvalidInput):
+            raise
+        raise InvalidInput(f"{path}: cannot be read: {error}") from None
+    return root.children[0]
