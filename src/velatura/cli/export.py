@@ -1,4 +1,4 @@
-"""`velatura export`: a material for other programs, as a shader, JSON, a scene of Mitsuba, or a Python script."""
+"""`velatura export`: a material for other programs, as a shader, JSON, a scene of Mitsuba, or a script."""
 
 from __future__ import annotations
 

@@ -41,6 +41,8 @@ FORMATS: dict[str, Format] = {
         name: Format(endings, "velatura.exports.shader", beside=(".tables.bin", ".films.bin"), constants=True)
         for name, endings in _SHADERS.items()
     },
+    "osl": Format((".osl",), "velatura.exports.osl", constants=True),
+    "blender": Format((".py",), "velatura.exports.blender"),
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
@@ -60,6 +62,15 @@ class Request:
     switches: Mapping[str, str]
     constant: Collection[str]
     folder: Path | None
+
+    @property
+    def constants(self) -> Collection[str]:
+        """Names of the values that are worked in; of all that do not vary for ["all"]."""
+        from velatura.stack import Varying
+
+        if list(self.constant) != ["all"]:
+            return self.constant
+        return [name for name, value in self.stack.flat().items() if not isinstance(value, Varying)]
 
 
 @dataclass(frozen=True)
@@ -101,9 +112,9 @@ def export(
 
     Args:
         material: a stack, a file, or a preset's name.
-        to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl";
-            "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
-            renders it.
+        to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
+            shader of closures, "osl", or "blender", a script that makes a material of it; "json", the material with its
+            numbers; "mitsuba-xml", a scene to be included; "python", a script that renders it.
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         folder: where the text will lie, so that a scene may name its textures relative to it.

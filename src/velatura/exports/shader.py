@@ -8,7 +8,6 @@ from velatura.shader.c_like import CLike
 from velatura.shader.glsl import GLSL, Desktop, Vulkan
 from velatura.shader.hlsl import Hlsl, Slang
 from velatura.shader.wgsl import Wgsl
-from velatura.stack import Varying
 
 #: The language of each format.
 PRINTERS: dict[str, CLike] = {
@@ -23,9 +22,7 @@ PRINTERS: dict[str, CLike] = {
 
 def write(request: Request) -> Export:
     """The shader; beside it the textures that it reads, little-endian floats in rows of RGBA."""
-    free = [name for name, value in request.stack.flat().items() if not isinstance(value, Varying)]
-    constant = free if list(request.constant) == ["all"] else request.constant
-    made = shader(request.stack, request.model, constant, printer=PRINTERS[request.to])
+    made = shader(request.stack, request.model, request.constants, printer=PRINTERS[request.to])
     read = made.tables if made.looked_up else made.columns
     textures = {".tables.bin": read, ".films.bin": made.films}
     beside = {end: x.astype("<f4").tobytes() for end, x in textures.items() if x is not None}

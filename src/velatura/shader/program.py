@@ -102,7 +102,7 @@ def shader(
     name = "A material" if shown else " ".join(stack.name.split()) or "A material"
     costs = _costs(recording)
     parts = [
-        printer.header(name, _described(recording.model), bool(recording.energies), costs),
+        printer.header(name, described(recording.model), bool(recording.energies), costs),
         printer.structs(material.structs(stack, read)),
         *([printer.parameters(len(shown), *_changing(baked))] if shown else []),
         printer.material(filled),
@@ -163,7 +163,7 @@ def _shares(recording: Recording) -> list[str]:
     return [*(name for name in energies if name.startswith("t")), *(name for name in energies if name[0] != "t")]
 
 
-def _described(model: Model) -> str:
+def described(model: Model) -> str:
     """The name of a model, with the switches that were changed."""
     shipped = named(model.name)
     changed = [f"{key}={getattr(model, key)}" for key in SWITCHES if getattr(model, key) != getattr(shipped, key)]

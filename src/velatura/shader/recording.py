@@ -96,25 +96,15 @@ def record(
         InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture; films
             over a diffuse base in closed form.
     """
-    chosen = named(model, **switches)
-    if chosen.channels == "separate":
-        raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
-    flat = stack.flat()
-    for name in constant:
-        if name not in flat:
-            raise InvalidInput(f"constant: {unknown('parameter', name, flat)}")
-    wi, wo, u = _direction("wi"), _direction("wo"), _direction("u")
+    chosen, flat = drawn_by(stack, named(model, **switches)), stack.flat()
+    check_constant(stack, constant)
+    wi, wo, u = direction("wi"), direction("wo"), direction("u")
 
     # Run the model
-    uniform = not any(isinstance(value, Varying) for value in flat.values())
-    if not (uniform and stack.interfaces):
-        chosen = chosen.adder  # which is worked out at every point, and is Lambert's law for a diffuse base alone
+    uniform = is_uniform(stack)
     solved = not chosen.recursion.closed_form
     constants = flat if solved and not parameters else {*constant, *([] if parameters else films.beside(stack))}
-    recorded = Material.of(
-        stack, lambda at, value: material.constant(at, value) if at.name in constants else _input(at)
-    )
-    recorded = films.recorded(recorded, stack, parameters)
+    recorded = films.recorded(symbols(stack, constants), stack, parameters)
     kind = structure(stack) if parameters else variance(stack)
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     baked: Bake | Tabulated | None = None
@@ -150,6 +140,36 @@ def record(
     return Recording(stack, chosen, baked, shown, kinds, lobes, found, of_value, of_density, sampled)
 
 
+def drawn_by(stack: Stack, model: Model) -> Model:
+    """The model that a shader of a stack computes: in closed form where it is worked out at every point.
+
+    Raises:
+        InvalidInput: it has a lobe for each colour.
+    """
+    if model.channels == "separate":
+        raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
+    # In closed form a diffuse base alone is Lambert's law
+    return model if is_uniform(stack) and stack.interfaces else model.adder
+
+
+def is_uniform(stack: Stack) -> bool:
+    """Whether no value differs from point to point."""
+    return not any(isinstance(value, Varying) for value in stack.flat().values())
+
+
+def check_constant(stack: Stack, constant: Collection[str]) -> None:
+    """Refuse names of constants that the stack does not have."""
+    flat = stack.flat()
+    for name in constant:
+        if name not in flat:
+            raise InvalidInput(f"constant: {unknown('parameter', name, flat)}")
+
+
+def symbols(stack: Stack, constants: Collection[str]) -> Material:
+    """A stack with inputs as its values, but for the `constants`."""
+    return Material.of(stack, lambda at, x: material.constant(at, x) if at.name in constants else _input(at))
+
+
 def _lobed(
     body: bsdf.Lobed, wi: Direction, added: bool, parameters: bool
 ) -> tuple[bsdf.Lobed, dict[str, Value], list[str]]:
@@ -175,7 +195,8 @@ def _held(name: str, kind: Kind, value: Symbol) -> Symbol:
     return Symbol("input", (), value.kind, f"l.{name}" if value.kind == kind else f"l.{name}.r")
 
 
-def _direction(name: str) -> tuple[Symbol, Symbol, Symbol]:
+def direction(name: str) -> tuple[Symbol, Symbol, Symbol]:
+    """A direction as inputs."""
     return symbol.number(f"{name}.x"), symbol.number(f"{name}.y"), symbol.number(f"{name}.z")
 
 

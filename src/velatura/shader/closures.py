@@ -1,0 +1,350 @@
+"""The light of a material as a sum of closures, for languages that have no functions of two directions.
+
+Lobes depend on the direction of view alone, so a shader works out their energies and roughnesses and returns a sum of
+closures of reflectance 1. What differs from the model is measured by `losses`: masking is correlated by the height of
+facets, as renderers have it; lobes in their own media are drawn outside; all other light is diffuse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import pi
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model import Model, bsdf, variance_kind
+from velatura.model.bsdf import Asked
+from velatura.model.context import Context
+from velatura.model.lobe_statistics import LobeStatistics, StackLobes
+from velatura.model.mixture import ALPHA_MIN
+from velatura.model.roughness_maps import AS_IT_IS
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.ops import Value
+from velatura.optics import fresnel, ggx
+from velatura.optics.directions import directions
+from velatura.optics.ggx import Direction
+from velatura.sampling import directional_grid
+from velatura.sampling.directional_grid import Curves
+from velatura.sampling.low_discrepancy import fibonacci, square
+from velatura.stack import Material
+
+Array = NDArray[np.floating]
+
+LINE, PLANE = (128,), (32, 17)  # nodes over the cosine, and the azimuth where an interface is brushed
+COS_MIN = 1e-3  # of directions at nodes
+STRAIGHT = 3.0  # index at which light that goes straight on is spread
+SPREAD = 2 / (1 - 1 / STRAIGHT)  # of its roughness
+LEAST = 0.5  # share of a closure's light that passes: below, light passes in all directions
+FAINT = 1e-6  # weight, below which there is no closure
+SAMPLES = 377  # of the albedo of a closure
+COSINES = (1.0, 0.7, 0.35)  # of directions for which losses are given
+PAIRS = 2**13  # of samples of each, of the model and of the closures
+
+Kind = Literal["reflection", "refraction", "straight", "diffuse", "translucent"]
+
+
+class Closure(NamedTuple):
+    """A closure for one direction: its weight, a colour; for facets their roughness, and the index beyond over that on
+    the side of the light.
+
+    Refraction that goes `straight` on bends nothing: its facets lie about the direction of view, the first axis of
+    their roughness in the plane of incidence.
+    """
+
+    kind: Kind
+    weight: Value
+    roughness: Roughness = Roughness(1.0, 1.0, 0.0)
+    eta: Value = 1.0
+
+
+Closures = Callable[[Direction], list[Closure]]
+
+
+def of_body(body: bsdf.Lobed, wi: Direction, straight: bool) -> list[Closure]:
+    """The closures for light from wi, of lobes that a model draws outside; `straight` if light leaves into the medium
+    that it comes from."""
+    seen, w = bsdf.scattered(body, wi), bsdf.upright(wi, wi)
+    found = [
+        Closure("reflection", lobe.energy * _separable(w, lobe.roughness), _bounded(lobe.roughness))
+        for lobe in seen.reflected
+    ]
+    if seen.base:
+        found.append(Closure("diffuse", seen.base.energy))
+    if seen.transmitted:
+        found.append(_through(seen.transmitted.energy, seen.transmitted.roughness, w, seen.eta, straight))
+    return found
+
+
+def _separable(w: Direction, roughness: Roughness) -> Value:
+    """Albedo of a GGX reflection with separable masking over that with masking correlated by height: a fit within .006
+    for cosines of .1 and more."""
+    u, v, _ = roughness
+    x, y, z = ggx.rotate(w, roughness.rotation)
+    sin2, cos2 = ops.maximum(1 - z * z, ops.TINY), ops.maximum(z * z, 1e-6)
+    along2 = (u * u * x * x + v * v * y * y) / sin2
+    hidden = ops.sqrt(1 + along2 * sin2 / cos2)
+    m, a = (hidden - 1) / (hidden + 1), ops.sqrt(along2)
+    polynomial = 0.7525 - 0.14 * a - 0.9354 * m - 0.105 * m * a + 0.6987 * m * m + 0.2909 * a * a - 0.6575 * z
+    return 1 / (1 + ops.maximum(m * a * polynomial, 0.0))
+
+
+def _through(energy: Value, roughness: Roughness, w: Direction, eta: Value, straight: bool) -> Closure:
+    """Light that passes, of a lobe about the refracted direction: as wide, to first order, in tangential momentum."""
+    u, v, rotation = roughness = _bounded(roughness)
+    if straight:
+        c, s = ggx.plane(ggx.rotate(w, rotation))
+        along, across = ops.sqrt(u * u * c * c + v * v * s * s), ops.sqrt(u * u * s * s + v * v * c * c)
+        own = Roughness(SPREAD * along, SPREAD * w[2] * across, 0.0)
+        return Closure("straight", energy, _bounded(own), STRAIGHT)
+    inside = eta * fresnel.cos_transmitted(w[2], eta)
+    scale = ops.divide(2 * inside, ops.absolute(inside - w[2]))
+    return Closure("refraction", energy, _bounded(roughness.scaled(scale)), eta)
+
+
+def _bounded(roughness: Roughness) -> Roughness:
+    u, v, rotation = roughness
+    return Roughness(ops.clip(u, ALPHA_MIN, 1.0), ops.clip(v, ALPHA_MIN, 1.0), rotation)
+
+
+# Tabulated over direction
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """The closures of a uniform material over direction, from above and, where it transmits, from below: `rows` (sides,
+    nodes, columns). `kinds` are those of the closures, `etas` the relative index beyond, by side."""
+
+    kinds: Sequence[Kind]
+    variance: type[Variance]
+    shape: tuple[int, ...]
+    etas: Sequence[float]
+    rows: Array
+
+    def at(
+        self, wi: Direction, read: Callable[[Direction], Sequence[Value]], colour: Callable[..., Value], eta: Value
+    ) -> list[Closure]:
+        """The closures for light from wi, of the columns that are read at an upright direction."""
+        columns, found = iter(read(bsdf.upright(wi, wi))), list[Closure]()
+        for kind in self.kinds:
+            weight = colour(*(next(columns) for _ in range(3)))
+            if kind in _SMOOTH:
+                found.append(Closure(kind, weight))
+                continue
+            variance = _variance(kind, self.variance)
+            u, v, rotation = variance(*(next(columns) for _ in variance.__dataclass_fields__)).roughness(AS_IT_IS)
+            if kind != "straight" and self.variance is PerAxis:
+                rotation = ops.arctan2(wi[1], wi[0])
+            found.append(Closure(kind, weight, Roughness(u, v, rotation), STRAIGHT if kind == "straight" else eta))
+        return found
+
+    def above(self, wi: Direction) -> list[Closure]:
+        """In NumPy, for light from above."""
+        curves = Curves(self.rows[0].reshape(*self.shape, -1), self.shape)
+        return self.at(wi, curves, lambda *channels: np.stack(channels), self.etas[0])
+
+
+_SMOOTH = ("diffuse", "translucent")
+
+
+def _variance(kind: Kind, variance: type[Variance]) -> type[Variance]:
+    """Of the columns of a closure. Lobes of isotropic stacks have their axes in the plane of incidence."""
+    return PerAxis if kind == "straight" else variance
+
+
+def tabulated(material: Material, model: Model) -> Tabulated:
+    """The closures of a material with values in NumPy, as `velatura.lobes` reports its lobes."""
+    isotropic = variance_kind(material) is Isotropic
+    shape, variance = (LINE, PerAxis) if isotropic else (PLANE, Covariance)
+    x, y, z = (np.ravel(w) for w in directional_grid.directions(shape, None))
+    z = np.maximum(z, COS_MIN)
+    scale = np.sqrt((1 - z * z) / (x * x + y * y))
+    w = x * scale, y * scale, z
+    sides = [material, material.reversed()] if material.transmits else [material]
+    etas = [float(np.mean(side.below) / np.mean(side.exterior)) if material.transmits else 1.0 for side in sides]
+    each = [_of_statistics(model.recursion.statistics(side, model, w), w, eta) for side, eta in zip(sides, etas)]
+    kept = [k for k, closures in enumerate(zip(*each)) if max(np.max(c.weight) for c in closures) > FAINT]
+    rows = np.array([np.concatenate([_columns(closures[k], variance) for k in kept]).T for closures in each])
+    return Tabulated([each[0][k].kind for k in kept], variance, shape, etas, rows.astype(np.float32).astype(float))
+
+
+def _of_statistics(lobes: StackLobes, w: Direction, eta: float) -> list[Closure]:
+    """Closures of the energies of lobes at directions (N,)."""
+
+    def facets(energy: Array, alpha: Array, rotation: Array) -> Closure:
+        own = _bounded(Roughness(alpha[0], alpha[1], rotation))
+        closure = Closure("reflection", energy, own)
+        return closure._replace(weight=energy / albedo(closure, w))
+
+    found = [facets(*each) for each in zip(lobes.energy, lobes.alpha, lobes.rotation)]
+    found.append(Closure("diffuse", np.maximum(lobes.remainder, 0.0)))
+    passed: LobeStatistics | None = lobes.transmitted
+    if passed:
+        u, v = passed.alpha
+        closure = _through(passed.energy, Roughness(u, v, passed.rotation), w, eta, abs(eta - 1) < FAINT)
+        through = albedo(closure, w)
+        weight = passed.energy / np.maximum(through, LEAST)
+        found += [closure._replace(weight=weight), Closure("translucent", passed.energy - weight * through)]
+    return found
+
+
+def _columns(closure: Closure, variance: type[Variance]) -> Array:
+    if closure.kind in _SMOOTH:
+        return np.asarray(closure.weight)
+    own = vars(_variance(closure.kind, variance).of(closure.roughness, AS_IT_IS)).values()
+    return np.concatenate([closure.weight, np.stack(np.broadcast_arrays(*own))])
+
+
+# As renderers evaluate them
+
+
+def albedo(closure: Closure, wi: Direction) -> Array:
+    """Share of light from upright directions wi (N,) that a closure of weight 1 keeps."""
+    u1, u2 = fibonacci(SAMPLES)
+    roughness = Roughness(*(np.reshape(x, (-1, 1)) for x in closure.roughness))
+    one = closure._replace(weight=1.0, roughness=roughness)
+    w = tuple(np.reshape(x, (-1, 1)) for x in wi)
+    wo = sample(one, w, u1, u2)  # type: ignore[arg-type]
+    value, density = eval_pdf(one, w, wo)  # type: ignore[arg-type]
+    return np.mean(ops.divide(value, density), axis=-1)
+
+
+def evaluate(closures: Sequence[Closure], wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o| of a sum, a colour, and the density of `_samples`; wi is above, wo on either side."""
+    shares = _shares(closures)
+    each = [eval_pdf(closure, wi, wo) for closure in closures]
+    value = sum(closure.weight * value for closure, (value, _) in zip(closures, each))
+    return value, sum(share * density for share, (_, density) in zip(shares, each))
+
+
+def _shares(closures: Sequence[Closure]) -> Array:
+    """Chances of sampling each."""
+    weights = np.array([np.mean(closure.weight) for closure in closures]) + FAINT
+    return np.asarray(weights / weights.sum())
+
+
+def _samples(closures: Sequence[Closure], wi: Direction, count: int) -> Direction:
+    """Directions (count,) for light from one."""
+    u1, u2 = square(count)
+    u = (np.arange(count) + 0.5) / count
+    number = np.searchsorted(np.cumsum(_shares(closures))[:-1], u)
+    found = np.zeros((3, count))
+    for k, closure in enumerate(closures):
+        own = number == k
+        found[:, own] = sample(closure, wi, u1[own], u2[own])
+    return found[0], found[1], found[2]
+
+
+def sample(closure: Closure, wi: Direction, u1: Value, u2: Value) -> Direction:
+    """A direction for light from above; maybe on the wrong side, where the value is 0."""
+    if closure.kind in _SMOOTH:
+        radius, phi = ops.sqrt(u1), 2 * pi * u2
+        side = -1.0 if closure.kind == "translucent" else 1.0
+        return radius * ops.cos(phi), radius * ops.sin(phi), side * ops.sqrt(1 - u1)
+    u, v, _ = closure.roughness
+    i = _into(closure, wi, wi)
+    h = ggx.sample_visible(i, u, v, u1, u2)
+    if closure.kind == "reflection":
+        return _out_of(closure, wi, ggx.reflect(i, h))
+    eta, cosine = closure.eta, ggx.dot(i, h)
+    inside = fresnel.cos_transmitted(cosine, eta)
+    # Where light is totally reflected, on the wrong side
+    x, y, z = (ops.select(inside > 0, (cosine / eta - inside) * a - b / eta, a) for a, b in zip(h, i))
+    return _out_of(closure, wi, (x, y, z))
+
+
+def eval_pdf(closure: Closure, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o| of a closure of weight 1, for light from above, and the density of `sample`."""
+    if closure.kind in _SMOOTH:
+        cosine = ops.maximum(-wo[2] if closure.kind == "translucent" else wo[2], 0.0) / pi
+        return cosine, cosine
+    u, v, _ = closure.roughness
+    reflects, eta = closure.kind == "reflection", closure.eta
+    i, o = _into(closure, wi, wi), _into(closure, wi, wo)
+    there = (o[2] > 0) & (wo[2] > 0) if reflects else (o[2] < 0) & (wo[2] < 0)
+    h = ggx.normalize((i[0] + o[0], i[1] + o[1], i[2] + o[2]) if reflects else _facet(i, o, eta))
+    cos_i, cos_o = ggx.dot(i, h), ggx.dot(o, h)
+    if reflects:
+        jacobian = 0.25 / ops.maximum(cos_i, ops.TINY)
+    else:
+        there = there & (cos_i > 0) & (cos_o < 0)
+        jacobian = eta * eta * -cos_o / ops.maximum((cos_i + eta * cos_o) ** 2, ops.TINY)
+    lit, seen = _hidden(i, u, v), _hidden(o, u, v)
+    density = ggx.ndf(h, u, v) / (1 + lit) * ops.maximum(cos_i, 0.0) / ops.maximum(i[2], ops.TINY) * jacobian
+    return ops.select(there, density * (1 + lit) / (1 + lit + seen), 0.0), ops.select(there, density, 0.0)
+
+
+def _facet(i: Direction, o: Direction, eta: Value) -> Direction:
+    """The normal, up to its length, of a facet that refracts i to o."""
+    x, y, z = (-(a + eta * b) for a, b in zip(i, o))
+    sign = ops.select(z < 0, -1.0, 1.0)
+    return sign * x, sign * y, sign * z
+
+
+def _hidden(w: Direction, u: Value, v: Value) -> Value:
+    """Smith's Lambda (Heitz 2014, Eq. 86)."""
+    z = ops.maximum(ops.absolute(w[2]), 1e-6)
+    return 0.5 * (ops.sqrt(1 + ((u * w[0]) ** 2 + (v * w[1]) ** 2) / (z * z)) - 1)
+
+
+def _into(closure: Closure, wi: Direction, w: Direction) -> Direction:
+    """A direction in the frame of a closure's facets."""
+    if closure.kind != "straight":
+        return ggx.rotate(w, closure.roughness.rotation)
+    x, y, z = _about(wi)
+    return ggx.dot(w, x), ggx.dot(w, y), ggx.dot(w, z)
+
+
+def _out_of(closure: Closure, wi: Direction, w: Direction) -> Direction:
+    if closure.kind != "straight":
+        return ggx.rotate(w, -closure.roughness.rotation)
+    a, b, c = (w[0] * x + w[1] * y + w[2] * z for x, y, z in zip(*_about(wi)))
+    return a, b, c
+
+
+def _about(wi: Direction) -> tuple[Direction, Direction, Direction]:
+    """Axes about a direction, the first in the plane of incidence."""
+    c, s = ggx.plane(wi)
+    sine = ops.sqrt(1 - wi[2] * wi[2])
+    return (c * wi[2], s * wi[2], -sine), (-s, c, 0.0 * c), wi
+
+
+# What is lost
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What closures are off a model in light from one direction: total variation, which is half the sum of the
+    differences over the light; and the greatest difference of albedo, over the colours."""
+
+    cosine: float
+    variation: float
+    albedo: float
+
+
+def losses(material: Material, model: Model, closures: Closures) -> Iterator[Loss]:
+    """Of the closures of a material with values in NumPy, for light from above."""
+    material = material.solid()
+    body = model.recursion.body(material, model, variance_kind(material), Context())
+    asked = Asked(radiance=False)
+    u1, u2 = square(PAIRS)
+    u = (np.arange(PAIRS) + 0.5) / PAIRS
+    for cosine, direction in zip(COSINES, directions(COSINES, 0.0)):
+        x, y, z = np.repeat(direction[:, None], PAIRS, axis=1)
+        one = x[:1], y[:1], z[:1]
+        found = closures(one)
+        mine = _samples(found, one, PAIRS)
+        theirs, _ = body.sample((x, y, z), u, u1, u2, asked)
+        truth, approximate = np.zeros(3), np.zeros(3)
+        apart = 0.0
+        for wo in (mine, theirs):
+            value, density = body.eval_pdf((x, y, z), wo, asked)
+            other, also = evaluate(found, one, wo)
+            value, other = np.broadcast_to(value, (3, PAIRS)), np.broadcast_to(other, (3, PAIRS))
+            share = 1 / np.maximum(density + also, ops.TINY) / PAIRS
+            truth, approximate = truth + (value * share).sum(axis=1), approximate + (other * share).sum(axis=1)
+            apart += 0.5 * float(np.sum(np.abs(value - other) * share))
+        yield Loss(cosine, apart / float(truth.sum()), float(np.max(np.abs(approximate - truth))))

@@ -1,0 +1,537 @@
+"""Open Shading Language: a material as a sum of closures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from math import isclose
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import velatura
+from velatura import ops, tables
+from velatura.model import DEFAULT, Model, bsdf, named
+from velatura.model.context import at_a_point
+from velatura.model.variance import Isotropic
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+from velatura.sampling import directional_grid
+from velatura.shader import atlas, closures, films, recording
+from velatura.shader.bake import Group, together
+from velatura.shader.closures import Closure, Closures, Loss, Tabulated
+from velatura.shader.graph import Graph
+from velatura.shader.material import constant as as_constant
+from velatura.shader.material import place
+from velatura.shader.printer import ATOM, Language
+from velatura.shader.program import described
+from velatura.shader.statements import statements
+from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
+from velatura.stack import Address, Brushing, Material, MaterialLike, Stack, Texture, Varying, load
+from velatura.stack import number as plain
+
+LINE = 116  # characters of comments
+ACROSS = 12  # numbers of an array on a line
+LARGE = 1e3  # limit of a parameter that is not stated, nor one beyond it
+
+Array = NDArray[np.floating]
+
+_TYPES: dict[str, str] = {"number": "float", "colour": "color", "condition": "int", "conditions": "color"}
+_FUNCTIONS = {op: op for op in ("exp", "log", "sin", "cos", "sqrt")} | {
+    "absolute": "abs",
+    "mean": "vt_mean",
+    "power": "pow",
+    "arctan2": "atan2",
+    "minimum": "min",
+    "maximum": "max",
+    "clip": "clamp",
+}
+_OPERATORS = {  # with how strongly they bind
+    "add": ("+", 5),
+    "subtract": ("-", 5),
+    "multiply": ("*", 6),
+    "divide": ("/", 6),
+    "less": ("<", 4),
+    "greater": (">", 4),
+    "at_most": ("<=", 4),
+    "at_least": (">=", 4),
+    "both": ("&&", 2),
+}
+# Words of the language, its globals and functions, and names of the shader
+_WORDS = """
+    and bool break case catch char class closure color const continue default delete do double else emit enum extern
+    false float for friend goto if illuminance illuminate inline int light matrix new normal not operator or output
+    patch point private protected public return shader short signed sizeof static string struct surface switch template
+    this throw true try typedef uniform union unsigned varying vector virtual void volatile while
+    P I N Ng dPdu dPdv Ps u v time dtime dPdtime Ci wi UV Tangent Normal cosine view shading x y z outwards BSDF
+    abs acos asin atan atan2 backfacing blackbody ceil clamp cos cosh cross degrees diffuse distance dot exp fabs floor
+    fmod getattribute hypot length log luminance max microfacet min mix mod noise normalize pow radians reflect refract
+    round select sign sin sinh sqrt step tan texture transform translucent transparent trunc
+"""
+
+
+class Osl(Language):
+    """The spelling of Open Shading Language; its conditions of colours are colours of 0 and 1."""
+
+    words = frozenset(_WORDS.split())
+    functions = _FUNCTIONS
+    operators = _OPERATORS
+
+    def input(self, place: str) -> str:
+        if place.startswith("m."):
+            return place[2:].replace(".", "_")
+        name, _, axis = place.partition(".")
+        return f"{name}[{'xyz'.index(axis)}]" if axis else name
+
+    def literal(self, x: Operand) -> str:
+        if isinstance(x, tuple):
+            return self.colour([self.literal(channel) for channel in x])
+        if isinstance(x, bool):
+            return str(int(x))
+        assert not isinstance(x, Symbol)
+        text = f"{np.float32(x):.9g}" if np.float32(x) != np.float32(f"{x:.6g}") else f"{x:.6g}"
+        return text if "." in text or "e" in text else f"{text}.0"
+
+    def colour(self, channels: Sequence[str]) -> str:
+        return f"color({', '.join(channels)})"
+
+    def component(self, x: str, channel: int, kind: Kind) -> str:
+        return f"{x}[{channel}]"
+
+    def each_channel(self, op: str, a: str, b: str) -> str:
+        return f"color({a}) * color({b})" if op == "both" else f"vt_{op}({a}, {b})"
+
+    def select(self, condition: str, a: str, b: str) -> tuple[str, int]:
+        return f"({condition} ? {a} : {b})", ATOM
+
+    def select_channels(self, conditions: str, a: str, b: str) -> str:
+        return f"select({b}, {a}, {conditions})"
+
+    def value(self, table: str, args: Sequence[str], wide: bool) -> str:
+        nodes = atlas.layouts([table])[0].nodes
+        return f"vt_value(vt_{table}, {', '.join(map(str, nodes))}, {', '.join(args)})"
+
+    def film(self, table: str, args: Sequence[str]) -> str:
+        nodes = films.layouts([table])[0].nodes
+        return f"vt_film(vt_{table}, {', '.join(map(str, nodes))}, {', '.join(args)})"
+
+    def title(self, text: str) -> str:
+        return f"// {text}"
+
+    def named(self, name: str, kind: Kind, text: str) -> str:
+        return f"{_TYPES[kind]} {name} = {text};"
+
+    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+        _, _, nodes, channels = atlas.layouts([table])[0]
+        at = ", ".join([*map(str, nodes), *args])
+        return [f"float {name}[{channels}];", f"vt_texels(vt_{table}, {at}, {name});"]
+
+    def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
+        return [f"float {name}[{group.texels}];", f"vt_closures(vt_columns, {', '.join(place)}, {name});"]
+
+    def nodes(self, name: str, nodes: Sequence[float]) -> list[str]:
+        return [f"float {name}[{len(nodes)}] = {{{', '.join(map(self.literal, nodes))}}};"]
+
+    def results(self, name: str, kind: Kind, count: int) -> list[str]:
+        return [f"{_TYPES[kind]} {name}[{count}];"]
+
+    def state(self, name: str, following: str, kind: Kind, begin: Sequence[str]) -> list[str]:
+        kind_of, count = _TYPES[kind], len(begin)
+        return [f"{kind_of} {name}[{count}] = {{{', '.join(begin)}}};", f"{kind_of} {following}[{count}];"]
+
+    def loop(self, index: str, times: int, lines: Sequence[str]) -> list[str]:
+        return [f"for (int {index} = 0; {index} < {times}; {index}++) {{", *_indented(lines), "}"]
+
+    def store(self, array: str, place: str, text: str) -> str:
+        return f"{array}[{place}] = {text};"
+
+    def put(self, place: str, text: str) -> str:
+        return f"{place} = {text};"
+
+    def advance(self, name: str, following: str) -> str:
+        return f"for (int k = 0; k < arraylength({name}); k++) {name}[k] = {following}[k];"
+
+
+OSL = Osl()
+
+
+@dataclass(frozen=True)
+class OslShader:
+    """The code, the name of its shader, and whether its lobes turn with the tangent."""
+
+    text: str
+    name: str
+    turns: bool
+
+
+def osl(
+    stack: MaterialLike, model: str | Model = DEFAULT, constant: Collection[str] = (), **switches: str
+) -> OslShader:
+    """A material as a shader whose output `BSDF` is a sum of closures.
+
+    Args:
+        stack: a material (a stack, a file, or a preset's name). Of models in closed form its values are parameters;
+            of a solved one the closures are tabulated over direction, but where values come from textures.
+        constant: flat names of values that are worked in.
+
+    Raises:
+        InvalidInput: as `velatura.shader.record`.
+    """
+    stack, asked = load(stack), named(model, **switches)
+    chosen = recording.drawn_by(stack, asked)
+    recording.check_constant(stack, constant)
+    numbers, wi = _numbers(stack), recording.direction("wi")
+    baked: Tabulated | None = None
+    known: Closures
+    if chosen.recursion.closed_form:
+        constants = {*constant, *films.beside(stack)}
+        recorded = films.recorded(recording.symbols(stack, constants), stack, general=False)
+        body, kind = bsdf.body(numbers, chosen), recording.variance(stack)
+        straight = numbers.transmits and isclose(float(body.eta), 1.0)
+        known = partial(closures.of_body, body, straight=straight)
+        with ops.readable():
+            found = closures.of_body(bsdf.body(recorded, chosen, kind, at_a_point()), wi, straight)
+    else:
+        baked = closures.tabulated(numbers, chosen)
+        known = baked.above
+        with ops.readable():
+            found = _read(baked, wi)
+    return _Program(stack, chosen, found, baked, list(closures.losses(numbers, asked, known))).made()
+
+
+def _numbers(stack: Stack) -> Material:
+    """A stack with numbers in place of what varies: those of texels of .5."""
+
+    def value(address: Address, described: Any) -> Value:
+        if isinstance(described, Texture):
+            return float(np.clip(0.5 * described.scale + described.offset, *address.declared.within))
+        return described.offset if isinstance(described, Brushing) else plain(address, described)
+
+    return Material.of(stack, value).solid()
+
+
+def _read(baked: Tabulated, wi: Direction) -> list[Closure]:
+    """Closures that are read from the array of columns."""
+    group = Group("columns", 0, baked.rows.shape[-1])
+    above = wi[2] > 0
+    one = len(baked.etas) == 1
+    side = 0.0 if one else ops.select(above, 0.0, 1.0)
+
+    def read(w: Direction) -> list[Symbol]:
+        at = [operand(x) for x in (*directional_grid.places(w, len(baked.shape)), side)]
+        texels = Symbol("baked", tuple(at), "texels", group)
+        return [Symbol("component", (texels,), "number", k) for k in range(group.texels)]
+
+    return baked.at(wi, read, together, baked.etas[0] if one else ops.select(above, *baked.etas))
+
+
+@dataclass(frozen=True)
+class _Program:
+    """The parts of a shader."""
+
+    stack: Stack
+    model: Model
+    closures: Sequence[Closure]
+    baked: Tabulated | None
+    losses: Sequence[Loss]
+
+    def made(self) -> OslShader:
+        outputs: list[tuple[Value, Kind]] = []
+        for closure in self.closures:
+            outputs += [(closure.weight, "colour"), *((x, "number") for x in (*closure.roughness, closure.eta))]
+        found = Graph().unique([x for x, _ in outputs])
+        lines, texts = statements([(x, kind) for x, (_, kind) in zip(found, outputs)], OSL)
+        symbols = in_order(found)
+        read = {symbol.detail for symbol in symbols if symbol.op == "input"}
+        values = [(at, x) for at, x in self.stack.values() if f"m.{place(at)}" in read]
+        maps = {f"{at.name}_map": x for at, x in values if isinstance(x, Texture)}
+        varying = [(at, x) for at, x in values if isinstance(x, Varying)]
+        parameters = [_parameter(self.stack, at, x) for at, x in values if not isinstance(x, Varying)]
+        parameters += [_file(name, image) for name, image in maps.items()]
+        parameters += [*([_UV] if varying else []), *_PLACE]
+        each = [texts[k : k + 5] for k in range(0, len(texts), 5)]
+        body = [*self._arrays(symbols), *(_varied(at, x) for at, x in varying), *_FRAME, *lines]
+        body += ["", *_sum([closure.kind for closure in self.closures], each)]
+        name, lines = self._name(), _indented(body)
+        shader = "\n".join([f"shader {name}(", ",\n".join(parameters), ")", "{", *lines, "}", ""])
+        lookup = _LOOKUP[len(self.baked.shape)].format(*self.baked.rows.shape, *self.baked.shape) if self.baked else ""
+        helpers = [text for called, text in _HELPERS.items() if re.search(rf"\b{called}\(", shader)]
+        turns = recording.variance(self.stack) is not Isotropic
+        return OslShader("\n".join([self._header(), *helpers, *([lookup] if lookup else []), shader]), name, turns)
+
+    def _name(self) -> str:
+        """An identifier."""
+        name = re.sub(r"\W+", "_", self.stack.name.lower(), flags=re.ASCII).strip("_") or "material"
+        return f"vt_{name}" if name in OSL.words or not name[0].isalpha() else name
+
+    def _header(self) -> str:
+        """Comments that describe the material and what is lost."""
+        model = described(self.model)
+        name = " ".join(self.stack.name.split()) or "A material"
+        over = "Lobes are tabulated over the direction of view. " if self.baked else ""
+        varying = " where textures are half bright" if not recording.is_uniform(self.stack) else ""
+        lost = [f"    cosine {x.cosine:g}: {x.variation:.3f} of the light, albedo {x.albedo:.4f}" for x in self.losses]
+        return _HEADER.format(
+            name=name,
+            model=model,
+            version=velatura.__version__,
+            text="\n".join(f"// {line}" for line in wrap(_ABOUT.format(over=over, varying=varying), LINE)),
+            lost="\n".join(f"//{line}" for line in lost),
+        )
+
+    def _arrays(self, symbols: Sequence[Symbol]) -> Iterator[str]:
+        """The numbers that are looked up."""
+        for name in sorted({symbol.detail for symbol in symbols if symbol.op in ("texels", "value")}):
+            yield from _of_table(name)
+        for name, film in films.tables(self.stack, films.read_by(symbols), self.model).items():
+            yield from _array(name, film)
+        if self.baked:
+            yield from _array("columns", self.baked.rows)
+
+
+@cache
+def _of_table(name: str) -> list[str]:
+    return _array(name, getattr(tables.load(), name).data)
+
+
+def _array(name: str, values: Array) -> list[str]:
+    """The declaration of an array of numbers."""
+    numbers = [f"{x:.6g}" for x in np.ravel(values).astype(np.float32).tolist()]
+    lines = [f"    {', '.join(numbers[k : k + ACROSS])}," for k in range(0, len(numbers), ACROSS)]
+    return [f"float vt_{name}[{len(numbers)}] = {{", *lines[:-1], lines[-1].rstrip(","), "};"]
+
+
+def _parameter(stack: Stack, at: Address, value: Any) -> str:
+    """The declaration of a value."""
+    number = as_constant(at, value)
+    text = OSL.literal(operand(number)) if not at.colour or np.ndim(number) else OSL.colour([OSL.literal(number)])
+    low, high = at.declared.within
+    layer = "" if at.layer is None else f"Layer {at.layer}: "
+    facts = [f'string label = "{layer}{at.key}"', f'string help = "{at.declared.doc}"']
+    if at.layer is not None:
+        facts.append(f'string page = "Layer {at.layer} ({stack.kinds[at.layer]})"')
+    facts += [f"float {name} = {x:g}" for name, x in (("min", low), ("max", high)) if abs(x) < LARGE]
+    return f"    {_TYPES['colour' if at.colour else 'number']} {at.name} = {text}\n        [[ {', '.join(facts)} ]]"
+
+
+def _file(name: str, image: Texture) -> str:
+    """The declaration of the file of a texture."""
+    path = str(image.texture).replace("\\", "/").replace('"', '\\"')
+    return f'    string {name} = "{path}"\n        [[ string label = "{name}", string widget = "filename" ]]'
+
+
+def _varied(at: Address, value: Varying) -> str:
+    """The declaration of a value at the texture coordinates."""
+    literal = OSL.literal
+    if isinstance(value, Brushing):
+        turned = literal((90.0 if value.brushing == "concentric" else 0.0) + value.offset)
+        away = f"UV[1] - {literal(value.v)}, UV[0] - {literal(value.u)}"
+        return f"float {at.name} = degrees(atan2({away})) + {turned};"
+    assert isinstance(value, Texture)
+    channel, file = value.channel or "r", f"{at.name}_map"
+    texel = f"vt_colour({file}, UV)" if channel == "rgb" else f"vt_channel({file}, {'rgba'.index(channel)}, UV)"
+    texel = f"vt_linear({texel})" if value.encoding == "srgb" else texel
+    low, high = (literal(float(np.clip(x, -1e6, 1e6))) for x in at.declared.within)
+    bounded = f"clamp({texel} * {literal(value.scale)} + {literal(value.offset)}, {low}, {high})"
+    colour = f"color({bounded})" if channel != "rgb" else bounded
+    return f"color {at.name} = {colour};" if at.colour else f"float {at.name} = {bounded};"
+
+
+def _sum(kinds: Sequence[closures.Kind], each: Sequence[Sequence[str]]) -> Iterator[str]:
+    """The sum of closures, of a weight, two roughnesses, a rotation and an index each."""
+    yield "BSDF = 0;"
+    for kind, (weight, u, v, rotation, eta) in zip(kinds, each):
+        yield f"BSDF += ({weight}) * {_CLOSURES[kind].format(u=u, v=v, rotation=rotation, eta=eta)};"
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}".rstrip() for line in lines]
+
+
+_AXIS = "vt_turned(x, y, {rotation})"
+_CLOSURES: dict[closures.Kind, str] = {
+    "reflection": f'generalized_schlick_bsdf(shading, {_AXIS}, 1.0, 0.0, {{u}}, {{v}}, 1.0, 1.0, 5.0, "ggx")',
+    "refraction": f'microfacet("ggx", shading, {_AXIS}, {{u}}, {{v}}, {{eta}}, 1)',
+    "straight": 'microfacet("ggx", view, vt_along(view, outwards, x), {u}, {v}, {eta}, 1)',
+    "diffuse": "diffuse(shading)",
+    "translucent": "translucent(shading)",
+}
+
+_HEADER = """\
+// {name} as the model {model} has it; Open Shading Language, written by Velatura {version}.
+//
+{text}
+//
+{lost}
+"""
+
+_ABOUT = (
+    "The output BSDF is a sum of closures: GGX reflections of reflectance 1 by generalized_schlick_bsdf, refractions"
+    " without Fresnel by microfacet, diffuse light. {over}What it is off the model{varying}, in light from above, as"
+    " total variation and as the greatest difference of albedo:"
+)
+
+_UV = '    point UV = point(u, v, 0)\n        [[ string label = "UV", string widget = "null" ]]'
+_PLACE = [
+    '    vector Tangent = dPdu\n        [[ string label = "Tangent", string widget = "null" ]]',
+    '    normal Normal = N\n        [[ string label = "Normal", string widget = "null" ]]',
+    "    output closure color BSDF = 0",
+]
+
+_FRAME = """\
+// The direction of view in the frame of the surface: x along the tangent, z outwards
+vector view = normalize(-I);
+normal shading = normalize(dot(Normal, Normal) > 0 ? Normal : N);
+shading = dot(shading, I) > 0 ? -shading : shading;
+vector outwards = backfacing() ? -shading : shading;
+vector x = dot(Tangent, Tangent) > 0 ? Tangent : dPdu;
+x = normalize(x - dot(x, outwards) * outwards);
+vector y = cross(outwards, x);
+float cosine = max(dot(view, shading), 1e-3);
+vector wi = vector(dot(view, x), dot(view, y), backfacing() ? -cosine : cosine);
+""".splitlines()
+
+_HELPERS = {
+    "vt_turned": """\
+vector vt_turned(vector x, vector y, float rotation) { return cos(rotation) * x + sin(rotation) * y; }
+""",
+    "vt_along": """\
+// Across the direction of view, in the plane of incidence
+vector vt_along(vector view, vector outwards, vector x)
+{
+    vector along = outwards - dot(view, outwards) * view;
+    return dot(along, along) > 1e-8 ? normalize(along) : x;
+}
+""",
+    "vt_mean": """\
+float vt_mean(color x) { return (x[0] + x[1] + x[2]) / 3; }
+""",
+    **{
+        f"vt_{op}": f"color vt_{op}(color a, color b)\n"
+        f"{{\n    return color(a[0] {sign} b[0], a[1] {sign} b[1], a[2] {sign} b[2]);\n}}\n"
+        for op, sign in (("less", "<"), ("greater", ">"), ("at_most", "<="), ("at_least", ">="))
+    },
+    "vt_texels": """\
+// The channels of a table, interpolated in a plane or in space
+void vt_texels(float table[], int nx, int ny, float x, float y, output float texels[])
+{
+    int channels = arraylength(texels);
+    float px = clamp(x, 0.0, 1.0) * (nx - 1), py = clamp(y, 0.0, 1.0) * (ny - 1);
+    int i = min(int(px), nx - 2), j = min(int(py), ny - 2);
+    for (int k = 0; k < channels; k++) {
+        int a = (i * ny + j) * channels + k, b = a + ny * channels;
+        texels[k] = mix(mix(table[a], table[a + channels], py - j), mix(table[b], table[b + channels], py - j), px - i);
+    }
+}
+
+void vt_texels(float table[], int nx, int ny, int nz, float x, float y, float z, output float texels[])
+{
+    int channels = arraylength(texels);
+    float px = clamp(x, 0.0, 1.0) * (nx - 1), py = clamp(y, 0.0, 1.0) * (ny - 1), pz = clamp(z, 0.0, 1.0) * (nz - 1);
+    int i = min(int(px), nx - 2), j = min(int(py), ny - 2), k = min(int(pz), nz - 2);
+    for (int c = 0; c < channels; c++) {
+        float planes[2];
+        for (int s = 0; s < 2; s++) {
+            int a = (((i + s) * ny + j) * nz + k) * channels + c, b = a + nz * channels;
+            float before = mix(table[a], table[a + channels], pz - k);
+            float after = mix(table[b], table[b + channels], pz - k);
+            planes[s] = mix(before, after, py - j);
+        }
+        texels[c] = mix(planes[0], planes[1], px - i);
+    }
+}
+""",
+    "vt_value": """\
+// A table of one channel, interpolated in space
+float vt_value(float table[], int nx, int ny, int nz, float x, float y, float z)
+{
+    float px = clamp(x, 0.0, 1.0) * (nx - 1), py = clamp(y, 0.0, 1.0) * (ny - 1), pz = clamp(z, 0.0, 1.0) * (nz - 1);
+    int i = min(int(px), nx - 2), j = min(int(py), ny - 2), k = min(int(pz), nz - 2);
+    float planes[2];
+    for (int s = 0; s < 2; s++) {
+        int a = ((i + s) * ny + j) * nz + k, b = a + nz;
+        planes[s] = mix(mix(table[a], table[a + 1], pz - k), mix(table[b], table[b + 1], pz - k), py - j);
+    }
+    return mix(planes[0], planes[1], px - i);
+}
+
+color vt_value(float table[], int nx, int ny, int nz, color x, color y, color z)
+{
+    color found = 0;
+    for (int c = 0; c < 3; c++)
+        found[c] = vt_value(table, nx, ny, nz, x[c], y[c], z[c]);
+    return found;
+}
+""",
+    "vt_film": """\
+// Thin films: reflectances over the cosine, averages over direction and roughness
+color vt_film(float table[], int n, float x)
+{
+    float position = clamp(x, 0.0, 1.0) * (n - 1);
+    int i = min(int(position), n - 2), a = 3 * i;
+    color before = color(table[a], table[a + 1], table[a + 2]), after = color(table[a + 3], table[a + 4], table[a + 5]);
+    return mix(before, after, position - i);
+}
+
+color vt_film(float table[], int nx, int ny, float x, float y)
+{
+    float px = clamp(x, 0.0, 1.0) * (nx - 1), py = clamp(y, 0.0, 1.0) * (ny - 1);
+    int i = min(int(px), nx - 2), j = min(int(py), ny - 2);
+    color found = 0;
+    for (int c = 0; c < 3; c++) {
+        int a = (i * ny + j) * 3 + c, b = a + ny * 3;
+        found[c] = mix(mix(table[a], table[a + 3], py - j), mix(table[b], table[b + 3], py - j), px - i);
+    }
+    return found;
+}
+""",
+    "vt_linear": """\
+// Decoded from sRGB
+float vt_linear(float x) { return x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4); }
+color vt_linear(color x) { return color(vt_linear(x[0]), vt_linear(x[1]), vt_linear(x[2])); }
+""",
+    "vt_channel": """\
+float vt_channel(string file, int channel, point uv)
+{
+    float found = texture(file, uv[0], 1 - uv[1], 0.0, 0.0, 0.0, 0.0, "interp", "linear", "wrap", "periodic",
+        "firstchannel", channel);
+    return found;
+}
+""",
+    "vt_colour": """\
+color vt_colour(string file, point uv)
+{
+    color found = texture(file, uv[0], 1 - uv[1], 0.0, 0.0, 0.0, 0.0, "interp", "linear", "wrap", "periodic");
+    return found;
+}
+""",
+}
+
+_LOOKUP = {
+    1: """\
+// Weights and roughnesses over the cosine
+void vt_closures(float table[], float x, float side, output float columns[])
+{{
+    float position = clamp(x, 0.0, 1.0) * ({1} - 1);
+    int i = min(int(position), {3} - 2), a = (int(side) * {1} + i) * {2};
+    for (int k = 0; k < {2}; k++)
+        columns[k] = mix(table[a + k], table[a + {2} + k], position - i);
+}}
+""",
+    2: """\
+// Weights and roughnesses over cosine and azimuth
+void vt_closures(float table[], float x, float y, float side, output float columns[])
+{{
+    float px = clamp(x, 0.0, 1.0) * ({3} - 1), py = clamp(y, 0.0, 1.0) * ({4} - 1);
+    int i = min(int(px), {3} - 2), j = min(int(py), {4} - 2);
+    int a = (int(side) * {1} + i * {4} + j) * {2}, b = a + {4} * {2};
+    for (int k = 0; k < {2}; k++)
+        columns[k] = mix(mix(table[a + k], table[a + {2} + k], py - j),
+            mix(table[b + k], table[b + {2} + k], py - j), px - i);
+}}
+""",
+}
