@@ -89,7 +89,7 @@ def test_films_are_exported(to: str, run: Run, tmp_path: Path) -> None:
     (tmp_path / "film.yaml").write_text(FILMS, encoding="utf-8")
     stack, path = vt.load(tmp_path / "film.yaml"), tmp_path / f"film{FORMATS[to].endings[0]}"
     assert run("export", str(tmp_path / "film.yaml"), "--to", to, "-o", str(path))[0] == 0
-    if FORMATS[to].constants:
+    if FORMATS[to].beside:
         films, expected = np.frombuffer((tmp_path / "film.films.bin").read_bytes(), "<f4"), shader(stack).films
         assert expected is not None
         np.testing.assert_array_equal(films, expected.ravel())
