@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import velatura
 from velatura import ops, tables
 from velatura.model import DEFAULT, Model, bsdf, named
 from velatura.model.context import at_a_point
@@ -278,7 +277,6 @@ class _Program:
         return _HEADER.format(
             name=name,
             model=model,
-            version=velatura.__version__,
             text="\n".join(f"// {line}" for line in wrap(_ABOUT.format(over=over, varying=varying), LINE)),
             lost="\n".join(f"//{line}" for line in lost),
         )
@@ -362,7 +360,7 @@ _CLOSURES: dict[closures.Kind, str] = {
 }
 
 _HEADER = """\
-// {name} as the model {model} has it; Open Shading Language, written by Velatura {version}.
+// {name} as the model {model} has it; Open Shading Language, written by Velatura.
 //
 {text}
 //
