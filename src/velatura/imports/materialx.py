@@ -62,6 +62,11 @@ RENAMED: Mapping[str, Mapping[str, str | None]] = {
         "ior": "eta",
     },
 }
+#: Defaults of nodes that are not those of the source.
+DEFAULTS: Mapping[str, Mapping[str, Any]] = {
+    "gltf_pbr": {"iridescenceThicknessMaximum": 100.0},
+    "disney_principled": {"base_color": 0.16, "clearcoat_gloss": 1.0, "sheen_tint": 0.5},
+}
 IMAGES = ("image", "tiledimage", "gltf_image", "gltf_colorimage")
 DEEPEST = 64  # nodes in a row, and files that include each other
 LINEAR_FROM_ACESCG = np.array(  # primaries AP1 and white of ACES to those of sRGB, adapted by Bradford's matrix
@@ -120,7 +125,7 @@ def _material(element: Element, path: Path, notes: Notes) -> Imported:
             raise InvalidInput(f"{path}: material {name}: {error}") from None
     if surface.tag not in SHADERS:
         raise InvalidInput(f"{path}: material {name}: its surface {surface.tag} is none of {', '.join(SHADERS)}")
-    values: dict[str, Any] = {}
+    values: dict[str, Any] = dict(DEFAULTS.get(surface.tag, {}))
     source, renamed = SHADERS[surface.tag], RENAMED.get(surface.tag, {})
     for each in surface.of("input"):
         parameter = renamed.get(each.name, each.name)

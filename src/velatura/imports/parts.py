@@ -68,7 +68,7 @@ def blended(given: Given, base: str, weight: float, below: str, share: float) ->
 
 def absorbed(transmittance: RGB, length: float) -> Array:
     """Extinction of a medium that has this transmittance over a length."""
-    return -np.log(np.maximum(transmittance, 1e-6)) / length
+    return np.log(1 / np.maximum(transmittance, 1e-6)) / length
 
 
 def inside(given: Given, name: str, sigma_a: Array, sigma_s: RGB = (0.0, 0.0, 0.0), g: float = 0.0) -> None:

@@ -17,7 +17,7 @@ _NODES = 65  # of curves
 
 
 def changed(value: Value, function: Callable[[Array], Any]) -> Value:
-    """The value that a function of single numbers gives; of an image, one with a curve."""
+    """The value that a function of single numbers gives; of an image, one with a curve, or a number if it is level."""
     if isinstance(value, Texture):
         return _with_curve(value, np.broadcast_to(np.asarray(function(_at_nodes(value)), float), _NODES))
     found = np.broadcast_to(np.asarray(function(np.asarray(value, float)), float), np.shape(value))
@@ -48,8 +48,10 @@ def _at_nodes(texture: Texture) -> Array:
     return np.asarray(texture.scale * curve + texture.offset)
 
 
-def _with_curve(texture: Texture, values: Array) -> Texture:
+def _with_curve(texture: Texture, values: Array) -> Value:
     first, last = values[0], values[-1]
+    if np.ptp(values) == 0:
+        return rounded(float(first))
     if np.allclose(values, np.linspace(first, last, _NODES), atol=1e-9):
         line: dict[str, Any] = {"scale": float(last - first), "offset": float(first), "curve": None}
     else:

@@ -1,0 +1,121 @@
+"""Materials of other programs, wherever Velatura asks for a material.
+
+Rationale: an import is only worth something if what is rendered follows the other program's file; so each way to name
+such a file gives the same stack, and what a stack cannot carry is said once, in one line.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+from velatura.errors import Incomplete
+
+Run = Callable[..., tuple[int, str, str]]
+
+DOCUMENT = """<?xml version="1.0"?>
+<materialx version="1.39" colorspace="lin_rec709">
+  <open_pbr_surface name="S" type="surfaceshader">
+    <input name="base_color" type="color3" value="0.1, 0.3, 0.6"/>
+    <input name="coat_weight" type="float" value="1"/>
+    <input name="coat_color" type="color3" value="0.9, 0.7, 0.5"/>
+    <input name="fuzz_weight" type="float" value="0.2"/>
+  </open_pbr_surface>
+  <surfacematerial name="Painted" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="S"/>
+  </surfacematerial>
+</materialx>
+"""
+LEFT = "fuzz_weight 0.2: a stack has no fibres above it: left out"
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> Path:
+    path = tmp_path / "painted.mtlx"
+    path.write_text(DOCUMENT)
+    return path
+
+
+def test_a_file_is_taken_wherever_a_material_is(document: Path) -> None:
+    """Expected: one warning of one line, and the stack that the parameters give."""
+    expected = vt.from_openpbr(
+        base_color=(0.1, 0.3, 0.6), coat_weight=1, coat_color=(0.9, 0.7, 0.5), fuzz_weight=0.2
+    ).stack
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        stack = vt.load(document)
+        lobes = vt.lobes(str(document), 0.5)
+        bsdf = vt.bsdf(f"{document}#Painted")
+    assert [(each.category, str(each.message)) for each in caught[:2]] == [(Incomplete, f"{document}: {LEFT}")] * 2
+    assert len(caught) == 3 and stack.layers == expected.layers
+    np.testing.assert_array_equal(lobes.energy, vt.lobes(expected, 0.5).energy)
+    assert str(bsdf) == str(vt.bsdf(expected))
+
+
+def test_a_scene_names_it(document: Path, tmp_path: Path) -> None:
+    """Expected: the BSDF of its stack, from a dictionary, and from a scene beside it that names the material."""
+    mi: Any = kernel.mitsuba()
+    vt.register()
+    scene = """<scene version="3.0.0"><shape type="sphere"><bsdf type="layered">
+        <string name="material" value="painted.mtlx#Painted"/></bsdf></shape></scene>"""
+    (tmp_path / "scene.xml").write_text(scene)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Incomplete)
+        expected = str(vt.bsdf(document))
+        assert str(mi.load_dict({"type": "layered", "material": str(document)})) == expected
+        assert str(mi.load_file(str(tmp_path / "scene.xml")).shapes()[0].bsdf()) == expected
+
+
+def test_the_command_writes_the_material_and_lists_the_rest(run: Run, document: Path, tmp_path: Path) -> None:
+    """Expected: YAML that reads back as the stack, on standard output or in a file; the list on standard error."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Incomplete)
+        expected = vt.load(document)
+    status, out, err = run("import", str(document))
+    assert (status, err) == (0, f"left: {LEFT}\n")
+    (tmp_path / "out.yaml").write_text(out)
+    assert vt.load(tmp_path / "out.yaml") == expected
+    output = tmp_path / "painted.yaml"
+    assert run("import", str(document), "-o", str(output))[:2] == (0, f"{output}\n")
+    assert vt.load(output) == expected
+    found = json.loads(run("import", str(document), "--json", "--material", "Painted")[1])
+    assert vt.Stack.from_dict(found["material"]) == expected
+    assert found["left"] == [{"parameter": "fuzz_weight", "value": "0.2", "why": LEFT.partition(": ")[2]}]
+
+
+def test_errors_and_warnings_of_the_command_are_one_line(run: Run, document: Path, tmp_path: Path) -> None:
+    assert run("lobes", str(document), "--cos", "1")[2] == f"velatura: {document}: {LEFT}\n"
+    bomb = tmp_path / "bomb.mtlx"
+    bomb.write_text('<!DOCTYPE x [<!ENTITY a "ha">]><materialx>&a;</materialx>')
+    status, out, err = run("import", str(bomb))
+    assert (status, out) == (2, "")
+    assert err == f"velatura: {bomb}: line 1: has a document type, which is not read\n"
+    assert run("import", str(document), "-o", "material.txt")[0] == 2
+    assert run("import", str(document), "--material", "Other")[2].endswith(
+        "unknown material 'Other' (known: Painted)\n"
+    )
+
+
+def test_images_are_rendered_by_their_curves(tmp_path: Path) -> None:
+    """Expected: where an image has the texel t, the value of the material of roughness t and colour t."""
+    mi: Any = kernel.mitsuba()
+    texels = np.full((2, 2, 3), 0.0, np.float32)
+    texels[:] = (0.3, 0.5, 0.8)
+    mi.Bitmap(texels).write(str(tmp_path / "colour.exr"))
+    colour = vt.Texture(texture=tmp_path / "colour.exr")
+    grey = vt.Texture(texture=tmp_path / "colour.exr", channel="g")
+    found = vt.bsdf(vt.from_openpbr(base_metalness=1, base_color=colour, specular_roughness=grey).stack)
+    wanted = vt.bsdf(vt.from_openpbr(base_metalness=1, base_color=(0.3, 0.5, 0.8), specular_roughness=0.5).stack)
+    si = mi.SurfaceInteraction3f()
+    si.wi, si.uv = mi.Vector3f(0.6, 0.0, 0.8), mi.Point2f(0.3, 0.6)
+    wo = mi.Vector3f(-0.28, 0.0, 0.96)
+    values = [np.ravel(each.eval(mi.BSDFContext(), si, wo)) for each in (found, wanted)]
+    np.testing.assert_allclose(values[0], values[1], rtol=5e-3)
