@@ -232,12 +232,25 @@ void main() {{
 def on_machine(case: Case, recording: Recording, made: Shader, machine: Machine) -> Results:
     """What the shader says in the language of a machine."""
     called = program(case, recording, made, machine.printer)
-    count, size = len(called.given), len(called.answers)
-    begin = machine.printer.declared("int", "first", f"{size} * row")
-    stored = [f"results[first + {k}] = {answer};" for k, answer in enumerate(called.answers)]
-    within = machine.main([f"if (row < {count}) {{", *called.lines, begin, *stored, "}"])
-    text = "\n".join([made.text, machine.declarations(count * size), called.function, within, ""])
-    return called.results(machine.run(text, count, size, {"vt_given": called.given, **textures(made)}))
+    (answers,) = together([called], made.text, machine, textures(made))
+    return called.results(answers)
+
+
+def together(
+    programs: Sequence[Program], text: str, machine: Machine, read: Mapping[str, np.ndarray], **options: Any
+) -> list[np.ndarray]:
+    """The answers of programs that take the same inputs, all in one."""
+    given, size = programs[0].given, sum(len(each.answers) for each in programs)
+    lines = [f"if (row < {len(given)}) {{", machine.printer.declared("int", "first", f"{size} * row")]
+    ends: list[int] = []
+    for each in programs:
+        first = ends[-1] if ends else 0
+        stored = [f"results[first + {first + k}] = {answer};" for k, answer in enumerate(each.answers)]
+        lines += ["{", *each.lines, *stored, "}"]
+        ends.append(first + len(each.answers))
+    parts = [text, machine.declarations(len(given) * size), programs[0].function, machine.main([*lines, "}"]), ""]
+    found = machine.run("\n".join(parts), len(given), size, {"vt_given": given, **read}, **options)
+    return np.split(found, ends[:-1], axis=1)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,9 @@ class Machine(ABC):
         """Statements for each `row` below a number of them."""
 
     @abstractmethod
-    def run(self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray]) -> np.ndarray:
+    def run(
+        self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray], bindings: Mapping[str, int] = SLOTS
+    ) -> np.ndarray:
         """What a program writes: `size` results for each of so many rows, (count, size, 4).
 
         Textures are float arrays (height, width, 4) by name; among them `vt_given`, with a row for each.
@@ -63,13 +65,15 @@ class _OnVulkan(Machine):
             return f"wgpu is missing: {INSTALLED}"
         return "" if _device() else f"there is no Vulkan device: {INSTALLED}"
 
-    def run(self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray]) -> np.ndarray:
+    def run(
+        self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray], bindings: Mapping[str, int] = SLOTS
+    ) -> np.ndarray:
         import wgpu
 
         device = _device()
         shader = device.create_shader_module(code=self.code(text))
         maps = [name for name in textures if name.startswith("vt_map")]
-        places = {name: SLOTS[name] for name in textures if name in SLOTS} | {x: MAPS + k for k, x in enumerate(maps)}
+        places = {**bindings, **{name: MAPS + k for k, name in enumerate(maps)}}
         given: tuple[list[dict], list[dict]] = ([], [])
         for name, data in textures.items():
             group, place = (1, GIVEN) if name == "vt_given" else (0, places[name])
@@ -199,11 +203,13 @@ class InOpenGl(Machine):
     def main(self, lines: Sequence[str]) -> str:
         return "\n".join(["void main() {", "int row = int(gl_GlobalInvocationID.x);", *lines, "}"])
 
-    def run(self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray]) -> np.ndarray:
+    def run(
+        self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray], bindings: Mapping[str, int] = SLOTS
+    ) -> np.ndarray:
         context: Any = _context()
         program = context.compute_shader(f"#version 450\n{text}")
         maps = [name for name in textures if name.startswith("vt_map")]
-        places = {**SLOTS, "vt_given": IN_OPENGL} | {name: MAPS + k for k, name in enumerate(maps)}
+        places = {**bindings, "vt_given": IN_OPENGL} | {name: MAPS + k for k, name in enumerate(maps)}
         made = []
         for name, data in textures.items():
             texels = np.ascontiguousarray(data, np.float32)

@@ -7,6 +7,7 @@ readers load it.
 from __future__ import annotations
 
 import json
+import re
 import runpy
 import sys
 from collections.abc import Callable
@@ -19,6 +20,7 @@ import pytest
 import velatura as vt
 from velatura import kernel
 from velatura.exports import FORMATS
+from velatura.exports.formats import headed
 from velatura.shader import shader
 
 Run = Callable[..., tuple[int, str, str]]
@@ -32,7 +34,7 @@ def test_glsl_is_the_shader_with_its_tables_beside(run: Run, tmp_path: Path) -> 
     arguments = ["--model", "belcour2018", "--constant", "layer0_eta", "--set", "layer0_alpha=0.2", "-o", str(path)]
     assert run("export", "coated-gold", "--to", "glsl", *arguments)[0] == 0
     made = shader(vt.preset("coated-gold").replace(layer0_alpha=0.2), "belcour2018", ["layer0_eta"])
-    assert path.read_text() == made.text
+    assert path.read_text() == headed(made.text)
     found = np.frombuffer((tmp_path / "gold.tables.bin").read_bytes(), "<f4")
     np.testing.assert_array_equal(found.reshape(made.tables.shape), made.tables)
 
@@ -60,6 +62,39 @@ def test_without_tables_there_is_one_file(run: Run, tmp_path: Path) -> None:
     run("export", "coated-gold", "--to", "glsl", "--model", "weier2020", "--constant", "all", "-o", str(path))
     assert [entry.name for entry in tmp_path.iterdir()] == ["gold.glsl"]
     assert "vt_tables" not in path.read_text()
+
+
+def test_code_says_where_it_comes_from(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the material, the model with its changed switches, version, date and licence; no textures, said so."""
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    status, out, err = run("export", "coated-gold", "--to", "slang", "--model", "belcour2018", "--set", "tir=off")
+    first, second = out.split("\n")[:2]
+    assert first == "// Coated brushed gold as the model belcour2018 (tir=off) has it; Slang."
+    assert second == f"// Velatura {vt.__version__}, 2023-11-14; SPDX-License-Identifier: BSD-3-Clause"
+    assert (status, err) == (0, "not written without -o: .tables.bin, which the code reads\n")
+
+
+def test_names_and_bindings_may_be_chosen(run: Run) -> None:
+    """Expected: all names begin with the prefix; numbers are defaults where there are macros."""
+    bound = ["--prefix", "gold", "--group", "2", "--binding", "5"]
+    _, wgsl, _ = run("export", "coated-gold", "--to", "wgsl", *bound)
+    assert "@group(2) @binding(5) var gold_baked: texture_2d<f32>;" in wgsl
+    assert not re.search(r"\bvt_|\bVt[A-Z]|\bVT_", wgsl)
+    _, hlsl, _ = run("export", "coated-gold", "--to", "hlsl", *bound)
+    assert "#ifndef GOLD_BAKED_REGISTER\n#define GOLD_BAKED_REGISTER t5, space2\n#endif\n" in hlsl
+    _, vulkan, _ = run("export", "coated-gold", "--to", "vulkan", *bound)
+    assert "#define GOLD_SET 2\n" in vulkan and "#define GOLD_BAKED_BINDING 5\n" in vulkan
+
+
+@pytest.mark.parametrize("to", ["json", *(name for name in FORMATS if "prefix" in FORMATS[name].options)])
+def test_no_export_names_a_folder_of_this_machine(
+    to: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rough.png").touch()
+    (tmp_path / "gold.yaml").write_text("layers:\n  - interface: {conductor: Au, alpha: {texture: rough.png}}\n")
+    status, out, _ = run("export", "gold.yaml", "--to", to)
+    assert status == 0 and "rough.png" in out and str(tmp_path) not in out
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -173,6 +208,8 @@ def test_the_script_runs(preset: str, run: Run, tmp_path: Path, monkeypatch: pyt
         (["coated-gold", "--to", "json", "-o", "gold.yaml"], "gold.yaml: json output ends in .json"),
         (["coated-gold", "--to", "json", "-o", "nowhere/gold.json"], "nowhere/gold.json: there is no folder nowhere"),
         (["coated-gold", "--to", "json", "--constant", "all"], "--constant: only for --to glsl"),
+        (["coated-gold", "--to", "glsl", "--binding", "2"], "--binding: only for --to glsl450, vulkan, hlsl"),
+        (["coated-gold", "--to", "glsl", "--prefix", "a b"], "prefix: must be letters, digits and single underscores"),
         (["coated-gold", "--to", "glsl", "--constant", "layer9_eta"], "constant: unknown parameter 'layer9_eta'"),
         (["coated-gold", "--to", "python", "--model", "weier"], "unknown model 'weier' (did you mean weier2020?)"),
         (["gold", "--to", "json"], "unknown preset 'gold'"),

@@ -6,14 +6,29 @@ ES runs in Chromium (tests/browser/test_shader.py); `benchmarks/shader.py` runs 
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from agreement import PATTERNS, compare, differences, in_numpy, on_machine, random_case
-from machines import MACHINES
+from agreement import (
+    PATTERNS,
+    Case,
+    compare,
+    differences,
+    in_numpy,
+    on_machine,
+    program,
+    random_case,
+    textures,
+    together,
+)
+from machines import MACHINES, SLOTS
 
-from velatura.shader import record, shader
+import velatura as vt
+from velatura.shader import constant, record, shader
+from velatura.shader.program import prefixed
 
 # Patterns that together have every kind of layer and every shape; merged lobes, films, brushed `velatura`, and the form
 # that looks at pairs of directions
@@ -52,3 +67,75 @@ def test_a_wrong_constant_is_seen(name: str) -> None:
     recording = record(case.stack, "weier2020")
     found = on_machine(case, recording, wrong, MACHINES[name])
     assert differences(in_numpy(case, recording), found).energy > 1e-4
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_one_program_holds_two_materials(name: str) -> None:
+    """Expected: each has its own functions, structs and textures, and answers as it does alone."""
+    machine = MACHINES[name]
+    if why := machine.missing():
+        pytest.skip(why)
+    wi = random_case(PATTERNS[9], 40, np.random.default_rng(7)).directions
+    texts, programs, truths, read, bindings = [], [], [], dict[str, np.ndarray](), dict[str, int]()
+    of = {0: ("gold", "coated-gold", "velatura"), 4: ("Old_paint", "varnished-paint", "belcour2018")}
+    for place, (prefix, preset, model) in of.items():
+        case = Case(vt.preset(preset), {}, wi)
+        fixed = [] if model == "velatura" else list(case.stack.flat())
+        printer = replace(machine.printer, binding=place)
+        made = shader(case.stack, model, fixed, printer=printer, prefix=prefix)
+        recording = record(case.stack, model, fixed)
+        called = program(case, recording, made, printer)
+        lines = [line if "vt_read" in line else prefixed(line, prefix) for line in called.lines]
+        named = [prefixed(answer, prefix) for answer in called.answers]
+        texts.append(made.text)
+        programs.append(replace(called, lines=lines, answers=named))
+        truths.append(in_numpy(case, recording))
+        read |= {prefixed(key, prefix): data for key, data in textures(made).items()}
+        bindings |= {prefixed(key, prefix): place + slot for key, slot in SLOTS.items()}
+    found = together(programs, "\n".join(texts), machine, read, bindings=bindings)
+    for called, answers, truth in zip(programs, found, truths):
+        apart = differences(truth, called.results(answers))
+        assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
+        assert max(apart.value, apart.density) < 1e-3
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_textures_are_read_where_the_material_is(name: str, tmp_path: Path) -> None:
+    """Expected: lobes, values and samples are those of the numbers that textures hold, and of the way of brushing."""
+    machine = MACHINES[name]
+    if why := machine.missing():
+        pytest.skip(why)
+    for each in ("rough.png", "wood.png"):
+        (tmp_path / each).touch()
+    rough = {"texture": str(tmp_path / "rough.png"), "scale": 0.5, "offset": 0.1, "channel": "g"}
+    brushing = {"brushing": "concentric", "u": 0.25, "v": 0.5, "offset": 10}
+    coat = vt.Interface(eta=1.5, alpha=[rough, 0.2], rotation=brushing)
+    stack = vt.Stack([coat, vt.Diffuse(albedo={"texture": str(tmp_path / "wood.png"), "scale": 0.9})])
+    rng = np.random.default_rng(4)
+    maps = {key: rng.integers(16, 240, (2, 2, 4)) / 256 for key in ("vt_map_layer0_alpha_u", "vt_map_layer1_albedo")}
+    x, y = rng.integers(0, 2, (2, 40))
+    uv = np.array([0.25 + 0.5 * x, 0.25 + 0.5 * y])  # centres of texels
+
+    # What NumPy is given is read by hand
+    plain = vt.Stack([vt.Interface(eta=1.5, alpha=[0.1, 0.2], rotation=1), vt.Diffuse(albedo=0.5)])
+    values = {at.name: np.multiply.outer(np.ravel(constant(at, value)), np.ones(40)) for at, value in plain.values()}
+    values["layer0_alpha_u"] = maps["vt_map_layer0_alpha_u"][y, x, 1] * 0.5 + 0.1
+    values["layer0_rotation"] = np.degrees(np.arctan2(uv[1] - 0.5, uv[0] - 0.25)) + 100
+    values["layer1_albedo"] = maps["vt_map_layer1_albedo"][y, x, :3].T * 0.9
+    values = {
+        key: x[0] if key not in ("layer0_eta", "layer1_albedo") and x.ndim == 2 else x for key, x in values.items()
+    }
+    directions = random_case(PATTERNS[15], 40, rng).directions
+    truth = in_numpy(Case(plain, values, directions), record(plain, "weier2020"))
+
+    made = shader(stack, "weier2020", printer=machine.printer)
+    assert str(tmp_path) not in made.text
+    case = Case(stack, {}, {**directions, "at": np.array([*uv, uv[0]])})
+    recording = record(stack, "weier2020")
+    called = program(case, recording, replace(made, uniforms={}), machine.printer)
+    filled = [line for line in called.lines if "VtMaterial" not in line]
+    lines = [*filled[:-1], machine.printer.declared("VtMaterial", "m", "vt_material(at.xy)"), filled[-1]]
+    (found,) = together([replace(called, lines=lines)], made.text, machine, {**textures(made), **maps})
+    apart = differences(truth, called.results(found))
+    assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
+    assert max(apart.value, apart.density) < 1e-3

@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "plugins": "stack optics tables model ops kernel binding sampling",
     "shader": "stack optics tables model ops sampling",
     "targets": "optics sampling",
-    "exports": "stack model shader",
+    "exports": "__init__ stack model shader",
     "imports": "stack optics model kernel binding targets",
     "inverse": "stack optics tables model ops kernel",
     "reference": "stack optics ops kernel binding sampling",

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from velatura.cli import options
 from velatura.errors import InvalidInput
-from velatura.exports import FORMATS, check_writable, with_constants
+from velatura.exports import FORMATS, check_writable, taking
 from velatura.exports import export as exported
 
 To = Enum("To", {name: name for name in FORMATS}, type=str)  # type: ignore[misc]
-_SHADERS = ", ".join(with_constants())
+_SHADERS = ", ".join(taking("constant"))
+_BOUND = ", ".join(taking("binding"))
 
 
 def export(
@@ -32,18 +34,35 @@ def export(
             help=f"For {_SHADERS}: a parameter that never changes (layer0_eta), or all; may be repeated.",
         ),
     ] = None,
+    prefix: Annotated[
+        str | None,
+        typer.Option(
+            help="For shaders: begins all names, so that one program may hold several materials; default: vt."
+        ),
+    ] = None,
+    group: Annotated[
+        int | None, typer.Option(min=0, help=f"For {_BOUND}: the group, set or space of textures; default: 0.")
+    ] = None,
+    binding: Annotated[
+        int | None, typer.Option(min=0, help=f"For {_BOUND}: the binding of the first texture; default: 0.")
+    ] = None,
     settings: options.Settings = None,
 ) -> None:
     """Write a material as a shader, JSON, a Mitsuba scene or a script."""
     if output is not None:
         check_writable(output, to.value)
-    if constant and not FORMATS[to.value].constants:
-        raise InvalidInput(f"--constant: only for --to {_SHADERS}, not for {to.value}")
+    chosen: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
+    chosen = {name: value for name, value in chosen.items() if value is not None}
+    for name in chosen:
+        if name not in FORMATS[to.value].options:
+            raise InvalidInput(f"--{name}: only for --to {', '.join(taking(name))}, not for {to.value}")
     stack, switches = options.read(material, settings)
     folder = output.parent if output else None
-    made = exported(stack, to.value, options.model_name(model), constant=constant or (), folder=folder, **switches)
+    made = exported(stack, to.value, options.model_name(model), folder=folder, **chosen, **switches)
     if output is None:
         print(made.text, end="")
+        if made.beside:
+            print(f"not written without -o: {', '.join(made.beside)}, which the code reads", file=sys.stderr)
         return
     path, *beside = made.save(output)
     print(path if not beside else f"{path}, and its tables {beside[0]}")

@@ -27,6 +27,7 @@ from velatura.editor.messages import Answer, array, document
 from velatura.editor.service import ENVIRONMENTS, VERBS
 from velatura.editor.shading import in_closed_form, pattern
 from velatura.errors import InvalidInput
+from velatura.exports.formats import headed
 from velatura.model import MODELS, Model, named
 from velatura.scenes.objects import OBJECTS
 from velatura.shader import atlas, shader
@@ -237,7 +238,7 @@ def _shader(model: str, order: Order) -> Made:
     drawn = in_closed_form(stack, chosen, order.brushed)
     written = shader(pattern(stack, order.brushed), chosen.adder)
     costs = {name: str(cost) for name, cost in written.costs.items()}
-    exported = {"text": written.text, "tables": ",".join(written.looked_up) or None, "costs": costs}
+    exported = {"text": headed(written.text), "tables": ",".join(written.looked_up) or None, "costs": costs}
     names = [*written.looked_up, *(drawn["tables"] or "").split(","), *(drawn["baked"] or {}).get("tables", [])]
     made = {"shader": drawn, "glsl": exported}
     return Made(

@@ -88,7 +88,7 @@ def _constants() -> Answer:
         "presets": [_preset(name) for name in presets()],
         "models": [_model(model) for model in MODELS],
         "default_model": DEFAULT,
-        "formats": [{"name": name, "fixed": format.constants} for name, format in exports.FORMATS.items()],
+        "formats": [{"name": name, "fixed": "constant" in format.options} for name, format in exports.FORMATS.items()],
         "names": _names(),
         "objects": list(OBJECTS),
         "environments": [{"name": name, "title": _titled(name), "url": url} for name, url in environments],
@@ -238,7 +238,7 @@ def export(body: Body) -> Answer:
     Values are worked in where they are `fixed` and the format allows that.
     """
     to = field(body, "to", str)
-    constant = ["all"] if body.get("fixed") and to in exports.with_constants() else []
+    constant = ["all"] if body.get("fixed") and to in exports.taking("constant") else []
     made = exports.export(material_of(body), to, model_of(body), constant=constant, folder=Path.cwd())
     beside = {ending: array(np.frombuffer(data, np.uint8), "uint8") for ending, data in made.beside.items()}
     return {"text": made.text, "beside": beside, "ending": exports.FORMATS[to].endings[0], "costs": made.costs}

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime, timezone
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from velatura import files
+from velatura import __version__, files
 from velatura.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -19,13 +22,13 @@ if TYPE_CHECKING:
 class Format(NamedTuple):
     """A format: how names of its files end, and the endings of what may lie beside them; the module that writes it.
 
-    `constants` says whether values may be worked in, and are parameters otherwise.
+    `options` are those of `export` that it takes besides the model.
     """
 
     endings: tuple[str, ...]
     module: str
     beside: tuple[str, ...] = ()
-    constants: bool = False
+    options: frozenset[str] = frozenset()
 
 
 _SHADERS = {
@@ -36,12 +39,19 @@ _SHADERS = {
     "slang": (".slang",),
     "wgsl": (".wgsl",),
 }
+LICENCE = "BSD-3-Clause"  # of code that is written
+_OF_SHADERS = frozenset({"constant", "prefix"})
+_BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
+
+
+def _shader(name: str) -> Format:
+    options = _OF_SHADERS if name == "glsl" else _BOUND
+    return Format(_SHADERS[name], "velatura.exports.shader", (".tables.bin", ".films.bin"), options)
+
+
 FORMATS: dict[str, Format] = {
-    **{
-        name: Format(endings, "velatura.exports.shader", beside=(".tables.bin", ".films.bin"), constants=True)
-        for name, endings in _SHADERS.items()
-    },
-    "osl": Format((".osl",), "velatura.exports.osl", constants=True),
+    **{name: _shader(name) for name in _SHADERS},
+    "osl": Format((".osl",), "velatura.exports.osl", options=frozenset({"constant"})),
     "blender": Format((".py",), "velatura.exports.blender"),
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
@@ -51,7 +61,7 @@ FORMATS: dict[str, Format] = {
 
 @dataclass(frozen=True)
 class Request:
-    """A request for an export: a format, a stack, the model with its changed switches, and values that are worked in.
+    """A request for an export: a format, a stack, the model with its changed switches, and the format's options.
 
     Paths of textures are relative to `folder`, where the format allows that; absolute without one.
     """
@@ -60,16 +70,17 @@ class Request:
     stack: Stack
     model: Model
     switches: Mapping[str, str]
-    constant: Collection[str]
     folder: Path | None
+    options: Mapping[str, Any]
 
     @property
     def constants(self) -> Collection[str]:
         """Names of the values that are worked in; of all that do not vary for ["all"]."""
         from velatura.stack import Varying
 
-        if list(self.constant) != ["all"]:
-            return self.constant
+        asked: Collection[str] = self.options.get("constant", ())
+        if list(asked) != ["all"]:
+            return asked
         return [name for name, value in self.stack.flat().items() if not isinstance(value, Varying)]
 
 
@@ -105,6 +116,9 @@ def export(
     model: str | Model | None = None,
     *,
     constant: Collection[str] = (),
+    prefix: str | None = None,
+    group: int | None = None,
+    binding: int | None = None,
     folder: str | Path | None = None,
     **switches: Any,
 ) -> Export:
@@ -117,6 +131,10 @@ def export(
             numbers; "mitsuba-xml", a scene to be included; "python", a script that renders it.
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
+        prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by
+            default.
+        group, binding: for shaders, but glsl: where the first texture is bound (or the default of the macro that says
+            so), the set in Vulkan and the space in HLSL being the group; the next ones follow. 0 by default.
         folder: where the text will lie, so that a scene may name its textures relative to it.
 
     Raises:
@@ -129,10 +147,13 @@ def export(
 
     if to not in FORMATS:
         raise InvalidInput(unknown("format", to, FORMATS))
-    if constant and not FORMATS[to].constants:
-        raise InvalidInput(f"constant: only for {', '.join(with_constants())}, not for {to}")
+    options = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
+    options = {name: value for name, value in options.items() if value is not None}
+    for name in options:
+        if name not in FORMATS[to].options:
+            raise InvalidInput(f"{name}: only for {', '.join(taking(name))}, not for {to}")
     chosen = named(DEFAULT if model is None else model, **switches)
-    request = Request(to, load(material), chosen, switches, constant, None if folder is None else Path(folder))
+    request = Request(to, load(material), chosen, switches, None if folder is None else Path(folder), options)
     written: Export = import_module(FORMATS[to].module).write(request)
     return written
 
@@ -148,6 +169,17 @@ def check_writable(path: Path, to: str) -> None:
         files.check_writable(path.with_suffix(ending), "what belongs beside it", (Path(ending).suffix,))
 
 
-def with_constants() -> list[str]:
-    """The formats of which values may be constants."""
-    return [name for name, each in FORMATS.items() if each.constants]
+def taking(option: str) -> list[str]:
+    """The formats that take an option."""
+    return [name for name, each in FORMATS.items() if option in each.options]
+
+
+def headed(text: str) -> str:
+    """Code that says below its first line by what it was written, when, and under which licence it may be used.
+
+    The date is today, or that of the environment's SOURCE_DATE_EPOCH.
+    """
+    seconds = os.environ.get("SOURCE_DATE_EPOCH")
+    day = datetime.fromtimestamp(int(seconds) if seconds else time.time(), timezone.utc)
+    first, _, rest = text.partition("\n")
+    return f"{first}\n// Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}\n{rest}"

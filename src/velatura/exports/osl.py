@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from velatura.exports.formats import Export, Request
+from velatura.exports.formats import Export, Request, headed
 from velatura.shader.osl import osl
 
 
 def write(request: Request) -> Export:
     """A shader with one output, a sum of closures; it holds all tables that it reads."""
-    return Export(osl(request.stack, request.model, request.constants).text)
+    return Export(headed(osl(request.stack, request.model, request.constants).text))

@@ -347,7 +347,7 @@ def _film(layout: Layout) -> str:
 
 
 _HEADER = """\
-// {name} as the model {model} has it; {language}, written by Velatura.
+// {name} as the model {model} has it; {language}.
 //
 """
 

@@ -360,7 +360,7 @@ _CLOSURES: dict[closures.Kind, str] = {
 }
 
 _HEADER = """\
-// {name} as the model {model} has it; Open Shading Language, written by Velatura.
+// {name} as the model {model} has it; Open Shading Language.
 //
 {text}
 //

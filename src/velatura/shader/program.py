@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.lobe_merging import merging
 from velatura.shader import atlas, films, material
@@ -22,6 +24,11 @@ from velatura.stack import MaterialLike, Texture, load
 
 if TYPE_CHECKING:  # it loads SciPy
     from velatura.shader.solved import Tabulated
+
+
+PREFIX = "vt"  # of names in code
+_PREFIX = re.compile(r"(?!gl_)[A-Za-z](_?[A-Za-z0-9])*")
+_NAME = re.compile(r"\b(vt_|Vt(?=[A-Z])|VT_)")
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,7 @@ def shader(
     constant: Collection[str] = (),
     values: Literal["literals", "uniforms"] = "literals",
     printer: Printer = GLSL,
+    prefix: str = PREFIX,
     **switches: str,
 ) -> Shader:
     """A material as shader code: the structs `VtMaterial` and `VtLobes`, and functions on them.
@@ -89,10 +97,14 @@ def shader(
         values: plain values as `literals`, or as `uniforms` that a user changes; then the code is the same for all
             of them, be roughnesses equal or not, and lobes are drawn once for a change, and read.
         printer: the language; GLSL ES 3.00 by default.
+        prefix: begins the names of functions, structs, textures and macros, so that one program may hold several
+            materials: `vt` of `vt_lobes`, `VtLobes` and `VT_TABLES_BINDING`.
 
     Raises:
-        InvalidInput: as `record`.
+        InvalidInput: as `record`; a prefix that names cannot begin with.
     """
+    if not _PREFIX.fullmatch(prefix):
+        raise InvalidInput(f"prefix: must be letters, digits and single underscores, a letter first, not {prefix!r}")
     stack = load(stack)
     recording = record(stack, model, constant, values == "uniforms", **switches)
     baked, read, shown = recording.baked, list(recording.read), recording.shown
@@ -117,18 +129,25 @@ def shader(
         printer.sample([(w, "number") for w in recording.drawn]),
     ]
     return Shader(
-        text="\n".join(parts),
+        text=prefixed("\n".join(parts), prefix),
         looked_up=[layout.name for layout in layouts],
         uniforms=recording.parameters,
-        maps=filled.samplers,
+        maps={prefixed(name, prefix): image for name, image in filled.samplers.items()},
         lobes=_interfaces(recording),
         shown=shown,
         shares=_shares(recording),
         baked=baked,
         film_tables=[layout.name for layout in placed],
         films=films.texture(films.tables(stack, recording.films, recording.model)),
-        costs=costs,
+        costs={prefixed(name, prefix): cost for name, cost in costs.items()},
     )
+
+
+def prefixed(text: str, prefix: str) -> str:
+    """Code whose own names begin with a prefix."""
+    words = "".join(word[:1].upper() + word[1:] for word in prefix.split("_"))
+    names = {"vt_": f"{prefix}_", "Vt": words, "VT_": f"{prefix.upper()}_"}
+    return text if prefix == PREFIX else _NAME.sub(lambda found: names[found[1]], text)
 
 
 def _costs(recording: Recording) -> dict[str, Cost]:
