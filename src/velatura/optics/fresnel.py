@@ -45,13 +45,19 @@ def dielectric_together(cos2: Value, n12: Value, eta: Value) -> Value:
 
 
 def _dielectric(cos2: Value, inside2: Value, both: Value, eta2: Value) -> Value:
-    """By the squares of cos_theta, of eta cos_t inside and of eta, and the product of the former two before they are
-    squared; both polarisations by one root and one division."""
-    s, p = cos2 + inside2 + 2 * both, eta2 * (eta2 * cos2 + 2 * both) + inside2
-    twice = 2 / ops.maximum(s * p, SMALL)
-    r_s, r_p = 1 - (inside2 + both) * p * twice, 1 - (inside2 + eta2 * both) * s * twice
-    ops.names(s=s, p=p, r_s=r_s, r_p=r_p)
-    return 0.5 * (r_s * r_s + r_p * r_p)
+    """By the squares of c = cos_theta, of g = eta cos_t inside and of eta, and the product c g.
+
+    The mean of the squares of r_s = (c - g) / (c + g) and r_p = (eta2 c - g) / (eta2 c + g) is
+    ((eta2 c^2 - g^2)^2 + (eta2 - 1)^2 (c g)^2) / ((c + g) (eta2 c + g))^2.
+    """
+    s, grown = cos2 + inside2 + 2 * both, eta2 * cos2
+    difference, step = grown - inside2, eta2 - 1
+    # Under total reflection, this is the square of the difference to the last digit
+    product = eta2 * s * (grown + 2 * both) + s * inside2
+    some = ops.maximum(product, SMALL)
+    ops.names(s=s, grown=grown, difference=difference, step=step, product=product, some=some)
+    found = (difference * difference + step * step * (cos2 * inside2) + (some - product)) / some
+    return ops.minimum(found, 1.0)
 
 
 def conductor(cos_theta: Value, eta: Value, kappa: Value) -> Value:
