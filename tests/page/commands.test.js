@@ -303,19 +303,22 @@ test('films are added below the others, changed, moved and removed', () => {
   assert.deepEqual(documentOf(state), MATERIAL, 'no films are no key');
 });
 
-test('no film absorbs on a dielectric, and none lies on a mirror', () => {
+test('films stay on a dielectric, and none lies on a mirror', () => {
   const film = { eta: 2, k: 0.1, thickness_nm: 250 };
   const coated = commands.addFilm(opened(), 3, film);
   const become = (variant) => commands.setVariant(coated, 3, variant, NAMES, FRESH).layers[2].keys.films;
   assert.deepEqual(become('custom'), [film]);
-  assert.deepEqual(become('dielectric'), [{ eta: 2, thickness_nm: 250 }]);
+  assert.deepEqual(become('dielectric'), [film]);
   assert.equal(become('mirror'), undefined);
 });
 
-test('code depends on whether there are films, and on nothing about them', () => {
-  const film = (thickness_nm) => ({ eta: 2, thickness_nm });
+test('code depends on whether there are films, and whether any absorbs, and on nothing else about them', () => {
+  const film = (thickness_nm, k) => ({ eta: 2, thickness_nm, ...(k && { k }) });
   const shape = (...films) => pattern(films.reduce((state, next) => commands.addFilm(state, 1, next), opened()));
   assert.equal(shape(film(100)), shape(film(900), film(50)));
   assert.notEqual(shape(), shape(film(100)));
   assert.equal(shape(), shape(film(0)), 'a thickness of 0 is no film');
+  assert.notEqual(shape(film(100)), shape(film(100, 0.1)));
+  assert.equal(shape(film(100, [0, 0, 0.2])), shape(film(50), film(100, 0.1)));
+  assert.equal(shape(film(100)), shape(film(100), film(0, 0.1), film(50, [0, 0, 0])));
 });

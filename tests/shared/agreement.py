@@ -105,7 +105,7 @@ def coated(case: Case) -> Case:
     layers: list[Any] = []
     for k, layer in enumerate(case.stack.layers):
         if isinstance(layer, Interface) and layer.kind != "mirror":
-            absorbs = 0.2 if layer.opaque else 0.0
+            absorbs = 0.2 if layer.opaque or k == 0 else 0.0
             films = [Film(eta=2.1, k=absorbs, thickness_nm=60 + 110 * k), Film(eta=(1.36, 1.38, 1.4), thickness_nm=90)]
             layer = layer.model_copy(update={"films": tuple(films)})
         layers.append(layer)

@@ -43,7 +43,7 @@ def light_of(wavelength_nm: float) -> Iterator[None]:
 class Mixed:
     """Media of indices from the top, of optical depths along the normal, and the films on the interfaces between them.
 
-    The last medium may be a metal, and the films on it may absorb.
+    The last medium may be a metal, and films may absorb.
     """
 
     indices: tuple[complex, ...]
@@ -53,7 +53,8 @@ class Mixed:
 
     @property
     def is_clear(self) -> bool:
-        return not any(self.depths) and not np.imag(self.indices[-1])
+        absorbs = any(f.k for on_it in self.films for f in on_it)
+        return not absorbs and not any(self.depths) and not np.imag(self.indices[-1])
 
     @property
     def stack(self) -> Stack:
@@ -126,11 +127,11 @@ def random_mixed(rng: np.random.Generator, thickest_nm: float = 5000.0) -> tuple
         tuple(
             Film(
                 float(rng.uniform(1.05, 3)),
-                float(rng.uniform(0, 1)) if metal and k == count - 1 and rng.random() < 0.5 else 0.0,
+                float(rng.uniform(0, 1)) if not clear and rng.random() < 0.3 else 0.0,
                 float(rng.uniform(0, thickest_nm) * rng.random() ** 2),
             )
             for _ in range(rng.integers(0, 4))
         )
-        for k in range(count)
+        for _ in range(count)
     )
     return Mixed(tuple(indices), tuple(depths), on_it, float(rng.uniform(380, 780))), float(rng.uniform(0.02, 1))

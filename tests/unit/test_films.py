@@ -16,7 +16,7 @@ from velatura.optics.films import Film
 from velatura.sampling import coated
 from velatura.stack import Material
 from velatura.stack.spectra import srgb_sensitivity, srgb_weights
-from velatura.tables.microsurface_walks import reflected_share
+from velatura.tables.microsurface_walks import Side, shares_in_the_end
 
 COSINES = np.linspace(0.01, 1, 34)
 
@@ -253,7 +253,7 @@ def test_of_light_between_facets_a_mirror_reflects_all_and_a_black_film_nothing(
     def metal(cosine: np.ndarray) -> np.ndarray:
         return np.stack([0 * cosine, cosine > 0.5, 0 * cosine + 1])
 
-    black, half, mirror = reflected_share((metal, None), 1.0, cosines, alphas, 512)
+    (black, half, mirror), _ = shares_in_the_end([Side(metal, np.zeros_like)], 1.0, cosines, alphas, 512)
     assert black == pytest.approx(np.zeros(3))
     assert np.all((half > 0.05) & (half < 0.95))
     assert mirror == pytest.approx(np.ones(3), abs=0.02)

@@ -33,11 +33,13 @@ def one_wavelength() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("one_wavelength")
-@pytest.mark.parametrize("depths_nm", [[], [130.0], [90.0, 210.0, 40.0]])
-def test_matrices_are_those_of_the_amplitudes(depths_nm: list[float]) -> None:
-    """From both sides, under total reflection too: shares of s and p, and their phases."""
-    n = [1.1, *[2.0, 1.4, 2.3][: len(depths_nm)], 1.7]
-    films = tuple(ColouredFilm((x,) * 3, (0.0,) * 3, d) for x, d in zip(n[1:-1], depths_nm))
+@pytest.mark.parametrize(
+    ("depths_nm", "k"), [([], 0.0), ([130.0], 0.0), ([90.0, 210.0, 40.0], 0.0), ([90.0, 60.0], 0.3)]
+)
+def test_matrices_are_those_of_the_amplitudes(depths_nm: list[float], k: float) -> None:
+    """From both sides, under total reflection too: shares of s and p, and their phases. The first film may absorb."""
+    n = [1.1, *[2.0 + 1j * k, 1.4, 2.3][: len(depths_nm)], 1.7]
+    films = tuple(ColouredFilm((float(np.real(x)),) * 3, (float(np.imag(x)),) * 3, d) for x, d in zip(n[1:], depths_nm))
     found = polarised_films.polarised_films(Coating(films, (1.1,) * 3, (1.7,) * 3), False, srgb_sensitivity)
     for indices, depths in ((n, depths_nm), (n[::-1], depths_nm[::-1])):
         eta = indices[-1] / indices[0]
@@ -46,12 +48,14 @@ def test_matrices_are_those_of_the_amplitudes(depths_nm: list[float]) -> None:
                 tmm.coh_tmm(kind, indices, [np.inf, *depths, np.inf], np.arccos(cosine), WAVELENGTH) for kind in "sp"
             )
             cos_t = float(fresnel.cos_transmitted(cosine, eta))
-            reflection, refraction = found.dielectric(np.array([cosine]), np.array([cos_t]), eta, np.ones(1))
+            cosines = np.array([cosine]), np.array([cos_t])
+            reflection, refraction = found.dielectric(np.array(eta > 1), *cosines, eta, np.ones(1))
             product = reflection.real[0, 0] + 1j * reflection.imaginary[0, 0]
             assert product == pytest.approx(s["r"] * np.conj(p["r"]), abs=2e-3)
             assert reflection.s[0, 0] == pytest.approx(s["R"], abs=1e-3)
             assert reflection.p[0, 0] == pytest.approx(p["R"], abs=1e-3)
             if cos_t > 0:
+                assert refraction.s[0, 0] == pytest.approx(s["T"], abs=1e-3)
                 through = s["t"] * np.conj(p["t"]) / abs(s["t"] * p["t"]) * np.sqrt(s["T"] * p["T"])
                 assert refraction.real[0, 0] + 1j * refraction.imaginary[0, 0] == pytest.approx(through, abs=2e-3)
 

@@ -347,10 +347,15 @@ layers:
   - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 1.3, thickness_nm: 90}]}
   - interface: {eta: 1, alpha: 0.2, films: [{eta: 2.1, thickness_nm: 250}]}
 """
+TINTED = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 1.3, k: 0.5, thickness_nm: 90}]}
+  - interface: {eta: 1, alpha: 0.2, films: [{eta: 2.1, thickness_nm: 250}]}
+"""
 
 
 @pytest.mark.parametrize("textured", [False, True])
-@pytest.mark.parametrize("text", [UNDER_A_COAT, PANE])
+@pytest.mark.parametrize("text", [UNDER_A_COAT, PANE, TINTED])
 @pytest.mark.parametrize("model", ["belcour2018", "weier2020", "realtime"])
 def test_films_may_change(text: str, model: str, textured: bool, tmp_path: Path) -> None:
     """A shader of one stack, given the films and the values of another, has the lobes of that, from either side."""

@@ -23,14 +23,14 @@ def film(body: Body) -> Answer:
         raise InvalidInput(f"layer {layer}: has no film {chosen}")
     films = coated_layers(stack.replace(**{f"layer{layer}_film{chosen}_thickness_nm": thickest_nm}))[layer]
     assert films and films.coating
-    # Those of no thickness are none; and all are listed from the rarer side
+    # Those of no thickness are none
     place = sum(each.thickness_nm > 0 for each in written[:chosen])
-    drawn = list(films.coating.films)
-    place = place if films.rarer == 1 else len(drawn) - 1 - place
+    seen = films.coating if films.rarer == 1 else films.coating.reversed()
+    drawn = list(seen.films)
     colours = []
     for thickness_nm in np.linspace(0, thickest_nm, COLOURS).tolist():
         drawn[place] = replace(drawn[place], thickness_nm=thickness_nm)
-        coating = replace(films.coating, films=tuple(drawn))
+        coating = replace(seen, films=tuple(drawn))
         colours.append(coating.reflectance(np.ones(1), srgb_sensitivity)[:, 0])
     return {"colours": array(np.array(colours))}
 

@@ -115,7 +115,8 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
             values[address.name] = address.declared.typical
     for k, coated in enumerate(films.coated_layers(stack)):
         if coated:
-            values |= {f"layer{k}_film0_{key}": value for key, value in _FILM.items()}
+            film = {**_FILM, "k": 0.1} if coated.absorbs else _FILM
+            values |= {f"layer{k}_film0_{key}": value for key, value in film.items()}
             values[f"layer{k}_eta"] = _LOWEST + k * _STEP
     return Stack.from_flat(stack.kinds, values)
 

@@ -137,7 +137,7 @@ def _leaving(passage: Passage, under: Sequence[Value]) -> Callable[[Value], Valu
                 continue
             above, below = (ops.sqrt(1 - p2 * (n[-1] / x) * (n[-1] / x)) for x in n[l : l + 2])
             below = cos_o if l == len(crossings) - 1 else below
-            passes = passes * (1 - flag * crossing.reflectance(above, below))
+            passes = passes * (1 - flag + flag * crossing.passing(above, below))
         return passes
 
     return leaving

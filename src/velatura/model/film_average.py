@@ -19,29 +19,30 @@ COARSE, FEW = (33, 9), 144  # nodes, and normals, of coarse ones
 
 
 class FilmAverage(Sampled):
-    """The directional albedo of an isotropic interface, sampled over direction and roughness.
+    """The directional albedo of an isotropic interface, sampled over direction and roughness, and after it what films
+    of a dielectric absorb.
 
     `critical` is the critical angle that the angular axis follows, None for an axis in the cosine.
     """
 
-    def __init__(self, data: NDArray[np.floating], critical: float | None) -> None:
+    def __init__(self, data: NDArray[np.floating], channels: int, critical: float | None) -> None:
         super().__init__(data)
-        self.critical = critical
+        self.channels, self.critical = channels, critical
 
-    def __call__(self, cos_theta: Value, alpha: Value, like: Value) -> Value:
-        """A colour of the kind of `like`."""
+    def __call__(self, cos_theta: Value, alpha: Value, like: Value) -> list[Value]:
+        """Colours of the kind of `like`."""
         x = (
             coordinates.from_cosine(cos_theta)
             if self.critical is None
             else coordinates.from_angle(cos_theta, self.critical)
         )
-        return self.fetched(like, x, coordinates.from_roughness(alpha))
+        return self.colours(like, x, coordinates.from_roughness(alpha), count=self.channels)
 
 
 @functools.lru_cache(32)
 def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverage:
     """Of an interface whose facets are met once or often; made once. A `coarse` one is quicker, for what moves."""
-    from velatura.model.transport.interfaces import Facets, of_first_events, share_of_films
+    from velatura.model.transport.interfaces import Facets, of_first_events, shares_of_films
 
     opaque, n12 = films.n12 is None, films.n12 or 1.0
     critical = None if opaque or n12 >= 1 else float(np.arcsin(n12))
@@ -51,19 +52,22 @@ def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverag
     samples = FEW if coarse else SAMPLES if critical is None else SAMPLES_INSIDE
     one, below = np.ones(1), np.full(1, n12)
     each = [
-        Facets(one, below, one if opaque else None, alpha, alpha, films=films.data, rarer=films.rarer)
+        Facets(one, below, one if opaque else None, alpha, alpha, films=films)
         for alpha in coordinates.to_roughness(y).tolist()
     ]
-    kept, blocked = zip(*(of_first_events(facets, p, samples, often) for facets in each))
-    found = np.array(kept)
+    first = [of_first_events(facets, p, samples, often) for facets in each]
+    kept, absorbed, blocked = (np.array(x) for x in zip(*first))
     if often:
-        walked = np.array([share_of_films(facets, {}, p) for facets in each[::WALKED]])
+        walked = np.array([shares_of_films(facets, {}, p) for facets in each[::WALKED]])
         place = np.arange(len(y)) / WALKED
         before = np.minimum(place.astype(int), len(walked) - 2)
-        upper = (place - before)[:, None, None]
-        found = found + np.array(blocked) * ((1 - upper) * walked[before] + upper * walked[before + 1])
+        upper = (place - before)[:, None, None, None]
+        reflected, passed = np.moveaxis((1 - upper) * walked[before] + upper * walked[before + 1], 1, 0)
+        kept, absorbed = kept + blocked * reflected, absorbed + blocked * (1 - reflected - passed)
+    channels = kept.shape[1]
+    found = np.concatenate([kept, absorbed], axis=1) if films.absorbs else kept
     found = found.transpose(2, 0, 1)
     if coarse:
         even = np.meshgrid(*(np.linspace(0, 1, n) for n in NODES), indexing="ij")
         found = np.stack(ops.interpolate(Sampled(found), *(each.ravel() for each in even)), axis=-1)
-    return FilmAverage(found.reshape(*NODES, -1).copy(), critical)
+    return FilmAverage(found.reshape(*NODES, -1).copy(), channels, critical)

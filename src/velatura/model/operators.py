@@ -60,12 +60,20 @@ def interface(
         passes = sin2_t < 1
         cos_t = ops.select(passes, ops.sqrt(1 - sin2_t), 1.0)
         ratio = ops.select(passes, layer.n12 * cos_t / ops.maximum(cos_theta, COS_MIN), 1.0)
-        t = ops.select(passes, 1 - r, 0.0)
+        lost: Value = 0.0
+        if layer.absorbed is not None:
+            lost = ops.clip(layer.absorbed(*fetched(prepared, lit, cos_theta, wi)), 0.0, 1 - r)
+        t = ops.select(passes, 1 - r - lost, 0.0)
         n = ratio if model.scale == "angles" else layer.n12
         s_t12 = _transmitted(prepared, layer.roughness, 1 / n, passes)
         s_t21 = _transmitted(prepared, layer.roughness, n, passes)
         ops.names(sin2_t=sin2_t, passes=passes, cos_t=cos_t, ratio=ratio, t=t)
-    r_21, a_12, a_21 = ops.select(passes, r, 0.0), ops.select(passes, 0.0, 1 - r), ops.select(passes, 0.0, 1.0)
+    back = r
+    if layer.absorbed is not None:
+        # Both sides differ as they do for the mean direction
+        back = ops.clip(r + layer.reflect_back(cos_theta, cos_t) - layer.reflect(cos_theta), 0.0, 1 - t)
+    r_21, a_12 = ops.select(passes, back, 0.0), ops.select(passes, lost, 1 - r)
+    a_21 = ops.select(passes, 1 - t - back, 1.0) if layer.absorbed is not None else ops.select(passes, 0.0, 1.0)
     return Operator(r, t, r_21, t, a_12, a_21, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
 
 

@@ -18,7 +18,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.sampling import coated
-from velatura.sampling.coated import Coated, Either, Films, dielectric_between
+from velatura.sampling.coated import Coated, Either, Films, absorbs
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.tables import Average, Row, Tables
 
@@ -32,7 +32,7 @@ class PreparedInterface(ops.Named):
     `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is that of means
     over the channels: one refracted direction for all colours. `reflectance` is its directional albedo, None where
     the model takes Fresnel at the mean direction; `leaving` the share of light going up from it that total internal
-    reflection lets out, None where that is all.
+    reflection lets out, None where that is all; `absorbed` what films of a dielectric absorb, None for nothing.
     """
 
     eta: Value | None
@@ -43,6 +43,7 @@ class PreparedInterface(ops.Named):
     reflectance: Average | None
     leaving: Average | None
     films: Films = None
+    absorbed: Average | None = None
 
     @property
     def opaque(self) -> bool:
@@ -55,7 +56,7 @@ class PreparedInterface(ops.Named):
         if self.films:
             if self.opaque and not isinstance(self.films, Either):
                 return self.films.at(cos_theta, self.eta)
-            return dielectric_between(self.films, cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
+            return self.films.between(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
         if self.kappa is None:
             return fresnel.dielectric(cos_theta, self.eta)
         return fresnel.conductor(cos_theta, self.eta, self.kappa)
@@ -66,6 +67,22 @@ class PreparedInterface(ops.Named):
         if self.eta is None or self.kappa is not None or self.films:
             return self.reflect(ops.sqrt(cos2))
         return fresnel.dielectric_together(cos2, self.n12, self.eta)
+
+    def pass_together(self, cos2: Value) -> Value:
+        """What facets of a dielectric let pass, likewise."""
+        if self.films:
+            cos_theta = ops.sqrt(cos2)
+            return self.films.passing(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
+        return 1 - self.reflect_together(cos2)
+
+    def absorb(self, cos_theta: Value) -> Value:
+        """What films on the facets of a dielectric absorb."""
+        return 1 - self.reflect(cos_theta) - self.pass_together(cos_theta * cos_theta)
+
+    def reflect_back(self, cos_theta: Value, cos_t: Value) -> Value:
+        """Fresnel reflectance of the facets of a dielectric with films from below, for cosines on both sides."""
+        assert self.films
+        return self.films.reversed().between(cos_t, cos_theta, self.eta)
 
 
 @dataclass(frozen=True)
@@ -172,7 +189,7 @@ def _interface(
     kappa = layer.k / eta_1 if layer.kind == "conductor" else None
     n12 = ops.mean(layer.eta) / ops.mean(eta_1) if layer.kind == "dielectric" else 1.0
     facets = PreparedInterface(eta, kappa, n12, roughness, s_r, None, averages.leaving(n_leaving), films)
-    return replace(facets, reflectance=averages.reflectance(facets))
+    return replace(facets, reflectance=averages.reflectance(facets), absorbed=averages.absorbed(facets))
 
 
 @dataclass(frozen=True)
@@ -189,13 +206,13 @@ class _Averages:
         multiple = self.model.microsurface
         films = facets.films if self.model.reflectance != "split-sum" else None
         if isinstance(films, Coated) and (own := films.averaged(multiple)):
-            return own
+            return own[0]
         if isinstance(films, Coated) and films.known:
-            return lambda cos_theta, alpha: film_average(films, multiple)(cos_theta, alpha, eta)
+            return lambda cos_theta, alpha: film_average(films, multiple)(cos_theta, alpha, eta)[0]
         if self.model.reflectance == "split-sum":
             r_0 = 1.0 if eta is None else fresnel.normal_incidence(eta, 0.0 if kappa is None else kappa)
             if facets.films and not isinstance(facets.films, Either):
-                r_0 = facets.films.at(1.0, eta)
+                r_0 = facets.reflect(1.0)
             row = tables.schlick_row(self.context.tables, r_0)
         elif eta is None:
             if multiple:
@@ -206,8 +223,21 @@ class _Averages:
         else:
             row = tables.conductor_row(self.context.tables, eta, kappa, self.context.constant, multiple)
         if films:
-            row = tables.with_films(self.context.tables, row, facets.reflect)
+            row = tables.with_films(self.context.tables, row, facets.reflect, absorbs(films))
         return self._of(row)
+
+    def absorbed(self, facets: PreparedInterface) -> Average | None:
+        """What films of a dielectric absorb, by the cosine and the roughness."""
+        films, multiple = facets.films, self.model.microsurface
+        if facets.opaque or films is None or not absorbs(films):
+            return None
+        if self.model.reflectance not in ("fgd", "fgd-multi"):
+            return lambda cos_theta, alpha: facets.absorb(cos_theta)
+        if isinstance(films, Coated) and (own := films.averaged(multiple)):
+            return own[1]
+        if isinstance(films, Coated) and films.known:
+            return lambda cos_theta, alpha: film_average(films, multiple)(cos_theta, alpha, facets.eta)[1]
+        return tables.over_facets(self.context.tables, facets.absorb)
 
     def _of(self, row: Row) -> Average:
         if self.context.number:

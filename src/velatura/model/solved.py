@@ -67,7 +67,7 @@ class Shape:
         n, cos2 = self.n_first, cosine * cosine
         if not n.is_outside:
             cos2 = ops.maximum((n.ring2 + cos2) * (n.inverse * n.inverse), 0.0)
-        return 1 - self.first.reflect_together(cos2)
+        return self.first.pass_together(cos2)
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.sampling import coated, low_discrepancy
-from velatura.sampling.coated import Films, dielectric_between
+from velatura.sampling.coated import Films, dielectric_passing
 from velatura.stack import InterfaceValues, Material, MediumValues
 
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
@@ -61,7 +61,7 @@ WEIGHT_MIN = 1e-12  # squared width that decides the shares where no interface h
 WIDTHS = RoughnessMap(lambda a, _: ops.power(a, EXPONENT), lambda s, _: ops.power(s, 1 / EXPONENT))
 
 Momentum = tuple[Value, Value]
-Reflectance = Callable[[Value, Value], Value]
+Passing = Callable[[Value, Value], Value]
 Array = NDArray[np.floating]
 
 
@@ -84,9 +84,9 @@ class Crossing(ops.Named):
     least: Value
     films: Films = None
 
-    def reflectance(self, cos_1: Value, cos_2: Value) -> Value:
-        """Fresnel's reflectance (a colour) for cosines above and below."""
-        return dielectric_between(self.films, cos_1, cos_2, self.eta)
+    def passing(self, cos_1: Value, cos_2: Value) -> Value:
+        """What facets let pass (a colour) for cosines above and below, by Fresnel."""
+        return dielectric_passing(self.films, cos_1, cos_2, self.eta)
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -
             cosines[l], bounded[l] = known, ops.maximum(known, GRAZING)
     crossings = passage.crossings
     steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(crossings)]
-    passes = [1 - c.reflectance(cosines[l], cosines[l + 1]) for l, c in enumerate(crossings)]
+    passes = [c.passing(cosines[l], cosines[l + 1]) for l, c in enumerate(crossings)]
     slabs = [1.0 if slab.is_clear else ops.exp(-slab.depth / c) for slab, c in zip(passage.slabs, bounded)]
     return Crossed(p, p2, passage.indices, cosines, bounded, steps, passes, slabs)
 
@@ -385,12 +385,12 @@ def _facet(crossing: Crossing, i: Crossed, o: Crossed, j: int, step: Value) -> _
     forwards = ops.select(turns, crossing.sign * (n_1 * c_1 - n_2 * c_2), 1.0)
     faces = (v_i > 0) & (v_o > 0) & (forwards > 0)
     v_i, v_o = ops.maximum(v_i, 0.0), ops.maximum(v_o, 0.0)
-    reflectance = crossing.reflectance(v_i * c_1 * height, v_o * c_2 * height)
-    return _Facet(slope, ops.select(faces, (1 - reflectance) * (v_i * v_o / (step * step)), 0.0))
+    passing = crossing.passing(v_i * c_1 * height, v_o * c_2 * height)
+    return _Facet(slope, ops.select(faces, passing * (v_i * v_o / (step * step)), 0.0))
 
 
 def _refracted(
-    n_1: Value, n_2: Value, reflectance: Reflectance, p: Momentum, w: Direction, h: Direction, lowest2: Value
+    n_1: Value, n_2: Value, passing: Passing, p: Momentum, w: Direction, h: Direction, lowest2: Value
 ) -> tuple[Momentum, Value]:
     """Momentum p, of direction w above, after refraction about a normal h, and the probability that light takes it:
     none unless it crosses all slabs below."""
@@ -399,22 +399,22 @@ def _refracted(
     step = n_1 * cos_1 - n_2 * cos_2
     x, y = p[0] + step * h[0], p[1] + step * h[1]
     crosses = (cos_1 > 0) & (cos_2 > 0) & (n_1 * w[2] > step * h[2]) & (x * x + y * y < lowest2)
-    passes = 1 - ops.mean(reflectance(cos_1, cos_2))
+    passes = ops.mean(passing(cos_1, cos_2))
     return (x, y), ops.select(crosses, passes, 0.0)
 
 
-def _chosen(crossings: Sequence[Crossing], eta: Value, u: Value, begins: Sequence[Value]) -> Reflectance:
-    """Fresnel's reflectance of the interface of relative index `eta` that u has chosen, by where each begins."""
+def _chosen(crossings: Sequence[Crossing], eta: Value, u: Value, begins: Sequence[Value]) -> Passing:
+    """What the facets of the interface of relative index `eta` let pass that u has chosen, by where each begins."""
     if not any(crossing.films for crossing in crossings):
-        return lambda cos_1, cos_2: fresnel.dielectric_between(cos_1, cos_2, eta)
+        return lambda cos_1, cos_2: 1 - fresnel.dielectric_between(cos_1, cos_2, eta)
 
-    def reflectance(cos_1: Value, cos_2: Value) -> Value:
-        found = crossings[0].reflectance(cos_1, cos_2)
+    def passing(cos_1: Value, cos_2: Value) -> Value:
+        found = crossings[0].passing(cos_1, cos_2)
         for crossing, begin in zip(crossings[1:], begins[1:]):
-            found = ops.select(u > begin, crossing.reflectance(cos_1, cos_2), found)
+            found = ops.select(u > begin, crossing.passing(cos_1, cos_2), found)
         return found
 
-    return reflectance
+    return passing
 
 
 def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roughness) -> Value:
@@ -423,7 +423,7 @@ def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roug
     cos_i, cos_o = i.bounded[j], o.bounded[j]
     w = i.p[0] / -c.n_1, i.p[1] / -c.n_1, cos_i
     h = ggx.normalize((w[0] + o.p[0] / c.n_1, w[1] + o.p[1] / c.n_1, cos_i + cos_o))
-    _, passes = _refracted(c.n_1, c.n_2, c.reflectance, i.p, w, h, _lowest2(n[j + 1 :]))
+    _, passes = _refracted(c.n_1, c.n_2, c.passing, i.p, w, h, _lowest2(n[j + 1 :]))
     passes = ops.select(_turns(c.sign), passes, ops.mean(i.passes[j]))
     visible = ggx.ndf(_turned(h, roughness.rotation), roughness.alpha_u, roughness.alpha_v)
     density = visible * _masking(roughness, i, j) * (1 - passes) / (4 * cos_i * cos_o * c.n_1 * c.n_1)

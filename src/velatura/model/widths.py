@@ -157,7 +157,7 @@ class _Coat:
         """Share that it lets pass, at cosines outside."""
         cosine = _cosine(cos_theta, self.n)
         if self.facets.films is not None:
-            return np.asarray(1 - ops.mean(self.facets.reflectance(cosine)))
+            return np.asarray(ops.mean(self.facets.passing(cosine)))
         return np.asarray(1 - fresnel.dielectric(cosine, self.n_below / self.n))
 
     def moved(self) -> Tensor:
@@ -213,7 +213,7 @@ def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array
             result.append(own)
         if not part.opaque:
             assert part.below is not None
-            passed = 1 - part.reflectance(cosine)
+            passed = part.passing(cosine)
             coats.append(_Coat(own, n, float(ops.mean(part.below)), cosine, passed, part))
     return result
 

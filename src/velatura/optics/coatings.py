@@ -53,24 +53,43 @@ class Coating:
     eta_2: Channels
     k_2: Channels = (0.0, 0.0, 0.0)
 
+    @property
+    def absorbs(self) -> bool:
+        """Whether any of the films does."""
+        return any(any(film.k) for film in self.films)
+
     def reflectance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
         """Reflectance (C, N) of unpolarised light at cosines (N,) above, in [0, 1]."""
-        return np.clip(self._integrated("reflected", cos_theta, sensitivity), 0.0, 1.0)
+        return np.clip(self.share("reflected", cos_theta, sensitivity), 0.0, 1.0)
 
-    def at(self, wavelengths_nm: Array, cos_theta: Array) -> Array:
-        """As `reflectance`, of channels of one wavelength each (C,)."""
+    def at(self, name: str, wavelengths_nm: Array, cos_theta: Array) -> Array:
+        """As `share`, of channels of one wavelength each (C,)."""
         eta_1, eta_2, k_2 = (np.reshape(x, (-1, 1)) for x in (self.eta_1, self.eta_2, self.k_2))
         films = [Film(np.reshape(x.eta, (-1, 1)), np.reshape(x.k, (-1, 1)), x.thickness_nm) for x in self.films]
-        found = coherent(cos_theta, wavelengths_nm[:, None], eta_1, films, eta_2, k_2).reflected
-        return np.asarray(np.clip(found, 0.0, 1.0))
+        return np.asarray(getattr(coherent(cos_theta, wavelengths_nm[:, None], eta_1, films, eta_2, k_2), name))
 
     def reversed(self) -> Coating:
         """As seen from below, between media that do not absorb."""
         return replace(self, films=self.films[::-1], eta_1=self.eta_2, eta_2=self.eta_1)
 
     def share(self, name: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
-        """A property of `optics.films.Response`, by its name, as `reflectance`, with colours outside sRGB."""
-        return self._integrated(name, cos_theta, sensitivity)
+        """A property of `optics.films.Response`, by its name, as `reflectance`, with colours outside sRGB; cosines may
+        differ from channel to channel, (C, N)."""
+        if np.ndim(cos_theta) == 1:
+            return self._integrated(name, cos_theta, sensitivity)
+        return np.stack([self._integrated(name, each, sensitivity)[c] for c, each in enumerate(cos_theta)])
+
+    def below(self, cos_theta: Array) -> Array:
+        """Cosines (C, N) of refracted light, of cosines (N,) above; the medium below is not of lower index."""
+        return np.sqrt(np.maximum(1 - self._ratio2 * (1 - cos_theta * cos_theta), 0))
+
+    def totally_reflected(self, share: Array) -> Array:
+        """Cosines (C, N) below, of light that cannot be above, by their ratio (N,) to that at the critical angle."""
+        return np.sqrt(np.maximum(1 - self._ratio2, 0)) * share
+
+    @property
+    def _ratio2(self) -> Array:
+        return np.asarray((np.array(self.eta_1) / np.array(self.eta_2))[:, None] ** 2)
 
     def _integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
         channels = [self._channel(c) for c in range(len(self.eta_1))]

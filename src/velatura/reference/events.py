@@ -25,7 +25,8 @@ HUGE = 1e15  # products of densities stay finite
 class Meeting:
     """A path that meets surface `j` from `wi`, out of a slab of index `n_in`; beyond lies index `n_out`.
 
-    `light` is its polarisation, along -wi; None where that is left out.
+    That is in the stack where the light comes from `above`, or else below the surface. `light` is its polarisation,
+    along -wi; None where that is left out.
     """
 
     layers: Layers
@@ -33,6 +34,7 @@ class Meeting:
     n_in: Value
     n_out: Value
     wi: Direction
+    above: Value
     light: Polarisation | None = None
 
     @property
@@ -43,8 +45,9 @@ class Meeting:
     def opaque(self) -> Value:
         return False if self.layers.transmits else self.layers.is_base(self.j)
 
-    def reflectance(self, cosine: Value) -> Value:
-        return self.layers.reflectance(self.j, cosine, self.n_in, self.n_out)
+    def shares(self, cosine: Value) -> tuple[Value, Value]:
+        """What a facet reflects, and lets pass."""
+        return self.layers.shares(self.j, cosine, self.n_in, self.n_out, self.above)
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ def sample_refraction(meeting: Meeting, u1: Value, u2: Value) -> Scattered:
     cos_i = ggx.dot(i, h)
     o = refraction.refract(i, h, eta)
     # Weigh
-    transmittance = 1 - meeting.reflectance(cos_i)
+    _, transmittance = meeting.shares(cos_i)
     weight = ops.select(o[2] < 0, transmittance * surface.masking(o), 0.0)
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(surface.smooth, 1.0, density)
@@ -107,13 +110,14 @@ def _sample_interface(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3
     h = surface.sample_normal(i, u1, u2)
     # Choose between reflection and refraction
     light = meeting.light and meeting.light.seen_by(surface.into)
-    reflectance, mirrored, refracted = meeting.layers.meet(meeting.j, i, h, meeting.n_in, meeting.n_out, light)
-    chance = ops.divide(ops.mean(carried * reflectance), ops.mean(carried))
+    sides = meeting.n_in, meeting.n_out, meeting.above
+    (reflectance, passing), mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *sides, light)
+    chance = ops.divide(ops.mean(carried * reflectance), ops.mean(carried * (reflectance + passing)))
     chance = ops.select(meeting.opaque, 1.0, chance)
     reflected = u3 < chance
     o = select(reflected, ggx.reflect(i, h), refraction.refract(i, h, eta))
     # Weigh
-    share = ops.select(reflected, reflectance, 1 - reflectance)
+    share = ops.select(reflected, reflectance, passing)
     weight = ops.divide(share, ops.select(reflected, chance, 1 - chance)) * surface.masking(o)
     weight = ops.select(_same(o[2] > 0, reflected), weight, 0.0)
     density, back = _densities(surface, i, h, o, ops.select(reflected, 1.0, eta))
@@ -131,8 +135,7 @@ def _evaluate_interface(meeting: Meeting, wo: Direction, reflected: Value) -> Sc
     cos_i = ggx.dot(i, h)
     serves = (cos_i > 0) & _same(ggx.dot(o, h) > 0, reflected) & _negate(surface.smooth)
     # Evaluate
-    reflectance = meeting.reflectance(ops.maximum(cos_i, 0.0))
-    share = ops.select(reflected, reflectance, 1 - reflectance)
+    share = ops.select(reflected, *meeting.shares(ops.maximum(cos_i, 0.0)))
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(serves, density, 0.0)
     return Scattered(wo, share * density * surface.masking(o), reflected, density * ops.mean(share), back)

@@ -70,13 +70,14 @@ def sample_refraction(types: Any, meeting: Meeting, rng: Any) -> tuple[Scattered
     surface = meeting.layers.surface(meeting.j)
     rough = surface.smooth ^ True
     # Scatter between the facets elsewhere
-    colour = types.Float(1) + 0.0 * meeting.reflectance(1.0)
+    colour = types.Float(1) + 0.0 * meeting.shares(1.0)[0]
     flight = _fly(types, meeting, colour, rng, rough, UP)
     through = flight.outside ^ True
     wo = select(through, surface.out_of(_reverse(flight.w)), once.wo)
     # Weigh by what single events would do, here and back
     i = meeting.wi
-    back = Meeting(meeting.layers, meeting.j, meeting.n_out, meeting.n_in, (wo[0], wo[1], -wo[2]))
+    below = meeting.above ^ True
+    back = Meeting(meeting.layers, meeting.j, meeting.n_out, meeting.n_in, (wo[0], wo[1], -wo[2]), below)
     densities = events.evaluate(back, (i[0], i[1], -i[2]), False)
     turned = replace(densities, wo=wo, density=densities.density_back, density_back=densities.density)
     many = _weighed(turned, ops.select(through, flight.weight, 0.0))
@@ -105,12 +106,13 @@ def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, 
         f.value = ops.select(f.alive, f.value + f.weight * _value(meeting, f, i, goal), f.value)
         # Meet a facet
         h = ggx.sample_visible(i, *alpha, f.rng.next_float32(), f.rng.next_float32())
-        indices = _indices(meeting, f.outside)
-        reflectance, mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *indices, f.light)
-        chance = ops.divide(ops.mean(carried * f.weight * reflectance), ops.mean(carried * f.weight))
+        sides = _sides(meeting, f.outside)
+        (reflectance, passing), mirrored, refracted = meeting.layers.meet(meeting.j, i, h, *sides, f.light)
+        kept = carried * f.weight
+        chance = ops.divide(ops.mean(kept * reflectance), ops.mean(kept * (reflectance + passing)))
         chance = ops.select(meeting.opaque, 1.0, chance)
         reflected = f.rng.next_float32() < chance
-        share = ops.select(reflected, reflectance / chance, ops.divide(1 - reflectance, 1 - chance))
+        share = ops.select(reflected, reflectance / chance, ops.divide(passing, 1 - chance))
         f.weight = ops.select(f.alive, f.weight * share, f.weight)
         # Turn; for refracted light the surface is upside down
         o = select(reflected, ggx.reflect(i, h), _reverse(refraction.refract(i, h, _eta(meeting, f.outside))))
@@ -141,8 +143,8 @@ def _value(meeting: Meeting, flight: Flight, i: Direction, goal: Direction) -> V
     # Scatter there, and leave without meeting another
     surface = meeting.layers.surface(meeting.j)
     alpha = surface.alpha_u, surface.alpha_v
-    reflectance = _reflectance(meeting, flight.outside, ops.maximum(cos_i, 0.0))
-    share = ops.select(same_side, reflectance, 1 - reflectance)
+    sides = _sides(meeting, flight.outside)
+    share = ops.select(same_side, *meeting.layers.shares(meeting.j, ops.maximum(cos_i, 0.0), *sides))
     density = microsurface.visible(i, h, *alpha) * refraction.jacobian(cos_i, cos_o, eta)
     rank = ops.select(same_side, flight.rank, 1 - flight.rank)
     leaves = microsurface.escape(select(same_side, goal, _reverse(goal)), rank, *alpha)
@@ -153,15 +155,11 @@ def _eta(meeting: Meeting, outside: Value) -> Value:
     return ops.select(outside, meeting.eta, 1 / meeting.eta)
 
 
-def _reflectance(meeting: Meeting, outside: Value, cosine: Value) -> Value:
-    return meeting.layers.reflectance(meeting.j, cosine, *_indices(meeting, outside))
-
-
-def _indices(meeting: Meeting, outside: Value) -> tuple[Value, Value]:
-    """Of the medium that the light is in, and of that beyond."""
+def _sides(meeting: Meeting, outside: Value) -> tuple[Value, Value, Value]:
+    """Indices of the medium that the light is in, and of that beyond; and whether the first is the one above."""
     here = ops.select(outside, meeting.n_in, meeting.n_out)
     there = ops.select(outside, meeting.n_out, meeting.n_in)
-    return here, there
+    return here, there, outside ^ meeting.above ^ True
 
 
 def _weighed(event: Scattered, weight: Value) -> Scattered:

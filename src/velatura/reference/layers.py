@@ -18,7 +18,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
 from velatura.sampling import coated
-from velatura.sampling.coated import Coated
+from velatura.sampling.coated import Coated, OfInterface
 from velatura.sampling.polarised_films import PolarisedFilms, polarised_films
 from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
 from velatura.stack.values import Pair
@@ -100,7 +100,7 @@ class Layers:
     extinction: Value = 0.0
     albedo: Value = 0.0
     microsurface: bool = False
-    films: tuple[Coated | None, ...] = ()
+    films: tuple[OfInterface | None, ...] = ()
     flipped: Value = False
 
     @property
@@ -140,10 +140,11 @@ class Layers:
     def is_base(self, j: Value) -> Value:
         return True if self.count == 1 else j == self.count - 1
 
-    def reflectance(self, j: Value, cosine: Value, n_in: Value, n_out: Value) -> Value:
-        """Fresnel reflectance of surface j, a colour, for light that meets a facet from the side of index `n_in`.
+    def shares(self, j: Value, cosine: Value, n_in: Value, n_out: Value, above: Value) -> tuple[Value, Value]:
+        """What a facet of surface j reflects, and lets pass, by Fresnel: colours, for light from the side of index
+        `n_in`, which is the one above where the condition holds.
 
-        All colours are refracted into one direction, that of the mean indices; where there is none, all are reflected.
+        All colours are refracted into one direction, that of the mean indices; where there is none, none pass.
         """
         if self.base == "mirror":
             base: Value = 1.0
@@ -154,19 +155,30 @@ class Layers:
         else:
             base = None
         if self.count == 1 and base is not None:
-            return base
-        eta = relative_index(n_in, n_out)
-        cos_t = fresnel.cos_transmitted(cosine, eta)
-        dielectric = fresnel.dielectric_between(cosine, cos_t, n_out / n_in)
-        if any(self.films[:-1]) or (self.transmits and self.films[-1]):
-            rarer = ops.select(eta > 1, cosine, cos_t)
-            each = [dielectric if films is None else films.at(rarer, n_in) for films in self.films]
-            dielectric = self._of_interface(each, j)
-        dielectric = ops.select(cos_t > 0, dielectric, 1.0)
-        return dielectric if base is None else ops.select(self.is_base(j), base, dielectric)
+            return base, 0.0 * base
+        cos_t = fresnel.cos_transmitted(cosine, relative_index(n_in, n_out))
+        reflected = ops.select(cos_t > 0, fresnel.dielectric_between(cosine, cos_t, n_out / n_in), 1.0)
+        passing = 1 - reflected
+        if any(self._on_dielectrics):
+            bare, above = (reflected, passing), self._from_above(above)
+            each = [films.shares(above, cosine, cos_t, n_in) if films else bare for films in self._on_dielectrics]
+            reflected, passing = (self._of_interface(column, j) for column in zip(*each))
+        if base is None:
+            return reflected, passing
+        is_base = self.is_base(j)
+        return ops.select(is_base, base, reflected), ops.select(is_base, 0.0, passing)
 
-    def mueller(self, j: Value, cosine: Value, n_in: Value, n_out: Value) -> tuple[Mueller, Mueller]:
-        """As `reflectance`, of polarised light: Mueller matrices of the light that a facet reflects, and refracts."""
+    @property
+    def _on_dielectrics(self) -> Sequence[OfInterface | None]:
+        """The films on each surface, but for those of an opaque one."""
+        return self.films if self.transmits else (*self.films[:-1], None)
+
+    def _from_above(self, above: Value) -> Value:
+        """Whether light comes from the side above as films are listed."""
+        return above if self.flipped is False else self.flipped ^ above
+
+    def mueller(self, j: Value, cosine: Value, n_in: Value, n_out: Value, above: Value) -> tuple[Mueller, Mueller]:
+        """As `shares`, of polarised light: Mueller matrices of the light that a facet reflects, and refracts."""
         eta = relative_index(n_in, n_out)
         cos_t = fresnel.cos_transmitted(cosine, eta)
         passes = cos_t > 0
@@ -174,15 +186,21 @@ class Layers:
         total = mueller(*fresnel.total_amplitudes(cosine, eta))
         reflection = _of_either(passes, between, replace(total, s=1.0, p=1.0))
         refraction = complement(reflection)
-        polarised = [films and _polarised(films) for films in self.films]
-        if any(polarised[:-1]) or (self.transmits and polarised[-1]):
-            bare = reflection, refraction
-            each = [x.dielectric(cosine, cos_t, eta, n_in) if x and x.total else bare for x in polarised]
-            reflection, refraction = (self._picked(matrices, j) for matrices in zip(*each))
+        if any(self._on_dielectrics):
+            bare, above = (reflection, refraction), self._from_above(above)
+
+            def matrices(films: OfInterface | None) -> tuple[Mueller, Mueller]:
+                if not films:
+                    return bare
+                assert isinstance(films, Coated)
+                return _polarised(films).dielectric(films.from_rarer(above), cosine, cos_t, eta, n_in)
+
+            each = [matrices(films) for films in self._on_dielectrics]
+            reflection, refraction = (self._picked(column, j) for column in zip(*each))
         if self.base == "mirror":
             base = Mueller(1.0, 1.0, -1.0, 0.0)
-        elif self.base == "conductor" and (films := polarised[-1]):
-            base = films.opaque(cosine, n_in)
+        elif self.base == "conductor" and (films := self.films[-1]):
+            base = _polarised(films).opaque(cosine, n_in)
         elif self.base == "conductor":
             base = mueller(*fresnel.conductor_amplitudes(cosine, self.index[-1] / n_in, self.extinction / n_in))
         else:
@@ -198,16 +216,24 @@ class Layers:
         return _choose(self.flipped, pick(items[::-1], j), pick(items, j))
 
     def meet(
-        self, j: Value, i: Direction, h: Direction, n_in: Value, n_out: Value, light: Polarisation | None
-    ) -> tuple[Value, Polarisation | None, Polarisation | None]:
-        """Reflectance of a facet of normal h for light from i, and the light's polarisation once reflected, or
-        refracted; `light` is None where polarisation is left out."""
+        self,
+        j: Value,
+        i: Direction,
+        h: Direction,
+        n_in: Value,
+        n_out: Value,
+        above: Value,
+        light: Polarisation | None,
+    ) -> tuple[tuple[Value, Value], Polarisation | None, Polarisation | None]:
+        """`shares` of a facet of normal h for light from i, and the light's polarisation once reflected, or refracted;
+        `light` is None where polarisation is left out."""
         cosine = ggx.dot(i, h)
         if light is None:
-            return self.reflectance(j, cosine, n_in, n_out), None, None
-        reflection, refraction = self.mueller(j, cosine, n_in, n_out)
+            return self.shares(j, cosine, n_in, n_out, above), None, None
+        reflection, refraction = self.mueller(j, cosine, n_in, n_out, above)
         light = light.at((-i[0], -i[1], -i[2]), h)
-        return reflection.share(light), reflection.applied(light), refraction.applied(light)
+        shares = reflection.share(light), refraction.share(light)
+        return shares, reflection.applied(light), refraction.applied(light)
 
 
 def from_material(material: Material, microsurface: bool) -> Layers:
@@ -215,7 +241,7 @@ def from_material(material: Material, microsurface: bool) -> Layers:
     surfaces: list[Surface] = []
     slabs: list[Slab] = []
     index: list[Value] = [material.exterior]
-    films: list[Coated | None] = []
+    films: list[OfInterface | None] = []
     medium, last = Slab(), material.layers[-1]
     for layer, on_it in zip(material.solid().layers, coated.of(material)):
         if isinstance(layer, MediumValues):
@@ -244,8 +270,8 @@ def from_material(material: Material, microsurface: bool) -> Layers:
     )
 
 
-def _polarised(films: Coated) -> PolarisedFilms:
-    assert films.coating
+def _polarised(films: OfInterface) -> PolarisedFilms:
+    assert isinstance(films, Coated) and films.coating
     return polarised_films(films.coating, films.n12 is None, srgb_sensitivity)
 
 

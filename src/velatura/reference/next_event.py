@@ -47,7 +47,7 @@ class WayOut:
 
 @dataclass(frozen=True)
 class _Crossing:
-    """One surface on the way: its transmittance, its reflectance on both sides, and the slabs above and below.
+    """One surface on the way: its transmittance, its reflectance from above and below, and the slabs there.
 
     `smooth` is 1 where this surface and all before it are smooth, else 0.
     """
@@ -55,6 +55,7 @@ class _Crossing:
     smooth: Value
     passed: Value
     reflected: Value
+    reflected_below: Value
     above: Value
     below: Value
 
@@ -65,13 +66,14 @@ def way_out(types: Any, layers: Layers, wo: Direction, rng: Any) -> tuple[WayOut
     spread, smooth = [1.0], 1.0
     crossings: list[_Crossing] = []
     for k, surface in enumerate(layers.surfaces):
-        meeting = Meeting(layers, k, layers.index[k], layers.index[k + 1], w[k])
+        indices = layers.index[k], layers.index[k + 1]
+        meeting = Meeting(layers, k, *indices, w[k], True)
         # Reflect between smooth surfaces
         smooth = ops.select(surface.smooth, smooth, 0.0)
-        mirrored = smooth * layers.reflectance(k, w[k][2], meeting.n_in, meeting.n_out)
+        mirrored = smooth * meeting.shares(w[k][2])[0]
         above = transmittance(layers.slabs[k], w[k][2])
         if k == layers.count - 1 and not layers.transmits:
-            crossings.append(_Crossing(smooth, 0.0, mirrored, above, 0.0))
+            crossings.append(_Crossing(smooth, 0.0, mirrored, 0.0, above, 0.0))
             break
         # Refract into the next slab
         if layers.microsurface:
@@ -81,7 +83,10 @@ def way_out(types: Any, layers: Layers, wo: Direction, rng: Any) -> tuple[WayOut
         w.append((-inward.wo[0], -inward.wo[1], ops.maximum(-inward.wo[2], _GRAZING)))
         spread.append(spread[k] * w[k][2] / (meeting.eta * meeting.eta * w[k + 1][2]))
         below = transmittance(layers.slabs[k + 1], w[k + 1][2])
-        crossings.append(_Crossing(smooth, inward.weight, mirrored, above, below))
+        mirrored_below = mirrored
+        if any(layers.films):
+            mirrored_below = smooth * layers.shares(k, w[k + 1][2], *indices[::-1], False)[0]
+        crossings.append(_Crossing(smooth, inward.weight, mirrored, mirrored_below, above, below))
         # Sum up the strategies that the path may take instead
         density.append(inward.density)
         rough = ops.select(surface.smooth, 0.0, 1.0)
@@ -99,7 +104,7 @@ def _sum_reflections(crossings: list[_Crossing]) -> tuple[list[Value], list[Valu
     for k, x in enumerate(crossings):
         inside = x.passed * x.above / _left(x, b[k])
         a.append(inside * a[k])
-        b.append(x.reflected * x.below + inside * b[k] * x.smooth * x.passed * x.below)
+        b.append(x.reflected_below * x.below + inside * b[k] * x.smooth * x.passed * x.below)
     # Come back up
     down: list[Value] = [0.0]
     for k, x in reversed(list(enumerate(crossings))):

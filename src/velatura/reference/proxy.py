@@ -63,7 +63,7 @@ def density(layers: Layers, wi: Direction, wo: Direction) -> Value:
             spread = spread + left
             break
         # Reflect
-        reflectance = ops.mean(layers.reflectance(k, cosine, layers.index[k], layers.index[k + 1]))
+        reflectance = ops.mean(layers.shares(k, cosine, layers.index[k], layers.index[k + 1], True)[0])
         smooth = smooth & surface.smooth
         reflected = ops.select(smooth, 0.0, left * reflectance)
         energy += reflected

@@ -124,7 +124,7 @@ def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None, painted
     beyond = ops.select(down, path.slab + 1, path.slab - 1)
     wi = (-path.w[0], -path.w[1], ops.absolute(path.w[2]))
     light = path.light and path.light.mirrored(down ^ True)
-    meeting = Meeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi, light)
+    meeting = Meeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi, down, light)
     u1, u2, u3 = (path.rng.next_float32() for _ in range(3))
     target = way_up(out, j, down) if out is not None else UP
     if layers.microsurface:

@@ -6,9 +6,9 @@ from __future__ import annotations
 import copy
 import functools
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, floor
+from math import ceil, floor, pi
 from threading import Lock
 from typing import Any, TypeAlias
 
@@ -27,9 +27,16 @@ from velatura.stack import FilmValues, InterfaceValues, Material, luminance_sens
 
 Array = NDArray[np.floating]
 
+#: A look-up over the cosine and the roughness.
+Average: TypeAlias = Callable[[Value, Value], Value]
+
+#: A property of `optics.films.Response` of a coating, by its name, at cosines.
+Share: TypeAlias = Callable[[Coating, str, Array], Array]
+
 NODES = 257  # even over the cosine; between them no reflectance bends by more than 3e-4
 STEP_NM = 15.0  # optical, between thicknesses that are worked out,
 UNKNOWN_NM = (0.0, 1000.0)  # spanned by thicknesses that cannot be looked at
+MATCHED = 1e-6  # least square of the cosine at the critical angle
 FINE = 4  # and how many are interpolated, by splines, from one to the next
 
 
@@ -52,10 +59,10 @@ class Sampled:
         """A colour of the kind of `like`."""
         return _joined(like, self._read(*coordinates))
 
-    def colours(self, like: Value, *coordinates: Value) -> list[Value]:
-        """Colours of the kind of `like`, of three channels each."""
+    def colours(self, like: Value, *coordinates: Value, count: int = 3) -> list[Value]:
+        """Colours of the kind of `like`, of as many channels each."""
         channels = self._read(*coordinates)
-        return [_joined(like, channels[k : k + 3]) for k in range(0, len(channels), 3)]
+        return [_joined(like, channels[k : k + count]) for k in range(0, len(channels), count)]
 
     def _read(self, *coordinates: Value) -> list[Value]:
         if self._number:
@@ -66,11 +73,11 @@ class Sampled:
 class Coated(Sampled):
     """Reflectance of an interface by colour, for light from either side.
 
-    Where it transmits it absorbs nothing, so that light of one tangential momentum is reflected alike from both sides:
-    it is sampled over the cosine on the `rarer` side, beyond which light is totally reflected. That is 1 above the
-    interface, and 2 below it; above, where it is opaque. `data` are the values at the nodes, (NODES, C), of what was
-    `found` those in 0 to 1, and `n12` the relative index for all colours, None where it is opaque. `coating` is what
-    they are the reflectance of, from the rarer side.
+    Where it absorbs nothing, light of one tangential momentum is reflected alike from both sides: it is sampled over
+    the cosine on the `rarer` side, beyond which light is totally reflected. That is 1 above the interface, and 2 below
+    it; above, where it is opaque. `data` are the values at the nodes, (NODES, C), of what was `found` those in 0 to 1,
+    and `n12` the relative index for all colours, None where it is opaque. `coating` is what they are the reflectance
+    of, from the rarer side.
 
     Of a film whose thickness varies, `axis` are some thicknesses: data are (places, NODES, C), and `place` is that of
     the thickness.
@@ -86,12 +93,22 @@ class Coated(Sampled):
         coating: Coating | None = None,
         axis: Axis | None = None,
     ) -> None:
-        super().__init__(np.clip(found, 0, 1))
+        super().__init__(self.bounded(found))
         self.found, self.rarer, self.n12, self.coating, self.axis = found, rarer, n12, coating, axis
         self.place: tuple[Value, ...] = ()
         self._reversed: Coated | None = None
         if axis:
             self.known = False
+
+    @staticmethod
+    def bounded(found: Array) -> Array:
+        """Colours as those that light may have."""
+        return np.clip(found, 0, 1)
+
+    @property
+    def absorbs(self) -> bool:
+        """Whether less passes than is not reflected."""
+        return False
 
     def reading(self, flat: Any) -> Coated:
         """With values of Dr.Jit, flat; differentiable."""
@@ -113,13 +130,28 @@ class Coated(Sampled):
             self._reversed = found
         return self._reversed._at(*self.place)
 
-    def averaged(self, often: bool) -> Callable[[Value, Value], Value] | None:
-        """A look-up of its albedo over the cosine and the roughness, where it brings one along."""
+    def averaged(self, often: bool) -> tuple[Average, Average] | None:
+        """Look-ups of its albedo and of what it absorbs over the cosine and the roughness, where it brings them
+        along."""
         return None
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         """For cosines above and below, 0 where light cannot be; a colour of the kind of `like`."""
         return self.at(self.cosine(cos_1, cos_2), like)
+
+    def passing(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
+        """Transmittance, likewise."""
+        return 1 - self.between(cos_1, cos_2, like)
+
+    def shares(self, above: Value, cosine: Value, cos_t: Value, like: Value) -> tuple[Value, Value]:
+        """Reflectance and transmittance of light from above where the condition holds, else from below; for cosines on
+        its own side and beyond."""
+        reflected = self.at(ops.select(self.from_rarer(above), cosine, cos_t), like)
+        return reflected, 1 - reflected
+
+    def from_rarer(self, above: Value) -> Value:
+        """Whether light comes from the rarer side."""
+        return above if self.rarer == 1 else above ^ True
 
     def cosine(self, cos_1: Value, cos_2: Value) -> Value:
         """Of the cosines above and below, that on the rarer side."""
@@ -135,6 +167,68 @@ class Coated(Sampled):
         found = copy.copy(self)
         found.place = place
         return found
+
+
+class Absorbing(Coated):
+    """As `Coated`, of a dielectric whose films absorb.
+
+    `data` have three colours at a node: what is reflected on the rarer side, on the denser side, and what passes. The
+    nodes of the cosine on the rarer side follow those of total reflection, over the angle whose cosine is that on the
+    denser side over the one at the critical angle: (2 NODES - 1, 3 C).
+    """
+
+    @classmethod
+    def of_coating(cls, coating: Coating, rarer: int, n12: float, share: Share) -> Absorbing:
+        """Of a coating from the rarer side, by a function of its properties."""
+        cosines, back = np.linspace(0, 1, NODES), coating.reversed()
+        beyond = np.sin(np.linspace(0, 0.5 * pi, NODES))[:-1]
+        above, passing = (share(coating, name, cosines) for name in ("reflected", "transmitted"))
+        below, total = (
+            share(back, "reflected", x) for x in (coating.below(cosines), coating.totally_reflected(beyond))
+        )
+        nowhere = np.repeat(above[:, :1], NODES - 1, axis=1)
+        each = [nowhere, above], [total, below], [0 * nowhere, passing]
+        found = np.concatenate([np.concatenate(x, axis=1) for x in each])
+        return cls(found.T.copy(), rarer, n12, coating)
+
+    @staticmethod
+    def bounded(found: Array) -> Array:
+        above, below, passing = np.split(np.clip(found, 0, 1), 3, axis=-1)
+        passing = np.minimum(passing, 1 - np.maximum(above, below))
+        return np.concatenate([above, below, passing], axis=-1)
+
+    @property
+    def absorbs(self) -> bool:
+        return True
+
+    def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
+        return self._colours(*self._by_side(cos_1, cos_2), like)[self.rarer - 1]
+
+    def passing(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
+        return self._colours(*self._by_side(cos_1, cos_2), like)[2]
+
+    def shares(self, above: Value, cosine: Value, cos_t: Value, like: Value) -> tuple[Value, Value]:
+        from_rarer = self.from_rarer(above)
+        rarer, denser = (ops.select(from_rarer, *pair) for pair in ((cosine, cos_t), (cos_t, cosine)))
+        of_rarer, of_denser, passing = self._colours(rarer, denser, like)
+        return ops.select(from_rarer, of_rarer, of_denser), passing
+
+    def _by_side(self, cos_1: Value, cos_2: Value) -> tuple[Value, Value]:
+        """Cosines on the rarer side and on the denser one."""
+        return (cos_1, cos_2) if self.rarer == 1 else (cos_2, cos_1)
+
+    def _colours(self, rarer: Value, denser: Value, like: Value) -> list[Value]:
+        assert self.n12
+        at = *self.place, self.coordinate(rarer, denser, self.n12)
+        return self.colours(like, *at, count=self.data.shape[-1] // 3)
+
+    @staticmethod
+    def coordinate(rarer: Value, denser: Value, n12: Value) -> Value:
+        """Of cosines on both sides, among the nodes."""
+        ratio = ops.minimum(n12, 1 / n12)
+        share = ops.minimum(denser / ops.sqrt(ops.maximum(1 - ratio * ratio, MATCHED)), 1.0)
+        angle = ops.arctan2(ops.sqrt(1 - share * share), share)
+        return 0.5 + 0.5 * rarer - angle * (1 / pi)
 
 
 @dataclass(frozen=True)
@@ -185,29 +279,48 @@ class AtWavelengths:
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         """For cosines above and below, 0 where light cannot be."""
-        return self.at(ops.select(self._rarer_above, cos_1, cos_2), like)
+        return self._shares(cos_1, cos_2)[0]
+
+    def passing(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
+        """Transmittance, likewise."""
+        return self._shares(cos_1, cos_2)[1]
+
+    def shares(self, above: Value, cosine: Value, cos_t: Value, like: Value) -> tuple[Value, Value]:
+        """As of `Coated`."""
+        back = self.reversed()
+        turned = [
+            FilmValues(*(ops.select(above, a, b) for a, b in zip(vars(x).values(), vars(y).values())))
+            for x, y in zip(self.films, back.films)
+        ]
+        eta_1, eta_2 = (ops.select(above, *pair) for pair in ((self.eta_1, self.eta_2), (self.eta_2, self.eta_1)))
+        return replace(self, eta_1=eta_1, films=tuple(turned), eta_2=eta_2)._shares(cosine, cos_t)
+
+    def _shares(self, cos_1: Value, cos_2: Value) -> tuple[Value, Value]:
+        found = self._response(self._cosine(cos_1, cos_2))
+        passes = (cos_1 > 0) & (cos_2 > 0)
+        return self._colour(found.reflected), self._colour(ops.select(passes, found.transmitted, 0.0))
 
     def at(self, cosine: Value, like: Value) -> Value:
-        """For the cosine on the rarer side."""
-        films = [Film(x.eta, x.k, x.thickness_nm) for x in self.films]
-        if self.k_2 is not None:
-            return self._colour(coherent(cosine, self.wavelengths_nm, self.eta_1, films, self.eta_2, self.k_2))
-        where = self._rarer_above
-        above, below = (ops.select(where, *pair) for pair in ((self.eta_1, self.eta_2), (self.eta_2, self.eta_1)))
-        turned = [
-            Film(*(ops.select(where, a, b) for a, b in zip(vars(x).values(), vars(y).values())))
-            for x, y in zip(films, films[::-1])
-        ]
-        return self._colour(coherent(cosine, self.wavelengths_nm, above, turned, below))
+        """For the cosine above, of an opaque interface."""
+        return self._colour(self._response(cosine).reflected)
 
-    def _colour(self, found: Response) -> Value:
+    def _response(self, cosine: Value) -> Response:
+        films = [Film(x.eta, x.k, x.thickness_nm) for x in self.films]
+        k_2 = 0.0 if self.k_2 is None else self.k_2
+        return coherent(cosine, self.wavelengths_nm, self.eta_1, films, self.eta_2, k_2)
+
+    def _cosine(self, cos_1: Value, cos_2: Value) -> Value:
+        """That above, by colour: all are totally reflected from the same angle on."""
+        ratio, whole = self.eta_2 / self.eta_1, ops.mean(self.eta_2) / ops.mean(self.eta_1)
+        critical2 = ops.maximum(1 - whole * whole, MATCHED)
+        share2 = ops.minimum(cos_1 * cos_1 / critical2, 1.0)
+        denser = ops.sqrt((1 - ratio * ratio * (1 - cos_2 * cos_2)) * share2)
+        return ops.select(whole > 1, cos_1, denser)
+
+    def _colour(self, found: Value) -> Value:
         # Functions of Dr.Jit may have taken a colour of Mitsuba's for an array
         kind: Any = type(self.wavelengths_nm)
-        return kind(found.reflected)
-
-    @property
-    def _rarer_above(self) -> Value:
-        return ops.mean(self.eta_1) < ops.mean(self.eta_2)
+        return kind(found)
 
 
 @dataclass(frozen=True)
@@ -223,12 +336,22 @@ class Either:
         a, b = self.a, self.b
         if isinstance(a, Coated) and isinstance(b, Coated):
             cosine = ops.select(self.where, a.cosine(cos_1, cos_2), b.cosine(cos_1, cos_2))
-            if a.data is b.data and a.known == b.known and not a.place:
+            if a.data is b.data and a.known == b.known and not a.place and not a.absorbs:
                 return a.at(cosine, eta)
-            if a.known and b.known and a.data.shape == b.data.shape:
+            if a.known and b.known and a.data.shape == b.data.shape and not a.absorbs:
                 place = ops.minimum(cosine, 1.0) * (NODES - 1) + ops.select(self.where, 0.0, float(NODES))
                 return _both(a, b).fetched(eta, place / (2 * NODES - 1))
         return ops.select(self.where, *(dielectric_between(x, cos_1, cos_2, eta) for x in (a, b)))
+
+    def reversed(self) -> Either:
+        """As seen from below."""
+        return Either(self.where, *(x and x.reversed() for x in (self.a, self.b)))
+
+    def passing(self, cos_1: Value, cos_2: Value, eta: Value) -> Value:
+        """As `dielectric_passing`."""
+        if any(absorbs(x) for x in (self.a, self.b)):
+            return ops.select(self.where, *(dielectric_passing(x, cos_1, cos_2, eta) for x in (self.a, self.b)))
+        return 1 - self.between(cos_1, cos_2, eta)
 
 
 OfInterface: TypeAlias = Coated | AtWavelengths
@@ -251,6 +374,18 @@ def dielectric_between(films: Films, cos_1: Value, cos_2: Value, eta: Value) -> 
     if films is None:
         return fresnel.dielectric_between(cos_1, cos_2, eta)
     return films.between(cos_1, cos_2, eta)
+
+
+def dielectric_passing(films: Films, cos_1: Value, cos_2: Value, eta: Value) -> Value:
+    """What a dielectric with films transmits, likewise."""
+    if films is None:
+        return 1 - fresnel.dielectric_between(cos_1, cos_2, eta)
+    return films.passing(cos_1, cos_2, eta)
+
+
+def absorbs(films: Films) -> bool:
+    """Whether films may absorb, by what is known of them."""
+    return isinstance(films, AtWavelengths | Either) or (films is not None and films.absorbs)
 
 
 def _joined(like: Value, channels: list[Value]) -> Value:
@@ -287,14 +422,17 @@ def of(material: Material) -> list[Any]:
     return _of(material)
 
 
-def _of(material: Material) -> list[Any]:
+def _of(material: Material, may_absorb: Collection[int] = ()) -> list[Any]:
+    """Films that may absorb are taken for such, on layers of these numbers."""
     found: list[OfInterface | None] = []
     above = material.exterior
-    for layer in material.solid().layers:
+    for k, layer in enumerate(material.solid().layers):
         films: OfInterface | None = None
         if isinstance(layer, InterfaceValues):
-            if layer.films:
-                films = layer.coating.of(layer) if layer.coating else _worked_out(layer, above, material.light)
+            if layer.films and layer.coating:
+                films = layer.coating.of(layer)
+            elif layer.films:
+                films = _worked_out(layer, above, material.light, k in may_absorb)
             above = layer.eta
         found.append(films)
     return found
@@ -314,11 +452,15 @@ def constant(material: Material, spans: Sequence[tuple[int, int, float, float]],
         assert isinstance(layer, InterfaceValues)
         axes[k] = Axis.around(film, low, high, step_nm(layer.films[film]))
 
+    # Where an extinction varies it may be 0
+    varying = (given.addresses[place] for variable in given.given for place, _ in variable.places)
+    may_absorb = {address.layer for address in varying if address.role == "film_k" and address.layer is not None}
+
     def made(numbers: list[float]) -> list[Coated | None]:
         changed = given.replaced(start, numbers)
-        found = _of(changed)
+        found = _of(changed, may_absorb)
         for k, axis in axes.items():
-            found[k] = _over_thickness(changed, k, axis)
+            found[k] = _over_thickness(changed, k, axis, may_absorb)
         return found
 
     found = made([])
@@ -332,18 +474,18 @@ def constant(material: Material, spans: Sequence[tuple[int, int, float, float]],
     return [films and films.reading(next(flat)) for films in found]
 
 
-def _over_thickness(material: Material, k: int, axis: Axis) -> Coated:
+def _over_thickness(material: Material, k: int, axis: Axis, may_absorb: Collection[int]) -> Coated:
     """The films on the k-th layer, over thicknesses of one of them."""
     name = f"layer{k}_film{axis.film}_thickness_nm"
 
     def at(x: float) -> Coated:
-        found = _of(material.each(lambda address, old: x if address.name == name else old))[k]
+        found = _of(material.each(lambda address, old: x if address.name == name else old), may_absorb)[k]
         assert found
         return found
 
     each = [at(x) for x in axis.nodes.tolist()]
     found = axis.refined(np.array([films.found for films in each]))
-    return Coated(found, each[0].rarer, each[0].n12, None, axis)
+    return type(each[0])(found, each[0].rarer, each[0].n12, None, axis)
 
 
 def step_nm(film: FilmValues) -> float:
@@ -357,7 +499,7 @@ def optical_nm(material: Material) -> float:
     return max(each, default=0.0)
 
 
-def _worked_out(layer: InterfaceValues, above: Value, light: Any) -> OfInterface:
+def _worked_out(layer: InterfaceValues, above: Value, light: Any, may_absorb: bool) -> OfInterface:
     """The films on a layer; from values of NumPy made once."""
     if not isinstance(light, str | np.ndarray):
         return AtWavelengths(light, above, layer.films, layer.eta, layer.k if layer.kind == "conductor" else None)
@@ -373,7 +515,8 @@ def _worked_out(layer: InterfaceValues, above: Value, light: Any) -> OfInterface
     k_2 = channels(layer.k) if opaque else channels(0.0)
     coating = Coating(films, channels(above), channels(layer.eta), k_2)
     with _making:
-        return _coated(coating, opaque, light if isinstance(light, str) else tuple(light.tolist()))
+        absorbs = not opaque and (may_absorb or coating.absorbs)
+        return _coated(coating, opaque, absorbs, light if isinstance(light, str) else tuple(light.tolist()))
 
 
 _uploading, _making = Lock(), Lock()
@@ -381,14 +524,17 @@ _SENSITIVITIES = {"srgb": srgb_sensitivity, "luminance": luminance_sensitivity}
 
 
 @functools.lru_cache(512)
-def _coated(coating: Coating, opaque: bool, light: str | tuple[float, ...]) -> Coated:
+def _coated(coating: Coating, opaque: bool, absorbs: bool, light: str | tuple[float, ...]) -> Coated:
     n12 = None if opaque else sum(coating.eta_2) / sum(coating.eta_1)
     rarer = 1 if n12 is None or n12 > 1 else 2
     if rarer == 2:
         coating = coating.reversed()
-    cosines = np.linspace(0, 1, NODES)
-    if isinstance(light, str):
-        found = coating.share("reflected", cosines, _SENSITIVITIES[light])
-    else:
-        found = coating.at(np.array(light), cosines)
-    return Coated(found.T.copy(), rarer, n12, coating)
+
+    def share(of: Coating, name: str, cosines: Array) -> Array:
+        if isinstance(light, str):
+            return of.share(name, cosines, _SENSITIVITIES[light])
+        return of.at(name, np.array(light), cosines)
+
+    if n12 and absorbs:
+        return Absorbing.of_coating(coating, rarer, n12, share)
+    return Coated(share(coating, "reflected", np.linspace(0, 1, NODES)).T.copy(), rarer, n12, coating)

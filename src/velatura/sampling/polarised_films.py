@@ -20,10 +20,11 @@ TOTAL = 513  # directions under total reflection, where phases turn fast
 
 
 class PolarisedFilms:
-    """Matrices by colour, for light from either side; refraction is that of films that absorb nothing.
+    """Matrices by colour, for light from either side.
 
-    `within` are sampled over the cosine on the rarer side; `total`, under total reflection, over the angle whose cosine
-    is that on the denser side over the one at the critical angle. It is None for what is opaque.
+    `within` are sampled over the cosine on the rarer side: of light reflected from there, and from the denser side, and
+    of what is refracted. `total`, of light under total reflection, is over the angle whose cosine is that on the denser
+    side over the one at the critical angle. It is None for what is opaque, which has the first of the others alone.
     """
 
     def __init__(self, within: Sampled, total: Sampled | None) -> None:
@@ -33,57 +34,46 @@ class PolarisedFilms:
         """Of light that an opaque interface reflects, by colours of the kind of `like`."""
         return Mueller(*self.within.colours(like, cosine))
 
-    def dielectric(self, cosine: Value, cos_t: Value, eta: Value, like: Value) -> tuple[Mueller, Mueller]:
-        """Of light that is reflected, and refracted, for cosines on both sides, 0 beyond where it is totally reflected,
-        and the index there over that here."""
+    def dielectric(
+        self, from_rarer: Value, cosine: Value, cos_t: Value, eta: Value, like: Value
+    ) -> tuple[Mueller, Mueller]:
+        """Of light that is reflected, and refracted, for cosines on its own side and beyond, 0 where it is totally
+        reflected, and the index there over that here."""
         assert self.total
-        passes, from_rarer = cos_t > 0, eta > 1
-        s, p, *products = self.within.colours(like, ops.select(from_rarer, cosine, cos_t))
-        real, imaginary, real_below, imaginary_below, real_through, imaginary_through = products
+        passes = cos_t > 0
+        found = self.within.colours(like, ops.select(from_rarer, cosine, cos_t))
         share = ops.minimum(ops.divide(cosine, ops.sqrt(1 - eta * eta)), 1.0)
         angle = ops.arctan2(ops.sqrt(1 - share * share), share) * (2 / pi)
-        real_total, imaginary_total = self.total.colours(like, angle)
-        reflection = Mueller(
-            ops.select(passes, s, 1.0),
-            ops.select(passes, p, 1.0),
-            ops.select(passes, ops.select(from_rarer, real, real_below), real_total),
-            ops.select(passes, ops.select(from_rarer, imaginary, imaginary_below), imaginary_total),
-        )
-        return reflection, Mueller(1 - s, 1 - p, real_through, imaginary_through)
+        each = zip(found[:4], found[4:8], self.total.colours(like, angle))
+        reflection = Mueller(*(ops.select(passes, ops.select(from_rarer, a, b), total) for a, b, total in each))
+        return reflection, Mueller(*found[8:])
 
 
 @functools.lru_cache(16)
 def polarised_films(coating: Coating, opaque: bool, sensitivity: Sensitivity) -> PolarisedFilms:
     """Of films between a medium of the lower index, above, and one of the higher, or an opaque one."""
-    cosines = np.linspace(0, 1, NODES)[None].repeat(3, axis=0)
+    cosines = np.linspace(0, 1, NODES)
 
-    def product(of: Coating, name: str, cos: Array, s: Array | float, p: Array | float) -> list[Array]:
-        real, imaginary = (_by_channel(of, f"{name}_{part}", cos, sensitivity) for part in ("real", "imaginary"))
+    def matrix(of: Coating, name: str, cos: Array, most: Array | float = 1.0) -> list[Array]:
+        """Its numbers, of shares up to `most` in the mean of s and p."""
+        s, p = (of.share(f"{name}_{x}", cos, sensitivity) for x in "sp")
+        # Colours outside sRGB are clipped as those of unpolarised light are
+        both = 2 * np.clip(0.5 * (s + p), 0, most)
+        s = np.clip(s, np.maximum(both - 1, 0), np.minimum(both, 1))
+        p = both - s
+        real, imaginary = (of.share(f"{name}_{part}", cos, sensitivity) for part in ("real", "imaginary"))
         # Sensitivities that are negative leave no matrix that light cannot have
-        bound = np.sqrt(s * p) / np.maximum(np.hypot(real, imaginary), 1e-9)
-        return [np.minimum(bound, 1) * x for x in (real, imaginary)]
+        bound = np.minimum(np.sqrt(s * p) / np.maximum(np.hypot(real, imaginary), 1e-9), 1)
+        return [s, p, bound * real, bound * imaginary]
 
-    s, p = (_by_channel(coating, f"reflected_{x}", cosines, sensitivity) for x in "sp")
-    # Colours outside sRGB are clipped as those of unpolarised light are
-    both = 2 * np.clip(0.5 * (s + p), 0, 1)
-    s = np.clip(s, np.maximum(both - 1, 0), np.minimum(both, 1))
-    p = both - s
-    parts = [s, p, *product(coating, "reflected", cosines, s, p)]
+    reflected = matrix(coating, "reflected", cosines)
     if opaque:
-        return PolarisedFilms(_sampled(parts), None)
-    back = Coating(coating.films[::-1], coating.eta_2, coating.eta_1)
-    ratio2 = (np.array(coating.eta_1) / np.array(coating.eta_2))[:, None] ** 2
-    parts += product(back, "reflected", np.sqrt(1 - ratio2 * (1 - cosines**2)), s, p)
-    parts += product(coating, "transmitted", cosines, 1 - s, 1 - p)
-    beyond = np.sqrt(np.maximum(1 - ratio2, 0)) * np.cos(np.linspace(0, pi / 2, TOTAL))
-    return PolarisedFilms(_sampled(parts), _sampled(product(back, "reflected", beyond, 1.0, 1.0)))
-
-
-def _by_channel(coating: Coating, name: str, cosines: Array, sensitivity: Sensitivity) -> Array:
-    """A share (3, N) at cosines (3, N)."""
-    if (cosines == cosines[0]).all():
-        return coating.share(name, cosines[0], sensitivity)
-    return np.stack([coating.share(name, each, sensitivity)[c] for c, each in enumerate(cosines)])
+        return PolarisedFilms(_sampled(reflected), None)
+    back = coating.reversed()
+    below = matrix(back, "reflected", coating.below(cosines))
+    passed = matrix(coating, "transmitted", cosines, 1 - 0.5 * np.maximum(sum(reflected[:2]), sum(below[:2])))
+    total = matrix(back, "reflected", coating.totally_reflected(np.cos(np.linspace(0, pi / 2, TOTAL))))
+    return PolarisedFilms(_sampled([*reflected, *below, *passed]), _sampled(total))
 
 
 def _sampled(parts: list[Array]) -> Sampled:

@@ -1,14 +1,18 @@
 """Thin films in a shader: reflectances and averages of each interface that has any, tables in a texture of their own.
 
 Code knows them by name: `film2` is the reflectance of the facets of layer 2 over the cosine, `film2_above` and
-`film2_below` its directional albedo for light from either side. Where a user changes values, code knows which
-interfaces have films, and no more; the texture changes with the values.
+`film2_below` its directional albedo for light from either side. Of a dielectric with films that absorb, `film2_rarer`,
+`film2_denser` and `film2_passing` are the reflectances from either side and what passes, over the coordinate of
+`sampling.coated.Absorbing`, and `film2_above_lost` and `film2_below_lost` the averages of what is absorbed. Where a
+user changes values, code knows which interfaces have films, and whether these absorb, and no more; the texture changes
+with the values.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +24,7 @@ from velatura.model.film_average import NODES as AVERAGED
 from velatura.model.film_average import film_average
 from velatura.ops import Value
 from velatura.sampling import coated
-from velatura.sampling.coated import NODES, Coated
+from velatura.sampling.coated import NODES, Absorbing, Average, Coated
 from velatura.shader.atlas import Layout
 from velatura.shader.symbol import Symbol, operand
 from velatura.stack import Address, InterfaceValues, Material, Stack, Varying, number
@@ -30,42 +34,68 @@ Array = NDArray[np.floating]
 
 FILM = "film"  # an operation: a table of films, looked up at a cosine, or at coordinates of direction and roughness
 WIDTH = NODES  # texels of a line of the texture; each table begins a line
-_NAME = re.compile(r"film(\d+)(_above|_below)?")
+SIDES = ("rarer", "denser", "passing")  # what tables of films that absorb are of, as `Absorbing` has them
+_NAME = re.compile(r"film(\d+)(?:_(rarer|denser|passing))?(?:_(above|below)(_lost)?)?")
 
 
 class Read(Coated):
     """Films that code reads by `name`, `turned` as seen from below.
 
-    `data` are those of its facets, which are None where values change; `n12` is then recorded, too.
+    `data` are those of its facets, which are None where values change; `n12` is then recorded, too. Films may absorb.
     """
 
     known = False  # code reads the texture
     n12: Value
 
-    def __init__(self, name: str, data: Array | None, n12: Value | None, turned: bool = False) -> None:
+    def __init__(self, name: str, data: Array | None, n12: Value | None, absorbing: bool, turned: bool = False) -> None:
         super().__init__(np.empty((0, 3)) if data is None else data, 1)
-        self.name, self.n12, self.turned = name, n12, turned
+        self.name, self.n12, self.absorbing, self.turned = name, n12, absorbing, turned
+
+    @property
+    def absorbs(self) -> bool:
+        return self.absorbing
 
     def reversed(self) -> Read:
         """As seen from below."""
-        return Read(self.name, self.data if len(self.data) else None, 1 / self.n12, not self.turned)
+        data = self.data if len(self.data) else None
+        return Read(self.name, data, 1 / self.n12, self.absorbing, not self.turned)
+
+    def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
+        if not self.absorbing:
+            return super().between(cos_1, cos_2, like)
+        at = self._coordinate(cos_1, cos_2)
+        return ops.select(self.n12 > 1, self._side(0, at), self._side(1, at))
+
+    def passing(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
+        if not self.absorbing:
+            return super().passing(cos_1, cos_2, like)
+        return self._side(2, self._coordinate(cos_1, cos_2))
 
     def cosine(self, cos_1: Value, cos_2: Value) -> Value:
         return ops.select(self.n12 > 1, cos_1, cos_2)
+
+    def _coordinate(self, cos_1: Value, cos_2: Value) -> Value:
+        return Absorbing.coordinate(self.cosine(cos_1, cos_2), self.cosine(cos_2, cos_1), self.n12)
+
+    def _side(self, k: int, at: Value) -> Value:
+        """What is reflected on either side, or passes."""
+        if len(self.data) and not isinstance(at, Symbol):
+            return np.stack(ops.interpolate(self, float(at))[3 * k : 3 * k + 3])
+        return Symbol(FILM, (operand(at),), "colour", f"{self.name}_{SIDES[k]}")
 
     def at(self, cosine: Value, like: Value) -> Value:
         if len(self.data) and not isinstance(cosine, Symbol):
             return np.stack(ops.interpolate(self, float(cosine)))
         return Symbol(FILM, (operand(cosine),), "colour", self.name)
 
-    def averaged(self, often: bool) -> Callable[[Value, Value], Value]:
+    def averaged(self, often: bool) -> tuple[Average, Average]:
         name = f"{self.name}_{'below' if self.turned else 'above'}"
 
-        def average(cos_theta: Value, alpha: Value) -> Value:
+        def average(name: str, cos_theta: Value, alpha: Value) -> Value:
             at = operand(self._place(cos_theta)), operand(coordinates.from_roughness(alpha))
             return Symbol(FILM, at, "colour", name)
 
-        return average
+        return partial(average, name), partial(average, f"{name}_lost")
 
     def _place(self, cos_theta: Value) -> Value:
         """The coordinate of a direction, as a `FilmAverage` has it."""
@@ -88,7 +118,7 @@ def recorded(material: Material, stack: Stack, general: bool) -> Material:
             if general and n12 is not None:
                 below = material.exterior if material.thin and layer is layers[-1] else layer.eta
                 n12 = ops.mean(below) / ops.mean(above)
-            read: Any = Read(f"film{n}", data, n12)
+            read: Any = Read(f"film{n}", data, n12, known.absorbs)
             material = material.with_layer(n, coating=read)
         elif layer.films:
             material = material.with_layer(n, films=())
@@ -135,10 +165,14 @@ def tables(stack: Stack, names: Collection[str], model: Model, coarse: bool = Fa
     for name in sorted(names):
         parts = _NAME.fullmatch(name)
         assert parts
-        own = films[int(parts[1])]
+        (number, of_facets, side, lost) = parts.groups()
+        own = films[int(number)]
         assert own
-        seen = own.reversed() if parts[2] == "_below" else own
-        found[name] = film_average(seen, model.microsurface, coarse).data if parts[2] else own.data
+        if side:
+            average = film_average(own.reversed() if side == "below" else own, model.microsurface, coarse)
+            found[name] = np.split(average.data, average.data.shape[-1] // 3, axis=-1)[1 if lost else 0]
+        else:
+            found[name] = np.split(own.data, 3, axis=-1)[SIDES.index(of_facets)] if of_facets else own.data
     return found
 
 
@@ -147,7 +181,9 @@ def layouts(names: Iterable[str]) -> list[Layout]:
     found: list[Layout] = []
     start = 0
     for name in sorted(names):
-        nodes = AVERAGED if "_" in name else (NODES,)
+        parts = _NAME.fullmatch(name)
+        assert parts
+        nodes = AVERAGED if parts[3] else (2 * NODES - 1 if parts[2] else NODES,)
         found.append(Layout(name, start, nodes, 3))
         start = -(-found[-1].end // WIDTH) * WIDTH
     return found

@@ -211,9 +211,6 @@ class Interface(LayerRecord):
             raise ValueError("films: not on a mirror, which reflects all light")
         if self.films and isinstance(self.eta, Texture) | isinstance(self.k, Texture):
             raise ValueError("films: not over an index from a texture")
-        for k, film in enumerate(self.films):
-            if not self.opaque and film.absorbs:
-                raise ValueError(f"films: film {k}: k: only over a metal, an interface with k or conductor")
         return self
 
     @property
@@ -239,8 +236,8 @@ class Interface(LayerRecord):
 
     @property
     def lossless(self) -> bool:
-        """Whether it absorbs no light: it is no metal."""
-        return self.kind != "conductor"
+        """Whether it absorbs no light: it is no metal, and no film on it absorbs."""
+        return self.kind != "conductor" and not any(film.absorbs for film in self.films)
 
     def written(self, key: str) -> Any:
         """The value of a parameter as written: for the indices, the name of a conductor."""

@@ -441,7 +441,7 @@ class Film(Record):
     k: Annotated[
         float | RGB | str,
         Index(
-            "absolute extinction; only over metals",
+            "absolute extinction",
             low=0,
             high=INDEX_HIGH,
             part="k",

@@ -7,7 +7,8 @@ walks give a directional albedo to a thousandth.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,14 @@ FAINT = 0.05  # weight below which walks are ended at random, and the others tak
 MOST_MEETINGS = 1000
 
 Array = np.ndarray
-Reflectance = Callable[[Array], Array]  # of facets, (C, walks) by their cosines
+Share = Callable[[Array], Array]  # of light that meets facets, (C, walks) by their cosines
+
+
+class Side(NamedTuple):
+    """What facets reflect, and let pass, of light from one side."""
+
+    reflectance: Share
+    passing: Share
 
 
 class Walks:
@@ -84,24 +92,23 @@ class Walks:
     def reflect(self, i: Direction, h: Direction) -> None:
         self.w = ggx.reflect(i, h)
 
-    def scatter(
-        self, i: Direction, h: Direction, eta: Array, facets: tuple[Reflectance, Reflectance] | None = None
-    ) -> None:
-        """Reflect and refract: two walks out of each one; `eta` by point, as seen from above, and the reflectances of
-        facets from above and from below, Fresnel's without."""
+    def scatter(self, i: Direction, h: Direction, eta: Array, facets: Sequence[Side] | None = None) -> None:
+        """Reflect and refract: two walks out of each one; `eta` by point, as seen from above, and the facets from above
+        and from below, which reflect as Fresnel's without."""
         eta_here = eta.astype(np.float32)[self.point]
         eta_here = np.where(self.outside, eta_here, 1 / eta_here)
         cosine = np.clip(ggx.dot(i, h), 0, 1)
         if facets is None:
             reflectance = fresnel.dielectric(cosine, eta_here)
+            passing = 1 - reflectance
         else:
-            from_above, from_below = (facet(cosine) for facet in facets)
-            reflectance = np.where(self.outside, from_above, from_below)
+            reflectance = np.where(self.outside, *(side.reflectance(cosine) for side in facets))
+            passing = np.where(self.outside, *(side.passing(cosine) for side in facets))
         refracted = reverse(refraction.refract(i, h, eta_here))
         self._take(np.tile(np.arange(len(self)), 2))
         x, y, z = map(np.concatenate, zip(ggx.reflect(i, h), refracted))
         self.w = x, y, z
-        self.weight = self.weight * np.concatenate([reflectance, 1 - reflectance], axis=-1)
+        self.weight = self.weight * np.concatenate([reflectance, passing], axis=-1)
         # For refracted light the surface is upside down
         below = len(cosine)
         self.rank[below:] = 1 - self.rank[below:]
@@ -135,37 +142,41 @@ def reflected_later(cos_theta: Array, alpha: Array, eta: Array, paths: int, rng:
     return energy / paths
 
 
-def reflected_share(
-    facets: tuple[Reflectance, Reflectance | None], eta: float, cos_theta: Array, alpha: Array, paths: int
-) -> Array:
-    """Share (C, points) of light, of what meets facets again, that is reflected in the end.
+def shares_in_the_end(
+    facets: Sequence[Side], eta: float, cos_theta: Array, alpha: Array, paths: int
+) -> tuple[Array, Array]:
+    """Shares (C, points) of light, of what meets facets again, that are reflected, and that pass, in the end.
 
-    facets: their reflectance from above and from below, None for what is opaque. That takes its share already at the
-        first meeting, so that the share is of light that meets facets again if they first reflect all.
+    facets: from above and from below, the first alone for what is opaque. That takes its share already at the first
+        meeting, so that the share is of light that meets facets again if they first reflect all.
     eta: relative index, of what is not opaque.
 
     Points draw the same numbers, and so they have nearly the same error.
     """
-    above, below = facets
+    opaque = len(facets) == 1
     walks, count = Walks(cos_theta, alpha, paths, np.random.default_rng(0), alike=True), len(alpha)
     again: Array = np.zeros(1)
-    energy: Array = np.zeros(1)
+    energies: list[Array] = [np.zeros(1), np.zeros(1)]
     while len(walks) and walks.meetings < MOST_MEETINGS:
         i, h = walks.meet()
-        if below is None:
+        if opaque:
             walks.reflect(i, h)
         else:
-            walks.scatter(i, h, np.full(count, eta), (above, below))
+            walks.scatter(i, h, np.full(count, eta), facets)
         leaving = walks.leave()
         if walks.meetings == 1:
             again = _by_point(np.atleast_2d(walks.weight), walks, count)
-        if below is None:
-            reflectance = above(np.clip(ggx.dot(i, h), 0, 1))
+        if opaque:
+            reflectance = facets[0].reflectance(np.clip(ggx.dot(i, h), 0, 1))
             leaving, walks.weight = leaving * reflectance, walks.weight * reflectance
         if walks.meetings > 1:
-            energy = energy + _by_point(np.where(walks.outside, leaving, 0), walks, count)
+            here = walks.outside, ~walks.outside
+            energies = [
+                energy + _by_point(np.where(side, leaving, 0), walks, count) for energy, side in zip(energies, here)
+            ]
         walks.end_faint()
-    return energy / np.maximum(again, np.finfo(float).tiny)
+    again = np.maximum(again, np.finfo(float).tiny)
+    return energies[0] / again, energies[1] / again
 
 
 def _by_point(weights: Array, walks: Walks, count: int) -> Array:

@@ -124,9 +124,7 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
             k = _colours(each.k) / outside if each.kind == "conductor" else None
             angle = float(np.radians(each.rotation))
             facets = Facets(above, below, k, float(each.alpha_u), float(each.alpha_v), angle)
-            if films:
-                facets = replace(facets, films=films.data, rarer=films.rarer)
-            found.append(facets)
+            found.append(replace(facets, films=films) if films else facets)
             if each.kind == "dielectric" and below is not None:
                 above = below
     return found

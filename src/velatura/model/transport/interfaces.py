@@ -20,10 +20,10 @@ from velatura import ops, tables
 from velatura.model.transport.modes import TINY, Basis, Light
 from velatura.model.transport.operators import Layer, Operator
 from velatura.optics import fresnel, ggx
-from velatura.sampling.coated import Coated
+from velatura.sampling.coated import Coated, dielectric_between, dielectric_passing
 from velatura.sampling.low_discrepancy import fibonacci
 from velatura.tables import Tables, coordinates
-from velatura.tables.microsurface_walks import reflected_share
+from velatura.tables.microsurface_walks import Side, shares_in_the_end
 
 Array = NDArray[np.floating]
 
@@ -45,7 +45,7 @@ BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which
 class Facets:
     """An interface between indices `above` and `below`, by colour (C,); `k` is None for a dielectric, and `below` too
     for a mirror. Roughnesses, and a rotation in radians. `final` says that nothing sends back what it lets through.
-    `films` is the reflectance of thin films on it (nodes, 3), as of `Coated`, whose `rarer` side is 1 or 2.
+    `films` are thin films on it.
     """
 
     above: Array
@@ -55,8 +55,7 @@ class Facets:
     alpha_v: float
     rotation: float = 0.0
     final: bool = False
-    films: Array | None = None
-    rarer: int = 1
+    films: Coated | None = None
 
     @property
     def opaque(self) -> bool:
@@ -89,28 +88,36 @@ class Facets:
         """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
         n = float(ops.mean(self.above))
         cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, GRAZING**2))
-        r = self.reflectance(cosine)
-        return 1 - r if transmitted else r
+        return self.passing(cosine) if transmitted else self.reflectance(cosine)
 
     def reversed(self) -> Facets:
         assert self.below is not None
-        films = self.films, 3 - self.rarer
-        return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation, False, *films)
+        films = self.films and self.films.reversed()
+        return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation, False, films)
 
     def reflectance(self, cosine: Array) -> Array:
         """Fresnel reflectance (C, ...) of facets."""
-        shape = (-1, *(1,) * np.ndim(cosine))
         if self.below is None:
             return np.ones((1, *np.shape(cosine)))
-        eta = (self.below / self.above).reshape(shape)
-        if self.films is not None and self.k is not None:
-            return np.asarray(Coated(self.films, 1).at(cosine, eta))
         if self.k is None:
-            cos_t = fresnel.cos_transmitted(cosine, float(ops.mean(self.below) / ops.mean(self.above)))
-            if self.films is not None:
-                return np.asarray(Coated(self.films, self.rarer).between(cosine, cos_t, eta))
-            return np.asarray(fresnel.dielectric_between(cosine, cos_t, eta))
+            return np.asarray(dielectric_between(self.films, *self._between(cosine)))
+        shape = (-1, *(1,) * np.ndim(cosine))
+        eta = (self.below / self.above).reshape(shape)
+        if self.films is not None:
+            return np.asarray(self.films.at(cosine, eta))
         return np.asarray(fresnel.conductor(cosine, eta, (self.k / self.above).reshape(shape)))
+
+    def passing(self, cosine: Array) -> Array:
+        """Share (C, ...) of light that facets let pass."""
+        if self.opaque:
+            return np.zeros((1, *np.shape(cosine)))
+        return np.asarray(dielectric_passing(self.films, *self._between(cosine)))
+
+    def _between(self, cosine: Array) -> tuple[Array, Array, Array]:
+        """Cosines on both sides of a facet of a dielectric, and the relative index by colour."""
+        assert self.below is not None
+        cos_t = fresnel.cos_transmitted(cosine, float(ops.mean(self.below) / ops.mean(self.above)))
+        return cosine, np.asarray(cos_t), (self.below / self.above).reshape(-1, *(1,) * np.ndim(cosine))
 
 
 @dataclass(frozen=True)
@@ -178,7 +185,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
     t = along * h[0] - wi[0] / eta, along * h[1] - wi[1] / eta, along * h[2] - wi[2] / eta
     kept = [escape(t, t[2] < 0, True, often) for often in ways]
-    refracted, not_refracted = divided(t, below, (1 - reflectance) * share, kept)
+    refracted, not_refracted = divided(t, below, facets.passing(cosine) * share, kept)
     return _Events(reflected, refracted, back, blocked, not_refracted, whole)
 
 
@@ -293,7 +300,7 @@ class _Met:
         key = (
             *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in lengths),
             *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes(), setting.samples, *setting.ways),
-            *(facets.rarer, None if facets.films is None else facets.films.tobytes()),
+            *((facets.films.rarer, facets.films.data.tobytes()) if facets.films else ()),
             *(type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), nodes.cells),
         )
         if key not in setting.made:
@@ -385,8 +392,8 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> t
         return events.whole, np.zeros_like(events.whole)
     blocked: Array = events.whole if facets.opaque else events.blocked_reflected + events.blocked_refracted
     if facets.films is not None:
-        share = share_of_films(facets, setting.made, p)
-        return blocked * share, np.zeros_like(blocked) if facets.opaque else blocked * (1 - share)
+        reflected, passed = shares_of_films(facets, setting.made, p)
+        return blocked * reflected, blocked * passed
     mean = _mean_alpha(facets)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
     ratio = (facets.below / facets.above)[:, None]
@@ -416,29 +423,34 @@ def _mean_alpha(facets: Facets) -> float:
     return float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
 
 
-def share_of_films(facets: Facets, made: dict[Hashable, Any], p: Array) -> Array:
-    """Share (C, sources) of blocked light of lengths p that films reflect in the end, by walks, since no table has
-    them."""
+def shares_of_films(facets: Facets, made: dict[Hashable, Any], p: Array) -> tuple[Array, Array]:
+    """Shares (C, sources) of blocked light of lengths p that films reflect, and let pass, in the end, by walks, since
+    no table has them."""
     mean = _mean_alpha(facets)
-    assert facets.below is not None and facets.films is not None
-    numbers = facets.above, facets.below, facets.k, facets.films
-    key = mean, facets.rarer, *(None if x is None else x.tobytes() for x in numbers)
+    assert facets.below is not None and facets.films
+    numbers = facets.above, facets.below, facets.k, facets.films.data
+    key = mean, facets.films.rarer, *(None if x is None else x.tobytes() for x in numbers)
     # Walk in directions that crowd where shares bend
     places = (np.arange(WALKED) + 0.5) / WALKED
     critical = np.arcsin(float(ops.mean(facets.below) / ops.mean(facets.above))) if facets.is_exit else None
     if key not in made:
-        back = None if facets.opaque else facets.reversed().reflectance
+        sides = [facets] if facets.opaque else [facets, facets.reversed()]
         eta = float(ops.mean(facets.below) / ops.mean(facets.above))
         cosines = coordinates.to_cosine(places) if critical is None else coordinates.to_angle(places, critical)
         alpha = np.full(WALKED, mean)
-        made[key] = reflected_share((facets.reflectance, back), eta, np.asarray(cosines), alpha, PATHS)
+        each = [Side(side.reflectance, side.passing) for side in sides]
+        made[key] = shares_in_the_end(each, eta, np.asarray(cosines), alpha, PATHS)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
     at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
-    return np.array([np.interp(at, places, each) for each in made[key]])
+    reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in made[key])
+    return reflected, passed
 
 
-def of_first_events(facets: Facets, p: Array, samples: int, often: bool) -> tuple[Array, Array]:
-    """Shares (C, N) of light of lengths p that facets with films reflect when they are first met, and that meets others
-    then."""
+def of_first_events(facets: Facets, p: Array, samples: int, often: bool) -> tuple[Array, Array, Array]:
+    """Shares (C, N) of light of lengths p that facets with films reflect when they are first met, that films of a
+    dielectric absorb, and that meets others then."""
     events = _events(facets, p, 0 * p, samples, [often])
-    return events.kept, events.whole if facets.opaque else events.blocked_reflected + events.blocked_refracted
+    if events.refracted is None:
+        return events.kept, 0 * events.kept, events.whole
+    blocked = events.blocked_reflected + events.blocked_refracted
+    return events.kept, 1 - events.kept - events.refracted.weight.sum(axis=-1) - blocked, blocked

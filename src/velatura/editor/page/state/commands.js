@@ -220,12 +220,8 @@ function become(variant, kind, keys, names, fresh) {
   return { kind: 'interface', keys: { ...index[variant](), ...surface, ...filmsOn(variant, films) } };
 }
 
-/** The films that an interface keeps: none on a mirror, and those on a dielectric are clear. */
-function filmsOn(variant, films) {
-  if (variant === 'mirror' || !films.length) return {};
-  const clear = (film) => Object.fromEntries(Object.entries(film).filter(([key]) => key !== 'k'));
-  return { films: variant === 'dielectric' ? films.map(clear) : films };
-}
+/** The films that an interface keeps: none on a mirror. */
+const filmsOn = (variant, films) => (variant === 'mirror' || !films.length ? {} : { films });
 
 const rounded = (colour) => colour.map((channel) => Number(channel.toPrecision(4)));
 

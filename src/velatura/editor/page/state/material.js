@@ -74,6 +74,12 @@ function numbersOf(keys, parameters, names) {
 /** The two of a pair; a locked one has the same twice. */
 export const axes = (pair) => (Array.isArray(pair) ? pair : [pair, pair]);
 
+/** Whether an interface has any films, and one that absorbs. */
+function films({ films = [] }) {
+  const thick = films.filter(({ thickness_nm: thickness }) => thickness !== 0);
+  return [thick.length > 0, thick.some(({ k = 0 }) => [k].flat().some((channel) => channel !== 0))];
+}
+
 /** What decides about the code of a shader, as text; two states of one pattern differ in numbers alone. */
 export function pattern(state) {
   const shape = (value) => {
@@ -85,7 +91,7 @@ export function pattern(state) {
     Object.entries(keys)
       .filter(([key, value]) => key !== 'films' && typeof shape(value) === 'object')
       .map(([key, value]) => [key, shape(value)]),
-    keys.films?.some(({ thickness_nm: thickness }) => thickness !== 0) ?? false, // of which code knows no more
+    films(keys), // of which code knows no more
   ]);
   return JSON.stringify([state.thin, layers]);
 }

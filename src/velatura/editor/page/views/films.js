@@ -3,7 +3,7 @@
 import { html, nothing } from 'lit-html';
 import { styleMap } from 'lit-html/directives/style-map.js';
 import { addFilm, moveFilm, numberOf, removeFilm, setFilm } from '../state/commands.js';
-import { documentOf, isOpaque } from '../state/material.js';
+import { documentOf } from '../state/material.js';
 import { hex } from './colour.js';
 import { iconButton } from './controls.js';
 import { icons } from './icons.js';
@@ -49,9 +49,7 @@ function card({ services, layer, value, film, n, row, spec }) {
     store.run(removeFilm, layer.id, n);
     focus(value.length > 1 ? gripAt(Math.min(n, value.length - 2)) : `[data-layer="${layer.id}"] > .head .grip`);
   };
-  // An index of a metal may be that of a film over one
-  const seen = { id: `${layer.id}.film${n}`, kind: 'interface', keys: isOpaque(layer) ? { k: 0, ...film } : film };
-  const keys = Object.keys(spec).filter((key) => key !== 'k' || isOpaque(layer));
+  const seen = { id: `${layer.id}.film${n}`, kind: 'interface', keys: { k: 0, ...film } };
   const part = (key) => {
     const act = (next) => [setFilm, layer.id, n, key, next];
     const own = { layer: seen, key, label: name, value: film[key] ?? spec[key].default };
@@ -73,7 +71,7 @@ function card({ services, layer, value, film, n, row, spec }) {
       <span class="place">${name}</span>
       <span class="buttons">${iconButton({ label: `Remove film ${n}`, icon: 'remove', act: remove })}</span>
     </div>
-    ${keys.map(part)}
+    ${Object.keys(spec).map(part)}
   </li>`;
 }
 
