@@ -7,6 +7,7 @@ such a file gives the same stack, and what a stack cannot carry is said once, in
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -119,3 +120,16 @@ def test_images_are_rendered_by_their_curves(tmp_path: Path) -> None:
     wo = mi.Vector3f(-0.28, 0.0, 0.96)
     values = [np.ravel(each.eval(mi.BSDFContext(), si, wo)) for each in (found, wanted)]
     np.testing.assert_allclose(values[0], values[1], rtol=5e-3)
+
+
+def test_the_examples_of_the_manual_run(tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the page's file is read by its commands and its code."""
+    page = (Path(__file__).parents[2] / "docs" / "imports.md").read_text()
+    monkeypatch.chdir(tmp_path)
+    (document,) = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
+    Path("varnished.mtlx").write_text(document)
+    for command in re.findall(r"^velatura (.*)$", page, re.MULTILINE):
+        assert run(*command.split())[0] == 0, command
+    with pytest.warns(Incomplete):
+        exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), {})
+    assert vt.load("varnished.yaml").kinds == ("dielectric", "medium", "dielectric", "diffuse")

@@ -12,7 +12,10 @@ from velatura.errors import InvalidInput
 if TYPE_CHECKING:
     from velatura.stack import Stack
 
-Material = Annotated[str, typer.Argument(metavar="M", help="A material file (YAML or JSON), or the name of a preset.")]
+Material = Annotated[
+    str,
+    typer.Argument(metavar="M", help="A material file (YAML, JSON; MaterialX, glTF), or the name of a preset."),
+]
 
 # By name, since the models themselves load NumPy (tests/unit/test_cli.py holds the two to each other).
 MODELS = "belcour2018, yamaguchi2019, weier2020, bati2021, realtime, velatura"

@@ -23,7 +23,7 @@ _PRESETS = resources.files("velatura.stack") / "presets"
 _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 _LARGEST = 100_000  # values in a file
 _PATHS = ("texture", "spectrum")  # keys
-_FOREIGN = (".mtlx", ".gltf", ".glb", ".xml")  # of other programs, which `velatura.imports` reads
+FOREIGN = (".mtlx", ".gltf", ".glb", ".xml")  # of other programs, which `velatura.imports` reads
 
 #: What names a material wherever one is asked for: a stack, a file, or the name of a preset.
 MaterialLike: TypeAlias = Stack | str | Path
@@ -61,7 +61,7 @@ def load(material: MaterialLike) -> Stack:
 def foreign(material: str) -> str:
     """The file of another program in FILE or FILE#NAME; empty for what is none."""
     file = material if os.path.exists(material) else material.rpartition("#")[0] or material
-    return file if Path(file).suffix.lower() in _FOREIGN else ""
+    return file if Path(file).suffix.lower() in FOREIGN else ""
 
 
 def loads(
