@@ -22,6 +22,7 @@ lobes:
   - {energy: 0.1, alpha: 0, interfaces: 1}
   - {energy: [0.35, 0.25, 0.3], variance: 0.04, interfaces: 1, base: conductor}
 """
+COATED = "layers: [interface: {eta: 1.5, alpha: 0.05}, interface: {conductor: Au, alpha: 0.2}]\n"
 PAIR = "lobes:\n  - {energy: [0.09, 0.09, 0.15], variance: 0.03, interfaces: 2}\n"
 
 
@@ -32,11 +33,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "hazy.yaml").write_text(TARGET)
     (tmp_path / "pair.yaml").write_text(PAIR)
     (tmp_path / "bright.yaml").write_text("lobes:\n  - {energy: 0.6}\n")
+    (tmp_path / "coated.yaml").write_text(COATED)
     return tmp_path
 
 
 def files(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir()} - {"hazy.yaml", "pair.yaml", "bright.yaml"}
+    return {path.name for path in folder.iterdir()} - {"hazy.yaml", "pair.yaml", "bright.yaml", "coated.yaml"}
 
 
 def test_a_target_becomes_a_material(run: Run, folder: Path) -> None:
@@ -184,7 +186,7 @@ def test_a_coat_that_keeps_the_appearance(run: Run, folder: Path, model: str, de
 
 def test_a_coat_too_rough_to_keep_says_what_is_lost(run: Run, folder: Path) -> None:
     """Expected: the nearest material, with a line for each layer; the coat's own lobe has a row, as in JSON."""
-    arguments = ("coat", "coated-gold", "--alpha", "0.5", "--keep-appearance")
+    arguments = ("coat", "coated.yaml", "--alpha", "0.5", "--keep-appearance")
     status, out, err = run(*arguments, "-o", "rough.yaml")
     assert (status, err) == (0, "")
     lines = out.splitlines()
@@ -204,8 +206,8 @@ def test_an_answer_names_its_model(run: Run, folder: Path) -> None:
     }
     for arguments in (
         ["invert", "pair.yaml"],
-        ["coat", "coated-gold"],
-        ["coat", "coated-gold", "--keep-appearance"],
+        ["coat", "coated.yaml"],
+        ["coat", "coated.yaml", "--keep-appearance"],
         ["simplify", "frosted-metal", "--interfaces", "1"],
     ):
         assert lines["velatura"] in run(*arguments)[1].splitlines()
