@@ -371,8 +371,7 @@ def test_gradients_of_a_pixel_are_finite_differences() -> None:
         parameters[names[key]] = after
         parameters.update()
         value = float(brightness()[0])
-        parameters[names[key]] = before
-        parameters.update()
+        parameters[names[key]] = before  # with the next update
         return value
 
     slopes = {}
