@@ -1,4 +1,4 @@
-"""`velatura export`: a material for other programs, as a shader, JSON, a scene of Mitsuba, or a script."""
+"""`velatura export`: a material for other programs, as code, as JSON, as a scene, or as fitted parameters."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def export(
     ] = None,
     settings: options.Settings = None,
 ) -> None:
-    """Write a material as a shader, JSON, a Mitsuba scene or a script."""
+    """Write a material as code, JSON, a scene, or fitted parameters."""
     if output is not None:
         check_writable(output, to.value)
     chosen: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
@@ -59,6 +59,8 @@ def export(
     stack, switches = options.read(material, settings)
     folder = output.parent if output else None
     made = exported(stack, to.value, options.model_name(model), folder=folder, **chosen, **switches)
+    for note in made.notes:
+        print(note, file=sys.stderr)
     if output is None:
         print(made.text, end="")
         if made.beside:

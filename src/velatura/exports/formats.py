@@ -39,6 +39,12 @@ _SHADERS = {
     "slang": (".slang",),
     "wgsl": (".wgsl",),
 }
+_BAKES = {
+    "openpbr": (".mtlx",),
+    "gltf": (".gltf",),
+    "blender-principled": (".py",),
+    "mitsuba-principled": (".xml",),
+}
 LICENCE = "BSD-3-Clause"  # of code that is written
 _OF_SHADERS = frozenset({"constant", "prefix"})
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
@@ -56,6 +62,7 @@ FORMATS: dict[str, Format] = {
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
+    **{name: Format(endings, "velatura.exports.baked") for name, endings in _BAKES.items()},
 }
 
 
@@ -88,12 +95,13 @@ class Request:
 class Export:
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
 
-    costs: of code, what a call of each function costs, in words.
+    costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in sentences.
     """
 
     text: str
     beside: Mapping[str, bytes] = field(default_factory=dict)
     costs: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def save(self, path: str | Path) -> list[Path]:
         """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.

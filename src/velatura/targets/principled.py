@@ -28,6 +28,7 @@ PARAMETERS = (
 LUMINANCE = np.array([[0.212671], [0.715160], [0.072169]])
 COAT_ALPHA = (0.1, 0.001)  # of a gloss of 0 and of 1
 COAT_F_0, COAT_MASKING = 0.04, 0.25
+UNRESOLVED = 0.01  # excess of an index over 1
 
 
 def alphas(roughness: float, anisotropic: float) -> tuple[float, float]:
@@ -86,7 +87,12 @@ def value(given: Values, pair: Pair, thin: bool = False) -> Array:
 
 
 def _refracted(pair: Pair, eta: float, alpha_u: float, alpha_v: float) -> Array:
-    """As energy, with the Fresnel transmittance of each facet, and separable masking."""
+    """As energy, with the Fresnel transmittance of each facet, and separable masking.
+
+    Facets that hardly deflect light leave a lobe too narrow to be resolved; it then has that of the least roughness.
+    """
+    if eta - 1 < UNRESOLVED:
+        return closures.refracted(pair, 1.0, closures.ALPHA_MIN, closures.ALPHA_MIN)
     h = pair.wi + eta * pair.wo
     h = h / np.sqrt(np.maximum(np.sum(h * h, axis=0), 1e-12)) * np.where(h[2] < 0, -1.0, 1.0)
     i_h, o_h = np.sum(pair.wi * h, axis=0), np.sum(pair.wo * h, axis=0)

@@ -1,0 +1,189 @@
+"""Fit of a target's parameters to a stack, and the loss that remains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from velatura.bakes.look import Array, Described
+from velatura.bakes.lost import lost
+from velatura.bakes.sampled import Sampled
+from velatura.bakes.targets import TARGETS, UNIT, Range, Target
+from velatura.errors import InvalidInput
+from velatura.model import DEFAULT, Model, named
+from velatura.optics.directions import directions
+from velatura.stack import Material, MaterialLike, load
+from velatura.stack.schema import unknown
+from velatura.targets.parameters import RGB, Values, complete
+
+FITTED, AZIMUTHS = (1.0, 0.85, 0.6, 0.35), (0.0, 60.0, 120.0)  # cosines of incidence, and degrees where brushed
+NODES, REPORTED = 350, 2**14  # for each direction: in the fit, and in the loss
+COSINES = (1.0, 0.7, 0.35)  # of the loss, as in `compare`
+PRIOR = 0.03  # weight of a change, of the whole range, of a parameter that hardly counts
+FIRST, STEPS = 3, 12  # of least squares: from every look, and from where the best of them has led
+Baked: TypeAlias = dict[str, float | RGB]
+
+NEAR = 2e-3
+STEP = 1e-4  # of finite differences, of a range
+
+
+@dataclass(frozen=True)
+class Bake:
+    """Parameters of a target that come closest to a stack, and what is lost.
+
+    For the N cosines of incidence `cos_theta`, in the target's own formulas against the model: total_variation (N,),
+    the share of the reflected light in wrong places, as `compare` measures it; albedo, baked_albedo (3, N); passed,
+    baked_passed (3, N), what leaves below. lost: what the target does not hold. thin: light passes without refraction.
+    """
+
+    target: str
+    name: str
+    model: str
+    values: Baked
+    cos_theta: tuple[float, ...]
+    total_variation: Array
+    albedo: Array
+    baked_albedo: Array
+    passed: Array
+    baked_passed: Array
+    lost: tuple[str, ...]
+    thin: bool
+
+    @property
+    def title(self) -> str:
+        """The target's name."""
+        return TARGETS[self.target].title
+
+    @property
+    def summary(self) -> list[str]:
+        """The loss in sentences, then what is not held."""
+        cosines, shares = (
+            ", ".join(f"{x:{form}}" for x in each)
+            for each, form in ((self.cos_theta, "g"), (100 * self.total_variation, ".1f"))
+        )
+        lines = [
+            f"Parameters of {self.title} that come closest to {self.name or 'a material'} by the model {self.model}.",
+            f"Loss in the formulas of {self.title}, at cosines of incidence {cosines}:",
+            f"total variation: {shares} % of the reflected light is in wrong places",
+            f"albedo: {_off(self.albedo, self.baked_albedo, self.cos_theta)}",
+        ]
+        if self.passed.any():
+            lines.append(f"light that passes: {_off(self.passed, self.baked_passed, self.cos_theta)}")
+        return lines + [f"not held: {each}" for each in self.lost]
+
+
+def _off(true: Array, found: Array, cosines: tuple[float, ...]) -> str:
+    """The mean and the greatest error of an energy, and where that is."""
+    error = found - true
+    channel, n = np.unravel_index(np.argmax(np.abs(error)), error.shape)
+    where = f"{('red', 'green', 'blue')[channel]}, cosine {cosines[n]:g}"
+    return f"{np.abs(error).mean():.3f} off in the mean, {error[channel, n]:+.3f} at most ({where})"
+
+
+def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **switches: str) -> Bake:
+    """Fit a target's parameters to the light of a stack.
+
+    Raises:
+        InvalidInput: not a valid material, an unknown target, model or switch, a texture.
+    """
+    if target not in TARGETS:
+        raise InvalidInput(unknown("target", target, TARGETS))
+    chosen, stack, kind = named(model, **switches), load(material), TARGETS[target]
+    described = Described.of(Material.of(stack), chosen)
+    azimuths = np.radians(AZIMUTHS if described.brushed else AZIMUTHS[:1])
+    cosines, turns = (x.ravel() for x in np.meshgrid(FITTED, azimuths))
+    sampled = Sampled.of(described, chosen, directions(cosines, turns), NODES)
+    values = _fitted(kind, described, sampled)
+
+    shown = Sampled.of(described, chosen, directions(COSINES), REPORTED)
+    light = kind.value(values, shown.pair, described.thin)
+    apart = np.abs((shown.distribution(light) - shown.distribution(shown.value)).mean(axis=0)).sum(axis=(1, 2))
+    total = np.maximum(shown.energy(shown.value).mean(axis=0), 1e-12)
+    return Bake(
+        target=target,
+        name=stack.name,
+        model=chosen.name,
+        values=values,
+        cos_theta=COSINES,
+        total_variation=0.5 * apart / total,
+        albedo=shown.energy(shown.value),
+        baked_albedo=shown.energy(light),
+        passed=shown.energy(shown.value, up=False),
+        baked_passed=shown.energy(light, up=False),
+        lost=tuple(lost(described, target)),
+        thin=described.thin,
+    )
+
+
+@dataclass(frozen=True)
+class _Space:
+    """The numbers that are fitted, one for each component of a colour, each between 0 and 1 of its range."""
+
+    like: Baked
+    ranges: dict[str, Range]
+
+    def numbers(self, values: Values) -> Array:
+        found: list[float] = []
+        for name, (low, high) in self.ranges.items():
+            each = np.atleast_1d(np.asarray(values[name], float))
+            found.extend(np.clip((each - low) / (high - low), 0, 1))
+        return np.array(found)
+
+    def values(self, numbers: Array) -> Baked:
+        each = iter(numbers)
+        changed: Baked = {}
+        for name, (low, high) in self.ranges.items():
+            if isinstance(self.like[name], tuple):
+                r, g, b = (low + (high - low) * float(next(each)) for _ in range(3))
+                changed[name] = (r, g, b)
+            else:
+                changed[name] = low + (high - low) * float(next(each))
+        return {**self.like, **changed}
+
+    def rounded(self, numbers: Array) -> Baked:
+        """As files have them: six digits, and a share that is nearly 0 or 1 is just that."""
+        shares = np.repeat(
+            [pair == UNIT for pair in self.ranges.values()], [np.size(self.like[n]) for n in self.ranges]
+        )
+        numbers = np.where(shares & (numbers < NEAR), 0, np.where(shares & (numbers > 1 - NEAR), 1, numbers))
+        plain = {
+            name: np.array([float(f"{x:.6g}") for x in np.atleast_1d(value)])
+            for name, value in self.values(numbers).items()
+        }
+        return {name: tuple(value.tolist()) if len(value) > 1 else float(value[0]) for name, value in plain.items()}
+
+
+def _fitted(target: Target, described: Described, sampled: Sampled) -> Baked:
+    """The closest values of descents from every look."""
+    starts = [complete(target.parameters, target.start(look)) for look in described.looks]
+    ends = [_descended(target, described, sampled, start, start, FIRST) for start in starts]
+    nearest = int(np.argmin([cost for cost, _ in ends]))
+    _, found = _descended(target, described, sampled, starts[nearest], ends[nearest][1], STEPS)
+    return found
+
+
+def _descended(
+    target: Target, described: Described, sampled: Sampled, look: Baked, start: Baked, steps: int
+) -> tuple[float, Baked]:
+    """Cost and values at the end of a descent by least squares, near the values of a look where nothing else counts."""
+    from scipy.optimize import least_squares
+
+    film = any(look.film for look in described.looks)
+    ranges = {
+        **target.always,
+        **(target.brushed if described.brushed else {}),
+        **(target.clear if described.below is not None else {}),
+        **(target.film if film else {}),
+    }
+    space = _Space(start, ranges)
+    first = space.numbers(look)
+
+    def residuals(numbers: Array) -> Array:
+        light = target.value(space.values(numbers), sampled.pair, described.thin)
+        return np.concatenate([sampled.residuals(light), PRIOR * (numbers - first)])
+
+    inside = np.clip(space.numbers(start), 1e-3, 1 - 1e-3)
+    found = least_squares(residuals, inside, bounds=(0, 1), diff_step=STEP, max_nfev=steps, tr_solver="lsmr")
+    return float(found.cost), space.rounded(found.x)

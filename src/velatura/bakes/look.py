@@ -1,0 +1,165 @@
+"""A stack in the terms that uber-shaders share: a coat over a base that is metal, diffuse, clear, or a mixture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.model import Model, variance_kind
+from velatura.model.lobe_statistics import StackLobes
+from velatura.model.variance import Isotropic
+from velatura.optics import fresnel
+from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.targets.parameters import RGB
+
+Array: TypeAlias = NDArray[np.floating]
+Pair: TypeAlias = tuple[float, float]
+
+CLEAR: RGB = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours (3,), roughness as GGX alpha along two axes, turned in radians from the tangent; indices over the
+    exterior.
+
+    color: of metal at normal incidence, and of diffuse light; clear: the share of the base that light passes, and
+    the colour that it takes on; film: index and thickness in nm of one on the base, or where there is a coat on that.
+    """
+
+    color: RGB
+    metalness: float
+    alpha: Pair
+    turn: float
+    eta: float
+    clear: float = 0.0
+    tint: RGB = CLEAR
+    coat_eta: float = 1.0
+    coat_alpha: Pair = (0.0, 0.0)
+    coat_turn: float = 0.0
+    coat_tint: RGB = CLEAR
+    film: Pair | None = None
+
+
+@dataclass(frozen=True)
+class Described:
+    """A stack for bakes: its values, the brushed lobes at normal incidence, the index that it transmits into (None if
+    none), and the looks that it may have.
+    """
+
+    material: Material
+    brushed: tuple[tuple[float, float, float], ...]
+    below: float | None
+    looks: tuple[Look, ...]
+
+    @classmethod
+    def of(cls, material: Material, model: Model) -> Described:
+        solid = material.solid()
+        below = float(np.mean(solid.interfaces[-1].eta / solid.exterior)) if solid.transmits else None
+        x, y, z = (np.array([w]) for w in (0.0, 0.0, 1.0))
+        seen = model.recursion.statistics(solid, model, (x, y, z))
+        lobes = [(*alpha, turn) for alpha, turn in (_along(seen, k) for k in range(len(seen.alpha)))]
+        brushed = () if variance_kind(solid) is Isotropic else tuple(lobes)
+        return cls(solid, brushed, below, tuple(_looks(solid, seen)))
+
+    @property
+    def thin(self) -> bool:
+        """Whether what light passes into has the index that it came from."""
+        return self.below is not None and abs(self.below - 1) < 1e-3
+
+
+def _looks(material: Material, seen: StackLobes) -> Iterator[Look]:
+    """Several ways to see the stack, from its lobes at normal incidence."""
+    energy = np.array([each[:, 0] for each in seen.energy]).clip(0)  # (lobes, 3)
+    remainder = seen.remainder[:, 0].clip(0)
+    interfaces = list(material.interfaces)
+    first = interfaces[0]
+
+    film = _film(interfaces)
+    all_light = energy.sum(axis=0) + remainder
+    eta_1 = float(np.mean(first.eta / material.exterior)) if first.kind == "dielectric" else 1.0
+    coated = first.kind == "dielectric" and len(energy) > 1
+    if material.transmits:
+        yield from _clear(seen, eta_1, film)
+        return
+
+    under = energy[1:] if coated else energy
+    metal = under.sum(axis=0)
+    if len(under) and metal.mean() > 0:
+        strongest = int(np.argmax(under.mean(axis=1))) + coated
+        alpha, turn = _along(seen, strongest)
+    else:
+        alpha, turn = _along(seen, 0)
+    share = float(metal.mean() / max((metal + remainder).mean(), 1e-6))
+    through = (1 - fresnel.normal_incidence(eta_1)) ** 2
+    color = (metal + remainder) / through
+    plain = Look(_rgb(color), share, alpha, turn, max(eta_1, 1.0), film=film)
+    if coated:
+        coat_alpha, coat_turn = _along(seen, 0)
+        coat = replace(plain, eta=1.0, coat_eta=eta_1, coat_alpha=coat_alpha, coat_turn=coat_turn)
+        yield coat
+        if 0 < share < 1:
+            yield replace(coat, metalness=1.0)
+        deep = _absorbed(material)
+        if deep.min() < 0.98:
+            yield replace(coat, color=_rgb(color / np.maximum(deep, color)), coat_tint=_rgb(deep))
+        yield replace(plain, alpha=coat_alpha, turn=coat_turn, metalness=0.0)
+    elif first.kind == "dielectric":
+        # A dielectric over a diffuse base
+        yield replace(plain, metalness=0.0)
+    else:
+        yield replace(plain, color=_rgb(all_light), metalness=1.0)
+
+
+def _clear(seen: StackLobes, eta_1: float, film: Pair | None) -> Iterator[Look]:
+    """One interface that does all, one below a coat, and one that does not deflect light."""
+    energy = np.array([each[:, 0] for each in seen.energy]).clip(0)
+    tint = _rgb(seen.passed[:, 0] / np.maximum(1 - energy.sum(axis=0), 1e-3))
+    alpha, turn = _along(seen, int(np.argmax(energy.mean(axis=1))))
+    one = Look(tint, 0.0, alpha, turn, _index_of(float(energy.sum(axis=0).mean())), clear=1.0, tint=tint, film=film)
+    yield one
+    yield replace(one, eta=1.0)
+    if len(energy) > 1 and seen.transmitted:
+        u, v = (float(x) for x in seen.transmitted.alpha[:, 0])
+        below = _index_of(float(energy[1:].sum(axis=0).mean()))
+        coat_alpha, coat_turn = _along(seen, 0)
+        yield replace(
+            one, alpha=(max(u, v), min(u, v)), eta=below, coat_eta=eta_1, coat_alpha=coat_alpha, coat_turn=coat_turn
+        )
+
+
+def _along(seen: StackLobes, k: int) -> tuple[Pair, float]:
+    """Roughness of a lobe with the greater one first, which other programs have along the tangent."""
+    (u, v), turn = seen.alpha[k][:, 0], float(seen.rotation[k][0])
+    return ((float(u), float(v)), turn) if u >= v else ((float(v), float(u)), turn + np.pi / 2)
+
+
+def _rgb(colour: Array) -> RGB:
+    r, g, b = (float(x) for x in np.clip(colour, 0, 1))
+    return r, g, b
+
+
+def _film(interfaces: list[InterfaceValues]) -> Pair | None:
+    """All films of the first interface that has some, as one of the same optical thickness."""
+    for each in interfaces:
+        if each.films:
+            nm = sum(float(film.thickness_nm) for film in each.films)
+            path = sum(float(np.mean(film.eta)) * float(film.thickness_nm) for film in each.films)
+            return (path / nm, nm) if nm > 0 else None
+    return None
+
+
+def _absorbed(material: Material) -> Array:
+    """What is left of light that passes all media twice, straight."""
+    depth = sum((m.sigma_a * m.depth for m in material.layers if isinstance(m, MediumValues)), np.zeros((3, 1)))
+    return np.asarray(np.exp(-2 * np.broadcast_to(depth, (3, 1))[:, 0]))
+
+
+def _index_of(f_0: float) -> float:
+    """The index of a dielectric of a reflectance at normal incidence."""
+    root = np.sqrt(np.clip(f_0, 0, 0.8))
+    return float((1 + root) / (1 - root))

@@ -1,0 +1,257 @@
+"""How each target is started from a look, and which of its parameters are fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from velatura.bakes.look import Look
+from velatura.targets import blender, closures, gltf, openpbr, principled
+from velatura.targets.closures import Array, Pair
+from velatura.targets.parameters import RGB, Parameter, Values
+
+Range: TypeAlias = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A program's material: its formulas, the parameters of a look, and the ranges of those that are fitted.
+
+    always: fitted for every stack; others only where a stack has what they stand for.
+    """
+
+    title: str
+    parameters: tuple[Parameter, ...]
+    value: Callable[[Values, Pair, bool], Array]
+    start: Callable[[Look], dict[str, float | RGB]]
+    always: dict[str, Range]
+    brushed: dict[str, Range]
+    clear: dict[str, Range]
+    film: dict[str, Range]
+
+
+UNIT = (0.0, 1.0)
+ROUGH = (closures.ALPHA_MIN**0.5, 1.0)  # smoother is evaluated alike
+
+
+def _product(a: RGB, b: RGB) -> RGB:
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2]
+
+
+def _mean(alpha: tuple[float, float]) -> float:
+    return float(np.sqrt(0.5 * (alpha[0] ** 2 + alpha[1] ** 2)))
+
+
+def _roughness(alpha: float) -> float:
+    return float(np.sqrt(np.clip(alpha, 0, 1)))
+
+
+def _openpbr(look: Look) -> dict[str, float | RGB]:
+    # The coat roughens the base again
+    base, coat = np.array(look.alpha), np.array(look.coat_alpha)
+    coated = look.coat_eta > 1
+    mean = np.sqrt(max(np.sqrt(base[0] * base[1]) ** 2 - 2 * coat[0] * coat[1] * coated, 1e-6))
+
+    def split(u: float, v: float) -> float:
+        return float(1 - v / u) if u > 0 else 0.0
+
+    def rough(u: float, v: float) -> float:
+        """The roughness whose alphas, by `openpbr.alphas`, are these."""
+        return _roughness(np.sqrt(0.5 * (u**2 + v**2)))
+
+    anisotropy = split(*base)
+    u = mean / np.sqrt(1 - min(anisotropy, 0.99))
+    values: dict[str, float | RGB] = {
+        "base_color": look.color,
+        "base_metalness": look.metalness,
+        "specular_roughness": rough(u, mean**2 / u if u else 0.0),
+        "specular_roughness_anisotropy": anisotropy,
+        "geometry_tangent": float(np.degrees(look.turn)),
+        "specular_ior": look.eta * look.coat_eta,  # in air
+        "transmission_weight": look.clear,
+        "transmission_color": look.tint,
+    }
+    if coated:
+        values |= {
+            "coat_weight": 1.0,
+            "coat_ior": look.coat_eta,
+            "coat_roughness": rough(*look.coat_alpha),
+            "coat_roughness_anisotropy": split(*coat),
+            "geometry_coat_tangent": float(np.degrees(look.coat_turn)),
+            "coat_color": look.coat_tint,
+        }
+    if look.film:
+        n, nm = look.film
+        values |= {"thin_film_weight": 1.0, "thin_film_ior": n, "thin_film_thickness": nm / 1000}
+    return values
+
+
+def _gltf(look: Look) -> dict[str, float | RGB]:
+    u, v = look.alpha
+    # Of two axes, the one across is the smoother one; the tint of a coat goes into the base
+    values: dict[str, float | RGB] = {
+        "baseColorFactor": look.tint if look.clear else _product(look.color, look.coat_tint),
+        "metallicFactor": look.metalness,
+        "roughnessFactor": _roughness(v),
+        "anisotropyStrength": float(np.sqrt(np.clip((u - v) / max(1 - v, 1e-6), 0, 1))),
+        "anisotropyRotation": look.turn,
+        "ior": look.eta,
+        "transmissionFactor": look.clear,
+    }
+    if look.coat_eta > 1:
+        share = closures.f_0_of(look.coat_eta) / gltf.COAT_F_0
+        values |= {
+            "clearcoatFactor": min(share, 1.0),
+            "clearcoatRoughnessFactor": _roughness(_mean(look.coat_alpha)),
+        }
+    if look.film:
+        n, nm = look.film
+        values |= {"iridescenceFactor": 1.0, "iridescenceIor": n, "iridescenceThicknessMaximum": nm}
+    return values
+
+
+def _blender(look: Look) -> dict[str, float | RGB]:
+    values: dict[str, float | RGB] = {
+        "Base Color": _product(look.tint, look.tint) if look.clear else look.color,
+        "Metallic": look.metalness,
+        **_burley(look, "Roughness", "Anisotropic"),
+        "Anisotropic Rotation": float(look.turn / (2 * np.pi) % 1),
+        "IOR": look.eta,
+        "Transmission Weight": look.clear,
+    }
+    if look.coat_eta > 1:
+        values |= {
+            "Coat Weight": 1.0,
+            "Coat Roughness": _roughness(_mean(look.coat_alpha)),
+            "Coat IOR": look.coat_eta,
+            "Coat Tint": look.coat_tint,
+        }
+    if look.film:
+        values |= {"Thin Film IOR": look.film[0], "Thin Film Thickness": look.film[1]}
+    return values
+
+
+def _principled(look: Look) -> dict[str, float | RGB]:
+    # It cannot be turned: across the tangent it is brushed less, never more
+    along = abs(np.cos(look.turn)) > 0.5
+    values: dict[str, float | RGB] = {
+        "base_color": _product(look.tint, look.tint) if look.clear else _product(look.color, look.coat_tint),
+        "metallic": look.metalness,
+        **_burley(look, "roughness", "anisotropic"),
+        "eta": look.eta,
+        "spec_trans": look.clear,
+    }
+    if not along:
+        values["anisotropic"] = 0.0
+    if look.coat_eta > 1:
+        alpha = _mean(look.coat_alpha)
+        smooth, rough = principled.COAT_ALPHA[1], principled.COAT_ALPHA[0]
+        values |= {
+            "clearcoat": min(closures.f_0_of(look.coat_eta) / principled.COAT_F_0, 1.0),
+            "clearcoat_gloss": float(np.clip((rough - alpha) / (rough - smooth), 0, 1)),
+        }
+    return values
+
+
+def _burley(look: Look, roughness: str, anisotropic: str) -> dict[str, float | RGB]:
+    u, v = np.maximum(look.alpha, 1e-6)
+    return {roughness: _roughness(np.sqrt(u * v)), anisotropic: float(np.clip((1 - v / u) / 0.9, 0, 1))}
+
+
+#: By the name of the format.
+TARGETS: dict[str, Target] = {
+    "openpbr": Target(
+        "OpenPBR",
+        (*openpbr.PARAMETERS, *openpbr.TURNS),
+        openpbr.value,
+        _openpbr,
+        always={
+            "base_color": UNIT,
+            "base_metalness": UNIT,
+            "specular_weight": UNIT,
+            "specular_color": UNIT,
+            "specular_roughness": ROUGH,
+            "specular_ior": (1.001, 4.0),
+            "coat_weight": UNIT,
+            "coat_color": UNIT,
+            "coat_roughness": ROUGH,
+            "coat_ior": (1.001, 3.0),
+            "coat_darkening": UNIT,
+            "base_diffuse_roughness": UNIT,
+        },
+        brushed={
+            "specular_roughness_anisotropy": UNIT,
+            "coat_roughness_anisotropy": UNIT,
+            "geometry_tangent": (-180.0, 180.0),
+        },
+        clear={"transmission_weight": UNIT, "transmission_color": UNIT},
+        film={"thin_film_weight": UNIT, "thin_film_ior": (1.001, 3.0), "thin_film_thickness": (0.01, 2.0)},
+    ),
+    "gltf": Target(
+        "glTF",
+        gltf.PARAMETERS,
+        gltf.value,
+        _gltf,
+        always={
+            "baseColorFactor": UNIT,
+            "metallicFactor": UNIT,
+            "roughnessFactor": ROUGH,
+            "clearcoatFactor": UNIT,
+            "clearcoatRoughnessFactor": ROUGH,
+            "ior": (1.001, 4.0),
+            "specularFactor": UNIT,
+            "specularColorFactor": UNIT,
+        },
+        brushed={"anisotropyStrength": UNIT, "anisotropyRotation": (-np.pi, np.pi)},
+        clear={"transmissionFactor": UNIT},
+        film={
+            "iridescenceFactor": UNIT,
+            "iridescenceIor": (1.001, 3.0),
+            "iridescenceThicknessMaximum": (10.0, 2000.0),
+        },
+    ),
+    "blender-principled": Target(
+        "Blender's Principled BSDF",
+        blender.PARAMETERS,
+        blender.value,
+        _blender,
+        always={
+            "Base Color": UNIT,
+            "Metallic": UNIT,
+            "Roughness": ROUGH,
+            "IOR": (1.001, 4.0),
+            "Diffuse Roughness": UNIT,
+            "Specular IOR Level": UNIT,
+            "Specular Tint": UNIT,
+            "Coat Weight": UNIT,
+            "Coat Roughness": ROUGH,
+            "Coat IOR": (1.001, 4.0),
+            "Coat Tint": UNIT,
+        },
+        brushed={"Anisotropic": UNIT, "Anisotropic Rotation": (-1.0, 2.0)},
+        clear={"Transmission Weight": UNIT},
+        film={"Thin Film IOR": (1.001, 3.0), "Thin Film Thickness": (10.0, 2000.0)},
+    ),
+    "mitsuba-principled": Target(
+        "Mitsuba's principled",
+        principled.PARAMETERS,
+        principled.value,
+        _principled,
+        always={
+            "base_color": UNIT,
+            "metallic": UNIT,
+            "roughness": ROUGH,
+            "eta": (1.001, 4.0),
+            "spec_tint": UNIT,
+            "clearcoat": UNIT,
+            "clearcoat_gloss": UNIT,
+            "flatness": UNIT,
+        },
+        brushed={"anisotropic": UNIT},
+        clear={"spec_trans": UNIT},
+        film={},
+    ),
+}

@@ -1,0 +1,192 @@
+"""Parameters for programs that take no code: what is written is read back by their readers, and the loss is said."""
+
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import velatura as vt
+from velatura import kernel
+from velatura.bakes import TARGETS, Bake, bake
+from velatura.bakes.look import Described
+from velatura.bakes.lost import lost
+from velatura.checks.probe import Probe
+from velatura.model import named
+from velatura.stack import Material
+from velatura.targets import gltf
+from velatura.targets.parameters import complete
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+SHEEN = vt.Stack([vt.Interface(eta=1.6, alpha=0.1), vt.Diffuse(albedo=(0.6, 0.2, 0.1))], name="Paint")
+
+
+@pytest.fixture(scope="module", params=TARGETS)
+def baked(request) -> Bake:
+    return bake(SHEEN, request.param)
+
+
+# Fits -----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_dielectric_over_paint_is_held_by_all(baked: Bake) -> None:
+    """Expected: all of them have this material; what is lost is light between the layers, and a clearcoat's shape."""
+    assert baked.total_variation.max() < 0.06
+    assert np.abs(baked.baked_albedo - baked.albedo).max() < 0.03
+    for each in TARGETS[baked.target].parameters:
+        value = np.array(baked.values[each.name])
+        assert np.all((value >= each.low) & (value <= each.high)), each.name
+
+
+def test_bare_metal_is_what_a_target_that_compensates_has() -> None:
+    """Expected: one lobe of the true roughness and colour, to a hundredth."""
+    made = bake(vt.Stack([vt.Interface(conductor="Au", alpha=0.2)]), "openpbr")
+    assert made.values["base_metalness"] == 1
+    assert made.values["specular_roughness"] == pytest.approx(0.2**0.5, abs=0.01)
+    assert made.total_variation.max() < 0.01
+
+
+def test_brushing_is_turned_with_the_material() -> None:
+    """Expected: glTF's direction is that of greater roughness, which is the second axis here."""
+    made = bake(vt.Stack([vt.Interface(conductor="Al", alpha=(0.1, 0.3), rotation=20)]), "gltf")
+    turn = np.degrees(made.values["anisotropyRotation"])
+    assert (turn - 110 + 90) % 180 - 90 == pytest.approx(0, abs=2)
+    along, across = gltf.alphas(made.values["roughnessFactor"], made.values["anisotropyStrength"])
+    assert (along, across) == pytest.approx((0.3, 0.1), rel=0.1)
+
+
+def test_panes_pass_light() -> None:
+    plate = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Medium(sigma_a=(0.7, 0.3, 0.1)), vt.Interface(eta=1.0)])
+    made = bake(plate, "gltf")
+    assert made.thin and made.values["transmissionFactor"] > 0.9
+    assert np.abs(made.baked_passed - made.passed)[:, :2].max() < 0.06
+
+
+def test_the_same_material_gives_the_same_numbers() -> None:
+    first, second = (bake(SHEEN, "gltf") for _ in range(2))
+    assert first.values == second.values
+
+
+def test_what_is_not_held_is_said() -> None:
+    stack = vt.Stack(
+        [
+            vt.Interface(eta=1.5, alpha=(0.1, 0.2), films=[{"eta": 1.4, "thickness_nm": 300}]),
+            vt.Medium(sigma_a=0.1, sigma_s=0.2),
+            vt.Interface(eta=1.7, alpha=0.1),
+            vt.Interface(conductor="Al", alpha=(0.1, 0.3), rotation=30),
+        ],
+        exterior=1.33,
+    )
+    described = Described.of(Material.of(stack), named("belcour2018"))
+    assert list(lost(described, "mitsuba-principled")) == [
+        "exterior: indices are taken relative to it, so that the material stands in air",
+        "layers 2, 3: merged into one base",
+        "layer 0: the coat's brushing is left out",
+        "layer 0: the coat's index is 1.5; its reflectance is the coat's weight",
+        "layer 0: thin films are replaced by a colour",
+        "layer 3: brushing is held along the tangent only",
+        "layer 1: scattering is part of the base's colour",
+        "layer 1: absorption is part of the base's colour, at all angles alike",
+    ]
+
+
+def test_unknown_targets_are_refused() -> None:
+    with pytest.raises(vt.InvalidInput, match=r"unknown target 'unreal' \(known: openpbr, gltf,"):
+        bake(SHEEN, "unreal")
+
+
+# Files ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory) -> Callable[[str, str], Path]:
+    """The file of a target, written once."""
+    made: dict[str, Path] = {}
+
+    def file(target: str, ending: str) -> Path:
+        if target not in made:
+            made[target] = tmp_path_factory.mktemp("bakes") / f"paint{ending}"
+            vt.export(SHEEN, target).save(made[target])
+        return made[target]
+
+    return file
+
+
+def loaded_bsdf(path: Path) -> Any:
+    mi = kernel.mitsuba()
+    scene = f"""<scene version="3.0.0"><include filename="{path.name}"/>
+        <shape type="sphere"><ref id="material"/></shape></scene>"""
+    (path.parent / "scene.xml").write_text(scene)
+    return mi.load_file(str(path.parent / "scene.xml")).shapes()[0].bsdf()
+
+
+def test_mitsuba_renders_the_loss_that_is_said(files) -> None:
+    """Expected: the albedo of the plugin in the file is the one that the bake says, to the noise of its samples."""
+    probe, rng = Probe(loaded_bsdf(files("mitsuba-principled", ".xml"))), np.random.default_rng(0)
+    made = bake(SHEEN, "mitsuba-principled")
+    for n, cosine in enumerate(made.cos_theta):
+        wi = np.broadcast_to([np.sqrt(1 - cosine**2), 0, cosine], (200_000, 3))
+        drawn = probe.sample(wi, rng.random((200_000, 3)))
+        weight = drawn.weight * (drawn.wo[:, 2:] > 0)
+        # 4 standard errors of the mean in each of 9 numbers, a false alarm of .06 %, and .002 of our own quadrature
+        error = 4 * weight.std(axis=0) / np.sqrt(len(weight)) + 0.002
+        assert np.all(np.abs(weight.mean(axis=0) - made.baked_albedo[:, n]) < error)
+
+
+def test_gltf_holds_one_material_by_its_extensions(files) -> None:
+    document = json.loads(files("gltf", ".gltf").read_text())
+    assert document["asset"]["version"] == "2.0"
+    (material,) = document["materials"]
+    names = {each.name: each for each in gltf.PARAMETERS}
+    for extension, values in material.get("extensions", {}).items():
+        assert extension in document["extensionsUsed"]
+        assert all(names[name].within == extension for name in values)
+    core = material["pbrMetallicRoughness"]
+    assert len(core["baseColorFactor"]) == 4 and core["baseColorFactor"][3] == 1
+    about = material["extras"]["velatura"]
+    assert about["material"] == json.loads(json.dumps(SHEEN.to_dict()))
+    assert max(about["loss"]["total_variation"]) < 0.06
+    # The values are those of the bake
+    written = {**core, **{k: v for part in material.get("extensions", {}).values() for k, v in part.items()}}
+    written["baseColorFactor"] = core["baseColorFactor"][:3]
+    held = {name: tuple(value) if isinstance(value, list) else value for name, value in written.items()}
+    assert complete(gltf.PARAMETERS, held) == bake(SHEEN, "gltf").values
+
+
+def test_materialx_has_a_material_with_known_inputs(files) -> None:
+    root = ElementTree.parse(files("openpbr", ".mtlx")).getroot()
+    (surface,) = root.findall("open_pbr_surface")
+    known = {each.name for each in TARGETS["openpbr"].parameters}
+    assert {each.get("name") for each in surface} <= known | {"geometry_thin_walled"}
+    (shader,) = root.findall("surfacematerial/input")
+    assert shader.get("nodename") == surface.get("name")
+
+
+def test_blender_runs_the_script(files, monkeypatch) -> None:
+    """Expected: every input that the script sets is one of the node's; its values are those of the bake."""
+    inputs = {each.name: SimpleNamespace(default_value=None) for each in TARGETS["blender-principled"].parameters}
+    node = SimpleNamespace(type="BSDF_PRINCIPLED", inputs=inputs)
+    material = SimpleNamespace(node_tree=SimpleNamespace(nodes=[SimpleNamespace(type="OUTPUT_MATERIAL"), node]))
+    materials = SimpleNamespace(new=lambda name: material)
+    monkeypatch.setitem(sys.modules, "bpy", SimpleNamespace(data=SimpleNamespace(materials=materials)))
+    runpy.run_path(str(files("blender-principled", ".py")))
+    for name, value in bake(SHEEN, "blender-principled").values.items():
+        assert inputs[name].default_value == ((*value, 1.0) if isinstance(value, tuple) else value)
+
+
+def test_the_command_says_the_loss_beside_the_file(run: Run, tmp_path: Path) -> None:
+    status, out, said = run("export", "varnished-paint", "--to", "gltf", "-o", str(tmp_path / "paint.gltf"))
+    assert status == 0 and out.strip() == str(tmp_path / "paint.gltf")
+    assert "total variation:" in said and "not held: layer 1: absorption is part of the base's colour" in said
+    status, _, said = run("export", "varnished-paint", "--to", "gltf", "-o", str(tmp_path / "paint.xml"))
+    assert status == 2 and ".gltf" in said
