@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from velatura.imports import from_openpbr
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Film, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
+    from velatura.sweeps import Axis, Space, sweep
 
 __version__ = "0.1.0"
 
@@ -52,12 +53,14 @@ _HOMES = {
         "presets",
         "save",
     ),
+    "velatura.sweeps": ("Axis", "Space", "sweep"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 # Without `Editor`, so that `import *` works where the extra `notebook` is missing
 __all__ = [
     "MODELS",
+    "Axis",
     "Diffuse",
     "Film",
     "Interface",
@@ -67,6 +70,7 @@ __all__ = [
     "MissingTool",
     "Model",
     "NoSolution",
+    "Space",
     "Spectrum",
     "Stack",
     "Texture",
@@ -83,6 +87,7 @@ __all__ = [
     "register",
     "render",
     "save",
+    "sweep",
 ]
 
 

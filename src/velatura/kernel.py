@@ -37,6 +37,7 @@ _MINIMUM = "import drjit, drjit.llvm as llvm; print(drjit.minimum(llvm.Float([1,
 
 _factories: dict[str, Factory] = {}
 _registered: set[tuple[str, str]] = set()
+_threads: int | None = None  # of Dr.Jit, None for as many as it likes
 
 
 # One thread at a time
@@ -182,7 +183,17 @@ def _drjit() -> ModuleType:
             import mitsuba  # noqa: F401
     except ImportError as error:
         raise MissingTool(f"Mitsuba does not load ({error}): run `{sys.executable} -m pip install mitsuba`") from error
+    if _threads is not None:
+        drjit.set_thread_count(_threads)
     return drjit
+
+
+def use_threads(count: int) -> None:
+    """Let Dr.Jit use that many threads of this process, from now on or as soon as it is loaded."""
+    global _threads
+    _threads = count
+    if "drjit" in sys.modules:
+        sys.modules["drjit"].set_thread_count(count)
 
 
 @contextlib.contextmanager
@@ -281,7 +292,12 @@ def load_dict(description: dict[str, Any]) -> Any:
 # Installed components
 
 #: Optional parts of the package, and what needs them.
-EXTRAS = {"plots": "--plot, --sheet and figures", "editor": "velatura edit", "notebook": "vt.Editor"}
+EXTRAS = {
+    "plots": "--plot, --sheet and figures",
+    "editor": "velatura edit",
+    "notebook": "vt.Editor",
+    "sweep": "velatura sweep",
+}
 
 
 class Finding(NamedTuple):

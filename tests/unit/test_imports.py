@@ -36,6 +36,8 @@ MAY_IMPORT = {
     "checks": "kernel",
     "scenes": "kernel",
     "comparison": "stack optics model reference sampling checks scenes api kernel",
+    "progress": "",
+    "sweeps": "__init__ stack optics model inverse reference checks api kernel progress",
     "figures": "stack optics ops sampling model inverse reference checks scenes comparison api kernel",
 }
 
@@ -47,6 +49,7 @@ IMPORTED_BY = {
     "exports": "__init__ cli editor",
     "imports": "__init__ cli",
     "figures": "cli editor",
+    "sweeps": "__init__ cli",
 }
 
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
@@ -69,6 +72,7 @@ LOADS_NO = {
     "velatura.imports": "mitsuba drjit numpy",
     "velatura.bakes": "mitsuba drjit scipy matplotlib",
     "velatura.plugins": "mitsuba drjit",
+    "velatura.sweeps": "mitsuba drjit matplotlib xarray zarr dask distributed",
     "velatura.comparison": "mitsuba drjit matplotlib",
     "velatura.figures": "mitsuba drjit matplotlib",
     "velatura.editor.server": "mitsuba drjit scipy matplotlib",

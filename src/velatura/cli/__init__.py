@@ -37,6 +37,7 @@ from velatura.cli import (
     render,
     schema,
     simplify,
+    sweep,
     tables,
 )
 from velatura.errors import Incomplete, VelaturaError, one_line
@@ -63,6 +64,7 @@ for verb in (
     explore.explore,
     fit.fit,
     simplify.simplify,
+    sweep.sweep,
     edit.edit,
     export.export,
     imports.import_,

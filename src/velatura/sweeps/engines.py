@@ -1,0 +1,131 @@
+"""Engines: what runs tasks, dask or any executor of the style of `concurrent.futures`."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import contextlib
+import gc
+import logging
+import os
+import signal
+import time
+from collections.abc import Callable, Collection, Iterator
+from multiprocessing import resource_tracker
+from typing import Any
+
+from velatura.errors import InvalidInput
+
+REFRESH = 1.0  # seconds after which newly joined workers are counted
+POLL = 0.05  # seconds between looks at tasks that do not report their end
+PATIENCE = 10  # seconds for a scheduler to answer
+
+
+class Engine:
+    """Runs tasks.
+
+    Args:
+        executor: has `submit`, which returns what has `done`, `result` and `cancel`.
+        workers: how many tasks run at once.
+        fatal: errors of tasks that end the processes that run them.
+    """
+
+    def __init__(self, executor: Any, workers: Callable[[], int], fatal: tuple[type[BaseException], ...] = ()) -> None:
+        self.submit, self.fatal = executor.submit, fatal
+        self._workers, self._counted, self._looked = workers, 0, -REFRESH
+
+    @property
+    def workers(self) -> int:
+        """How many tasks run at once, as it was a moment ago."""
+        if time.monotonic() - self._looked >= REFRESH:
+            self._counted, self._looked = max(self._workers(), 1), time.monotonic()
+        return self._counted
+
+    @staticmethod
+    def ended(tasks: Collection[Any]) -> list[Any]:
+        """Tasks that have ended, after a wait for the first one, not longer than `REFRESH`."""
+        if all(isinstance(task, concurrent.futures.Future) for task in tasks):
+            first = concurrent.futures.FIRST_COMPLETED
+            return list(concurrent.futures.wait(tasks, REFRESH, first).done)
+        found = [task for task in tasks if task.done()]
+        if not found:
+            time.sleep(POLL)
+        return found
+
+
+@contextlib.contextmanager
+def engine(executor: Any, workers: int | None) -> Iterator[Engine]:
+    """The engine that an executor, a client of dask, the address of a scheduler, or None stands for.
+
+    Raises:
+        InvalidInput: none of these, or no scheduler answers.
+    """
+    if executor is None:
+        with _local(workers or _cores()) as client:
+            yield _of_client(client)
+    elif isinstance(executor, str):
+        with _at(executor) as client:
+            yield _of_client(client)
+    elif hasattr(executor, "get_executor"):
+        yield _of_client(executor)
+    elif hasattr(executor, "submit"):
+        count = workers or getattr(executor, "_max_workers", None) or _cores()
+        yield Engine(executor, lambda: count)
+    else:
+        raise InvalidInput("executor: must be an executor, a client of dask, or the address of a scheduler")
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+@contextlib.contextmanager
+def _local(workers: int) -> Iterator[Any]:
+    """Processes on this machine."""
+    from distributed import Client, LocalCluster
+
+    with contextlib.ExitStack() as stack:
+        stack.callback(gc.collect)  # semaphores of its processes, which would be reported as leaked
+        with _interrupts_wait():
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=None,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(cluster)
+        yield stack.enter_context(Client(cluster))
+
+
+@contextlib.contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Hold Ctrl-C back while the block runs, and from threads and processes that begin in it for good.
+
+    It reaches all processes of a terminal; this one ends the others.
+    """
+    resource_tracker.ensure_running()  # which it would itself let through, once it had begun
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _at(address: str) -> Iterator[Any]:
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=PATIENCE)
+    except (OSError, ValueError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidInput(f"{address}: no scheduler of dask answers there ({reason})") from None
+    with client:
+        yield client
+
+
+def _of_client(client: Any) -> Engine:
+    from distributed.scheduler import KilledWorker
+
+    return Engine(client.get_executor(pure=False), lambda: sum(client.nthreads().values()), (KilledWorker,))

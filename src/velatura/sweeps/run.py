@@ -1,0 +1,202 @@
+"""The course of a sweep: what is missing in its store is computed, a few chunks at a time."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import math
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from velatura.errors import InvalidInput, VelaturaError
+from velatura.progress import bar
+from velatura.sweeps import work
+from velatura.sweeps.engines import Engine, engine
+from velatura.sweeps.plan import Plan, versions
+from velatura.sweeps.space import Space
+from velatura.sweeps.store import OWN, Layout, Store, Variable, create, existing
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+SHORTEST, RATE = 1.0, 100  # seconds of a task at least, and how many end in a second, of all workers, at most
+AHEAD = 2  # tasks that are submitted for each worker
+TRIED = 16  # points that are looked at for one that shows what is found
+
+Progress = Callable[[int, int], None]
+
+
+def sweep(
+    space: Space | Mapping[str, Any],
+    what: str | Callable[..., Mapping[str, Any]] = "lobes",
+    *,
+    store: str | Path,
+    executor: Any = None,
+    workers: int | None = None,
+    chunk: int | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Dataset:
+    """Ask the same of many materials, on one machine or a cluster, and keep the answers in a Zarr store.
+
+    What is in the store already is not computed again, so that the same call goes on with a sweep that was interrupted.
+    Values and seeds of a point follow from its number and the seed of the space alone: results depend neither on the
+    engine nor on what was interrupted.
+
+    Args:
+        space: a `Space`, or its mapping: `material`, `vary`, `sampling`, `count`, `seed`.
+        what: "lobes", "albedo", "statistics", "distribution", "check", "render" or "inverse", as the functions of these
+            names; or a function, called with the stack and the seed of a point, that returns its arrays by name, each
+            alone or as a pair of the names of its dimensions and the array.
+        store: the folder, which all workers must see.
+        executor: where it runs: None, one process of dask for each core of this machine; the address of a scheduler of
+            dask, or its client; or any executor in the style of `concurrent.futures`.
+        workers: processes of this machine; or how many tasks an executor runs at once, if it does not report it.
+        chunk: points that are computed and written at once; by default, a quarter of the root of their number.
+        progress: called with (points done, all points); by default a bar with the time left.
+        options: keyword arguments of `what` (`cos_theta=[1, 0.5]`).
+
+    Returns:
+        An `xarray.Dataset`, read from the store where it is looked at. A grid has a dimension for each value that
+        varies; otherwise there is one, `point`, with the values as its coordinates. Numbers of points that failed are
+        NaN, their `status` is 0, and `reason` says why. The attributes hold the plan as YAML, and all versions.
+
+    Raises:
+        InvalidInput: not a space, an unknown question or option, a store that holds something else, no scheduler at
+            that address, or none of the first points has an answer.
+        MissingTool: the extra `sweep` is not installed; or LLVM is missing on a worker.
+        VelaturaError: the engine broke down; what is in the store stays.
+    """
+    fields = {key: getattr(space, key) for key in Space.model_fields} if isinstance(space, Space) else dict(space)
+    plan = Plan.from_dict({**_given(fields), "what": what, "options": options, **({"chunk": chunk} if chunk else {})})
+    return carry_out(plan, store, executor, workers, progress)
+
+
+def _given(fields: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in fields.items() if value is not None}
+
+
+def carry_out(
+    plan: Plan,
+    store: str | Path,
+    executor: Any = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Dataset:
+    """As `sweep`, of a plan."""
+    path = Path(store).absolute()
+    found = existing(path, plan)
+    if found is None or len(found.done()) < math.prod(found.grid):
+        with engine(executor, workers) as runs:
+            job = work.Job(plan, path, None, work.here(), versions())
+            if found is None:
+                found = create(path, plan, _looked(runs, job.packed(), plan))
+            course = _Course(runs, found, replace(job, layout=found.layout()).packed())
+            with nullcontext(progress) if progress else bar(f"Sweeping {path.name}") as advance:
+                course.run(advance)
+    return found.open()
+
+
+def _looked(runs: Engine, packed: bytes, plan: Plan) -> Layout:
+    """What is found at every point, as one of the first shows it."""
+    why, tried = "", min(TRIED, math.prod(plan.shape))
+    for number in range(tried):
+        (answer,) = runs.submit(work.look, packed, (number,)).result()
+        if not isinstance(answer, str):
+            return _checked({name: Variable.of(*array) for name, array in answer.items()}, plan)
+        why = why or answer
+    points = "the only point has no answer" if tried == 1 else f"none of the first {tried} points has an answer"
+    raise InvalidInput(f"{points}: {why}")
+
+
+def _checked(layout: Layout, plan: Plan) -> Layout:
+    """Raises InvalidInput where names or sizes of what is found do not fit together."""
+    sizes: dict[str, int] = {}
+    for name, variable in layout.items():
+        for dim, size in zip(variable.dims, variable.shape):
+            if sizes.setdefault(dim, size) != size:
+                raise InvalidInput(f"what: {name}: {dim} has {size} entries, and {sizes[dim]} in another array")
+    for name in (*layout, *sizes):
+        if name in {*OWN, *plan.vary, *plan.dims} or (name in layout and name in sizes):
+            raise InvalidInput(f"what: {name}: another name is needed, this one has a meaning of its own")
+    return layout
+
+
+class _Course:
+    """One run through what is missing.
+
+    Args:
+        runs: the engine.
+        store: what is there already.
+        packed: the job of the workers.
+    """
+
+    def __init__(self, runs: Engine, store: Store, packed: bytes) -> None:
+        self._runs, self._store, self._packed = runs, store, packed
+        done = store.done()
+        self._todo = deque(chunk for chunk in range(math.prod(store.grid)) if chunk not in done)
+        self._tasks: dict[Any, tuple[int, ...]] = {}
+        self._left = sum(map(store.count, self._todo))
+        self._pace: float | None = None  # seconds that a chunk takes
+
+    def run(self, progress: Progress) -> None:
+        """Compute what is missing.
+
+        Raises:
+            VelaturaError: the engine broke down.
+        """
+        total = self._store.size
+        progress(total - self._left, total)
+        try:
+            while self._todo or self._tasks:
+                while self._todo and len(self._tasks) < AHEAD * self._runs.workers:
+                    self._begin(tuple(self._todo.popleft() for _ in range(self._batch())))
+                for task in self._runs.ended(self._tasks):
+                    self._left -= self._ended(task, self._tasks.pop(task))
+                    progress(total - self._left, total)
+        except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as error:
+            raise VelaturaError(
+                f"{self._store.path}: the executor broke down ({type(error).__name__}) with {total - self._left} of "
+                f"{total} points stored; the same call goes on from there"
+            ) from None
+        finally:
+            for task in self._tasks:
+                task.cancel()
+
+    def _batch(self) -> int:
+        """How many chunks the next task has: few at the end, so that all workers stay busy."""
+        if self._pace is None:
+            return 1
+        seconds = max(SHORTEST, self._runs.workers / RATE)
+        return max(min(int(seconds / self._pace), len(self._todo) // (AHEAD * self._runs.workers)), 1)
+
+    def _begin(self, chunks: tuple[int, ...]) -> None:
+        self._tasks[self._runs.submit(work.fill, self._packed, chunks)] = chunks
+
+    def _ended(self, task: Any, chunks: tuple[int, ...]) -> int:
+        """The points of a task that has ended; where it ended its process, it is split."""
+        try:
+            points, seconds = task.result()
+        except self._runs.fatal:
+            if len(chunks) > 1:
+                for chunk in chunks:
+                    self._begin((chunk,))
+                return 0
+            points = self._store.count(chunks[0])
+            work.keep(self._packed, chunks[0], [self._alone(number) for number in self._store.points(chunks[0])])
+        else:
+            pace = seconds / len(chunks)
+            self._pace = pace if self._pace is None else 0.5 * (self._pace + pace)
+        return int(points)
+
+    def _alone(self, number: int) -> work.Answered:
+        """What a point gives that may end its process."""
+        try:
+            (answer,) = self._runs.submit(work.look, self._packed, (number,)).result()
+        except self._runs.fatal:
+            return "the process that looked at it ended"
+        found: work.Answered = answer
+        return found

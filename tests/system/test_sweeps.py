@@ -1,0 +1,164 @@
+"""Sweeps with real parts: pools of processes, a scheduler of dask with workers, and kills in the middle.
+
+Expected everywhere: data that are equal, bit by bit, to those of one thread that nothing interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from interrupts import hear
+from sweeping import COUNT, marked, point, pool, same, swept
+
+import velatura as vt
+
+SHARED = str(Path(__file__).parents[1] / "shared")
+QUIET = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": SHARED}
+FEW = 5  # chunks that are done before something is killed
+PATIENCE = 120.0  # seconds
+
+
+def wait_for(condition: Callable[[], object]) -> Any:
+    end = time.monotonic() + PATIENCE
+    while not (found := condition()):
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return found
+
+
+def killed_client(store: Path, executor: str) -> None:
+    """Begin the sweep in a process, and kill that with all its children."""
+    client = subprocess.Popen(
+        [sys.executable, "-c", "from sweeping import main; main()", str(store), executor],
+        env=QUIET,
+        start_new_session=True,
+    )
+    wait_for(lambda: marked(store) >= FEW)
+    os.killpg(client.pid, signal.SIGKILL)
+    assert client.wait() == -signal.SIGKILL
+    assert marked(store) < COUNT / 2
+
+
+class Killer:
+    """Kills a process once, when half of the points are done."""
+
+    def __init__(self, pid: int) -> None:
+        self.pid: int | None = pid
+
+    def __call__(self, done: int, total: int) -> None:
+        if self.pid and done >= total / 2:
+            os.kill(self.pid, signal.SIGKILL)
+            self.pid = None
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """By one thread, from the beginning to the end."""
+    with ThreadPoolExecutor(1) as executor:
+        return swept(tmp_path_factory.mktemp("expected") / "points.zarr", executor).load()
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """The address of a scheduler, and two workers."""
+    folder, started = tmp_path_factory.mktemp("dask"), list[subprocess.Popen[bytes]]()
+
+    def start(*arguments: str) -> subprocess.Popen[bytes]:
+        with open(folder / f"{len(started)}.txt", "w") as log:
+            command = [sys.executable, "-m", "distributed.cli.dask_" + arguments[0], *arguments[1:]]
+            started.append(subprocess.Popen(command, env=QUIET, cwd=folder, stdout=log, stderr=log))
+        return started[-1]
+
+    def address() -> str | None:
+        text = re.search(r"Scheduler at:\s+(tcp://\S+)", (folder / "0.txt").read_text())
+        return text and text[1]
+
+    try:
+        start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+        at = wait_for(address)
+        workers = [start("worker", at, "--no-nanny", "--nthreads", "1", "--no-dashboard") for _ in range(2)]
+        yield at, workers
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def test_points_without_an_answer_have_their_reason(expected: Any) -> None:
+    failed = expected.status.values == 0
+    assert 0 < failed.sum() < 40 and set(expected.status.values[~failed]) == {1}
+    assert set(expected.reason.values[failed]) == {"ValueError: unlucky"}
+    assert np.isnan(expected.numbers.values[failed]).all() and np.isnan(expected.energy.values[failed]).all()
+    for n in (0, COUNT - 1):
+        values = {name: expected[name].values[n] for name in ("layer0_alpha", "layer0_conductor")}
+        again = point(vt.load("bare-gold").replace(**values), int(expected.seed[n]))
+        assert np.array_equal(again["numbers"], expected.numbers[n])
+        assert np.array_equal(again["energy"][1], expected.energy[n])
+
+
+def test_a_pool_goes_on_after_kills_of_client_and_worker(expected: Any, tmp_path: Path) -> None:
+    store = tmp_path / "points.zarr"
+    killed_client(store, "pool")
+    with pool(2) as executor:
+        pid = executor.submit(os.getpid).result()
+        with pytest.raises(vt.VelaturaError, match=r"points\.zarr: the executor broke down .* goes on from there"):
+            swept(store, executor, progress=Killer(pid))
+    assert marked(store) < COUNT / 2
+    with pool(1) as executor:
+        assert same(swept(store, executor), expected)
+
+
+def test_dask_goes_on_after_kills_of_client_and_worker(
+    expected: Any, dask: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
+) -> None:
+    """Expected: the work of a killed worker is done by the other one."""
+    (address, (worker, _)), store = dask, tmp_path / "points.zarr"
+    killed_client(store, address)
+    assert same(swept(store, address, progress=Killer(worker.pid)), expected)
+    assert worker.wait() == -signal.SIGKILL
+
+
+def test_an_interrupt_ends_in_one_line_and_a_scheduler_goes_on(
+    dask: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
+) -> None:
+    """Expected: of Ctrl-C, which a terminal sends to all processes, one line; then the rest of a grid by dask."""
+    plan, store = tmp_path / "plan.yaml", tmp_path / "grid.zarr"
+    plan.write_text(
+        "material: bare-gold\n"
+        "vary:\n"
+        "  layer0_alpha: {range: [0.01, 0.5], steps: 40}\n"
+        "  layer0_rotation: {values: [0, 30, 60]}\n"
+        "what: lobes\n"
+        "options: {cos_theta: [1, 0.5], model: belcour2018}\n"
+        "chunk: 1\n"
+    )
+    command = [sys.executable, "-m", "velatura", "sweep", str(plan), "-o", str(store)]
+    process = subprocess.Popen(
+        [*command, "--workers", "1"], env=QUIET, start_new_session=True, preexec_fn=hear, stderr=subprocess.PIPE
+    )
+    wait_for((store / "status" / "0.2").exists)
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.communicate(timeout=PATIENCE)[1] == b"velatura: interrupted\n"
+    assert process.returncode == 130
+
+    again = subprocess.run([*command, "--scheduler", dask[0]], env=QUIET, capture_output=True, text=True)
+    assert (again.returncode, again.stderr) == (0, "")
+    assert re.fullmatch(r"\S+grid\.zarr: 120 points, \d+\.\d s\n", again.stdout)
+    import xarray
+
+    found = xarray.open_zarr(store)
+    assert found.energy.dims == ("layer0_alpha", "layer0_rotation", "interface", "colour", "direction")
+    alone = found.sel(layer0_alpha=0.5, layer0_rotation=30)
+    stack = vt.load("bare-gold").replace(layer0_alpha=0.5, layer0_rotation=30)
+    assert np.array_equal(alone.energy, np.array(vt.lobes(stack, [1, 0.5], model="belcour2018").energy))
