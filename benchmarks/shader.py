@@ -1,10 +1,11 @@
-"""The printed shader against NumPy, in headless Chromium: 10^4 random stacks and directions over all layer patterns.
+"""Printed shaders against NumPy: 10^4 random stacks and directions over all layer patterns, in every language.
 
-Of a model that solves materials the code holds a single one: then there is one stack to a pattern, and 10^4 directions.
-For each model the largest difference in energy, alpha, value and density, where it was met, and what a shader costs:
-time to record and print, its lines, time to compile it, and to draw it the first time (SwiftShader compiles then).
+GLSL ES runs in headless Chromium, the others as tests/shared/machines.py says. Of a model that solves materials code
+holds a single one: then there is one stack to a pattern, and 10^4 directions. For each language and model the largest
+difference in energy, alpha, value and density, where it was met, and what a shader costs: time to record and print, its
+lines, and time to compile and run it. At the end the tables of docs/shaders.md.
 
-    python benchmarks/shader.py [--models belcour2018,velatura] [--count 10000] [--seed 0] [--textured]
+    python benchmarks/shader.py [--language all] [--models belcour2018,velatura] [--count 10000] [--seed 0] [--textured]
 """
 
 from __future__ import annotations
@@ -12,20 +13,25 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Iterable
+from contextlib import nullcontext
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
 import chromium
-from agreement import PATTERNS, differences, in_browser, in_numpy, random_case
+from agreement import PATTERNS, Differences, differences, in_browser, in_numpy, on_machine, random_case
+from machines import MACHINES
 
 import velatura
 from velatura.model import Model, bsdf, named, solution
 from velatura.model.context import Context, at_a_point
 from velatura.shader import record, shader, variance
+from velatura.shader.glsl import GLSL
 from velatura.stack import Material, Stack
 
 #: Of textures: ranges by key, drawn for presets of several kinds, seen from some cosines.
@@ -48,24 +54,49 @@ SAMPLES = 4000
 MODELS = "belcour2018,weier2020,yamaguchi2019,realtime,velatura"
 
 
-def measure(model: str, count: int, seed: int, page: chromium.Browser) -> tuple[dict, dict]:
-    """The largest differences with their patterns, and the median costs."""
-    worst: dict[str, tuple[float, str]] = {}
-    costs: dict[str, list[float]] = {}
+#: Runs a shader in a language.
+LANGUAGES = ["glsl", *MACHINES]
+KEYS = ("energy", "alpha", "value", "density")
+
+
+def measure(model: str, languages: list[str], count: int, seed: int, page: Any) -> dict[str, dict[str, float]]:
+    """The largest differences by language."""
+    worst: dict[str, dict[str, tuple[float, str]]] = {language: {} for language in languages}
+    costs: dict[str, dict[str, list[float]]] = {language: {} for language in languages}
     for k, pattern in enumerate(PATTERNS):
         case = random_case(pattern, -(-count // len(PATTERNS)), np.random.default_rng((seed, k)))
-        start = time.perf_counter()
-        made = shader(case.stack, model)
-        recording = time.perf_counter() - start
         recorded = record(case.stack, model)
-        found, linking, drawing = in_browser(case, recorded, made, page)
-        here = vars(differences(in_numpy(case, recorded), found))
+        truth = in_numpy(case, recorded)
         name = f"{', '.join(pattern[0])}; {pattern[1]}"
-        worst = {key: max(worst.get(key, (0.0, "")), (value, name)) for key, value in here.items()}
-        cost = {"record s": recording, "lines": made.text.count("\n"), "link s": linking / 1e3, "draw s": drawing / 1e3}
-        for key, value in cost.items():
-            costs.setdefault(key, []).append(value)
-    return worst, costs
+        for language in languages:
+            printer = MACHINES[language].printer if language in MACHINES else GLSL
+            times = [time.perf_counter()]
+            made = shader(case.stack, model, printer=printer)
+            times.append(time.perf_counter())
+            if language in MACHINES:
+                found = on_machine(case, recorded, made, MACHINES[language])
+            else:
+                found, _, _ = in_browser(case, recorded, made, page)
+            times.append(time.perf_counter())
+            here: Differences = differences(truth, found)
+            for key, value in vars(here).items():
+                worst[language][key] = max(worst[language].get(key, (0.0, "")), (value, name))
+            spent = {"print s": times[1] - times[0], "lines": made.text.count("\n"), "run s": times[2] - times[1]}
+            for key, value in spent.items():
+                costs[language].setdefault(key, []).append(value)
+    for language in languages:
+        for key, (value, where) in worst[language].items():
+            print(f"{language:8} {model:14} {key:8} {value:.1e}  {where}")
+        for word, of in (("median", median), ("worst", max)):
+            each = ", ".join(f"{key} {of(values):.3g}" for key, values in costs[language].items())
+            print(f"{language:8} {model:14} {word:6} {each}", flush=True)
+    return {language: {key: value for key, (value, _) in found.items()} for language, found in worst.items()}
+
+
+def table(title: str, rows: dict[str, dict[str, float]]) -> str:
+    """In Markdown."""
+    head = [f"| {title} | {' | '.join(KEYS)} |", "|---" * (1 + len(KEYS)) + "|"]
+    return "\n".join([*head, *(f"| `{x}` | {' | '.join(f'{row[k]:.1e}' for k in KEYS)} |" for x, row in rows.items())])
 
 
 def closed_form(count: int, seed: int) -> None:
@@ -105,6 +136,7 @@ def _apart(stack: Stack, model: Model, rng: np.random.Generator) -> list[tuple[f
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--language", default="glsl", help=f"all, or some of {', '.join(LANGUAGES)}")
     parser.add_argument("--models", default=MODELS)
     parser.add_argument("--count", type=int, default=10_000, help="random stacks with directions, for each model")
     parser.add_argument("--seed", type=int, default=0)
@@ -113,19 +145,22 @@ def main() -> None:
     if arguments.textured:
         closed_form(3, arguments.seed)
         return
-    if why := chromium.missing():
-        print(f"skipped: {why}")
-        return
-    with chromium.browser() as page:
+    asked = LANGUAGES if arguments.language == "all" else arguments.language.split(",")
+    lacking = {x: MACHINES[x].missing() if x in MACHINES else chromium.missing() for x in asked}
+    for language, why in lacking.items():
+        print(f"{language}: skipped, {why}" if why else f"{language}: runs", flush=True)
+    languages = [language for language, why in lacking.items() if not why]
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    with chromium.browser() if "glsl" in languages else nullcontext() as page:
         for model in arguments.models.split(","):
-            worst, costs = measure(model, arguments.count, arguments.seed, page)
-            for key, (value, pattern) in worst.items():
-                print(f"{model:14} {key:8} {value:.1e}  {pattern}")
-            print(f"{model:14} median " + ", ".join(f"{key} {median(values):.3g}" for key, values in costs.items()))
-            print(
-                f"{model:14} worst  " + ", ".join(f"{key} {max(values):.3g}" for key, values in costs.items()),
-                flush=True,
-            )
+            found[model] = measure(model, languages, arguments.count, arguments.seed, page)
+    print(table("model", {model: _worst(of.values()) for model, of in found.items()}))
+    print(table("language", {x: _worst(of[x] for of in found.values()) for x in languages}))
+
+
+def _worst(found: Iterable[dict[str, float]]) -> dict[str, float]:
+    each = list(found)
+    return {key: max(x[key] for x in each) for key in KEYS}
 
 
 if __name__ == "__main__":

@@ -75,10 +75,12 @@ class _OnVulkan(Machine):
         maps = [name for name in textures if name.startswith("vt_map")]
         places = {**bindings, **{name: MAPS + k for k, name in enumerate(maps)}}
         given: tuple[list[dict], list[dict]] = ([], [])
+        views = []
         for name, data in textures.items():
             group, place = (1, GIVEN) if name == "vt_given" else (0, places[name])
             kind = "float" if name in maps else "unfilterable-float"
-            given[group].append({"binding": place, "resource": _texture(device, data, name in maps), "kind": kind})
+            views.append(_texture(device, data, name in maps))
+            given[group].append({"binding": place, "resource": views[-1], "kind": kind})
         if maps:
             filtering = device.create_sampler(mag_filter="linear", min_filter="linear")
             given[0].append({"binding": SAMPLER, "resource": filtering, "kind": "filtering"})
@@ -109,7 +111,10 @@ class _OnVulkan(Machine):
         computed.dispatch_workgroups(-(-count // THREADS))
         computed.end()
         device.queue.submit([encoder.finish()])
-        return np.frombuffer(device.queue.read_buffer(results), np.float32).reshape(count, size, 4)
+        found = np.frombuffer(device.queue.read_buffer(results), np.float32).reshape(count, size, 4)
+        for each in (results, *(view.texture for view in views)):
+            each.destroy()
+        return found
 
     @abstractmethod
     def code(self, text: str) -> str | bytes:

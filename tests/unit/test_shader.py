@@ -453,6 +453,29 @@ def test_costs_count_channels_rounds_of_loops_and_nodes_between_which_tables_are
     assert cost([first], 0).texels == 4 * texels(name)
 
 
+def test_look_ups_that_a_choice_throws_away_are_left_out() -> None:
+    """Of a table, what one side of a choice needs; of a channel, what that channel needs; of two sides, the larger."""
+    x, y, c, d = number("x"), number("y"), colour("c"), colour("d")
+    known = tables.load()
+    sides = ops.interpolate(known.dielectric, x, y)[0], ops.interpolate(known.tir_published, x, y, y)[0]
+    chosen = ops.select(x < 0.5, sides[0], sides[1])
+    text = printed(chosen)
+    assert "if (value) { dielectric[texel] = vt_dielectric(texel, x, y); }" in text
+    assert "if (!value) { value_2 = vt_tir_published(x, y, y); }" in text
+    assert cost([chosen], 0).texels == max(4 * texels("dielectric"), 8)
+    apart = ops.select(c < 0.5, ops.interpolate(known.absorbing_inside, x, y, d)[0], d)
+    text = printed(apart)
+    for k, channel in enumerate("rgb"):
+        name = f"absorbing_inside_{k + 1}" if k else "absorbing_inside"
+        assert f"if (value.{channel}) {{ {name}[texel] = vt_absorbing_inside(texel, x, y, d.{channel}); }}" in text
+    assert cost([apart], 0).texels == 3 * 8 * texels("absorbing_inside")
+    mixed = ops.select(c < 0.5, ops.mean(ops.interpolate(known.absorbing_inside, x, y, d)[0]) * d, d)
+    assert printed(mixed).count("if (any(value))") == 3
+    assert "if (" not in printed(ops.select(x < 0.5, sides[0], 1.0) + sides[0])
+    first, second, *_ = ops.interpolate(known.dielectric, x, y)
+    assert "if (" not in printed(ops.select(second < 0.5, first, 1.0))
+
+
 @pytest.mark.parametrize(
     ("model", "lobes"), [("velatura", [[0], [1], [3], [4]]), ("realtime", [[0], [1, 3], [4]])], ids=str
 )

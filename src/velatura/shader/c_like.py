@@ -100,6 +100,7 @@ class CLike(Printer):
     language: ClassVar[str]
     first_lines: ClassVar[str] = ""
     words = frozenset(_WORDS.split())
+    branches: ClassVar[bool] = True
     functions: ClassVar[Mapping[str, str]] = _FUNCTIONS
     operators: ClassVar[Mapping[str, tuple[str, int]]] = _OPERATORS
 
@@ -200,10 +201,32 @@ class CLike(Printer):
         first = f"{group.begin} + texel" if group.begin else "texel"
         return self._filled(name, group.texels, f"vt_baked_texel({first}, {self.colour(place)})")
 
-    def _filled(self, name: str, count: int, text: str) -> list[str]:
+    def texels_where(self, where: str, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+        return self._filled(name, count, f"vt_{table}(texel, {', '.join(args)})", where)
+
+    def all_of(self, conditions: Sequence[tuple[tuple[str, Kind], bool]]) -> str:
+        def held(text: str, kind: Kind, holds: bool) -> str:
+            whole = text if kind == "condition" else f"{'any' if holds else 'all'}({text})"
+            return whole if holds else f"!{whole}"
+
+        return " && ".join(held(*each, holds) for each, holds in conditions)
+
+    def looked_up(self, name: str, kind: Kind, text: str, where: str) -> list[str]:
+        zero = "0.0" if kind == "number" else self.colour(["0.0"])
+        return [self.variable(kind, name, zero), f"if ({where}) {{ {name} = {text}; }}"]
+
+    def variable(self, kind: str, name: str, text: str) -> str:
+        """A value that may change gets a name."""
+        return self.declared(kind, name, text)
+
+    def _filled(self, name: str, count: int, text: str, where: str = "") -> list[str]:
         """In a loop, which compiles faster than reading texels one by one."""
-        head = self.spelled(f"for (int texel = 0; texel < {count}; texel++)")
-        return [self.array("vec4", name, count), f"{head} {{ {name}[texel] = {text}; }}"]
+        head, own = self.spelled(f"for (int texel = 0; texel < {count}; texel++)"), f"{name}[texel]"
+        if not where:
+            return [self.array("vec4", name, count), f"{head} {{ {own} = {text}; }}"]
+        zero = f"{self.type('vec4')}(0.0, 0.0, 0.0, 0.0)"
+        body = [f"{own} = {zero};", f"if ({where}) {{ {own} = {text}; }}"]
+        return [self.array("vec4", name, count), *_block(head, body)]
 
     def nodes(self, name: str, nodes: Sequence[float]) -> list[str]:
         return [self.array("number", name, list(map(self.literal, nodes)), constant=True)]

@@ -10,13 +10,14 @@ from velatura import tables
 from velatura.shader import atlas
 from velatura.shader.films import FILM
 from velatura.shader.graph import work
+from velatura.shader.needed import most, needed
 from velatura.shader.symbol import Operand, Symbol, in_order, inside, is_colour
 
 
 @dataclass(frozen=True)
 class Cost:
     """Operations on numbers, those on colours being three, and elementary functions as many as they take; and texels
-    that are read."""
+    that are read, at most: a look-up that only one side of a choice needs counts for that side."""
 
     operations: int
     texels: int
@@ -31,12 +32,13 @@ def cost(outputs: Sequence[Operand], axes: int) -> Cost:
     order = in_order(outputs)
     bound = inside(order)
     loop_of = {name: symbol for symbol in order if symbol.kind == "loop" for name in symbol.detail.bound}
-    operations = texels = 0
+    operations, texels = 0, dict[Symbol, int]()
     for symbol in order:
         times = prod(loop.detail.times for loop in {loop_of[name] for name in bound[symbol]})
         operations += times * work(symbol) * (3 if is_colour(symbol) else 1)
-        texels += times * _texels(symbol, axes)
-    return Cost(operations, texels)
+        if read := times * _texels(symbol, axes):
+            texels[symbol] = read
+    return Cost(operations, most(texels, needed(outputs)))
 
 
 def _texels(symbol: Symbol, axes: int) -> int:

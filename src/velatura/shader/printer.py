@@ -51,11 +51,14 @@ class Language(ABC):
         functions: by operation, the function of as many arguments; with `clip`, which takes three, of a number kept
             between two constants.
         operators: by operation of two values, its sign and how strongly that binds, from 2 to 6.
+        branches: whether look-ups that only one side of a choice needs are left out by a branch, as `all_of`,
+            `looked_up` and `texels_where` spell it.
     """
 
     words: ClassVar[frozenset[str]]
     functions: ClassVar[Mapping[str, str]]
     operators: ClassVar[Mapping[str, tuple[str, int]]]
+    branches: ClassVar[bool] = False
 
     # Values
 
@@ -116,6 +119,18 @@ class Language(ABC):
     @abstractmethod
     def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
         """The channels of a table at a place get a name, as a number of texels."""
+
+    def all_of(self, conditions: Sequence[tuple[tuple[str, Kind], bool]]) -> str:
+        """That each of the conditions holds, or does not; of conditions of channels, any."""
+        raise NotImplementedError
+
+    def looked_up(self, name: str, kind: Kind, text: str, where: str) -> list[str]:
+        """A look-up gets a name; it is not made where a condition does not hold."""
+        raise NotImplementedError
+
+    def texels_where(self, where: str, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+        """Likewise the channels of a table."""
+        raise NotImplementedError
 
     @abstractmethod
     def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 
 from velatura.shader import atlas
+from velatura.shader.needed import OWN, needed, ordered
 from velatura.shader.printer import ATOM, CONDITION, NEGATIVE, Language, Output
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
 
@@ -41,13 +42,15 @@ class _Statements:
         self.places = places
         self.uses = Counter(x for symbol in order for x in symbol.args if isinstance(x, Symbol))
         self.uses.update(x for x in outputs if isinstance(x, Symbol))
+        self.cases = needed(outputs) if printer.branches else {}
+        self.uses.update(where.condition for case in self.cases.values() for where in case)
         self.clamped = {x.args[0] for x in order if self._clamps(x)}  # which need no text of their own
         self.inside = inside(order)
         self.open: frozenset[str] = frozenset()  # bound in the loops around this point
         self.text: dict[Symbol, tuple[str, int]] = {}
         self.taken = {*printer.words, *ARGUMENTS}
         self.lines: list[str] = []
-        self._write([symbol for symbol in order if not self.inside[symbol]])
+        self._write([symbol for symbol in ordered(order, self.cases) if not self.inside[symbol]])
 
     def _write(self, order: Sequence[Symbol]) -> None:
         title = ""
@@ -56,7 +59,7 @@ class _Statements:
                 continue
             named = symbol.kind in ("loop", "texels")
             text, precedence = ("", ATOM) if named else self._expression(symbol)
-            if not named and self._inline(symbol, text):
+            if not named and symbol not in self.cases and self._inline(symbol, text):
                 self.text[symbol] = text, precedence
                 continue
             if symbol.title != title:
@@ -71,6 +74,8 @@ class _Statements:
                 self._loop(symbol, name)
             elif symbol.kind == "texels":
                 self.lines += self._texels(symbol, name)
+            elif symbol in self.cases:
+                self.lines += self.printer.looked_up(name, symbol.kind, text, self._case(symbol))
             else:
                 self.lines.append(self.printer.named(name, symbol.kind, text))
             self.text[symbol] = name, ATOM
@@ -80,7 +85,22 @@ class _Statements:
         args = [self.of(x) for x in symbol.args]
         if symbol.op == "baked":
             return self.printer.baked(name, symbol.detail, args)
-        return self.printer.texels(name, symbol.detail, atlas.texels(symbol.detail), args)
+        count = atlas.texels(symbol.detail)
+        if symbol not in self.cases:
+            return self.printer.texels(name, symbol.detail, count, args)
+        return self.printer.texels_where(self._case(symbol), name, symbol.detail, count, args)
+
+    def _case(self, symbol: Symbol) -> str:
+        """The condition on which a look-up is needed."""
+        case = sorted(self.cases[symbol], key=lambda where: (where.condition.serial, where.channel))
+        return self.printer.all_of([(self._held(x, channel), holds) for x, holds, channel in case])
+
+    def _held(self, condition: Symbol, channel: int) -> tuple[str, Kind]:
+        """A condition of channels, or of one."""
+        text = self.text[condition][0]
+        if condition.kind == "condition" or channel >= OWN:
+            return text, condition.kind
+        return self.printer.component(text, channel, condition.kind), "condition"
 
     def _loop(self, symbol: Symbol, name: str) -> None:
         """A loop that fills an array, or goes from one state to the next."""

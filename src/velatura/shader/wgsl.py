@@ -36,6 +36,9 @@ class Wgsl(CLike):
     def declared(self, kind: str, name: str, text: str = "") -> str:
         return f"let {name} = {text};" if text else f"var {name}: {self.type(kind)};"
 
+    def variable(self, kind: str, name: str, text: str) -> str:
+        return f"var {name} = {text};"
+
     def array(self, kind: str, name: str, values: Sequence[str] | int, constant: bool = False) -> str:
         if isinstance(values, int):
             return f"var {name}: array<{self.type(kind)}, {values}>;"
