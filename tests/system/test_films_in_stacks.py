@@ -195,6 +195,19 @@ def test_light_that_facets_reflect_again_meets_their_films(name: str) -> None:
         assert found.passed == pytest.approx(truth.transmitted.energy, abs=3.5e-3)
 
 
+@pytest.mark.parametrize("alpha", [0.005, 0.015])
+def test_an_almost_smooth_film_within_reflects_as_a_smooth_one(alpha: float) -> None:
+    """Expected: no more than few walks meet its facets again, and these gain no light."""
+
+    def inner(alpha: float) -> list[np.ndarray]:
+        films = [{"eta": 2.0, "thickness_nm": 100}]
+        between = {"interface": {"eta": 2.12, "alpha": alpha, "films": films}}
+        coat, last = ({"interface": {"eta": eta, "alpha": a}} for eta, a in ((1.46, 0.025), (3.5, 0.1)))
+        return vt.lobes(vt.Stack.from_dict({"layers": [coat, between, last]}), 1.0).energy
+
+    np.testing.assert_allclose(inner(alpha), inner(0.0), atol=3e-4)
+
+
 @pytest.mark.parametrize(
     ("name", "reflectance"),
     [(name, x) for name in ("glass", "glass from inside", "aluminium") for x in ("fgd", "fgd-multi")]

@@ -175,7 +175,8 @@ def shares_in_the_end(
                 energy + _by_point(np.where(side, leaving, 0), walks, count) for energy, side in zip(energies, here)
             ]
         walks.end_faint()
-    again = np.maximum(again, np.finfo(float).tiny)
+    # Of the few walks of an almost smooth interface those that are kept may weigh too much; more would be a gain
+    again = np.maximum(np.maximum(again, energies[0] + energies[1]), np.finfo(float).tiny)
     return energies[0] / again, energies[1] / again
 
 
