@@ -37,15 +37,19 @@ from velatura.model import MODELS, Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic, Roughness
-from velatura.stack import Interface, Layer, Medium, Stack
+from velatura.stack import Film, Interface, Layer, Medium, Stack
 
 EXACT = 1e-6  # of energies and variances, at normal incidence
 CONFIGURATION, PAIRS, REACH = 5e-3, 2e5, 50e-3  # seconds, targets a second, seconds
 LEAST_STEP = 0.08  # of the logarithm of the index, of random stacks
+COATED, FILMED = (
+    0.5,
+    ("velatura", "bati2021"),
+)  # share of interfaces with films, and models that are asked for such stacks
 NODES, FINE = equivalence.NODES, 4 * equivalence.NODES  # on which sets of indices are looked for, and truly are
 CHUNK = 4096  # targets at once: what the caches of a core hold
 
-PARTS = ("physical", "exactness", "narrow", "speed")
+PARTS = ("physical", "films", "exactness", "narrow", "speed")
 
 #: One to three lobes: of one interface or a pair, the last one dielectric or a metal.
 KINDS = (
@@ -182,9 +186,17 @@ def exactness(model: Model, targets: int, seed: int = 0) -> Exactness:
     return result
 
 
-def physical(kinds: Sequence[str], rng: np.random.Generator, model: Model) -> Target:
-    """The lobes of a random stack, rougher from lobe to lobe, as a model reads them: of a pair, their mean blur."""
+def physical(kinds: Sequence[str], rng: np.random.Generator, model: Model, coated: bool = False) -> Target:
+    """The lobes of a random stack, rougher from lobe to lobe, as a model reads them: of a pair, their mean blur.
+
+    coated: with films on one of its interfaces at least, which the target fixes.
+    """
     layers: list[Layer] = []
+    places = sum(1 + ("pair" in kind) for kind in kinds)
+    films = [_films(rng) if rng.random() < COATED else () for _ in range(places)] if coated else [()] * places
+    if coated and not any(films):
+        films[int(rng.integers(places))] = _films(rng)
+    each = iter(films)
     lobes, eta, alpha = [], 1.0, 0.0
     for n, kind in enumerate(kinds):
         alpha = 0.0 if n == 0 and rng.random() < 0.3 else alpha + float(rng.uniform(0.01, 0.15))
@@ -195,21 +207,50 @@ def physical(kinds: Sequence[str], rng: np.random.Generator, model: Model) -> Ta
             if metal and k == count - 1:
                 index = rng.uniform(0.3, 2, 3)
                 extinction = index * rng.uniform(1.2, 4, 3)
-                layers.append(Interface(eta=tuple(index.tolist()), k=tuple(extinction.tolist()), alpha=alpha))
+                metal_index = {"eta": tuple(index.tolist()), "k": tuple(extinction.tolist())}
+                layers.append(Interface(**metal_index, alpha=alpha, films=next(each)))
             else:
                 above = eta
                 while abs(np.log(eta / above)) < LEAST_STEP:
                     eta = float(rng.uniform(1.1, 2.2))
-                layers.append(Interface(eta=eta, alpha=alpha))
+                layers.append(Interface(eta=eta, alpha=alpha, films=next(each)))
         base = "conductor" if metal else "dielectric"
-        lobes.append({"energy": 0.1, "alpha": alpha, "interfaces": count, "base": base})
+        own = [x or None for x in (layer.films for layer in layers if isinstance(layer, Interface))][-count:]
+        fixed = {"films": own} if any(own) else {}
+        lobes.append({"energy": 0.1, "alpha": alpha, "interfaces": count, "base": base, "fixed": fixed})
     return seen(Stack(layers), Target(lobes), model)
 
 
-def physical_targets(count: int, model: Model, seed: int = 0) -> Iterator[Target]:
+def _films(rng: np.random.Generator) -> tuple[Film, ...]:
+    """One film or two, of glass to titania, of up to half a micrometre together."""
+    count = 1 + int(rng.random() < 0.25)
+    return tuple(
+        Film(eta=float(rng.uniform(1.35, 2.4)), thickness_nm=float(rng.uniform(15, 500 / count))) for _ in range(count)
+    )
+
+
+def physical_targets(count: int, model: Model, seed: int = 0, coated: bool = False) -> Iterator[Target]:
     """Such targets, of all kinds in turn."""
     rng = np.random.default_rng(seed)
-    return (physical(KINDS[n % len(KINDS)], rng, model) for n in range(count))
+    return (physical(KINDS[n % len(KINDS)], rng, model, coated) for n in range(count))
+
+
+def of_coated(targets: int, model: Model, seed: int = 0) -> tuple[list[Target], list[Array], list[float]]:
+    """Lobes of random stacks with films: the refused ones, what stacks of the others miss of energies and variances,
+    (2,) each, and the seconds of processor time of each."""
+    refused, missed, seconds = list[Target](), list[Array](), list[float]()
+    for target in physical_targets(targets, model, seed, coated=True):
+        start = time.process_time()
+        found = stacks.search(target, model)
+        seconds.append(time.process_time() - start)
+        if found is None:
+            refused.append(target)
+            continue
+        has = [seen(found.stack, target, model).lobes, target.lobes]
+        energy = np.subtract(*([lobe.colour for lobe in lobes] for lobes in has))
+        variance = np.subtract(*([MAPS[model.map].variance(lobe.roughness) for lobe in lobes] for lobes in has))
+        missed.append(np.array([np.abs(energy).max(), np.abs(variance).max()]))
+    return refused, missed, seconds
 
 
 def width(members: EquivalenceClass, scale: float, nodes: int) -> float:
@@ -309,6 +350,19 @@ def main() -> int:
         for target in refused:
             print(" ", target.to_dict()["lobes"])
         failed |= bool(refused)
+
+    for model in map(named, (options.models or FILMED) if "films" in parts else ()):
+        refused, missed, seconds = of_coated(options.physical, model, options.seed)
+        energy, variance = np.max(missed, axis=0)
+        print(
+            f"lobes of random stacks with films, {model.name}: {len(refused)} of {options.physical} refused, energy to "
+            f"{energy:.1e}, variance to {variance:.1e}, {sum((x > EXACT).any() for x in missed)} beyond {EXACT:g}; "
+            f"processor time {np.median(seconds):.2f} s at the median, {np.quantile(seconds, 0.95):.1f} s at the 95th "
+            f"percentile, {max(seconds):.1f} s at most",
+            flush=True,
+        )
+        for target in refused:
+            print(" ", target.to_dict()["lobes"])
 
     variants = [named("bati2021", channels="separate"), named("bati2021", reflectance="fresnel")]
     models = [named(name) for name in options.models] if options.models else [*MODELS, *variants]

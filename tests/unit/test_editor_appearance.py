@@ -126,18 +126,36 @@ def test_lobes_have_their_own_base_also_where_they_are_only_shown() -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_an_interface_with_films_stays_and_says_so(model: str) -> None:
-    """Its lobes are shown as they are, and no wish takes films away."""
+def test_an_interface_keeps_its_films_while_lobes_are_dragged(model: str) -> None:
+    """Its lobes are those of the material, and what a wish changes is all but its films."""
     coat, medium, metal = copy.deepcopy(COATED["layers"])
     metal["interface"]["films"] = [{"eta": 2.0, "thickness_nm": 120}]
     material = {"layers": [coat, medium, metal]}
     found = appearance.appearance({"material": material, "model": model})
-    why = "layer 2: has thin films, and stays as it is; change it under Layers, or take its films away"
-    assert found["says"] == why
+    assert found["says"] is None
     read = vt.lobes(Stack.from_dict(material), 1.0, model=model).energy
     np.testing.assert_allclose([lobe["energy"] for lobe in found["target"]["lobes"]], np.array(read)[..., 0], atol=1e-9)
-    answer = appearance.invert({"material": material, "target": found["target"], "model": model})
-    assert answer == {"feasible": False, "why": why}
+    body = {"material": material, "target": found["target"], "model": model}
+    again = appearance.invert(body)["target"]["lobes"]
+    np.testing.assert_allclose([lobe["energy"] for lobe in again], np.array(read)[..., 0], atol=1e-6)
+
+    # A brighter metal below an oxide, under a sharper coat
+    wish = copy.deepcopy(found["target"])
+    wish["lobes"][1]["energy"] = [1.1 * e for e in wish["lobes"][1]["energy"]]
+    wish["lobes"][0]["alpha"] = 0.5 * wish["lobes"][0]["alpha"]
+    for read_before in (None, found["target"]):
+        answer = appearance.invert(body | {"target": wish} | ({"read": read_before} if read_before else {}))
+        assert answer["snapped"] is None
+        stack = Stack.from_dict(answer["material"])
+        assert stack.interfaces[1].films == (vt.Film(eta=2.0, thickness_nm=120),)
+        energies = [e[:, 0] for e in vt.lobes(stack, 1.0, model=model).energy]
+        # While a drag is held, lobes are approximate
+        np.testing.assert_allclose(
+            energies, [lobe["energy"] for lobe in wish["lobes"]], atol=2e-2 if read_before else 1e-6
+        )
+    with pytest.raises(InvalidInput, match=r"^lobe 2: has no map of its class, since thin films"):
+        class_maps.class_(body | {"lobe": 1})
+    assert class_maps.class_(body | {"lobe": 0})["kind"] == "dielectric"
 
 
 def test_a_pair_of_one_blur_is_one_lobe() -> None:

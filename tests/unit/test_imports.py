@@ -31,7 +31,7 @@ MAY_IMPORT = {
     "bakes": "stack optics sampling model targets reference",
     "exports": "__init__ stack model shader bakes targets",
     "imports": "stack optics model kernel binding targets",
-    "inverse": "stack optics tables model ops kernel",
+    "inverse": "stack optics tables model ops sampling kernel",
     "reference": "stack optics ops kernel binding sampling",
     "checks": "kernel",
     "scenes": "kernel",

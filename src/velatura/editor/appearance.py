@@ -64,12 +64,14 @@ def held(material: Answer, target: Target, model: Model) -> DraggedStack | None:
 
 
 def dragged(body: Body, target: Target) -> DraggedStack | None:
-    """The material as it is dragged, by a model in closed form where its lobes are given."""
+    """The material as it is dragged, by a model in closed form where its lobes are given, films known roughly."""
     model, material, read = reader_of(body, target), body.get("material") or {}, body.get("read")
-    if read is None or model.recursion.closed_form:
+    if read is None:
         return held(material, target, model)
     near = held(material, target, model.adder)
-    return near and near.known(Target.from_dict(read))
+    if near is None or (model.recursion.closed_form and not near.space.coated):
+        return near
+    return near.quickly.known(Target.from_dict(read))
 
 
 def described(target: Target) -> Answer:
@@ -88,7 +90,7 @@ def described(target: Target) -> Answer:
 def appearance(body: Body) -> Answer:
     """A material as a target; if it is not one, `says` is the reason, and the target is for display only."""
     stack, model = material_of(body), model_of(body)
-    if why := _varies(stack) or _coated(stack):
+    if why := _varies(stack):
         return _shown(stack, model, why)
     try:
         parts = plain(stack)
@@ -123,14 +125,6 @@ def _varies(stack: Stack) -> str | None:
         if isinstance(value, Varying) and address.layer not in (None, last):
             own = "so that every point of the surface has lobes of its own; give it one value to drag them"
             return f"layer {address.layer}: has a {value.what}, {own}"
-    return None
-
-
-def _coated(stack: Stack) -> str | None:
-    """Why an interface stays as it is, if one does."""
-    for n, layer in enumerate(stack.layers):
-        if isinstance(layer, Interface) and layer.films:
-            return f"layer {n}: has thin films, and stays as it is; change it under Layers, or take its films away"
     return None
 
 
@@ -180,7 +174,9 @@ def _target(stack: Stack, parts: list[Any], counts: list[int]) -> Target:
         axis = next((r.rotation for r in (part.roughness for part in reversed(own)) if r.alpha_u != r.alpha_v), axis)
         tau = np.broadcast_to(own[0].tau, (3, 1))[:, 0]
         pinned = bool(np.any(tau)) and (count == 2 or n == 0)
-        fixed = {"tau": [tuple(tau.tolist()), *[None] * (count - 1)]} if pinned else {}
+        fixed: Answer = {"tau": [tuple(tau.tolist()), *[None] * (count - 1)]} if pinned else {}
+        if any(part.films for part in own):
+            fixed["films"] = [part.films or None for part in own]
         tint = 0.5
         if own[-1].kind == "conductor":
             above = own[0].eta if count == 2 else eta
@@ -245,14 +241,12 @@ def invert(body: Body) -> Answer:
     model, material = reader_of(body, wish), body.get("material")
     near = dragged(body, wish) if material else None
     if near is None:
-        if material and (why := _coated(Stack.from_dict(material))):
-            return {"feasible": False, "why": why}
         if material and any(part.scatters for part in plain(Stack.from_dict(material))):
             return {"feasible": False, "why": "a medium that scatters stays where it is, and the interfaces around it"}
         return _fresh(wish, model)
     possible = near.achromatic(wish)
-    found, bound = near.towards(possible) if near.model.recursion.closed_form else _slowly(possible, near)
-    if bound is not None and near.model.recursion.closed_form and not near.rough:
+    found, bound = _slowly(possible, near) if near.space.slow else near.towards(possible)
+    if bound is not None and not near.space.slow and not near.rough:
         other = _elsewhere(possible, near)
         if other is not None:
             found, bound = other, None
@@ -260,6 +254,8 @@ def invert(body: Body) -> Answer:
             found, bound = _approached(possible, near) if near.far(possible) else (found, bound)
             found = _further(possible, found)
     says = bound.why(wish) if bound else None
+    if near.coloured:  # the index follows one channel, and films give the others
+        possible = found.now(wish)
     asked, given = (np.array(target.lobes[0].colour) for target in (wish, possible))
     if says is None and np.max(np.abs(asked - given)) > ROUNDED * np.max(given):
         says = f"lobe 1: {REASONS['mirror' if wish.lobes[0].base == 'mirror' else 'colour']}"
@@ -311,7 +307,7 @@ def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
     """A stack with the lobes, found independently of the present one; a medium that scatters would be lost."""
     if near.scatters:
         return None
-    found = stacks.search(wish, near.model.in_closed_form, EFFORT)
+    found = stacks.in_closed_form(wish, near.model.in_closed_form, EFFORT)
     fresh = DraggedStack.of(found.stack, wish, near.model) if found else None
     if fresh is None:
         return None
@@ -342,7 +338,7 @@ def _further(wish: Target, found: DraggedStack) -> DraggedStack:
 
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
-    found = stacks.search(wish, model.in_closed_form)
+    found = stacks.in_closed_form(wish, model.in_closed_form)
     fresh = DraggedStack.of(found.stack, wish, model) if found else None
     if fresh is not None:
         moved, bound = fresh.towards(wish)

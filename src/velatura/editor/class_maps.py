@@ -38,6 +38,11 @@ def class_(body: Body) -> Answer:
     if not isinstance(size, int) or not SIZES[0] <= size <= SIZES[1]:
         raise InvalidInput(f"size: must be a number from {SIZES[0]} to {SIZES[1]}, got {size!r}")
     place = _place(near, lobe)
+    if any(part.films for part, own in zip(near.point.layers, near.interfaces) if own.lobe == lobe):
+        raise InvalidInput(
+            f"lobe {lobe + 1}: has no map of its class, since thin films change what its indices reflect; "
+            "drag its lobe, or choose one without films"
+        )
     free, wanted = _members(near, lobe), near.target.lobes[lobe]
     members = free.held(tau_0=near.depths_of(lobe)[0]) if wanted.interfaces == 2 else free
     axis = np.geomspace(1.0, target.eta_max, size)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,8 +18,9 @@ from velatura.inverse.roots import bisect, intervals
 from velatura.inverse.smooth_pair import Interval
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
+from velatura.stack.values import Film
 
-NODES = 512  # on which a set without a closed form is looked for
+NODES, NODES_COATED = 512, 32  # on which a set without a closed form is looked for, and one below films
 ROUGHLY, ATTEMPTS = 16, 8  # halvings of a range that need not be exact, and draws of members
 NOTHING, VANISHED = 2e-3, 10.0  # logarithm of a step of the index that is no interface, and the cost of that
 MODERATE = 1.5  # an index that many media have; members near it, clear and with interfaces that show, are preferred
@@ -44,7 +46,7 @@ class EquivalenceClass:
 
     above: the stack (N = 1). energy: (C, 1). variance: in the space of the model's map, a number if all axes are alike.
     tau: given depths of the medium above a pair, None where they are free. choice: the last interface, and what is
-    given of it.
+    given of it. films: on the upper interface of a pair; those on the last one are in its choice.
     """
 
     above: Above
@@ -53,6 +55,7 @@ class EquivalenceClass:
     interfaces: int = 1
     choice: Choice = DIELECTRIC
     tau: Value | None = None
+    films: tuple[Film, ...] = ()
 
     # Members ---------------------------------------------------------------------------------------------------------
 
@@ -123,7 +126,7 @@ class EquivalenceClass:
         choice = dataclasses.replace(here.choice, eta=eta.pop()) if given else here.choice
         if self.interfaces == 1:
             return (interface.solve(self.above, self.energy, self._blur, choice).layers,)
-        upper, lower = pair.solve(self.above, self.energy, self._blur, eta[0], here._tau, choice)
+        upper, lower = pair.solve(self.above, self.energy, self._blur, eta[0], here._tau, choice, coated=self.films)
         return upper.layers, lower.layers
 
     def contains(self, *indices: ArrayLike, channel: int | None = None, **depths: ArrayLike) -> Mask:
@@ -135,9 +138,9 @@ class EquivalenceClass:
         if depths or (channel is None and (self.choice.kind != "dielectric" or self.above.model.tir != "off")):
             return np.asarray(np.logical_and.reduce([part.feasible for part in self.member(*each, **depths)]))
         below, rest, possible = self._last(*each[: self.interfaces - 1])
-        optical = _depth(below, rest, each[-1])
-        ok = (possible >= 0) & (optical >= -interface.NEGLIGIBLE)
-        ok = ok & ((optical <= interface.NEGLIGIBLE) | (not self._clear))
+        optical = _depth(below, rest, each[-1], self.choice.films)
+        ok = (possible >= 0) & (optical >= -self.choice.slack)
+        ok = ok & ((optical <= self.choice.slack) | (not self._clear))
         within = [interface.within(eta[None], self.choice.eta_max) >= 0 for eta in each]
         return np.asarray(np.logical_and.reduce([*within, *ok[self._channels(channel)]]))
 
@@ -149,7 +152,8 @@ class EquivalenceClass:
         if not len(some):
             return depths
         columns, of_columns = (mapped(take(x, some, len(eta_1)), lambda x: x[..., None]) for x in (below, rest))
-        depths[:, some] = _depth(columns, of_columns, np.broadcast_to(eta_2, (len(some), len(eta_2))))
+        eta = np.broadcast_to(eta_2, (len(some), len(eta_2)))
+        depths[:, some] = _depth(columns, of_columns, eta, self.choice.films)
         depths[np.broadcast_to(possible, depths.shape[:2]) < 0] = np.nan
         return depths
 
@@ -172,7 +176,7 @@ class EquivalenceClass:
         if self._smooth_in_one_medium:
             e = (self.energy * np.exp(2 * np.asarray(self._tau)))[self._channels(channel)]
             return smooth_pair.indices_1(self._eta_0, float(e.min()), float(e.max()), self.choice.eta_max)
-        return intervals(lambda eta: self._margin(eta, channel), self._axis)
+        return intervals(lambda eta: self._margin(eta, channel), self._axis, self._rounds)
 
     def indices_2(self, eta_1: float, channel: int | None = None) -> list[Interval]:
         """All values of the second index below a pair's first one: N2 of Bati et al. 2021, Eq. 14."""
@@ -181,7 +185,7 @@ class EquivalenceClass:
     def indices_blur(self) -> list[Interval]:
         """All values of a pair's first index for which its second interface need not be smoother than smooth: V of
         Bati et al. 2021, section 5.2.2."""
-        return intervals(lambda eta: self._last(eta)[1].blur, self._axis)
+        return intervals(lambda eta: self._last(eta)[1].blur, self._axis, self._rounds)
 
     def depths_1(self, eta_1: Array) -> tuple[Array, Array]:
         """The least and the largest optical depths (C, N) of the medium above the last interface, by the first index.
@@ -264,6 +268,8 @@ class EquivalenceClass:
             if self.tau is None:
                 found["tau_0"], here = tau_0, here.held(tau_0=tau_0)
         if self.choice.kind == "dielectric":
+            if self.choice.films and not last:
+                return found | {"eta_1": _draw(self.indices_1(), rng.random(count))}
             rarer, denser = here._roots(None, *([found["eta_1"]] if last else []))
             rarer, denser = (np.broadcast_to(root, count) for root in (rarer, denser))
             eta = np.where(rng.random(count) < 0.5, rarer, denser)
@@ -387,13 +393,24 @@ class EquivalenceClass:
     @cached_property
     def _axis(self) -> Array:
         """Points to search for an index: everywhere, and that of the medium above, where an interface vanishes."""
-        eta_max = self.choice.eta_max
-        return np.unique(np.r_[np.geomspace(1, eta_max, NODES), np.clip(self._eta_0, 1, eta_max)])
+        eta_max, nodes = self.choice.eta_max, NODES_COATED if self._coated else NODES
+        return np.unique(np.r_[np.geomspace(1, eta_max, nodes), np.clip(self._eta_0, 1, eta_max)])
+
+    @property
+    def _coated(self) -> bool:
+        """Whether its interfaces have films, of which reflectances are known roughly, and take longer."""
+        return bool(self.films or self.choice.films)
+
+    @property
+    def _rounds(self) -> int:
+        """Halvings of the ends of a set."""
+        return ROUGHLY if self._coated else 50
 
     @property
     def _coarse(self) -> Array:
         """Few of these points."""
-        return np.unique(np.r_[self._axis[::16], self._axis[-1], np.clip(self._eta_0, 1, self.choice.eta_max)])
+        some = 4 if self._coated else 16
+        return np.unique(np.r_[self._axis[::some], self._axis[-1], np.clip(self._eta_0, 1, self.choice.eta_max)])
 
     @property
     def _tau(self) -> Value:
@@ -435,7 +452,7 @@ class EquivalenceClass:
 
     @property
     def _smooth_in_one_medium(self) -> bool:
-        alone = self.above.over is None
+        alone = self.above.over is None and not self._coated
         open_ = self.choice.kind == "dielectric" and self.choice.eta is None and self.choice.tau is None
         return bool(alone and open_ and self.interfaces == 2 and self.variance == 0)
 
@@ -454,7 +471,8 @@ class EquivalenceClass:
         """
         above, left, blur = self.above, self.energy, np.zeros(1)
         if eta_1:
-            upper = pair.top(above, self.energy, self._blur, eta_1[0][None], self._tau, self.choice.eta_max)
+            eta_max, coated = self.choice.eta_max, self.films
+            upper = pair.top(above, self.energy, self._blur, eta_1[0][None], self._tau, eta_max, coated=coated)
             above, left, blur = upper.below, self.energy - upper.energy, upper.layers.margins["blur"]
         bright = interface.attenuated(above, left)
         if self.choice.tau is not None:
@@ -478,8 +496,10 @@ class EquivalenceClass:
             layers = interface.solve(above, energy, self._blur, choice).layers
             found[ok] = np.minimum(found[ok], np.min(np.broadcast_arrays(*layers.margins.values()), axis=0))
             return found
-        ends = [_depth(below, rest, np.full(len(eta_1), eta))[some] for eta in (1.0, self.choice.eta_max)]
-        return np.minimum(found, interface.margin(np.max(np.min(ends, axis=1), axis=0), interface.NEGLIGIBLE))
+        films = self.choice.films
+        last = (1.0, self.choice.eta_max) if not films else self._coarse
+        ends = [_depth(below, rest, np.full(len(eta_1), eta), films)[some] for eta in last]
+        return np.minimum(found, interface.margin(np.max(np.min(ends, axis=1), axis=0), self.choice.slack))
 
     def _roots(self, channel: int | None, *eta_1: Array) -> tuple[Array, Array]:
         """Last indices that need least absorption, (N,) on either side, NaN if there is none."""
@@ -490,12 +510,19 @@ class EquivalenceClass:
             layers = interface.dielectric(below, rest.r[some], rest.roughness, choice)
             ok = layers.feasible & np.all(possible[some] >= 0, axis=0)
             if self._clear:  # then one index must do for all channels
-                ok = ok & (np.ptp(_depth(below, rest, np.ravel(layers.eta))[some], axis=0) <= interface.NEGLIGIBLE)
+                depth = _depth(below, rest, np.ravel(layers.eta), self.choice.films)[some]
+                ok = ok & (np.ptp(depth, axis=0) <= self.choice.slack)
             found.append(np.where(ok, np.ravel(layers.eta), np.nan))
         return found[0], found[1]
 
     def _beyond(self, channel: int | None, *eta_1: Array) -> list[Interval]:
         """All last indices: those that need least absorption, and those beyond them if more absorption is allowed."""
+        if self.choice.films and not self._clear and self.choice.eta is None:
+            below, rest, possible = self._last(*eta_1)
+            some, depth = self._channels(channel), functools.partial(_depth, below, rest, coated=self.choice.films)
+            if np.any(possible[some] < 0):
+                return []
+            return intervals(lambda eta: np.min(depth(eta)[some], axis=0) + self.choice.slack, self._axis, ROUGHLY)
         ends = (float(eta[0]) for eta in self._roots(channel, *eta_1))
         bounds = (1.0, self.choice.eta_max)
         alone = self._clear or self.choice.eta is not None
@@ -523,9 +550,9 @@ def dislike(eta_0: Value, layers: Layers) -> Array:
     return absorbs + 0.2 * extreme + almost
 
 
-def _depth(below: Above, rest: _Rest, eta: Array) -> Array:
+def _depth(below: Above, rest: _Rest, eta: Array, coated: tuple[Film, ...]) -> Array:
     """Optical depths (C, N) with which dielectrics of given indices reflect enough (Bati et al. 2021, Eq. 13)."""
-    layers = Layers("dielectric", eta[None], None, rest.roughness, 0.0)
+    layers = Layers("dielectric", eta[None], None, rest.roughness, 0.0, films=coated)
     found = below.reflectance(layers)
     return 0.5 * np.log(np.maximum(found, interface.ENERGY_MIN) / rest.r)
 
@@ -555,7 +582,11 @@ def metal_depths(
 ) -> tuple[Array, Array]:
     """The least and the largest optical depths (C, N) above conductors that are to reflect r below them."""
     metals = interface.Metals(above, roughness, choice, shape[0])
-    dark, bright = (metals.reflectance(np.broadcast_to(end, shape)) for end in metals.ends)
+    ends = metals.ends
+    if choice.films:  # of any metal between these
+        ends = tuple(ends[0] + share * (ends[1] - ends[0]) for share in np.linspace(0, 1, interface.NODES_COATED))
+    each = [metals.reflectance(np.broadcast_to(end, shape)) for end in ends]
+    dark, bright = np.min(each, axis=0), np.max(each, axis=0)
     low, high = (0.5 * np.log(np.maximum(x / r, 1.0)) for x in (dark, bright))
     return np.broadcast_to(low, shape), np.broadcast_to(high, shape)
 

@@ -93,7 +93,7 @@ def infeasible(target: Target, model: Model) -> Infeasible:
     A model without a closed form is explained by the nearest one that has; its ways out are moved to where the model
     itself has stacks.
     """
-    if model.recursion.closed_form:
+    if stacks.exact(target, model):
         return _in_closed_form(target, model)
     from velatura.inverse import refined  # which drags, for reasons that stand here
 
@@ -342,8 +342,11 @@ def _of_form(target: Target, n: int, last: bool) -> Iterator[Way]:
     if last:
         base = "dielectric" if lobe.base == "conductor" else "conductor"
         forms.append((f"{what} base {base}", {"base": base, "fixed": Fixed()}, REMADE))
-    if lobe.fixed != Fixed():
-        forms.append((f"{what} nothing fixed", {"fixed": Fixed()}, FREED))
+    kept = lobe.fixed.films_alone
+    if lobe.fixed != kept:
+        forms.append((f"{what} nothing fixed" + " but films" * (kept != Fixed()), {"fixed": kept}, FREED))
+    if kept != Fixed():
+        forms.append((f"{what} nothing fixed", {"fixed": Fixed()}, REMADE))
     for name, changes, cost in forms:
         yield _at(target, target.with_lobe(n, **changes), name, cost)
 
@@ -405,7 +408,7 @@ def _capped(target: Target) -> Iterator[Way]:
 
 def _to_sure(target: Target) -> Iterator[Way]:
     """Towards lobes that are almost always possible, dark and blurred more the deeper they lie; then nothing fixed."""
-    for kept in (target, freed(target)):
+    for kept in dict.fromkeys((target, freed(target, films=True), freed(target))):
         for dark in SURE:
             sure, s = kept, 0.0
             for n, lobe in enumerate(target.lobes):
@@ -425,9 +428,10 @@ def _to_sure(target: Target) -> Iterator[Way]:
             yield Way("lobes", target, along, _described, 1.0, OTHER)
 
 
-def freed(target: Target) -> Target:
-    for n in range(len(target.lobes)):
-        target = target.with_lobe(n, fixed=Fixed())
+def freed(target: Target, films: bool = False) -> Target:
+    """The target with nothing fixed, or `films` alone."""
+    for n, lobe in enumerate(target.lobes):
+        target = target.with_lobe(n, fixed=lobe.fixed.films_alone if films else Fixed())
     return target
 
 

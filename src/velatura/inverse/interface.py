@@ -14,14 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura import ops
+from velatura.inverse import films
 from velatura.inverse.partial_stack import Above, Array, Batch, Layers, Mask
-from velatura.inverse.roots import false_position
+from velatura.inverse.roots import false_position, first_crossing, nearest_to_zero
 from velatura.inverse.target import BLUR
 from velatura.model import Model, named
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.stack.values import INDEX_HIGH, INDEX_LOW
+from velatura.stack.coatings import STEP_MIN
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Film
 
 CLOSED_FORM = "bati2021"  # the model of the paper, by which interfaces follow from lobes one by one
 DENSER, RARER = 1, -1
@@ -33,6 +35,8 @@ CONDUCTOR_MIN = 3 - 2 * np.sqrt(2)  # a conductor (k >= eta) reflects more
 CONDUCTOR_MAX = 1 - 2.1e-3  # up to which indices of a metal lie within what a material may hold, with any tint
 ROUNDS, ENOUGH = 40, 1e-7  # of corrections where a model's own reading differs from the closed form
 MISSED = 1e-6  # what remains after them is no solution
+NODES_COATED = 16  # indices below films between which solutions are looked for
+TINTS = (0.0, -0.5, 0.5, -1.0, 1.0)  # of metals under films, as shares of the way to the least and the largest
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,9 @@ class Choice:
     side: of the two indices that reflect the same, the denser (1) or the rarer one (-1); (N,) or a number.
     eta, kappa, tau: given values, None where they are sought; absorption that is sought is as little as can be.
     tint: 0..1 between the bounds of a conductor's eta (Bati et al. 2021, Eqs. 9-10).
-    absorbs: whether the medium above may absorb at all. eta_max: largest index of a dielectric.
+    absorbs: whether the medium above may absorb at all. eta_max: largest index of a dielectric. films: on the
+    interface; of several indices that reflect the same with them, the nearest to that above, and of several metals the
+    brightest.
     """
 
     kind: str = "dielectric"
@@ -53,6 +59,12 @@ class Choice:
     tint: Value = 0.5
     absorbs: bool = True
     eta_max: float = 4.0
+    films: tuple[Film, ...] = ()
+
+    @property
+    def slack(self) -> float:
+        """By which constraints may be broken: what films reflect is known roughly here."""
+        return films.NEAR if self.films else NEGLIGIBLE
 
 
 DIELECTRIC = Choice()
@@ -121,20 +133,28 @@ def solve(above: Above, energy: Array, variance: Variance, choice: Choice) -> Fo
         below, lobe = above.below(layers, reflectance)
         read = at_brightest(above, lobe.variance, bright)
         missing, apart = energy / np.maximum(lobe.energy, ops.TINY), variance + read * -1.0
-        apart_e = np.abs(energy - lobe.energy) / np.maximum(lobe.energy, FAINT)
+        apart_e = np.abs(energy - lobe.energy) / np.maximum(energy.max(axis=0) if choice.films else lobe.energy, FAINT)
         off = np.maximum(np.max(apart_e, axis=0), _size(apart))
-        if not np.any(layers.feasible & (off > ENOUGH)):
+        if not np.any(layers.feasible & (off > (films.NEAR if choice.films else ENOUGH))):
             break
         before, want_e, want_s = (
             (want_s, read),
             want_e * np.clip(missing, 0.5, 2.0),
             _secant(want_s, read, apart, before),
         )
-    layers = layers.with_margins(model=np.where(layers.feasible & (off > MISSED), -off, 0.0))
+    missed = 2 * films.NEAR if choice.films else MISSED
+    layers = layers.with_margins(model=np.where(layers.feasible & (off > missed), -off, 0.0))
     return Found(layers, below, lobe.energy, read)
 
 
-def with_index(above: Above, eta: Value, tau: Value, variance: Variance, paired: Array | None = None) -> Found:
+def with_index(
+    above: Above,
+    eta: Value,
+    tau: Value,
+    variance: Variance,
+    paired: Array | None = None,
+    coated: tuple[Film, ...] = (),
+) -> Found:
     """The dielectrics of given index whose lobes have these variances, of any energy.
 
     The roughness depends on the light that bounces above, that on the reflectance, and that on the roughness.
@@ -143,14 +163,17 @@ def with_index(above: Above, eta: Value, tau: Value, variance: Variance, paired:
         paired: energy of the pair whose upper interface this is, for the roughness as printed in Bati et al. 2021,
             Algorithm 5: then the light that bounces above follows from the reflectance of the whole pair, and the
             variance is missed by a little.
+        coated: films on them.
     """
     lit = above.through(tau)
     smooth = np.atleast_2d(fresnel.normal_incidence(eta / above.eta))
+    if coated:
+        smooth = lit.reflectance(Layers("dielectric", eta, None, Roughness(0.0, 0.0, 0.0), 0.0, films=coated))
     r = smooth if paired is None else attenuated(lit, paired)
     s_r = reflected(lit, variance, r, r)
     before = None
     for _ in range(ROUNDS):
-        layers = Layers("dielectric", eta, None, floor(s_r).roughness(above.f), tau)
+        layers = Layers("dielectric", eta, None, floor(s_r).roughness(above.f), tau, films=coated)
         below, lobe = above.below(layers)
         bright = attenuated(above, lobe.energy)
         read = at_brightest(above, lobe.variance, bright)
@@ -211,12 +234,14 @@ def _closed_form(
     margins = {"blur": margin(least(s_r)), **layers.margins}
     reflectance = above.reflectance(layers)
     tau = 0.5 * np.log(np.maximum(reflectance, ops.TINY) / r)  # Bati et al. 2021, Eq. 13
+    # With films dark channels are missed by shares of the bright ones
+    more = _apart(reflectance, r) if choice.films else tau
     if choice.tau is not None or not choice.absorbs:
-        margins["colour"] = margin(-np.max(np.abs(tau), axis=0), NEGLIGIBLE)
+        margins["colour"] = margin(-np.max(np.abs(more), axis=0), choice.slack)
         tau = choice.tau if choice.tau is not None else 0.0
     else:
-        margins["absorption"] = margin(np.min(tau, axis=0), NEGLIGIBLE)
-        tau = np.where((tau < 0) & (tau >= -NEGLIGIBLE), 0.0, tau)
+        margins["absorption"] = margin(np.min(more, axis=0), choice.slack)
+        tau = np.where((tau < 0) & (more >= -choice.slack), 0.0, tau)
     return dataclasses.replace(layers, tau=tau, margins=margins), reflectance
 
 
@@ -252,10 +277,12 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice, not
     """
 
     def layers(eta: Value) -> Layers:
-        return Layers("dielectric", eta, None, roughness, 0.0)
+        return Layers("dielectric", eta, None, roughness, 0.0, films=choice.films)
 
     if choice.eta is not None:
         return layers(as_index(choice.eta)).with_margins(index=within(choice.eta, choice.eta_max))
+    if choice.films:
+        return _coated_dielectric(above, r, roughness, choice)
 
     denser = np.broadcast_to(np.asarray(choice.side) > 0, np.broadcast_shapes(np.shape(choice.side), r.shape[1:]))
 
@@ -279,6 +306,39 @@ def dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice, not
     u = np.exp(false_position(excess, low, high, least, most)) - FAINT
     solved = np.where(most < 0, u_max, u)
     return layers(index(solved)).with_margins(energy=margin(np.where(exists, most, -1.0), NEGLIGIBLE))
+
+
+def _coated_dielectric(above: Above, r: Array, roughness: Roughness, choice: Choice) -> Layers:
+    """The dielectric that reflects enough with films: where nothing absorbs, what is nearest to r."""
+    count = np.broadcast_shapes(np.shape(choice.side), r.shape[1:])[0]
+    denser = np.broadcast_to(np.asarray(choice.side) > 0, count)
+    eta_1 = np.broadcast_to(np.mean(np.atleast_2d(above.eta), axis=0), count)
+    far = np.log(np.where(denser, choice.eta_max, 1.0) / eta_1)
+    exists = np.where(denser, far > STEP_MIN, far < -STEP_MIN)
+    first = np.where(exists, np.copysign(2 * STEP_MIN, far), 0.0)
+
+    def excess(share: Array) -> Array:
+        eta = (eta_1 * np.exp(first + share * (far - first)))[None]
+        reflectance = above.reflectance(Layers("dielectric", eta, None, roughness, 0.0, films=choice.films))
+        apart = _apart(reflectance, r)
+        alone = choice.tau is not None or not choice.absorbs
+        return np.asarray(-np.max(np.abs(apart), axis=0) if alone else np.min(apart, axis=0))
+
+    nodes = np.linspace(0, 1, NODES_COATED)
+    each = np.array([excess(np.full(count, x)) for x in nodes])
+    share = np.where(
+        (each.min(axis=0) < 0) & (each.max(axis=0) >= 0),
+        first_crossing(excess, nodes, each),
+        nearest_to_zero(excess, nodes, each),
+    )
+    enough = np.where(exists, margin(excess(share), choice.slack), -1.0)
+    eta = (eta_1 * np.exp(first + share * (far - first)))[None]
+    return Layers("dielectric", eta, None, roughness, 0.0, {"energy": enough}, films=choice.films)
+
+
+def _apart(reflectance: Value, r: Array) -> Array:
+    """By how much reflectances (C, N) are above others, as shares of the brightest channel of these."""
+    return np.asarray((reflectance - r) / np.max(r, axis=0))
 
 
 @dataclass(frozen=True)
@@ -326,7 +386,8 @@ class Metals:
         else:
             n = conductor_index(u, self.choice.tint) if eta is None else np.broadcast_to(eta, u.shape)
             k = conductor_extinction(u, n)
-        return Layers("conductor", n * self.above.eta, k * self.above.eta, self.roughness, 0.0)
+        index = n * self.above.eta, k * self.above.eta
+        return Layers("conductor", *index, self.roughness, 0.0, films=self.choice.films)
 
     def reflectance(self, u: Array) -> Array:
         """What they reflect below their stacks."""
@@ -346,13 +407,51 @@ def _conductor(above: Above, r: Array, roughness: Roughness, choice: Choice) -> 
     def excess(u: Array) -> Array:
         return metals.reflectance(u) / r - 1
 
-    least, most = excess(low), excess(high)
-    u = false_position(excess, low, high, least, most)
+    if choice.films:
+        metals, u, least, most = _coated_metals(metals, r, shape)
+    else:
+        least, most = excess(low), excess(high)
+        u = false_position(excess, low, high, least, most)
     found = metals.layers(u)
-    margins = {"bright": np.minimum(margin(np.min(most, axis=0), NEGLIGIBLE), _writable(found.eta, found.kappa))}
+    margins = {"bright": np.minimum(margin(np.min(most, axis=0), choice.slack), _writable(found.eta, found.kappa))}
     if not choice.absorbs or choice.tau is not None:
-        margins["metal"] = margin(np.min(-least, axis=0), NEGLIGIBLE)
+        margins["metal"] = margin(np.min(-least, axis=0), choice.slack)
     return found.with_margins(**margins)
+
+
+def _coated_metals(metals: Metals, r: Array, shape: tuple[int, ...]) -> tuple[Metals, Array, Array, Array]:
+    """Metals that reflect r with films, by u, and the least and the largest excess over r that there are.
+
+    Films make the reflectance depend on the tint, too: in every channel it is the nearest to that of the choice that
+    leaves room, or else that leaves any.
+    """
+    low, high = (np.broadcast_to(end, shape) for end in metals.ends)
+    nodes = np.linspace(1, 0, NODES_COATED)
+    wanted = np.broadcast_to(metals.choice.tint, shape)
+    tint, best = wanted.copy(), np.full(shape, -np.inf)
+    least, most = np.full(shape, np.inf), np.full(shape, -np.inf)
+    tinted = all(given is None for given in metals.given)
+    for way in TINTS if tinted else TINTS[:1]:
+        tried = np.where(way > 0, wanted + way * (1 - wanted), wanted * (1 + way))
+        there = dataclasses.replace(metals, choice=dataclasses.replace(metals.choice, tint=tried))
+        each = np.array([there.reflectance(low + x * (high - low)) for x in nodes]) / r - 1
+        # What is too bright may be absorbed
+        dark = films.NEAR if metals.choice.absorbs and metals.choice.tau is None else -each.min(axis=0)
+        room = np.minimum(np.minimum(dark, each.max(axis=0)), films.NEAR)
+        better = room > best + 1e-6
+        tint, best = np.where(better, tried, tint), np.where(better, room, best)
+        least, most = (np.where(better, x, old) for x, old in ((each.min(axis=0), least), (each.max(axis=0), most)))
+        if np.all(best >= films.NEAR):
+            break
+    metals = dataclasses.replace(metals, choice=dataclasses.replace(metals.choice, tint=tint))
+
+    def excess(share: Array) -> Array:
+        return metals.reflectance(low + share * (high - low)) / r - 1
+
+    each = np.array([excess(np.full(shape, x)) for x in nodes])
+    crosses = (least < 0) & (most >= 0)
+    share = np.where(crosses, first_crossing(excess, nodes, each), nearest_to_zero(excess, nodes, each))
+    return metals, low + share * (high - low), least, most
 
 
 def _writable(eta: Array, kappa: Array) -> Array:

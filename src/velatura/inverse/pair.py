@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from velatura.inverse import interface
+from velatura.inverse import films, interface
 from velatura.inverse.interface import CLOSED_FORM, DIELECTRIC, Choice, Found
 from velatura.inverse.partial_stack import Above, Array, Layers, Mask
 from velatura.model import Model, named
 from velatura.model.variance import Variance
 from velatura.ops import Value
+from velatura.stack.values import Film
 
 
 @dataclass(frozen=True)
@@ -74,19 +75,37 @@ def invert_pair(
 
 
 def solve(
-    above: Above, energy: Array, variance: Variance, eta_1: Value, tau: Value, choice: Choice, printed: bool = False
+    above: Above,
+    energy: Array,
+    variance: Variance,
+    eta_1: Value,
+    tau: Value,
+    choice: Choice,
+    printed: bool = False,
+    coated: tuple[Film, ...] = (),
 ) -> tuple[Found, Found]:
-    """Both interfaces of pairs below any stacks, and their lobes as read by these: Bati et al. 2021, Algorithm 5."""
-    upper = top(above, energy, variance, eta_1, tau, choice.eta_max, printed)
+    """Both interfaces of pairs below any stacks, and their lobes as read by these: Bati et al. 2021, Algorithm 5.
+
+    coated: films on the upper one; those on the lower one are in its choice.
+    """
+    upper = top(above, energy, variance, eta_1, tau, choice.eta_max, printed, coated)
     left = energy - upper.energy  # Bati et al. 2021, Eq. 20
     return upper, interface.solve(upper.below, left, variance, choice)
 
 
 def top(
-    above: Above, energy: Array, variance: Variance, eta_1: Value, tau: Value, eta_max: float, printed: bool = False
+    above: Above,
+    energy: Array,
+    variance: Variance,
+    eta_1: Value,
+    tau: Value,
+    eta_max: float,
+    printed: bool = False,
+    coated: tuple[Film, ...] = (),
 ) -> Found:
-    """The upper interfaces of pairs."""
-    upper = interface.with_index(above, eta_1, tau, variance, energy if printed else None)
+    """The upper interfaces of pairs, with films."""
+    upper = interface.with_index(above, eta_1, tau, variance, energy if printed else None, coated)
     left = np.min(1 - upper.energy / np.maximum(energy, interface.ENERGY_MIN), axis=0)
-    margins = {"upper": interface.margin(left), "index": interface.within(eta_1, eta_max)}
+    slack = films.NEAR if coated else interface.SLACK
+    margins = {"upper": interface.margin(left, slack), "index": interface.within(eta_1, eta_max)}
     return dataclasses.replace(upper, layers=upper.layers.with_margins(**margins))

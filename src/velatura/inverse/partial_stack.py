@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.inverse import films
 from velatura.inverse.target import ROUND
 from velatura.model import Model, adding, operators, prepare
 from velatura.model.diffuse import Base
@@ -25,6 +26,7 @@ from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, V
 from velatura.ops import Value
 from velatura.stack import (
     DiffuseValues,
+    Film,
     Interface,
     InterfaceValues,
     Kind,
@@ -56,6 +58,7 @@ class Layers(Batch):
     eta, kappa: absolute indices below, (1, N) or (C, N), kappa None for a dielectric. roughness: GGX, each (N,).
     tau: optical depths at normal incidence of the media above, (C, N) or a number. margins: by name of a constraint,
     (N,), negative where it is broken. scatters: the medium above, if that scatters; it then absorbs as tau says.
+    films: on all of them, from the top.
     """
 
     kind: Kind
@@ -65,6 +68,7 @@ class Layers(Batch):
     tau: Value
     margins: dict[str, Array] = dataclasses.field(default_factory=dict)
     scatters: MediumValues | None = None
+    films: tuple[Film, ...] = ()
 
     @property
     def medium(self) -> MediumValues:
@@ -103,7 +107,8 @@ class Layers(Batch):
         brushed = abs(u - v) > ROUND
         alpha = (u, v) if brushed else u if u == v else (u + v) / 2
         index = {"conductor": "mirror"} if self.kind == "mirror" else {"eta": eta, "k": kappa}
-        return [*media, Interface(**index, alpha=alpha, rotation=float(np.degrees(rotation)) if brushed else 0.0)]
+        turned = float(np.degrees(rotation)) if brushed else 0.0
+        return [*media, Interface(**index, alpha=alpha, rotation=turned, films=self.films)]
 
 
 @dataclass(frozen=True)
@@ -134,7 +139,7 @@ class Above(Batch):
     def prepared(self, layers: Layers, reflectance: Value | None = None) -> Prepared:
         """The interfaces as the next layer of each stack; `reflectance` if it is known already."""
         model = self.model if reflectance is None else dataclasses.replace(self.model, reflectance="fresnel")
-        material = Material((_interface(layers),), self.eta)
+        material = Material((_interface(layers, self.eta),), self.eta)
         if self.over is not None and self.model.tir != "off":
             # The interface above is there for its indices alone, which total reflection depends on
             smooth = InterfaceValues("dielectric", 0.0, 0.0, 0.0, self.eta)
@@ -219,30 +224,37 @@ def named_as(roughness: Roughness, axis: float) -> Roughness:
 RECORDS: tuple[Any, ...] = (Batch, Base, ops.Named)
 
 
-def whole(path: Sequence[Layers], exterior: Value) -> Material:
-    """Whole stacks of interfaces and the media above them."""
+def whole(path: Sequence[Layers], exterior: Value, closely: bool = False) -> Material:
+    """Whole stacks of interfaces and the media above them; one stack `closely`: films are left to its model."""
     layers: list[LayerValues] = []
+    above = exterior
     for part in path:
         if np.any(part.tau) or part.scatters is not None:
             layers.append(part.medium)
-        layers.append(_interface(part))
+        layers.append(_interface(part, None if closely else above))
+        above = part.eta
     return Material(tuple(layers), exterior)
 
 
 def read_whole(path: Sequence[Layers], exterior: float, model: Model) -> StackLobes:
-    """The reflected lobes of one stack of interfaces and the media above them, by a model without a closed form."""
+    """The reflected lobes of one stack of interfaces and the media above them, as the model itself has them."""
+    material, normal = whole(path, exterior, closely=True), (np.zeros(1), np.zeros(1), np.ones(1))
+    if model.recursion.closed_form:
+        return model.recursion.statistics(material, model, normal)
     from velatura.model.solution import plain  # loads SciPy
 
     # Nothing passes that would be summed up
-    material = whole(path, exterior)
     material = dataclasses.replace(material, layers=(*material.layers, DiffuseValues(0.0)))
-    return model.recursion.statistics(plain(material), model, (np.zeros(1), np.zeros(1), np.ones(1)))
+    return model.recursion.statistics(plain(material), model, normal)
 
 
-def _interface(layers: Layers) -> InterfaceValues:
+def _interface(layers: Layers, above: Value | None) -> InterfaceValues:
+    """The interfaces, with what films below an index `above` reflect unless that is None."""
     u, v, rotation = layers.roughness
     eta = None if layers.kind == "mirror" else layers.eta
-    return InterfaceValues(layers.kind, u, v, rotation * (180 / np.pi), eta, layers.kappa)
+    own = films.values(layers.films) if layers.films else ()
+    coating = films.AtNormal(own, above, eta, layers.kappa) if own and above is not None else None
+    return InterfaceValues(layers.kind, u, v, rotation * (180 / np.pi), eta, layers.kappa, own, coating)
 
 
 def take(value: Any, index: Any, count: int) -> Any:

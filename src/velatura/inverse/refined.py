@@ -36,6 +36,7 @@ SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
 TRIES, OWN, FEWER = 6, 4, 2  # stacks that are begun with; those that have the lobes of one target; where none has
 SAME = 0.03  # logarithm by which models differ about the energy of an index
 MISSED = 1e-4  # energy or variance that is mentioned
+COLOURED = 1e-5  # energy by which the colour of a lobe that films make may be missed
 SMALL = 0.01  # variance that is added to that of a goal, for units in which it is missed
 
 
@@ -98,6 +99,8 @@ def moved(found: Solution, target: Target, model: Model, giving: bool = True, cl
     if isinstance(there, Bound):
         return there
     missed = there.missed(target) > MISSED
+    if there.coloured and there.missed(target) > COLOURED:
+        return GREY
     return Solution(target, model, tuple(there.point.layers), there.now(target) if missed else None)
 
 
@@ -118,6 +121,9 @@ def _keeps(layers: Sequence[Layers], target: Target) -> bool:
     for lobe in target.lobes:
         for n in range(lobe.interfaces):
             part = next(parts)
+            asked_films = lobe.fixed.of("films", n)
+            if asked_films is not None and asked_films != part.films:
+                return False
             has = {"eta": part.eta, "k": part.kappa, "alpha": part.roughness[:2], "tau": part.tau}
             for key, value in has.items():
                 asked = lobe.fixed.of(key, n)
@@ -129,7 +135,7 @@ def _keeps(layers: Sequence[Layers], target: Target) -> bool:
 def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
     """What keeps the model from lobes that the nearest one in closed form has a stack for, and that stack; None if it
     has none."""
-    found = stacks.search(target, model.adder, EFFORT)
+    found = stacks.in_closed_form(target, model.adder, EFFORT)
     if found is None:
         return None
     there = moved(found, target, model, giving=False, closely=False)
@@ -148,7 +154,7 @@ def ways(offered: Sequence[Direction], target: Target, model: Model) -> list[Dir
         if (form, loose) in tried or (found and readings < LEAST_READINGS):
             continue
         tried.append((form, loose))
-        start = stacks.search(way.target, model.adder, EFFORT)
+        start = stacks.in_closed_form(way.target, model.adder, EFFORT)
         if start is not None:
             near = nearest(start, form, loose, model, max(readings, LEAST_READINGS))
             left -= READINGS // 2
@@ -218,7 +224,11 @@ def _way(way: Direction, target: Target, near: Target, model: Model) -> Directio
         words += [f"lobe {k} interfaces {lobe.interfaces}"] if lobe.interfaces != asked.interfaces else []
         words += [f"lobe {k} base {lobe.base}"] if lobe.base != asked.base else []
         if lobe.fixed != asked.fixed:
-            pins = [f"{key} {_listed(entries)}" for key, entries in lobe.fixed if any(x is not None for x in entries)]
+            pins = [
+                key if key == "films" else f"{key} {_listed(entries)}"
+                for key, entries in lobe.fixed
+                if any(x is not None for x in entries)
+            ]
             words.append(f"lobe {k} fixed {', '.join(pins)}" if pins else f"lobe {k} nothing fixed")
         words += (
             [f"lobe {k} energy {digits(lobe.colour if np.ptp(lobe.colour) else lobe.colour[0])}"]
@@ -278,7 +288,7 @@ def _requested(found: Solution, target: Target, model: Model) -> Solution | Boun
             energy = tuple(np.maximum(request[3 * k : 3 * k + 3], 0).tolist())
             asked = asked.with_lobe(k, energy=energy).with_roughness(k, kind(*s).roughness(f))
         asked = _as_fixed(asked.with_lobe(0, energy=first), found.model) if held else asked
-        return stacks.search(asked, found.model, EFFORT)
+        return stacks.in_closed_form(asked, found.model, EFFORT)
 
     def read(solution: Solution) -> Array:
         return numbers(seen(solution.stack, target, model))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ROUNDS, NARROW = 40, 1e-11  # of false position, and the width of a bracket that holds one number
+COARSE, NARROWED = 1e-4, 6  # of zeros of functions that are known roughly, and halvings towards those that have none
 ZOOMS, PEAKS, BETWEEN = 6, 8, 4  # of a grid about its highest peaks, and points between these and their neighbours
 
 
@@ -46,6 +47,30 @@ def false_position(
     return x
 
 
+def first_crossing(function: Callable[[Array], Array], nodes: Array, each: Array) -> Array:
+    """Zeros of functions between the first nodes (K,) where their values there, (K, ...), change sign; the first node
+    where none does."""
+    crosses = (each[1:] < 0) != (each[:-1] < 0)
+    at = np.argmax(crosses, axis=0)
+    f_low, f_high = (np.take_along_axis(each, n[None], axis=0)[0] for n in (at, at + 1))
+    crossed = crosses.any(axis=0)
+    low, high = np.where(crossed, nodes[at], nodes[0]), np.where(crossed, nodes[at + 1], nodes[0])
+    return false_position(function, low, high, f_low, np.where(crossed, f_high, f_low), COARSE)
+
+
+def nearest_to_zero(function: Callable[[Array], Array], nodes: Array, each: Array) -> Array:
+    """Where functions come nearest to 0, given their values (K, ...) at nodes (K,)."""
+    width = abs(nodes[1] - nodes[0])
+    best, off = nodes[np.argmin(np.abs(each), axis=0)], np.min(np.abs(each), axis=0)
+    for _ in range(NARROWED):
+        for side in (-0.5, 0.5):
+            tried = np.clip(best + side * width, min(nodes[0], nodes[-1]), max(nodes[0], nodes[-1]))
+            other = np.abs(function(tried))
+            best, off = np.where(other < off, tried, best), np.minimum(other, off)
+        width /= 2
+    return best
+
+
 def bisect(holds: Callable[[Array], NDArray[np.bool_]], inside: Array, outside: Array, rounds: int = 50) -> Array:
     """The ends of a condition: the last points towards `outside` for which it holds."""
     for _ in range(rounds):
@@ -55,7 +80,7 @@ def bisect(holds: Callable[[Array], NDArray[np.bool_]], inside: Array, outside: 
     return inside
 
 
-def intervals(margin: Callable[[Array], Array], grid: Array) -> list[tuple[float, float]]:
+def intervals(margin: Callable[[Array], Array], grid: Array, rounds: int = 50) -> list[tuple[float, float]]:
     """The intervals on which a margin is not negative, with ends found by bisection.
 
     Those that a grid steps over are found where the margin has a peak between its points.
@@ -67,7 +92,7 @@ def intervals(margin: Callable[[Array], Array], grid: Array) -> list[tuple[float
         return []
     inside = np.r_[grid[starts], grid[ends]]
     outside = np.r_[grid[np.maximum(starts - 1, 0)], grid[np.minimum(ends + 1, len(grid) - 1)]]
-    low, high = np.split(bisect(lambda x: margin(x) >= 0, inside, outside), 2)
+    low, high = np.split(bisect(lambda x: margin(x) >= 0, inside, outside, rounds), 2)
     return list(zip(low.tolist(), high.tolist()))
 
 

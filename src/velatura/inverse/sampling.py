@@ -21,6 +21,7 @@ WIDEST, SHRINKS = 0.4, 0.5  # share of the range of indices that the first of th
 SETTLED = 3  # generations with a stack
 STALE, NEARER = 6, 0.99  # generations that end the search, unless what is missing is this share of it, or less
 DRAWN, KEPT = 1024, 256  # partial stacks that are tried and followed, to be drawn from
+DRAWN_COATED = 64  # of those with films, each of which takes longer
 SELDOM = 1e-9  # weight of an interface that vanishes
 NARROWEST = 1e-4  # share of a range within which others near a known stack are tried
 
@@ -133,13 +134,14 @@ def drawn(known: Solution, rng: np.random.Generator) -> Partial:
     """
     target, layers = known.target, iter(known.layers)
     paths = dataclasses.replace(stacks.beginning(target, known.model), cost=np.ones(1))
+    count = DRAWN_COATED if target.has_films else DRAWN
     for n, lobe in enumerate(target.lobes):
         own = [next(layers) for _ in range(lobe.interfaces)]
-        paths = paths.take(rng.integers(len(paths.cost), size=DRAWN))
-        share = np.where(rng.random(DRAWN) < 0.5, 1.0, NARROWEST ** rng.random(DRAWN))
+        paths = paths.take(rng.integers(len(paths.cost), size=count))
+        share = np.where(rng.random(count) < 0.5, 1.0, NARROWEST ** rng.random(count))
         tried = _redrawn(paths, lobe, target, n == 0, own, share, rng)
         weight = paths.cost * share * np.where(tried.cost - paths.cost >= VANISHED, SELDOM, 1.0)
-        paths = stacks.pruned(dataclasses.replace(tried, cost=weight), lobe.interfaces, DRAWN)
+        paths = stacks.pruned(dataclasses.replace(tried, cost=weight), lobe.interfaces, count)
         # A race that each wins with a probability in proportion to its share
         paths = paths.take(np.argsort(rng.exponential(1 / paths.cost))[:KEPT])
         if not len(paths.cost):

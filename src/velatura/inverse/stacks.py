@@ -88,11 +88,11 @@ class Solution:
     @cached_property
     def in_closed_form(self) -> Solution:
         """The same stack, and its lobes as the nearest model in closed form reads them."""
-        if self.model.recursion.closed_form:
+        if exact(self.target, self.model):
             return self
         from velatura.inverse.drag import seen  # which solves with this
 
-        return Solution(seen(self.stack, self.target, self.model.adder), self.model.adder, self.layers)
+        return Solution(seen(self.stack, self.target, self.model.adder, quick=True), self.model.adder, self.layers)
 
     @cached_property
     def classes(self) -> tuple[EquivalenceClass, ...]:
@@ -148,7 +148,7 @@ def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EF
     """The preferred stack, of those found at the lowest effort that finds any."""
     if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
         return None
-    if not model.recursion.closed_form:
+    if not exact(target, model):
         from velatura.inverse import refined  # which begins with this
 
         met = refined.search(target, model)
@@ -157,6 +157,18 @@ def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EF
             near = refined.search(smooth, model)
             return near and dataclasses.replace(near, target=target, reached=smooth)
         return met
+    return in_closed_form(target, model, efforts)
+
+
+def exact(target: Target, model: Model) -> bool:
+    """Whether the closed form reads lobes as the model itself does: films it knows roughly."""
+    return model.recursion.closed_form and not target.has_films
+
+
+def in_closed_form(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Solution | None:
+    """The preferred stack of a model in closed form, films on it known roughly."""
+    if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
+        return None
     paths = found(target, model, efforts)
     return next(solutions(target, model, paths, [int(np.argmin(paths.cost))]), None) if paths else None
 
@@ -233,7 +245,7 @@ def alternatives(
 
 def _met(drawn: Solution, first: Solution) -> Solution | None:
     """What is drawn, moved to where the model of the first stack reads its lobes; None if there is no such stack."""
-    if first.model.recursion.closed_form:
+    if exact(first.target, first.model):
         return drawn
     from velatura.inverse import refined
 
@@ -295,6 +307,7 @@ def class_of(above: Above, lobe: TargetLobe, target: Target, first: bool) -> Equ
         interfaces=lobe.interfaces,
         tau=_pinned(lobe, "tau", 0) if lobe.interfaces == 2 else 0.0,
         choice=_choice(lobe, lobe.interfaces - 1, target, absorbs=True),
+        films=lobe.fixed.films_of(0) if lobe.interfaces == 2 else (),
     )
 
 
@@ -337,7 +350,8 @@ def extended(
 def with_upper(paths: Partial, lobe: TargetLobe, target: Target, eta: Array, tau: Value) -> tuple[Partial, Array]:
     """Partial stacks with the upper interfaces of a pair, and the energy that these leave, (C, N)."""
     energy = np.array(lobe.colour)[:, None]
-    upper = pair.top(paths.above, energy, _variance(paths, lobe), eta, tau, target.eta_max)
+    coated = lobe.fixed.films_of(0)
+    upper = pair.top(paths.above, energy, _variance(paths, lobe), eta, tau, target.eta_max, coated=coated)
     return _with(paths, _held(upper.layers, lobe, 0), upper.below), energy - upper.energy
 
 
@@ -364,7 +378,8 @@ def _of_fixed_roughness(
 
     def apart(index: np.ndarray, eta: Array) -> Array:
         above = take(paths.above, index, count)
-        _, lower = pair.solve(above, energy, variance, eta[None], 0.0 if tau is None else tau, choice)
+        depth, coated = 0.0 if tau is None else tau, lobe.fixed.films_of(0)
+        _, lower = pair.solve(above, energy, variance, eta[None], depth, choice, coated=coated)
         return np.broadcast_to(lower.layers.alpha, eta.shape) - alpha
 
     # Where the roughness passes the fixed one between the indices that are tried, and where it is that one throughout
@@ -406,6 +421,7 @@ def _choice(lobe: TargetLobe, n: int, target: Target, absorbs: bool) -> Choice:
         tint=lobe.tint,
         absorbs=absorbs,
         eta_max=target.eta_max,
+        films=lobe.fixed.films_of(n),
     )
 
 

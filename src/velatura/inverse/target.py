@@ -15,7 +15,7 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import RGB, Stack, io
 from velatura.stack.schema import Parameter, Record, show
-from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Pair, Scalar, Text
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text, Texture
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
 ROUND = 1e-6  # difference of roughnesses of a lobe that has no axes
@@ -101,6 +101,17 @@ class Fixed(Record):
     k: Annotated[tuple[Any, ...], Entries("absolute extinctions", entry=_colour("", high=INDEX_HIGH))] = ()
     alpha: Annotated[tuple[Any, ...], Entries("GGX roughnesses", entry=_number("", high=1.0))] = ()
     tau: Annotated[tuple[Any, ...], Entries("optical depths of the media above", entry=_colour(""))] = ()
+    films: Annotated[tuple[Any, ...], Entries("thin films, each interface's from the top", entry=Films(""))] = ()
+
+    def films_of(self, interface: int) -> tuple[Film, ...]:
+        """The thin films on an interface of the lobe, from the top."""
+        found: tuple[Film, ...] = self.of("films", interface) or ()
+        return found
+
+    @property
+    def films_alone(self) -> Fixed:
+        """The films, with nothing else fixed."""
+        return Fixed(films=self.films)
 
     def of(self, key: str, interface: int) -> Any:
         """The value that an interface of the lobe must keep, None where it is free."""
@@ -156,7 +167,17 @@ class TargetLobe(Record):
                 raise ValueError("fixed: k: only for the last interface of a lobe with base: conductor")
             if isinstance(self.fixed.of("eta", n), tuple):
                 raise ValueError("fixed: eta: of a dielectric must be one number for all channels")
+        for n in range(self.interfaces):
+            self._check_films(n, self.fixed.films_of(n), dielectric=n < dielectrics)
         return self
+
+    def _check_films(self, n: int, films: tuple[Film, ...], dielectric: bool) -> None:
+        for m, film in enumerate(films):
+            where = f"fixed: films: interface {n}, film {m}"
+            if self.base == "mirror" and not dielectric:
+                raise ValueError(f"{where}: not on a mirror, which reflects all light")
+            if isinstance(film.thickness_nm, Texture):
+                raise ValueError(f"{where}: thickness_nm: must be one number, since a lobe is that of one point")
 
     @property
     def axes(self) -> Roughness:
@@ -228,6 +249,11 @@ class Target(Record):
     def kind(self) -> type[Variance]:
         """The cheapest kind of variance that holds all lobes."""
         return kind_of(lobe.axes for lobe in self.lobes)
+
+    @property
+    def has_films(self) -> bool:
+        """Whether an interface has thin films."""
+        return any(lobe.fixed.films_of(n) for lobe in self.lobes for n in range(lobe.interfaces))
 
     @classmethod
     def from_dict(cls, fields: Any) -> Target:

@@ -17,6 +17,7 @@ import numpy as np
 
 from velatura import ops
 from velatura.errors import InvalidInput
+from velatura.inverse import films
 from velatura.inverse.explain import because
 from velatura.inverse.interface import (
     CONDUCTOR_MAX,
@@ -34,7 +35,7 @@ from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.stack import InterfaceValues, Kind, Material, MediumValues, Stack, number
+from velatura.stack import Film, InterfaceValues, Kind, Material, MediumValues, Stack, number
 
 SLACK = 1e-8  # by which a bound may be broken
 STEP = 1e-5  # of a coordinate, to see how the lobes change
@@ -42,6 +43,9 @@ NEAR = 1e-3  # coordinates above which it is to smaller values
 SAME = 1e-6  # difference of tints that count as equal
 SMOOTH = 1e-10  # variance below which an interface is smooth
 REFLECTANCE_MAX = 0.95  # of a dielectric
+DEEP = 50.0  # an optical depth that nothing passes
+CLEARED, OUTSIDE = 1e-7, 1e-4  # optical depths below 0: that are none, and that are read on the way
+SHIFT, FLAT = 0.01, 0.1  # share of an index by which it is changed, and of that by which what films reflect follows
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,9 @@ class InterfaceCoordinates:
     above that its reflectances do not need. absorbs: whether that medium takes away what its reflectances need.
     axis: near that of its roughness that comes first, in radians.
     scatters: the medium above, if that scatters; it stays, and absorbs as the coordinates say.
+    films: on it; then the index of a dielectric follows from the reflectance of the channel `reference`: that of least
+    absorption, or where nothing absorbs that in which an index shows most. darkest: the least reflectances (3, 1) of a
+    conductor; what is to reflect less is below more that absorbs.
     variance, depth, reflectances, log_index: indices of the entries of the variance, of the factor on `kept` (None
     where that is pinned), of the reflectances by channel or the one of all (None where the index itself is a
     coordinate), and of the logarithm of the index.
@@ -69,12 +76,15 @@ class InterfaceCoordinates:
     reflectances: slice | None = None
     log_index: int | None = None
     scatters: MediumValues | None = None
+    films: tuple[Film, ...] = ()
+    reference: int = 0
+    darkest: Array | None = None
 
 
 @dataclass(frozen=True)
 class Bound:
-    """A bound on a coordinate, on the logarithm of an interface's index, or on the least variance of the entries
-    `axes`: `sign` times it is at least `sign * at`.
+    """A bound on a coordinate, on the logarithm of an interface's index, or the optical depth above it in a `channel`,
+    or on the least variance of the entries `axes`: `sign` times it is at least `sign * at`.
 
     lobe, reason: the lobe that cannot be given beyond the bound, and why, a key of `REASONS`.
     """
@@ -86,6 +96,7 @@ class Bound:
     coordinate: int | None = None
     interface: int | None = None
     axes: slice | None = None
+    channel: int | None = None
 
     def why(self, target: Target) -> str:
         """The reason, in words, why a target is not met."""
@@ -106,7 +117,7 @@ class Space:
     """The space of coordinates of stacks of one form, below an index `exterior`, as a model reads them.
 
     Points x have shape (D,), or (D, N) for N stacks. factors: of readings, (3 K + V I,), where a model in closed form
-    stands in for another one. kind: of the variances.
+    stands in for another one. kind: of the variances. quick: whether films are known roughly, of many points at once.
     """
 
     model: Model
@@ -115,13 +126,22 @@ class Space:
     bounds: tuple[Bound, ...]
     factors: Array | None = None
     kind: type[Variance] = Isotropic
+    quick: bool = False
 
     # Points as layers, and as the model reads them -------------------------------------------------------------------
 
     def layers(self, x: Array) -> list[Layers]:
         """The interfaces of N points."""
         return [
-            Layers(own.kind, eta, kappa, self._roughness(x[own.variance], own.axis), tau, scatters=own.scatters)
+            Layers(
+                own.kind,
+                eta,
+                kappa,
+                self._roughness(x[own.variance], own.axis),
+                tau,
+                scatters=own.scatters,
+                films=own.films,
+            )
             for own, (eta, kappa, tau) in zip(self.interfaces, self._values(x))
         ]
 
@@ -142,7 +162,7 @@ class Space:
                     tau = tau - 0.5 * np.log(np.maximum(x[own.reflectances], ENERGY_MIN))
             else:
                 eta, absorbed = _dielectric(own, x[own.reflectances])
-                eta, tau = eta * eta_1, tau + absorbed
+                eta, tau = eta * eta_1, np.maximum(tau + absorbed, -OUTSIDE) if own.films else tau + absorbed
             yield eta, kappa, tau
             if own.kind == "dielectric":
                 eta_1 = eta
@@ -156,7 +176,7 @@ class Space:
 
     def read(self, x: Array) -> Array:
         """Energies of all lobes, then variances of all interfaces, (3 K + V I, N), of N points."""
-        if not self.model.recursion.closed_form:
+        if self.slow:
             return np.stack([self._solved(point[:, None]) for point in x.T], axis=-1)
         material = whole(self.layers(x), self.exterior)
         reflected, _ = lobes(prepare(material, self.model, self.kind), NORMAL)
@@ -195,14 +215,14 @@ class Space:
         Of a model that is slow, the differences are those of the nearest one that adds up layers, in proportion; or, if
         another point and its reading `before` are given, Broyden's, which follow from the change of the reading.
         """
-        closed = self.model.recursion.closed_form
+        closed = not self.slow
         if before and not closed:
             value, step = self.read(x[:, None])[:, 0], x[free] - before[0][free]
             along = step / (np.abs(x[free]) + 0.01) ** 2
             missed = value - before[1].value - before[1].slopes @ step
             return Reading(value, before[1].slopes + np.outer(missed, ops.divide(along, along @ step)))
         points = self.points(x, free)
-        read = dataclasses.replace(self, model=self.model.adder).read(points)
+        read = self.quickly.read(points)
         slopes = (read[:, 1:] - read[:, :1]) / (points[free, 1 + np.arange(len(free))] - x[free])
         if closed:
             return Reading(read[:, 0], slopes)
@@ -232,6 +252,21 @@ class Space:
         return self.interfaces[-1].lobe + 1
 
     @property
+    def slow(self) -> bool:
+        """Whether one point is read at a time."""
+        return not self.quick and (not self.model.recursion.closed_form or self.coated)
+
+    @property
+    def coated(self) -> bool:
+        """Whether there are films."""
+        return any(own.films for own in self.interfaces)
+
+    @property
+    def quickly(self) -> Space:
+        """The space as the nearest model reads it that adds up layers, many points at a time."""
+        return dataclasses.replace(self, model=self.model.adder, quick=True)
+
+    @property
     def winds(self) -> bool:
         """Whether readings wind as coordinates change, as those of a slow model do of lobes with axes."""
         return self.entries > 1 and not self.model.recursion.closed_form
@@ -254,14 +289,20 @@ class Space:
         found = []
         for own in self.interfaces:
             if own.reflectances is not None:
-                found += [3 * own.lobe + c for c in range(own.reflectances.stop - own.reflectances.start)]
+                channels = own.reflectances.stop - own.reflectances.start
+                found += [3 * own.lobe + c for c in (range(3) if channels == 3 else (own.reference,))]
         return np.array([*found, *(3 * self.lobes + n for n in range(self.entries * len(self.interfaces)))])
 
     # Bounds ----------------------------------------------------------------------------------------------------------
 
     def clipped(self, x: Array) -> Array:
-        """The point (D,) within the bounds on coordinates."""
-        return np.clip(x, *self.box)
+        """The point (D,) within the bounds on coordinates, and where no medium over films absorbs less than nothing."""
+        x = np.clip(x, *self.box)
+        for own in self.interfaces:
+            if own.films and own.absorbs and own.kind == "dielectric" and own.reflectances and own.depth:
+                span = x[own.reflectances]
+                x[own.reflectances] = np.minimum(span, span[own.reference] * np.exp(2 * min(x[own.depth], DEEP)))
+        return x
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
@@ -275,7 +316,7 @@ class Space:
 
     def margins(self, bounds: Sequence[Bound], x: Array) -> Array:
         """Distances of N points from bounds, negative outside, (bounds, N)."""
-        indices = [np.log(eta[0]) for eta, _, _ in self._values(x)]
+        indices, depths = zip(*((np.log(eta[0]), tau) for eta, _, tau in self._values(x)))
         found = np.empty((len(bounds), x.shape[1]))
         for n, bound in enumerate(bounds):
             if bound.coordinate is not None:
@@ -284,7 +325,7 @@ class Space:
                 value = least(self.kind(*x[bound.axes]))
             else:
                 assert bound.interface is not None
-                value = indices[bound.interface]
+                value = indices[bound.interface] if bound.channel is None else depths[bound.interface][bound.channel]
             found[n] = bound.sign * (value - bound.at)
         return found
 
@@ -295,7 +336,7 @@ class Space:
         """
         tied = np.eye(len(x), dtype=bool)
         for own in self.interfaces:
-            if own.kind == "dielectric" and own.reflectances is not None:
+            if own.kind == "dielectric" and own.reflectances is not None and not own.films:
                 span = x[own.reflectances]
                 largest = span > span.max() - SLACK
                 tied[own.reflectances, own.reflectances] |= largest[:, None] & largest
@@ -313,7 +354,13 @@ class Space:
 
     def bound_at(self, coordinate: int, x: Array) -> Bound:
         """The bound on a coordinate that a point violates."""
-        return next(b for b in self.bounds if b.coordinate == coordinate and b.sign * (x[coordinate] - b.at) < 0)
+        outside = (b for b in self.bounds if b.coordinate == coordinate and b.sign * (x[coordinate] - b.at) < 0)
+        return next(outside, None) or next(
+            bound
+            for n, own in enumerate(self.interfaces)
+            for bound in self.bounds
+            if own.reflectances and bound.interface == n and bound.channel == coordinate - own.reflectances.start
+        )
 
 
 @dataclass(frozen=True)
@@ -337,18 +384,22 @@ class Point:
 
 def _conductor(own: InterfaceCoordinates, reflectances: Array) -> tuple[Array, Array, Value]:
     """Relative eta and kappa of conductors, and what absorbs where they cannot reflect as little."""
-    u = np.clip(reflectances, CONDUCTOR_MIN + 1e-12, CONDUCTOR_MAX)
+    darkest = CONDUCTOR_MIN + 1e-12 if own.darkest is None else own.darkest
+    u = np.clip(reflectances, darkest, CONDUCTOR_MAX)
     n = conductor_index(u, own.tint)
     return n, np.maximum(conductor_extinction(u, n), n), 0.5 * np.log(u / np.minimum(reflectances, u))
 
 
 def _dielectric(own: InterfaceCoordinates, reflectances: Array) -> tuple[Array, Value]:
     """Relative indices of dielectrics, and what absorbs in the channels that reflect less than the most."""
-    most = np.clip(np.max(reflectances, axis=0, keepdims=True), 0.0, REFLECTANCE_MAX)
+    known = reflectances[own.reference][None] if own.films and own.absorbs else reflectances
+    most = np.clip(np.max(known, axis=0, keepdims=True), 0.0, REFLECTANCE_MAX)
     root = np.sqrt(most)
     eta = ((1 + root) / (1 - root)) ** own.side
     if not own.absorbs:
         return eta, 0.0
+    if own.films:
+        return eta, 0.5 * np.log(np.maximum(most, ENERGY_MIN) / np.maximum(reflectances, ENERGY_MIN))
     least = np.clip(reflectances, ENERGY_MIN, most + ENERGY_MIN)
     return eta, 0.5 * np.log(np.maximum(most, ENERGY_MIN) / least)
 
@@ -392,6 +443,7 @@ class Reader:
             "variance": self._blur(k, part.roughness),
             "axis": lobe.axes.rotation,
             "scatters": part.scatters,
+            "films": part.films,
         }
         if not last:
             own = self._upper(k, float(np.mean(ratio)), values)
@@ -423,9 +475,20 @@ class Reader:
         span = self._colour(k, reflectances, "upper", 0.0)
         if values["absorbs"]:
             depth, values["kept"] = self._coordinate(k, least, "absorption", 0.0), np.ones((3, 1))
+        here = len(self.interfaces)
         for sign, at in ((1, 0.0), (-1, float(np.log(self.target.eta_max)))):
-            self.bounds.append(Bound(k, "energy", sign, at, interface=len(self.interfaces)))
+            self.bounds.append(Bound(k, "energy", sign, at, interface=here))
+        if values["films"]:
+            values["reference"] = int(np.argmin(tau)) if values["absorbs"] else self._shown_by(ratio, values["films"])
+            for c in range(3) if values["absorbs"] else ():
+                self.bounds.append(Bound(k, "absorption", 1, -CLEARED, interface=here, channel=c))
         return InterfaceCoordinates(**values, depth=depth, reflectances=span)
+
+    def _shown_by(self, ratio: float, coated: tuple[Film, ...]) -> int:
+        """The channel in which an index below films shows most."""
+        eta = self.eta_1 * ratio * np.array([[1 - SHIFT, 1 + SHIFT]])
+        r = films.AtNormal(films.values(coated), self.eta_1, eta, None).at(1.0, None)
+        return int(np.argmax(np.abs(r[:, 1] - r[:, 0])))
 
     def _mirror(self, k: int, values: dict[str, Any]) -> InterfaceCoordinates:
         """A mirror: what absorbs above it makes its colour, and nothing does above one on top."""
@@ -443,7 +506,22 @@ class Reader:
         span = self._colour(k, reflectances, why, low, float(CONDUCTOR_MAX))
         depth = self._coordinate(k, 1.0, "absorption", 0.0, 1.0) if values["absorbs"] else None
         values["tint"] = np.broadcast_to(conductor_tint(ratio, kappa), (3, 1))
+        if values["films"] and values["absorbs"]:
+            flat = self._flat(reflectance, values)
+            darker = np.where(flat, np.exp(-2 * values["kept"]), 1.0)[:, 0]
+            self.x[span] = (np.array(self.x[span]) * darker).tolist()
+            values["darkest"] = np.where(flat, reflectance, CONDUCTOR_MIN + 1e-12)
+            values["kept"] = np.where(flat, 0.0, values["kept"])
         return InterfaceCoordinates(**values, depth=depth, reflectances=span)
+
+    def _flat(self, reflectance: Array, values: dict[str, Any]) -> Array:
+        """In which channels (3, 1) what absorbs makes a conductor dark, since no other reflects less with its films."""
+        u = np.clip(reflectance, CONDUCTOR_MIN, CONDUCTOR_MAX) * np.array([[1, 1 + SHIFT]])
+        eta = conductor_index(np.clip(u, CONDUCTOR_MIN + 1e-12, CONDUCTOR_MAX), values["tint"])
+        kappa = np.maximum(conductor_extinction(u, eta), eta)
+        own = films.values(values["films"])
+        r = films.AtNormal(own, self.eta_1, eta * self.eta_1, kappa * self.eta_1).at(1.0, None)
+        return (r[:, 1:] - r[:, :1] < FLAT * SHIFT * r[:, :1]) & (values["kept"] > 0)
 
     def _blur(self, lobe: int, roughness: Roughness) -> slice:
         """The entries of a variance."""
@@ -495,6 +573,7 @@ def plain(stack: Stack) -> list[Layers]:
     tau: Array | float = 0.0
     scatters: MediumValues | None = None
     base = len(stack.layers) - 1 if stack.base else None
+    coatings = [layer.films for layer in stack.interfaces]
     material = Material.of(stack, lambda at, value: value if at.layer == base else number(at, value))
     for n, layer in enumerate(material.layers[:base]):
         if isinstance(layer, MediumValues):
@@ -507,7 +586,8 @@ def plain(stack: Stack) -> list[Layers]:
         if layer.kind != "conductor":
             eta = np.full((1, 1), 1.0 if layer.kind == "mirror" else np.mean(layer.eta))
         roughness = Roughness(layer.alpha_u, layer.alpha_v, np.radians(layer.rotation))
-        found.append(Layers(layer.kind, eta, layer.k, roughness, tau, scatters=scatters))
+        coated = coatings[len(found)]
+        found.append(Layers(layer.kind, eta, layer.k, roughness, tau, scatters=scatters, films=coated))
         tau, scatters = 0.0, None
     if not found:
         raise InvalidInput("layers: no interface; without one there is no lobe")

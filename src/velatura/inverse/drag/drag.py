@@ -33,7 +33,7 @@ from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
-from velatura.stack import Diffuse, Interface, Layer, Stack, Varying, refuse_films
+from velatura.stack import Diffuse, Interface, Layer, Stack, Varying
 
 ATTEMPTS = 4  # bounds that are tried on the way, and halves of a step through a class
 ASIDE = (-0.02, 0.05, -0.1, 0.2)  # by which free choices change, one after the other, to lead past a jump
@@ -67,7 +67,6 @@ class DraggedStack:
         Raises:
             InvalidInput: a layer that no target can have.
         """
-        refuse_films(stack, "the inverse has")
         layers = plain(stack)
         if len(layers) != sum(lobe.interfaces for lobe in target.lobes):
             return None
@@ -79,6 +78,8 @@ class DraggedStack:
         for k, lobe in enumerate(target.lobes):
             own, layers = layers[: lobe.interfaces], layers[lobe.interfaces :]
             if [part.kind for part in own] != ["dielectric"] * (lobe.interfaces - 1) + [lobe.base]:
+                return None
+            if any(asked is not None and asked != part.films for asked, part in zip(lobe.fixed.films, own)):
                 return None
             for n, part in enumerate(own):
                 reader.add(k, n, part)
@@ -109,11 +110,16 @@ class DraggedStack:
     def in_closed_form(self) -> DraggedStack:
         """The same stack and its lobes, read by the model with a closed form."""
         model = self.model.in_closed_form
-        if model == self.model:
+        if model == self.model and not self.space.slow:
             return self
-        point = Point(dataclasses.replace(self.space, model=model), self.point.x)
+        point = Point(dataclasses.replace(self.space, model=model, quick=True), self.point.x)
         seen = dataclasses.replace(self, point=point)
         return seen.renamed(seen.now(self.target))
+
+    @property
+    def quickly(self) -> DraggedStack:
+        """The same stack, as the nearest model reads it that adds up layers, films known roughly."""
+        return dataclasses.replace(self, point=Point(self.space.quickly, self.point.x))
 
     @property
     def rough(self) -> bool:
@@ -248,13 +254,13 @@ class DraggedStack:
         if isinstance(found, Bound):
             return found
         met = self._at(found).renamed(wish)
-        for aside in () if self.model.recursion.closed_form or not closely else ASIDE:
-            beside = None if met.missed(wish) < SAME else met._beside(aside)
+        for aside in () if not self.space.slow or not closely else ASIDE:
+            beside = None if met._off(wish) < SAME else met._beside(aside)
             if beside is None:
                 break
             other = beside._problem(problem.goal).solve()
             if isinstance(other, Solution):
-                met = min(met, beside._at(other).renamed(wish), key=lambda stack: stack.missed(wish))
+                met = min(met, beside._at(other).renamed(wish), key=lambda stack: stack._off(wish))
         return met
 
     def _beside(self, aside: float) -> DraggedStack | None:
@@ -304,7 +310,7 @@ class DraggedStack:
                 held.append(own.depth)
             if own.reflectances is not None and above:
                 span = list(range(own.reflectances.start, own.reflectances.stop))
-                most = max(span, key=lambda c: x[c])
+                most = span[own.reference] if own.films else max(span, key=lambda c: x[c])
                 if own.kind == "dielectric" and not depth:
                     caps += [(c, most) for c in span if c != most]
                     span = [most]
@@ -314,6 +320,10 @@ class DraggedStack:
     def missed(self, wish: Target) -> float:
         """The largest difference of its energies and variances from those of a target."""
         return float(np.max(np.abs(self.point.reading.value - self._wanted(wish))))
+
+    def _off(self, wish: Target) -> float:
+        """The same of those that coordinates are free for."""
+        return float(np.max(np.abs(self.point.reading.value - self._wanted(wish))[self.space.counted]))
 
     def changes(self, wish: Target) -> list[tuple[int, str]]:
         """The "energy" or "blur" of which lobes a target asks to be others than the present ones."""
@@ -328,10 +338,16 @@ class DraggedStack:
         """Whether the lobes of a target are far away."""
         return float(np.max(np.abs(self._problem(self._wanted(wish)).way))) > FAR
 
+    @property
+    def coloured(self) -> bool:
+        """Whether films alone colour the first lobe, so that its energy in one channel gives those in the others."""
+        first = self.interfaces[0]
+        return bool(first.films) and first.kind == "dielectric" and first.log_index is None
+
     def achromatic(self, wish: Target) -> Target:
         """A wish, its first lobe without what needs absorption where nothing may absorb: colours, a mirror's energy."""
         first = self.interfaces[0]
-        if first.absorbs or first.log_index is not None or first.kind == "conductor":
+        if first.absorbs or first.log_index is not None or first.kind == "conductor" or first.films:
             return wish
         now, own = self.point.reading.value[:3], np.array(wish.lobes[0].colour)
         if first.kind == "mirror":
@@ -372,7 +388,7 @@ class DraggedStack:
         """Kept coordinates that may change at a bound: those of the nearest lobe first."""
         found = []
         for own in reversed([own for own in self.interfaces if own.lobe <= bound.lobe]):
-            if own.depth is not None and self.point.x[own.depth] > 0 and np.any(own.kept):
+            if own.depth is not None and (self.point.x[own.depth] > 0 or own.films) and np.any(own.kept):
                 found.append(own.depth)
             if own.log_index is not None and self.target.lobes[own.lobe].fixed.of("eta", 0) is None:
                 found.append(own.log_index)
@@ -495,14 +511,16 @@ class DraggedStack:
         return dataclasses.replace(self, point=Point(space, x)), held, level
 
 
-def seen(stack: Stack, target: Target, model: Model) -> Target:
-    """A target with the energies and blurs that a stack of its form has."""
+def seen(stack: Stack, target: Target, model: Model, quick: bool = False) -> Target:
+    """A target with the energies and blurs that a stack of its form has; `quick`: by the nearest model that adds up
+    layers, films known roughly."""
     form = target
     for k in range(len(target.lobes)):
         form = form.with_lobe(k, fixed=Fixed())
     dragged = DraggedStack.of(stack, form, model)
     assert dragged is not None
-    return dragged._target_of(dragged.space.read(dragged.point.x[:, None])[:, 0], target)
+    space = dragged.space.quickly if quick else dragged.space
+    return dragged._target_of(space.read(dragged.point.x[:, None])[:, 0], target)
 
 
 def with_depth(target: Target, k: int, depth: Array | None) -> Target:

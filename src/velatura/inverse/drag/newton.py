@@ -73,12 +73,13 @@ class Problem:
         nearest = Nearest()
         found = self._searched(compromise, nearest)
         space = self.start.space
-        slow = not space.model.recursion.closed_form
+        slow = space.slow
         if isinstance(found, Bound) and compromise is None and closely and slow:
             # Near, one step ends the search; from further off, where readings wind, the way leads on: once at a bound,
             # and not where what misses most is at its own
             stopped = space.winds and found.coordinate is not None
-            if (nearest.missing > ALMOST) == space.winds and not (stopped and self._ends(nearest)):
+            apart = nearest.missing > ALMOST
+            if (apart == space.winds or space.coated) and not (stopped and self._ends(nearest)):
                 self._approach(nearest, 1 if stopped else MEASURED)
             enough = WINDING if space.winds else JUMP if found.reason in UNMET else ALMOST
             if nearest.missing < enough and not space.broken(nearest.x, None):
@@ -88,7 +89,7 @@ class Problem:
     def _searched(self, compromise: Compromise | None, nearest: Nearest) -> Solution | Bound:
         """The same by Newton's method with the slopes of `Space.reading`; also keeps the nearest point."""
         space, bound = self.start.space, compromise.bound if compromise else None
-        closed = space.model.recursion.closed_form
+        closed = not space.slow
         enough = ENOUGH if bound and closed else ALMOST if closed else SLOW_ALMOST
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
         x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, dict[int, int]()
