@@ -296,9 +296,11 @@ class _Met:
     def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
         """Once for interfaces that are alike but for their rotation and the unit of momentum."""
         basis, nodes = setting.basis, setting.basis.nodes
-        lengths = facets.above, facets.below, facets.k, p, nodes.ends
+        if facets.alpha_u == facets.alpha_v and (lengths := np.unique(p)).shape < p.shape:
+            return cls.of(facets, lengths, 0 * lengths, setting)._around(np.searchsorted(lengths, p), psi, basis)
+        momenta = facets.above, facets.below, facets.k, p, nodes.ends
         key = (
-            *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in lengths),
+            *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in momenta),
             *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes(), setting.samples, *setting.ways),
             *((facets.films.rarer, facets.films.data.tobytes()) if facets.films else ()),
             *(type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), nodes.cells),
@@ -323,6 +325,15 @@ class _Met:
         every = [vars(met(first)).values() for first in range(0, max(len(p), 1), size)]
         whole: list[Any] = [None if each[0] is None else np.concatenate(each, axis=-1) for each in zip(*every)]
         return cls(*whole)
+
+    def _around(self, places: NDArray[np.integer], psi: Array, basis: Basis) -> _Met:
+        """The sources of numbers `places`, which isotropic facets met at the azimuth 0, at others."""
+        reflected, refracted = (
+            None if x is None else basis.around(x[..., places], psi) for x in (self.reflected, self.refracted)
+        )
+        assert reflected is not None
+        blocked = self.blocked_reflected[:, places], self.blocked_refracted[:, places], self.whole[:, places]
+        return _Met(reflected, refracted, self.kept[:, places], *blocked)
 
 
 @dataclass(frozen=True)

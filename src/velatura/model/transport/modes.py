@@ -58,6 +58,10 @@ class Basis(ABC):
         """Sums over the samples of each source, (C, modes, N, sources)."""
 
     @abstractmethod
+    def around(self, light: Array, psi: Array) -> Array:
+        """What was deposited for sources at the azimuth 0, with all turned to azimuths (sources,)."""
+
+    @abstractmethod
     def operators(self, light: Array, rotation: float) -> Array:
         """Matrices (C, families, n, n) of what becomes of light from the nodes, azimuth by azimuth, as deposited."""
 
@@ -110,6 +114,9 @@ class Relative(Basis):
         length, cosine, _ = _polar(light)
         angular = [np.ones_like(cosine), cosine, 2 * cosine * cosine - 1][: self.count]
         return _deposited(self.nodes, light, length, angular, [m % 2 == 1 for m in range(self.count)])
+
+    def around(self, light: Array, psi: Array) -> Array:
+        return light
 
     def columns(self, light: Array, rotation: float) -> Array:
         return light
@@ -171,6 +178,13 @@ class Even(Basis):
             waves.append([c * turn[0] - s * turn[1], c * turn[1] + s * turn[0]])
         angular = [np.ones_like(cosine), *(ROOT * part for wave in waves for part in wave)]
         return _deposited(self.nodes, light, length, angular, [False] * self.modes)
+
+    def around(self, light: Array, psi: Array) -> Array:
+        found = [light[:, 0]]
+        for i, m in enumerate(self.orders):
+            c, s, cosine, sine = np.cos(m * psi), np.sin(m * psi), light[:, 2 * i + 1], light[:, 2 * i + 2]
+            found += [c * cosine - s * sine, s * cosine + c * sine]
+        return np.stack(found, axis=1)
 
     def columns(self, light: Array, rotation: float) -> Array:
         found = self._turned(rotation).T @ light.reshape(len(light), self.modes, -1)
