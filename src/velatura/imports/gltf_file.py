@@ -15,7 +15,7 @@ from velatura.errors import InvalidInput
 from velatura.imports import gltf
 from velatura.imports.file import content
 from velatura.imports.result import Imported, Notes, shown
-from velatura.imports.values import Value, changed
+from velatura.imports.values import changed
 from velatura.stack import Texture
 from velatura.stack.schema import show
 from velatura.targets.gltf import PARAMETERS as FACTORS
@@ -143,7 +143,10 @@ def _texture(
     return Texture(texture=file, channel=channel, encoding="srgb" if channel == "rgb" else "linear")
 
 
-def _scaled(texture: Texture, factor: Any, least: float, name: str, notes: Notes) -> Value:
+def _scaled(texture: Texture, factor: Any, least: float, name: str, notes: Notes) -> Any:
+    """An image times its factor; what is no factor stays, to be refused with the others."""
+    if np.shape(factor) not in ((), (3,)) or np.asarray(factor).dtype.kind not in "iuf":
+        return factor
     if isinstance(factor, list | tuple) and len(set(factor)) > 1:
         notes.add(name, shown(tuple(factor)), "its mean is a factor on the image")
     most = float(np.mean(factor))
