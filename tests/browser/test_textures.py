@@ -23,7 +23,7 @@ TEXTURED = """
 layers:
   - interface: {eta: 1.5, alpha: 0.05}
   - medium: {depth: 0.5, sigma_a: {texture: spots.png, scale: 3}}
-  - interface: {conductor: Al, alpha: {texture: spots.png, scale: 0.4}}
+  - interface: {conductor: Al, alpha: {texture: spots.png, curve: [0.1, 0.2, 0.5]}}
 """
 
 

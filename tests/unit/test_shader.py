@@ -231,12 +231,12 @@ def test_textures_become_samplers(tmp_path: Path) -> None:
     for path in (scratches, wood):
         path.touch()
     alpha = {"texture": str(scratches), "scale": 0.5, "offset": 0.1, "channel": "g"}
-    albedo = {"texture": str(wood), "encoding": "srgb"}
+    albedo = {"texture": str(wood), "encoding": "srgb", "curve": [0, 0.5]}
     stack = vt.Stack([vt.Interface(eta=1.5, alpha=alpha), vt.Diffuse(albedo=albedo)])
     text = shader(stack).text
     assert "// scratches.png\nuniform highp sampler2D vt_map_layer0_alpha_u;\n" in text
     assert "m.layer0.alpha_u = clamp(texture(vt_map_layer0_alpha_u, uv).g * 0.5 + 0.1, 0.0, 1.0);" in text
-    assert "// wood.png, to be decoded from sRGB\n" in text
+    assert "// wood.png, to be decoded from sRGB, and taken through the curve 0, 0.5\n" in text
     assert str(tmp_path) not in text
     with pytest.raises(InvalidInput, match="layer0_alpha_u"):
         shader(stack, constant=["layer0_alpha_u"])

@@ -50,7 +50,12 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         "uniforms": {address.name: made.uniforms[address.name] for address, _ in _free(stack, made)},
         "tables": ",".join(made.looked_up) or None,
         "maps": [
-            {"sampler": sampler, "texture": os.path.relpath(image.texture), "encoding": image.encoding}
+            {
+                "sampler": sampler,
+                "texture": os.path.relpath(image.texture),
+                "encoding": image.encoding,
+                **({"curve": image.curve} if image.curve else {}),
+            }
             for sampler, image in made.maps.items()
         ],
         "lobes": [

@@ -24,6 +24,7 @@ from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import Field, Output, Printer, Struct
 from velatura.shader.statements import assignments, statements
 from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
+from velatura.stack import Texture
 
 if TYPE_CHECKING:  # it loads SciPy
     from velatura.shader.solved import Tabulated
@@ -269,7 +270,7 @@ class CLike(Printer):
 
     def material(self, filled: Filled) -> str:
         maps = [
-            f"// {image.texture.name}{', to be decoded from sRGB' * (image.encoding == 'srgb')}\n"
+            f"// {image.texture.name}{', to be decoded from sRGB' * (image.encoding == 'srgb')}{_curve(image)}\n"
             + self.texture(name, MAPS + k)
             for k, (name, image) in enumerate(filled.samplers.items())
         ]
@@ -343,6 +344,12 @@ class CLike(Printer):
 
 def _block(head: str, lines: Sequence[str]) -> list[str]:
     return [f"{head} {{", *(f"    {line}".rstrip() for line in lines), "}"]
+
+
+def _curve(image: Texture) -> str:
+    if image.curve is None:
+        return ""
+    return f", and taken through the curve {', '.join(f'{value:g}' for value in image.curve)}"
 
 
 def _table(layout: Layout) -> str:

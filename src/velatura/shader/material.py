@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from velatura.errors import InvalidInput
 from velatura.shader.printer import Field, Struct
 from velatura.shader.symbol import Operand, operand
 from velatura.stack import Address, Brushing, Stack, Texture, Varying
@@ -100,8 +99,6 @@ def _value(address: Address, value: Any, images: Mapping[Texture, str]) -> Opera
     if not isinstance(value, Varying):
         return operand(constant(address, value))
     assert isinstance(value, Texture)
-    if value.curve:
-        raise InvalidInput(f"{address.name}: a texture with a curve: shaders read none yet")
     colour = address.colour and value.channel in (None, "rgb")
     channel = "rgb" if colour else (value.channel or "r")
     return Mapped(images[value], channel, value.scale, value.offset, *address.declared.within)

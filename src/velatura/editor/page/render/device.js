@@ -1,5 +1,7 @@
 // WebGL 2 in few words: textures, targets, programs that compile beside the page's work, and waiting.
 
+import { throughCurve } from './curve.js';
+
 const VERTEX = `#version 300 es
 void main() {
   gl_Position = vec4(4.0 * vec2(gl_VertexID & 1, gl_VertexID >> 1) - 1.0, 0.0, 1.0);
@@ -55,15 +57,33 @@ export class Device {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.FLOAT, data);
   }
 
-  /** A texture of a decoded image, from its upper row on. */
-  image(bitmap, encoding) {
+  /** A texture of a decoded image, from its upper row on; its texels taken through a curve, if there is one. */
+  image(bitmap, encoding, curve) {
     const { gl } = this;
+    const { width, height } = bitmap;
     const handle = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, handle);
-    const format = encoding === 'srgb' ? gl.SRGB8_ALPHA8 : gl.RGBA8;
+    const format = encoding === 'srgb' && !curve ? gl.SRGB8_ALPHA8 : gl.RGBA8;
     gl.texImage2D(gl.TEXTURE_2D, 0, format, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+    if (curve) {
+      const values = throughCurve(this.#bytes(handle, width, height), curve, encoding);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, width, height, 0, gl.RGBA, gl.FLOAT, values);
+    }
     this.filtered('LINEAR', 'REPEAT', false);
-    return { handle, width: bitmap.width, height: bitmap.height };
+    return { handle, width, height };
+  }
+
+  /** The bytes of a texture that holds them, which a canvas would multiply by opacity. */
+  #bytes(handle, width, height) {
+    const { gl } = this;
+    const buffer = gl.createFramebuffer();
+    const found = new Uint8Array(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, handle, 0);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, found);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.deleteFramebuffer(buffer);
+    return found;
   }
 
   filtered(filter, wrap, mipmaps) {

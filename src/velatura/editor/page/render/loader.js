@@ -51,15 +51,15 @@ export class Loader {
   }
 
   /** A texture of the folder. */
-  image(name, encoding) {
-    return this.#kept.once(`${encoding} ${name}`, async () => {
+  image(name, encoding, curve) {
+    return this.#kept.once(`${encoding} ${curve ?? ''} ${name}`, async () => {
       const answer = await this.#fetch(this.#files + encodeURIComponent(name));
       if (!answer.ok) throw new Error(`${name}: no such texture`);
       const bitmap = await createImageBitmap(await answer.blob(), {
         colorSpaceConversion: 'none',
         premultiplyAlpha: 'none',
       });
-      return this.#device.image(bitmap, encoding);
+      return this.#device.image(bitmap, encoding, curve);
     });
   }
 }

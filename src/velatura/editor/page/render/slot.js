@@ -72,7 +72,7 @@ export class Slot {
         device.program(lighting(shader)),
         shader.tables && this.#loader.tables(shader.tables),
         Promise.all(baked.map((name) => this.#loader.table(name))),
-        Promise.all((shader.maps ?? []).map(({ texture, encoding }) => this.#loader.image(texture, encoding))),
+        Promise.all((shader.maps ?? []).map(({ texture, encoding, curve }) => this.#loader.image(texture, encoding, curve))),
         this.compile(),
       ]);
       if (this.#asked !== shader) return;
