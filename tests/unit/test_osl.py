@@ -81,7 +81,8 @@ def test_closures_are_sampled_by_their_density(kind: closures.Kind, eta: float) 
     """The density integrates to the share of samples that land on the right side, the value to the albedo."""
     if kind == "straight":
         eta = closures.STRAIGHT
-    own = closures.Roughness(np.array([0.3]), np.array([0.5]), np.array([0.4]))
+    v = 0.3 if kind in PASSING else 0.5
+    own = closures.Roughness(np.array([0.3]), np.array([v]), np.array([0.4]))
     closure, wi = Closure(kind, np.ones(3), own, eta), (np.array([0.6]), np.array([0.0]), np.array([0.8]))
     n = 1200
     x, y = np.meshgrid(*[(np.arange(n) + 0.5) / n * 2 - 1] * 2)

@@ -51,8 +51,7 @@ class Closure(NamedTuple):
     """A closure for one direction: its weight, a colour; for facets their roughness, and the index beyond over that on
     the side of the light.
 
-    Refraction that goes `straight` on bends nothing: its facets lie about the direction of view, the first axis of
-    their roughness in the plane of incidence.
+    Refraction that goes `straight` on bends nothing: its facets lie about the direction of view.
     """
 
     kind: Kind
@@ -93,16 +92,16 @@ def _separable(w: Direction, roughness: Roughness) -> Value:
 
 
 def _through(energy: Value, roughness: Roughness, w: Direction, eta: Value, straight: bool) -> Closure:
-    """Light that passes, of a lobe about the refracted direction: as wide, to first order, in tangential momentum."""
-    u, v, rotation = roughness = _bounded(roughness)
+    """Light that passes, of a lobe about the refracted direction: to first order as wide in tangential momentum, but
+    alike along all axes, since Cycles refracts so."""
+    u, v, _ = _bounded(roughness)
+    alpha = ops.sqrt(u * v)
     if straight:
-        c, s = ggx.plane(ggx.rotate(w, rotation))
-        along, across = ops.sqrt(u * u * c * c + v * v * s * s), ops.sqrt(u * u * s * s + v * v * c * c)
-        own = Roughness(SPREAD * along, SPREAD * w[2] * across, 0.0)
-        return Closure("straight", energy, _bounded(own), STRAIGHT)
+        alpha = ops.clip(SPREAD * alpha * ops.sqrt(w[2]), ALPHA_MIN, 1.0)
+        return Closure("straight", energy, Roughness(alpha, alpha, 0.0), STRAIGHT)
     inside = eta * fresnel.cos_transmitted(w[2], eta)
-    scale = ops.divide(2 * inside, ops.absolute(inside - w[2]))
-    return Closure("refraction", energy, _bounded(roughness.scaled(scale)), eta)
+    alpha = ops.clip(alpha * ops.divide(2 * inside, ops.absolute(inside - w[2])), ALPHA_MIN, 1.0)
+    return Closure("refraction", energy, Roughness(alpha, alpha, 0.0), eta)
 
 
 def _bounded(roughness: Roughness) -> Roughness:
@@ -116,7 +115,8 @@ def _bounded(roughness: Roughness) -> Roughness:
 @dataclass(frozen=True)
 class Tabulated:
     """The closures of a uniform material over direction, from above and, where it transmits, from below: `rows` (sides,
-    nodes, columns). `kinds` are those of the closures, `etas` the relative index beyond, by side."""
+    nodes, columns). `kinds` are those of the closures, `etas` the relative index beyond, by side. Where roughness has
+    no rotation (`variance` is PerAxis) its first axis lies in the plane of incidence."""
 
     kinds: Sequence[Kind]
     variance: type[Variance]
@@ -136,7 +136,7 @@ class Tabulated:
                 continue
             variance = _variance(kind, self.variance)
             u, v, rotation = variance(*(next(columns) for _ in variance.__dataclass_fields__)).roughness(AS_IT_IS)
-            if kind != "straight" and self.variance is PerAxis:
+            if variance is PerAxis:
                 rotation = ops.arctan2(wi[1], wi[0])
             found.append(Closure(kind, weight, Roughness(u, v, rotation), STRAIGHT if kind == "straight" else eta))
         return found
@@ -151,8 +151,8 @@ _SMOOTH = ("diffuse", "translucent")
 
 
 def _variance(kind: Kind, variance: type[Variance]) -> type[Variance]:
-    """Of the columns of a closure. Lobes of isotropic stacks have their axes in the plane of incidence."""
-    return PerAxis if kind == "straight" else variance
+    """Of the columns of a closure."""
+    return variance if kind == "reflection" else Isotropic
 
 
 def tabulated(material: Material, model: Model) -> Tabulated:
@@ -239,21 +239,24 @@ def _samples(closures: Sequence[Closure], wi: Direction, count: int) -> Directio
 
 
 def sample(closure: Closure, wi: Direction, u1: Value, u2: Value) -> Direction:
-    """A direction for light from above; maybe on the wrong side, where the value is 0."""
+    """A direction for light from above, of length 0 where facets throw light to the wrong side."""
+    passes = closure.kind not in ("reflection", "diffuse")
     if closure.kind in _SMOOTH:
         radius, phi = ops.sqrt(u1), 2 * pi * u2
-        side = -1.0 if closure.kind == "translucent" else 1.0
-        return radius * ops.cos(phi), radius * ops.sin(phi), side * ops.sqrt(1 - u1)
+        z = ops.sqrt(1 - u1)
+        return radius * ops.cos(phi), radius * ops.sin(phi), -z if passes else z
     u, v, _ = closure.roughness
     i = _into(closure, wi, wi)
     h = ggx.sample_visible(i, u, v, u1, u2)
-    if closure.kind == "reflection":
-        return _out_of(closure, wi, ggx.reflect(i, h))
     eta, cosine = closure.eta, ggx.dot(i, h)
-    inside = fresnel.cos_transmitted(cosine, eta)
-    # Where light is totally reflected, on the wrong side
-    x, y, z = (ops.select(inside > 0, (cosine / eta - inside) * a - b / eta, a) for a, b in zip(h, i))
-    return _out_of(closure, wi, (x, y, z))
+    o = ggx.reflect(i, h)
+    if passes:
+        inside = fresnel.cos_transmitted(cosine, eta)
+        x, y, z = (ops.select(inside > 0, (cosine / eta - inside) * a - b / eta, 0.0) for a, b in zip(h, i))
+        o = x, y, z
+    x, y, z = _out_of(closure, wi, o)
+    there = (z < 0) & (o[2] < 0) if passes else z > 0
+    return ops.select(there, x, 0.0), ops.select(there, y, 0.0), ops.select(there, z, 0.0)
 
 
 def eval_pdf(closure: Closure, wi: Direction, wo: Direction) -> tuple[Value, Value]:

@@ -354,7 +354,7 @@ _AXIS = "vt_turned(x, y, {rotation})"
 _CLOSURES: dict[closures.Kind, str] = {
     "reflection": f'generalized_schlick_bsdf(shading, {_AXIS}, 1.0, 0.0, {{u}}, {{v}}, 1.0, 1.0, 5.0, "ggx")',
     "refraction": f'microfacet("ggx", shading, {_AXIS}, {{u}}, {{v}}, {{eta}}, 1)',
-    "straight": 'microfacet("ggx", view, vt_along(view, outwards, x), {u}, {v}, {eta}, 1)',
+    "straight": 'microfacet("ggx", view, x, {u}, {v}, {eta}, 1)',
     "diffuse": "diffuse(shading)",
     "translucent": "translucent(shading)",
 }
@@ -381,10 +381,11 @@ _PLACE = [
 ]
 
 _FRAME = """\
-// The direction of view in the frame of the surface: x along the tangent, z outwards
-vector view = normalize(-I);
+// The direction of view in the frame of the surface: x along the tangent, z outwards. N faces the viewer; I points away
+// from it, but not in Cycles. Inputs without a value are 0 there.
+vector view = normalize(dot(N, I) > 0 ? I : -I);
 normal shading = normalize(dot(Normal, Normal) > 0 ? Normal : N);
-shading = dot(shading, I) > 0 ? -shading : shading;
+shading = dot(shading, view) > 0 ? shading : -shading;
 vector outwards = backfacing() ? -shading : shading;
 vector x = dot(Tangent, Tangent) > 0 ? Tangent : dPdu;
 x = normalize(x - dot(x, outwards) * outwards);
@@ -396,14 +397,6 @@ vector wi = vector(dot(view, x), dot(view, y), backfacing() ? -cosine : cosine);
 _HELPERS = {
     "vt_turned": """\
 vector vt_turned(vector x, vector y, float rotation) { return cos(rotation) * x + sin(rotation) * y; }
-""",
-    "vt_along": """\
-// Across the direction of view, in the plane of incidence
-vector vt_along(vector view, vector outwards, vector x)
-{
-    vector along = outwards - dot(view, outwards) * view;
-    return dot(along, along) > 1e-8 ? normalize(along) : x;
-}
 """,
     "vt_mean": """\
 float vt_mean(color x) { return (x[0] + x[1] + x[2]) / 3; }
