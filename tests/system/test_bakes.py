@@ -190,3 +190,27 @@ def test_the_command_says_the_loss_beside_the_file(run: Run, tmp_path: Path) -> 
     assert "total variation:" in said and "not held: layer 1: absorption is part of the base's colour" in said
     status, _, said = run("export", "varnished-paint", "--to", "gltf", "-o", str(tmp_path / "paint.xml"))
     assert status == 2 and ".gltf" in said
+
+
+# Comparisons ----------------------------------------------------------------------------------------------------------
+
+
+def test_bakes_are_compared_with_the_truth_beside_the_models() -> None:
+    """Expected: the numbers of the bake itself, against walks in place of the model."""
+    names = ["velatura", *TARGETS]
+    found = vt.compare(SHEEN, names, [1.0, 0.35], paths=100_000)
+    assert list(found.models) == names
+    for target in TARGETS:
+        made = bake(SHEEN, target)
+        assert found.models[target].evaluated == pytest.approx(made.baked_albedo[:, ::2], abs=1e-3)
+        assert np.isnan(found.models[target].lobes[0].energy).all()
+        # By way of the model, whose distance from the truth is mostly the noise of walks
+        bound = made.total_variation[::2] + found.total_variation["velatura"]
+        assert np.all(found.total_variation[target] < bound + 0.01)
+
+
+def test_pictures_show_the_bake_that_can_be_rendered() -> None:
+    with pytest.raises(
+        vt.InvalidInput, match="pictures: not with openpbr, gltf; of the bakes, only mitsuba-principled"
+    ):
+        vt.compare(SHEEN, ["openpbr", "velatura", "gltf"], paths=100, pictures=True)

@@ -35,7 +35,7 @@ MAY_IMPORT = {
     "reference": "stack optics ops kernel binding sampling",
     "checks": "kernel",
     "scenes": "kernel",
-    "comparison": "stack optics model reference sampling checks scenes api kernel",
+    "comparison": "stack optics model reference sampling checks scenes api kernel bakes",
     "progress": "",
     "sweeps": "__init__ stack optics model inverse reference checks api kernel progress",
     "figures": "stack optics ops sampling model inverse reference checks scenes comparison api kernel",

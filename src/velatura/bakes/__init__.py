@@ -1,6 +1,6 @@
 """Bakes: parameters of other programs' materials, fitted to the light of a stack."""
 
-from velatura.bakes.fit import Bake, bake
+from velatura.bakes.fit import Bake, bake, distribution
 from velatura.bakes.targets import TARGETS
 
-__all__ = ["TARGETS", "Bake", "bake"]
+__all__ = ["TARGETS", "Bake", "bake", "distribution"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,7 +20,8 @@ from velatura.stack.schema import unknown
 from velatura.targets.parameters import RGB, Values, complete
 
 FITTED, AZIMUTHS = (1.0, 0.85, 0.6, 0.35), (0.0, 60.0, 120.0)  # cosines of incidence, and degrees where brushed
-NODES, REPORTED = 350, 2**14  # for each direction: in the fit, and in the loss
+NODES, REPORTED = 350, 2**14  # for each direction: in the fit, and in the loss, which has the errors of both alike
+COMPARED = 2**19  # and beside walks, which have not
 COSINES = (1.0, 0.7, 0.35)  # of the loss, as in `compare`
 PRIOR = 0.03  # weight of a change, of the whole range, of a parameter that hardly counts
 FIRST, STEPS = 3, 12  # of least squares: from every look, and from where the best of them has led
@@ -115,6 +117,13 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
         lost=tuple(lost(described, target)),
         thin=described.thin,
     )
+
+
+def distribution(made: Bake, material: MaterialLike, cos_theta: Sequence[float]) -> Array:
+    """Energies (3, N, bins, bins) of light that a bake of a material reflects, over the projected disc."""
+    stack, chosen = load(material), named(made.model)
+    shown = Sampled.of(Described.of(Material.of(stack), chosen), chosen, directions(cos_theta), COMPARED)
+    return shown.distribution(TARGETS[made.target].value(made.values, shown.pair, made.thin))
 
 
 @dataclass(frozen=True)

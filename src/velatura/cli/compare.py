@@ -24,8 +24,9 @@ def compare(
         str | None,
         typer.Option(
             metavar="NAME,NAME,...",
-            help=f"{options.MODELS}; default: all of these. Also weidlich_wilkie, reference, a BSDF plugin of "
-            "Mitsuba's with its defaults (principled), or an XML file of one (mine.xml).",
+            help=f"{options.MODELS}; default: all of these. Also weidlich_wilkie, reference, a bake (openpbr, gltf, "
+            "blender-principled, mitsuba-principled), a BSDF plugin of Mitsuba's with its defaults (principled), or an "
+            "XML file of one (mine.xml).",
         ),
     ] = None,
     cos: Annotated[

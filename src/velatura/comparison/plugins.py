@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import api, kernel
+from velatura.bakes import TARGETS
 from velatura.checks.probe import Probe
 from velatura.comparison.evaluated_lobes import Light, distribution
 from velatura.comparison.result import Account
@@ -54,7 +55,7 @@ def made(plugin: Plugin, stack: Stack, microsurface: bool) -> Any:
     except RuntimeError as error:
         said = " ".join(str(error).split())
         if isinstance(plugin, str) and "not found!" in said:
-            known = [*(model.name for model in MODELS), *api.PLUGINS]
+            known = [*(model.name for model in MODELS), *api.PLUGINS, *TARGETS]
             raise InvalidInput(f"{unknown('model', plugin, known)}, nor a BSDF plugin of Mitsuba's") from None
         reason = re.sub(r".*\[[\w.:]+\] ", "", said)  # without the places in Mitsuba's sources
         raise InvalidInput(f"models: {name_of(plugin)}: {reason}") from None
@@ -96,10 +97,14 @@ def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
         drawn = probe.sample(np.broadcast_to(wi, (SAMPLES, 3)), rng.random((SAMPLES, 3)))
         up = drawn.wo[:, 2] > 0
         grids.append(distribution(Light(drawn.wo[up, :2].T, drawn.weight[up].T / SAMPLES)))
-    grid = np.stack(grids, axis=1)
+    return without_lobes(stack, np.stack(grids, axis=1))
+
+
+def without_lobes(stack: Stack, grid: NDArray[np.floating]) -> Account:
+    """An account of a distribution (3, N, bins, bins) alone."""
 
     def nothing(*shape: int) -> NDArray[np.floating]:
-        return np.full((*shape, len(grids)), np.nan)
+        return np.full((*shape, grid.shape[1]), np.nan)
 
     lobe = WalkedLobe(energy=nothing(3), alpha=nothing(2), rotation=nothing(), mean=nothing(2), covariance=nothing(3))
     return Account((lobe,) * len(stack.surfaces), lobe if stack.transmits else None, grid.sum(axis=(2, 3)), grid)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
+from typing import Any
 
-from velatura.comparison import plugins
+from velatura.bakes import TARGETS, Bake, bake
+from velatura.comparison import baked, plugins
 from velatura.comparison.evaluated_lobes import account, along
 from velatura.comparison.pictures import pictures as spheres
 from velatura.comparison.plugins import Plugin
@@ -76,18 +78,17 @@ def compare(
         raise InvalidInput(f"models: {max(names, key=names.count)} is given twice")
     if switches and not any(isinstance(m, Model) for m in asked):
         raise InvalidInput(f"{', '.join(switches)}: for named models only, and there is none among these")
-    made = [m if isinstance(m, Model) else plugins.made(m, described, microsurface) for m in asked]
-    chosen = dict(zip(names, made))
+    if pictures:
+        baked.check_pictures(names)
+    chosen = {name: _made(m, described, microsurface) for name, m in zip(names, asked)}
 
     # Let the models speak, then the truth, and set them side by side
-    modelled = {
-        name: account(described, cos_theta, m) if isinstance(m, Model) else plugins.account(m, described, cos_theta)
-        for name, m in chosen.items()
-    }
+    modelled = {name: _account(m, described, cos_theta) for name, m in chosen.items()}
     advance = _counter(progress, 3 * len(cos_theta) * (1 + polarised) + (len(chosen) + 2) * pictures)
     truth, error, noise = walked(described, cos_theta, paths, seed, microsurface, polarised, advance)
     if polarised:
         modelled[UNPOLARISED], *_ = walked(described, cos_theta, paths, seed, microsurface, False, advance)
+    rendered = {name: baked.bsdf(m) if isinstance(m, Bake) else m for name, m in chosen.items()} if pictures else {}
     return Comparison(
         name=described.name,
         lobe_names=_lobe_names(described),
@@ -99,8 +100,23 @@ def compare(
         standard_error=error,
         noise=noise,
         models={name: _beside(model, truth) for name, model in modelled.items()},
-        pictures=spheres(described, chosen, seed, microsurface, advance) if pictures else None,
+        pictures=spheres(described, rendered, seed, microsurface, advance) if pictures else None,
     )
+
+
+def _made(model: Model | Plugin, stack: Stack, microsurface: bool) -> Any:
+    """The model, a bake, or the BSDF of a plugin."""
+    if isinstance(model, Model):
+        return model
+    return (
+        bake(stack, model) if isinstance(model, str) and model in TARGETS else plugins.made(model, stack, microsurface)
+    )
+
+
+def _account(made: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
+    if isinstance(made, Model):
+        return account(stack, cos_theta, made)
+    return (baked if isinstance(made, Bake) else plugins).account(made, stack, cos_theta)
 
 
 def _model(model: Model | Plugin, switches: dict[str, str]) -> Model | Plugin:
