@@ -22,7 +22,7 @@ from velatura import kernel
 from velatura.bakes import TARGETS
 from velatura.exports import FORMATS
 from velatura.exports.formats import headed
-from velatura.shader import shader
+from velatura.shader import atlas, shader
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -85,6 +85,27 @@ def test_names_and_bindings_may_be_chosen(run: Run) -> None:
     assert "#ifndef GOLD_BAKED_REGISTER\n#define GOLD_BAKED_REGISTER t5, space2\n#endif\n" in hlsl
     _, vulkan, _ = run("export", "coated-gold", "--to", "vulkan", *bound)
     assert "#define GOLD_SET 2\n" in vulkan and "#define GOLD_BAKED_BINDING 5\n" in vulkan
+
+
+def test_materials_may_share_their_tables(run: Run, tmp_path: Path) -> None:
+    """Expected: one file, whichever materials, in which each finds its numbers; halves of floats if asked."""
+    shared = tmp_path / "shared.bin"
+    common = ["--model", "belcour2018", "--tables", str(shared), "--half"]
+    written = []
+    for name in ("coated-gold", "varnished-paint"):
+        path = tmp_path / f"{name}.wgsl"
+        assert run("export", name, "--to", "wgsl", *common, "-o", str(path))[0] == 0
+        written.append(shared.read_bytes())
+        assert not path.with_suffix(".tables.bin").exists()
+        assert "RGBA16F, 1024 texels a row" in path.read_text()
+    assert written[0] == written[1]
+    whole = np.frombuffer(written[0], "<f2").reshape(-1, 4)
+    for name in ("coated-gold", "varnished-paint"):
+        made = shader(vt.preset(name), "belcour2018", shared=True)
+        for layout in atlas.layouts(made.looked_up, atlas.every()):
+            expected = atlas.texels_of(layout.name)
+            np.testing.assert_allclose(whole[layout.start :][: len(expected)], expected, rtol=1e-3, atol=1e-7)
+            assert f"({layout.start}, " in made.text
 
 
 @pytest.mark.parametrize("to", ["json", *(name for name in FORMATS if "prefix" in FORMATS[name].options)])

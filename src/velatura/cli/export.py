@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from velatura import files
 from velatura.cli import options
 from velatura.errors import InvalidInput
 from velatura.exports import FORMATS, check_writable, taking
@@ -46,12 +47,23 @@ def export(
     binding: Annotated[
         int | None, typer.Option(min=0, help=f"For {_BOUND}: the binding of the first texture; default: 0.")
     ] = None,
+    half: Annotated[bool, typer.Option("--half", help="For shaders: write textures as halves of floats.")] = False,
+    tables: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="F",
+            help="For shaders: a file of all tables, which several materials share, in place of one for each.",
+        ),
+    ] = None,
     settings: options.Settings = None,
 ) -> None:
     """Write a material as code, JSON, a scene, or fitted parameters."""
     if output is not None:
         check_writable(output, to.value)
+    if tables is not None:
+        files.check_writable(tables, "tables", (".bin",))
     chosen: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
+    chosen |= {"half": half or None, "tables": tables}
     chosen = {name: value for name, value in chosen.items() if value is not None}
     for name in chosen:
         if name not in FORMATS[to.value].options:
@@ -63,8 +75,8 @@ def export(
         print(note, file=sys.stderr)
     if output is None:
         print(made.text, end="")
-        if made.beside:
-            print(f"not written without -o: {', '.join(made.beside)}, which the code reads", file=sys.stderr)
+        if unwritten := [*made.beside, *map(str, made.apart)]:
+            print(f"not written without -o: {', '.join(unwritten)}, which the code reads", file=sys.stderr)
         return
     path, *beside = made.save(output)
-    print(path if not beside else f"{path}, and its tables {beside[0]}")
+    print(path if not beside else f"{path}, and its tables {', '.join(map(str, beside))}")

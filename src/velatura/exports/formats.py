@@ -46,7 +46,7 @@ _BAKES = {
     "mitsuba-principled": (".xml",),
 }
 LICENCE = "BSD-3-Clause"  # of code that is written
-_OF_SHADERS = frozenset({"constant", "prefix"})
+_OF_SHADERS = frozenset({"constant", "prefix", "half", "tables"})
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
 
 
@@ -96,12 +96,14 @@ class Export:
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
 
     costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in sentences.
+    apart: files that several exports share, by path.
     """
 
     text: str
     beside: Mapping[str, bytes] = field(default_factory=dict)
     costs: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    apart: Mapping[Path, bytes] = field(default_factory=dict)
 
     def save(self, path: str | Path) -> list[Path]:
         """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.
@@ -110,12 +112,13 @@ class Export:
             InvalidInput: a file cannot be written; an existing file stays.
         """
         path = Path(path)
-        for ending, data in self.beside.items():
-            with files.whole(path.with_suffix(ending)) as unfinished:
+        others = {**{path.with_suffix(ending): data for ending, data in self.beside.items()}, **self.apart}
+        for other, data in others.items():
+            with files.whole(other) as unfinished:
                 unfinished.write_bytes(data)
         with files.whole(path) as unfinished:
             unfinished.write_text(self.text, encoding="utf-8")
-        return [path, *(path.with_suffix(ending) for ending in self.beside)]
+        return [path, *others]
 
 
 def export(
@@ -127,6 +130,8 @@ def export(
     prefix: str | None = None,
     group: int | None = None,
     binding: int | None = None,
+    half: bool = False,
+    tables: str | Path | None = None,
     folder: str | Path | None = None,
     **switches: Any,
 ) -> Export:
@@ -143,6 +148,8 @@ def export(
             default.
         group, binding: for shaders, but glsl: where the first texture is bound (or the default of the macro that says
             so), the set in Vulkan and the space in HLSL being the group; the next ones follow. 0 by default.
+        half: for shaders, writes textures as halves of floats.
+        tables: for shaders, a file of all tables, which shaders of any materials share, in place of one for each.
         folder: where the text will lie, so that a scene may name its textures relative to it.
 
     Raises:
@@ -155,8 +162,9 @@ def export(
 
     if to not in FORMATS:
         raise InvalidInput(unknown("format", to, FORMATS))
-    options = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
-    options = {name: value for name, value in options.items() if value is not None}
+    asked: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
+    asked |= {"half": half or None, "tables": tables}
+    options = {name: value for name, value in asked.items() if value is not None}
     for name in options:
         if name not in FORMATS[to].options:
             raise InvalidInput(f"{name}: only for {', '.join(taking(name))}, not for {to}")

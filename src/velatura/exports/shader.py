@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from velatura.exports.formats import Export, Request, headed
 from velatura.shader import shader
 from velatura.shader.c_like import CLike
@@ -22,12 +24,18 @@ LANGUAGES: dict[str, type[CLike]] = {
 
 
 def write(request: Request) -> Export:
-    """The shader; beside it the textures that it reads, little-endian floats in rows of RGBA."""
+    """The shader; beside it the textures that it reads, little-endian floats, or halves of them, in rows of RGBA."""
     options = request.options
-    printer = LANGUAGES[request.to](options.get("group", 0), options.get("binding", 0))
+    half, shared = options.get("half", False), options.get("tables")
+    printer = LANGUAGES[request.to](options.get("group", 0), options.get("binding", 0), half)
     prefix = options.get("prefix", PREFIX)
-    made = shader(request.stack, request.model, request.constants, printer=printer, prefix=prefix)
+    made = shader(
+        request.stack, request.model, request.constants, printer=printer, prefix=prefix, shared=shared is not None
+    )
+
+    # Write its textures
     read = made.tables if made.looked_up else made.columns
     textures = {".tables.bin": read, ".films.bin": made.films}
-    beside = {end: x.astype("<f4").tobytes() for end, x in textures.items() if x is not None}
-    return Export(headed(made.text), beside, {name: str(cost) for name, cost in made.costs.items()})
+    beside = {end: x.astype("<f2" if half else "<f4").tobytes() for end, x in textures.items() if x is not None}
+    apart = {Path(shared): beside.pop(".tables.bin")} if shared is not None and made.looked_up else {}
+    return Export(headed(made.text), beside, {name: str(cost) for name, cost in made.costs.items()}, apart=apart)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -37,26 +37,27 @@ class Layout(NamedTuple):
         return self.start + (count * self.texels if self.channels > 1 else -(-count // 4))
 
 
-def height(layouts: Sequence[Layout]) -> int:
-    """Lines of the texture."""
-    return -(-layouts[-1].end // WIDTH) if layouts else 1
+def every() -> list[str]:
+    """The tables that shaders may look up, which have up to three axes."""
+    return [name for name, table in tables.load().items() if len(table.shape) <= 3]
 
 
-def layouts(names: Collection[str]) -> list[Layout]:
-    """Where each of the tables named lies in their texture."""
+def layouts(names: Collection[str], among: Collection[str] | None = None) -> list[Layout]:
+    """Where each of the tables named lies in their texture, which may hold others."""
     found: list[Layout] = []
     start = 0
     for name, table in tables.load().items():
-        if name in names:
+        if name in (names if among is None else among):
             found.append(Layout(name, start, table.shape, table.data.shape[-1]))
             start = found[-1].end
-    return found
+    return [layout for layout in found if layout.name in names]
 
 
 def texture(names: Collection[str]) -> np.ndarray:
     """The texture of the tables named, float32 of shape (height, WIDTH, 4); a line of zeros for none."""
     placed = layouts(names)
-    filled = np.zeros((height(placed) * WIDTH, 4), np.float32)
+    height = -(-placed[-1].end // WIDTH) if placed else 1
+    filled = np.zeros((height * WIDTH, 4), np.float32)
     for layout in placed:
         filled[layout.start : layout.end] = texels_of(layout.name)
     return filled.reshape(-1, WIDTH, 4)

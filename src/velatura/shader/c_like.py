@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from velatura.shader.atlas import WIDTH, Layout, height
+from velatura.shader.atlas import WIDTH, Layout
 from velatura.shader.bake import Bake, Group
 from velatura.shader.cost import Cost
 from velatura.shader.films import WIDTH as LINE_OF_FILMS
@@ -88,7 +88,8 @@ _WORDS = """
 class CLike(Printer):
     """A language of C's kind; a dialect states its differences.
 
-    `group` and `binding` are where the first of what the program is given is bound, in languages that say so.
+    `group` and `binding` are where the first of what the program is given is bound, in languages that say so; textures
+    hold halves of floats where it is `half`.
 
     Attributes:
         language: its name.
@@ -97,6 +98,7 @@ class CLike(Printer):
 
     group: int = 0
     binding: int = 0
+    half: bool = False
 
     language: ClassVar[str]
     first_lines: ClassVar[str] = ""
@@ -151,6 +153,11 @@ class CLike(Printer):
             names = ", ".join(f"{name}[{length}]" if length else name for name, _, length in each)
             lines += wrap(f"{kind} {names};", LINE, initial_indent="    ", subsequent_indent="        ")
         return lines
+
+    @property
+    def texels_of(self) -> str:
+        """The format of textures that are never filtered."""
+        return "RGBA16F" if self.half else "RGBA32F"
 
     def type(self, kind: str) -> str:
         return self.spelled(_KINDS.get(kind, kind))
@@ -293,16 +300,16 @@ class CLike(Printer):
         return self.colour([bounded]) if entry.wide and not wide else bounded
 
     def tables(self, layouts: Sequence[Layout]) -> str:
-        declared = _TABLES.format(WIDTH, height(layouts)) + self.texture("vt_tables", TABLES)
+        declared = _TABLES.format(self.texels_of, WIDTH) + self.texture("vt_tables", TABLES)
         return f"{declared}\n{self.spelled(_TEXELS + ''.join(map(_table, layouts)))}"
 
     def lookup(self, bake: Bake | Tabulated) -> str:
-        comment = _LOBES.format(bake.nodes[0], bake.height) + self.texture("vt_baked", TABLES)
+        comment = _LOBES.format(self.texels_of, bake.nodes[0], bake.height) + self.texture("vt_baked", TABLES)
         return f"{comment}\n{self.spelled(_BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides))}"
 
     def films(self, layouts: Sequence[Layout]) -> str:
         height = -(-layouts[-1].end // LINE_OF_FILMS)
-        declared = _FILMS.format(LINE_OF_FILMS, height) + self.texture("vt_films", FILMS)
+        declared = _FILMS.format(self.texels_of, LINE_OF_FILMS, height) + self.texture("vt_films", FILMS)
         return f"{declared}\n{self.spelled(_OF_FILMS.format(LINE_OF_FILMS) + ''.join(map(_film, layouts)))}"
 
     #: Functions by the operations that call them, under a comment; in GLSL.
@@ -404,7 +411,7 @@ float vt_pdf(VtMaterial m, VtLobes l, vec3 wi, vec3 wo) { return vt_eval_pdf(m, 
 """
 
 _TABLES = """\
-// Averages of Fresnel over rough interfaces: RGBA32F, {} x {} texels, never filtered.
+// Averages of Fresnel over rough interfaces: {}, {} texels a row, never filtered.
 """
 
 _TEXELS = f"""\
@@ -466,7 +473,7 @@ float vt_volume(int start, ivec3 nodes, vec3 at) {{
 """
 
 _LOBES = """\
-// The lobes over direction: RGBA32F, {} x {} texels, never filtered
+// The lobes over direction: {}, {} x {} texels, never filtered
 """
 
 _BAKED = {
@@ -496,7 +503,7 @@ vec4 vt_baked_texel(int texel, vec3 place) {{
 
 _FILMS = """\
 // Thin films: reflectances over the cosine, averages over direction and roughness.
-// RGBA32F, {} x {} texels, never filtered.
+// {}, {} x {} texels, never filtered.
 """
 
 _OF_FILMS = """\

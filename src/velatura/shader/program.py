@@ -44,7 +44,8 @@ class Shader:
     `film_tables` names the tables of thin films that the code, or `baked`, looks up in the texture `vt_films`.
     `lobes` are the layers whose light each reflected lobe is, seen from above; `shares` names the energies or chances,
     fields of `VtLobes`, by which `vt_sample` divides its first number, in order.
-    `costs` are those of `vt_lobes`, `vt_eval_pdf` and `vt_sample`, each called once.
+    `costs` are those of `vt_lobes`, `vt_eval_pdf` and `vt_sample`, each called once; `shared` says whether the texture
+    of tables is the same for all materials.
     """
 
     text: str
@@ -58,11 +59,12 @@ class Shader:
     film_tables: Sequence[str]
     films: np.ndarray | None  # their texture, float32 of shape (height, width, 4); None without any
     costs: Mapping[str, Cost]
+    shared: bool
 
     @property
     def tables(self) -> np.ndarray:
-        """The texture of the tables that are looked up, float32 of shape (height, width, 4)."""
-        return atlas.texture(self.looked_up)
+        """The texture of the tables that are looked up, or of all, float32 of shape (height, width, 4)."""
+        return atlas.texture(atlas.every() if self.shared else self.looked_up)
 
     @property
     def columns(self) -> np.ndarray | None:
@@ -85,6 +87,7 @@ def shader(
     values: Literal["literals", "uniforms"] = "literals",
     printer: Printer = GLSL,
     prefix: str = PREFIX,
+    shared: bool = False,
     **switches: str,
 ) -> Shader:
     """A material as shader code: the structs `VtMaterial` and `VtLobes`, and functions on them.
@@ -99,6 +102,7 @@ def shader(
         printer: the language; GLSL ES 3.00 by default.
         prefix: begins the names of functions, structs, textures and macros, so that one program may hold several
             materials: `vt` of `vt_lobes`, `VtLobes` and `VT_TABLES_BINDING`.
+        shared: whether the texture of tables holds all of them, so that it is the same for all materials.
 
     Raises:
         InvalidInput: as `record`; a prefix that names cannot begin with.
@@ -109,7 +113,10 @@ def shader(
     recording = record(stack, model, constant, values == "uniforms", **switches)
     baked, read, shown = recording.baked, list(recording.read), recording.shown
     looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
-    layouts, filled = atlas.layouts(looked_up), material.filled(stack, read, bool(shown))
+    layouts, filled = (
+        atlas.layouts(looked_up, atlas.every() if shared else None),
+        material.filled(stack, read, bool(shown)),
+    )
     placed = films.layouts(recording.films)
     name = "A material" if shown else " ".join(stack.name.split()) or "A material"
     costs = _costs(recording)
@@ -140,6 +147,7 @@ def shader(
         film_tables=[layout.name for layout in placed],
         films=films.texture(films.tables(stack, recording.films, recording.model)),
         costs={prefixed(name, prefix): cost for name, cost in costs.items()},
+        shared=shared,
     )
 
 
