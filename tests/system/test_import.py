@@ -105,6 +105,18 @@ def test_errors_and_warnings_of_the_command_are_one_line(run: Run, document: Pat
     )
 
 
+def test_a_stack_comes_back_from_its_gltf(run: Run, tmp_path: Path) -> None:
+    """Expected: exactly, from the file that was written; from its parameters where another program has written it."""
+    path = tmp_path / "gold.gltf"
+    assert run("export", "coated-gold", "--to", "gltf", "-o", str(path))[0] == 0
+    found = vt.imports.read(path)
+    assert found.stack == vt.preset("coated-gold") and [each.parameter for each in found.left] == ["extras"]
+    written = json.loads(path.read_text())
+    written["asset"]["generator"] = "another program"
+    path.write_text(json.dumps(written))
+    assert vt.imports.read(path).stack.source == "imported from glTF"
+
+
 def test_images_are_rendered_by_their_curves(tmp_path: Path) -> None:
     """Expected: where an image has the texel t, the value of the material of roughness t and colour t."""
     mi: Any = kernel.mitsuba()

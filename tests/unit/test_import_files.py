@@ -159,6 +159,20 @@ def test_other_surfaces_of_materialx_are_read(write: Write, tag: str, inputs: st
     assert found.stack.layers == expected().stack.layers
 
 
+def test_turned_tangents_are_rotations(write: Write) -> None:
+    """Expected: of what turns the tangent of the surface; other vectors are listed."""
+    nodes = """<tangent name="t" type="vector3"/><bitangent name="b" type="vector3"/>
+    <rotate3d name="r" type="vector3">
+      <input name="in" type="vector3" nodename="t"/><input name="amount" type="float" value="30"/>
+    </rotate3d>"""
+    inputs = number("base_metalness", 1) + number("specular_roughness_anisotropy", 0.5)
+    inputs += '<input name="geometry_tangent" type="vector3" nodename="{}"/>'
+    found = imports.read(write("a.mtlx", document(nodes + node(inputs.format("r")))))
+    assert found.stack.interfaces[0].rotation == 30 and found.left == ()
+    found = imports.read(write("a.mtlx", document(nodes + node(inputs.format("b")))))
+    assert [each.parameter for each in found.left] == ["geometry_tangent"]
+
+
 def test_one_of_several_materials_is_named(write: Write, tmp_path: Path) -> None:
     two = node(number("base_metalness", 1), "A") + node("", "B")
     path = write("a.mtlx", document(two))

@@ -16,7 +16,7 @@ from velatura.imports import gltf
 from velatura.imports.file import content
 from velatura.imports.result import Imported, Notes, shown
 from velatura.imports.values import changed
-from velatura.stack import Texture
+from velatura.stack import Texture, loads
 from velatura.stack.schema import show
 from velatura.targets.gltf import PARAMETERS as FACTORS
 
@@ -69,6 +69,11 @@ def _reader(
 ) -> Callable[[Notes], Imported]:
     def read(notes: Notes) -> Imported:
         try:
+            if str(document["asset"].get("generator", "")).startswith("Velatura "):
+                baked = entry.get("extras", {}).get("velatura", {}).get("material")
+                if baked is not None:
+                    notes.add("extras", "velatura", "holds the stack that the parameters were fitted to, which is read")
+                    return Imported(loads(json.dumps(baked), "material.json", path.parent), tuple(notes.left))
             return of_material(entry, name, notes, lambda reference: _file(reference, path, document))
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {name}: {error}") from None

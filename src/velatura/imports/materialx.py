@@ -214,6 +214,10 @@ def _value(entry: Element, parameter: str, notes: Notes, depth: int) -> Value:
             raise _Unread(f"the node {node.name} lacks {key}")
         return default
 
+    if node.tag == "tangent":  # by its angle
+        return 0.0
+    if node.tag == "rotate3d" and "in" in inputs and _node(inputs["in"], depth).tag == "tangent":
+        return at("amount", 0.0)
     if node.tag in IMAGES:
         image = _image(node, inputs, parameter, notes)
         return image.model_copy(update={"channel": "a"}) if entry.get("output") == "outa" else image

@@ -17,7 +17,6 @@ from velatura.imports.parts import (
     LAMBERTIAN,
     LIGHT,
     OPAQUE,
-    TANGENT,
     UNDISPERSED,
     absorbed,
     alphas,
@@ -35,6 +34,7 @@ from velatura.targets.parameters import GREATEST, Parameter
 
 PARAMETERS = (
     *openpbr.PARAMETERS,
+    *openpbr.TURNS,
     Parameter("emission_luminance", 0.0, high=GREATEST),
     Parameter("emission_color", WHITE),
     Parameter("geometry_opacity", 1.0),
@@ -43,8 +43,6 @@ PARAMETERS = (
 IGNORED = {
     "geometry_normal": FLAT,
     "geometry_coat_normal": FLAT,
-    "geometry_tangent": TANGENT,
-    "geometry_coat_tangent": TANGENT,
 }
 
 
@@ -71,6 +69,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     weight, eta = given.number("coat_weight"), index(given, "coat_ior")
     surface = Surface(
         alpha=stretched(given["specular_roughness"], given.number("specular_roughness_anisotropy")),
+        rotation=given.number("geometry_tangent"),
         metal=metal,
         eta=index(given, "specular_ior"),
         specular=specular,
@@ -85,6 +84,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
             Coat(
                 eta,
                 stretched(given["coat_roughness"], given.number("coat_roughness_anisotropy")) if weight else (0.0, 0.0),
+                given.number("geometry_coat_tangent"),
                 colour=given["coat_color"] if weight else WHITE,
                 darkening=given.number("coat_darkening"),
             ),
