@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -145,3 +146,23 @@ def test_the_examples_of_the_manual_run(tmp_path: Path, run: Run, monkeypatch: p
     with pytest.warns(Incomplete):
         exec("\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), {})
     assert vt.load("varnished.yaml").kinds == ("dielectric", "medium", "dielectric", "diffuse")
+
+
+def test_the_table_of_the_manual_is_that_of_the_benchmark() -> None:
+    """Expected: energies and roughness within .002, of one metal and one paint."""
+    root = Path(__file__).parents[2]
+    benchmark = runpy.run_path(str(root / "benchmarks" / "imports.py"))
+    page = (root / "docs" / "imports.md").read_text()
+    for name in ("copper, smooth coat", "paint, coat"):
+        parameters = benchmark["MATERIALS"][name]
+        theirs, ours = (
+            benchmark["of_formulas"](parameters, 1.0),
+            benchmark["of_stack"](vt.from_openpbr(**parameters).stack, parameters, 1.0),
+        )
+        for lobe in ours:
+            (row,) = re.findall(rf"^\| {name} \| {lobe} \|(.*)\|$", page, re.MULTILINE)
+            energy, _, alpha, _ = row.split("|")
+            for kind, cell in enumerate((energy, alpha)):
+                if cell.strip():
+                    printed = [float(part) for part in cell.split(",")]
+                    assert printed == pytest.approx([theirs[lobe][kind], ours[lobe][kind]], abs=0.002), (name, lobe)

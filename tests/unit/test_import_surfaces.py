@@ -52,6 +52,13 @@ def test_a_metal_has_its_colours_at_the_normal_and_at_82_degrees() -> None:
     assert found.left == () and metal.kind == "conductor"
 
 
+def test_an_edge_that_no_metal_has_is_listed() -> None:
+    """Expected: the metal that reflects least there, which is one without extinction."""
+    found = vt.from_openpbr(base_metalness=1, base_color=0.5, specular_color=0.2)
+    assert found.stack.interfaces[0].k == pytest.approx((0, 0, 0), abs=1e-2)
+    assert [each.parameter for each in found.left] == ["specular_color"]
+
+
 def test_weights_multiply_the_colour_of_a_metal() -> None:
     found = vt.from_openpbr(base_metalness=1, base_color=0.8, base_weight=0.5, specular_weight=0.7)
     np.testing.assert_allclose(fresnel(1.0, index_of(found.stack.layers[0])), 0.28, atol=1e-5)

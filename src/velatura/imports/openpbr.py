@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from velatura.imports.given import Given
-from velatura.imports.metals import of_f82_tint
+from velatura.imports.metals import EDGE, of_f82_tint
 from velatura.imports.parts import (
     BELOW,
     COVERS,
@@ -29,6 +29,7 @@ from velatura.imports.parts import (
 from velatura.imports.result import Imported, Notes
 from velatura.imports.surface import WHITE, Coat, Metal, Surface, imported
 from velatura.imports.values import Value, changed, colour
+from velatura.optics import fresnel
 from velatura.targets import openpbr
 from velatura.targets.parameters import GREATEST, Parameter
 
@@ -44,6 +45,9 @@ IGNORED = {
     "geometry_normal": FLAT,
     "geometry_coat_normal": FLAT,
 }
+
+
+MISSED = 0.02  # of the reflectance towards the edge, that is listed
 
 
 def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) -> Imported:
@@ -104,8 +108,15 @@ def stretched(roughness: Value, anisotropy: float) -> tuple[Value, Value]:
 
 def _metal(given: Given) -> Metal:
     weight = given.number("base_weight") * given.number("specular_weight")
-    reflectance = changed(given["base_color"], lambda c: weight * c)
-    return Metal(reflectance, given.colour("specular_color"), of_f82_tint)
+    reflectance, tint = changed(given["base_color"], lambda c: weight * c), given.colour("specular_color")
+    if isinstance(reflectance, tuple):
+        shown = np.array(tint) * fresnel.schlick(EDGE, np.array(reflectance))
+        missed = np.asarray(fresnel.conductor(EDGE, *of_f82_tint(np.array(reflectance), np.array(tint)))) - shown
+        if np.max(missed) > MISSED:
+            given.notes.add(
+                "specular_color", tint, "no metal reflects so little towards the edge: the nearest is taken"
+            )
+    return Metal(reflectance, tint, of_f82_tint)
 
 
 def _tint(given: Given, pane: bool) -> Value:
