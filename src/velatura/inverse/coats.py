@@ -23,6 +23,7 @@ from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import (
     Diffuse,
+    Film,
     Interface,
     InterfaceValues,
     Layer,
@@ -31,7 +32,6 @@ from velatura.stack import (
     MediumValues,
     Stack,
     load,
-    refuse_films,
 )
 
 KEEP = 64  # partial stacks that are followed
@@ -104,7 +104,6 @@ def coat(
         NoSolution: no material keeps any of the appearance; the message names the layer and the constraint.
     """
     chosen, stack = named(model, **switches), load(stack)
-    refuse_films(stack, "the inverse has")
     top = Interface(eta=eta, alpha=alpha)
     losses: list[str] = []
     if keep_appearance:
@@ -155,7 +154,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> Kept:
         return [(np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)) for lobe in found]
 
     wanted = solver_reads(material)
-    if model.recursion.closed_form or not wanted:
+    if (model.recursion.closed_form and not any(material.films)) or not wanted:
         return _solved(stack, above, eta_max, wanted)
 
     # Ask for other lobes, until the model itself reads those of the bare stack
@@ -220,7 +219,7 @@ def _solved(stack: Stack, above: Above, eta_max: float, wanted: Sequence[tuple[A
             if np.any(values.sigma_s > 0):
                 raise NoSolution(f"{where}: scatters light; an appearance is kept of media that only absorb")
         elif isinstance(layer, Interface):
-            (energy, variance), own = next(remaining), _choices(material, n, eta_max)
+            (energy, variance), own = next(remaining), _choices(material, n, eta_max, layer.films)
             tried = _extended(paths, energy, variance, own)
             kept = pruned(tried, 1, KEEP)
             if not len(kept.cost):
@@ -327,19 +326,20 @@ def with_albedo(stack: Stack, wanted: Array, model: Model) -> Stack:
     return stack.with_layers([*stack.layers[:-1], Diffuse(albedo=written(albedo))])
 
 
-def _choices(material: Material, n: int, eta_max: float) -> Sequence[Choice]:
-    """Choices for a layer, its present state first: the same index, one on the same side, one on the other side."""
+def _choices(material: Material, n: int, eta_max: float, films: tuple[Film, ...] = ()) -> Sequence[Choice]:
+    """Choices for a layer and its films, its present state first: the same index, one on the same side, one on the
+    other side."""
     layer = material.layers[n]
     assert isinstance(layer, InterfaceValues)
     if layer.kind == "mirror":
         return [Choice("mirror", tau=0.0)]
     eta, eta_1 = layer.eta, _index_above(material, n)
     if layer.kind == "conductor":
-        return [Choice("conductor", tint=conductor_tint(eta / eta_1, layer.k / eta_1))]
+        return [Choice("conductor", tint=conductor_tint(eta / eta_1, layer.k / eta_1), films=films)]
     sides = (DENSER, RARER) if np.mean(eta) >= np.mean(eta_1) else (RARER, DENSER)
     bounded = max(eta_max, float(np.max(eta)))
-    same = Choice(eta=eta, eta_max=bounded)
-    return [same, *(Choice(side=side, eta_max=bounded) for side in sides)]
+    same = Choice(eta=eta, eta_max=bounded, films=films)
+    return [same, *(Choice(side=side, eta_max=bounded, films=films) for side in sides)]
 
 
 def _index_above(material: Material, n: int) -> Array:

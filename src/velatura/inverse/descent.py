@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.errors import InvalidInput
 from velatura.inverse import angles
 from velatura.inverse.angles import ReflectanceTable, radiance
 from velatura.inverse.interface import conductor_extinction
@@ -36,6 +37,7 @@ from velatura.stack import (
     as_described,
     load,
 )
+from velatura.stack.layers import film_key
 
 STEP, STRIDE = 1e-5, 1e-3  # of a value, to see how a model changes: in closed form, and solved anew for each value
 MAPPED = 3  # readings by a model without a closed form, between descents of the one that stands in for it
@@ -45,6 +47,7 @@ ALONE = 20  # rounds of its own descent, from a start that is close
 ROUNDS, TOLERANCE, COARSE = 100, 1e-9, 1e-5
 CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
 DEPTH_MAX = 10.0  # of a medium
+THICKNESS_NM, OUTSIDE = (1.0, 5000.0), 1e3  # of a film, and errors where there is no material
 AS_WELL, EXACT = 1.05, 1e-6  # of the smallest error, and beside it: other stacks fit as well
 LIKELY, DRAWN = 0.95, 4000  # the probability of an interval, and the points that it is taken from
 SHARED = 1.25  # by which it is wider, for errors of the model that all angles share, as walked stacks ask for
@@ -174,12 +177,23 @@ def fit(
 
 
 def descended(
-    table: ReflectanceTable, starts: Sequence[MaterialLike], model: Model, eta_max: float, darkest: float = 0.0
+    table: ReflectanceTable,
+    starts: Sequence[MaterialLike],
+    model: Model,
+    eta_max: float,
+    darkest: float = 0.0,
+    films: bool = True,
 ) -> list[End]:
-    """The ends of descents from all starts, the closest first."""
-    ends = [Descent(table, load(start), model.adder, eta_max, darkest).run().of(model) for start in starts]
+    """The ends of descents from all starts, the closest first; `films`: whether these change.
+
+    No model stands in for another one where there are films, whose averages take as long as the solution.
+    """
+    coated = [start for start in map(load, starts) if any(start.films)]
+    ends = [Descent(table, start, model, eta_max, darkest, films=films).run(ALONE) for start in coated]
+    bare = [start for start in map(load, starts) if not any(start.films)]
+    ends += [Descent(table, start, model.adder, eta_max, darkest).run().of(model) for start in bare]
     ends.sort(key=lambda end: end.cost)
-    if ends and not model.recursion.closed_form:
+    if ends and not model.recursion.closed_form and not any(ends[0].descent.start.films):
         ends[0] = ends[0].descent.run(LAST)
     return ends
 
@@ -305,7 +319,8 @@ class End:
 class Descent:
     """A descent from one stack: its indices, roughnesses, absorption and albedo change; all else stays.
 
-    darkest: the least `share` of conductors; 0 for metals, k >= eta. gap: added to all residuals, (3 N,).
+    darkest: the least `share` of conductors; 0 for metals, k >= eta. gap: added to all residuals, (3 N,). films:
+    whether indices and thicknesses of films change.
     """
 
     table: ReflectanceTable
@@ -314,6 +329,7 @@ class Descent:
     eta_max: float
     darkest: float = 0.0
     gap: Array | float = 0.0
+    films: bool = True
 
     @cached_property
     def material(self) -> Material:
@@ -330,7 +346,14 @@ class Descent:
         for n, layer in enumerate(self.material.layers):
             if type(layer) in FREE:
                 found += FREE[type(layer)](n, layer, self.eta_max, self.darkest)
+            if isinstance(layer, InterfaceValues) and self.films:
+                found += _of_films(n, layer, self.eta_max)
         return found
+
+    @property
+    def slow(self) -> bool:
+        """Whether one point is read at a time."""
+        return not self.model.recursion.closed_form or any(self.start.films)
 
     @cached_property
     def wanted(self) -> Array:
@@ -376,7 +399,7 @@ class Descent:
 
     def residuals(self, x: Array) -> Array:
         """As `missed`, at P points x (P, free), with the gap."""
-        if not self.model.recursion.closed_form:
+        if self.slow:
             return np.array([self._read(one) for one in x])
         material = self.material
         for n, free in enumerate(self.free):
@@ -389,7 +412,11 @@ class Descent:
 
     def _read(self, x: Array) -> Array:
         """As `missed`, at one point (free,), of the material there."""
-        found = angles.table_of(self.placed(x)[0], self.table.directions, self.model, with_energy=True)
+        try:
+            found = angles.table_of(self.placed(x)[0], self.table.directions, self.model, with_energy=True)
+        except InvalidInput:  # a rough interface with films between equal indices
+            lit = 0 if self.table.energy is None else 3 * self.table.directions.incidence[0].size
+            return np.full(self.wanted.size + lit, OUTSIDE)
         assert found.energy is not None
         return self.missed(1, (found.value * self.table.directions.wo[2])[:, None], found.energy[:, None])[0]
 
@@ -416,7 +443,7 @@ class Descent:
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (3 N, free)."""
-        if self.model.recursion.closed_form:
+        if not self.slow:
             steps = STEP * np.eye(len(x))
             ahead, behind = np.split(self.residuals(np.concatenate([x + steps, x - steps])), 2)
             return ((ahead - behind) / (2 * STEP)).T
@@ -440,9 +467,9 @@ class Descent:
         material = self.material.each(lambda address, value: np.ravel(value))
         for free, coordinate in zip(self.free, x):
             for key in free.keys:
-                own = np.array(getattr(material.layers[free.layer], key))
+                own = np.array(_of_key(material, free.layer, key))
                 own[slice(None) if free.channel is None else free.channel] = free.rounded(free.shown(coordinate))
-                material = material.with_layer(free.layer, **{key: own})
+                material = _with_key(material, free.layer, key, own)
         changed = {(free.layer, key) for free in self.free for key in free.keys}
         values = _metals(material, lambda layer: extinction(layer.eta, layer.k)).values()
         found = self.start.replace(**{at.name: written(x) for at, x in values if (at.layer, at.key) in changed})
@@ -460,7 +487,7 @@ class Descent:
         return x
 
     def _first(self, free: Free) -> float:
-        value = np.ravel(getattr(self.material.layers[free.layer], free.keys[0]))
+        value = np.ravel(_of_key(self.material, free.layer, free.keys[0]))
         return float(np.mean(value) if free.channel is None else value[free.channel])
 
 
@@ -488,6 +515,26 @@ def _of_interface(n: int, layer: InterfaceValues, eta_max: float, darkest: float
         found += [Free(n, ("eta",), c, *CONDUCTOR, True) for c in range(3)]
         found += [Free(n, ("k",), c, min(float(np.ravel(layer.k)[c]), darkest), 1.0, False) for c in range(3)]
     return found
+
+
+def _of_films(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
+    found: list[Free] = []
+    for k, film in enumerate(layer.films):
+        channels = range(3) if np.ptp(film.eta) > 0 else (None,)
+        high = max(eta_max, np.max(film.eta))
+        found += [Free(n, (film_key(k, "eta"),), c, min(1.0, np.min(film.eta)), high, True) for c in channels]
+        found.append(Free(n, (film_key(k, "thickness_nm"),), None, *THICKNESS_NM, True))
+    return found
+
+
+def _of_key(material: Material, n: int, key: str) -> Value:
+    """A value of a layer, or of one of its films."""
+    return next(value for address, value in material.values() if (address.layer, address.key) == (n, key))
+
+
+def _with_key(material: Material, n: int, key: str, new: Value) -> Material:
+    """The material with such a value changed."""
+    return material.each(lambda address, value: new if (address.layer, address.key) == (n, key) else value)
 
 
 #: The values that may change, by layer; all others stay.

@@ -30,7 +30,6 @@ from velatura.stack import (
     Stack,
     as_described,
     load,
-    refuse_films,
 )
 
 STARTS = 4
@@ -101,7 +100,6 @@ def simplify(
         InvalidInput: not a valid material, no such number of interfaces, a texture, an unknown model or switch.
     """
     chosen, stack = named(model, **switches), load(stack)
-    refuse_films(stack, "the inverse has")
     count = len(stack.interfaces)
     if not 1 <= interfaces < count:
         raise InvalidInput(
@@ -132,14 +130,14 @@ def _simplest(stack: Stack, interfaces: int, table: ReflectanceTable, model: Mod
     count, opaque, closed = len(stack.interfaces), stack.interfaces[-1].opaque, model.recursion.closed_form
 
     def itself(start: Stack) -> End:
-        return Descent(table, start, model, eta_max, DARKEST).run(ROUNDS if closed else ALONE)
+        return Descent(table, start, model, eta_max, DARKEST, films=False).run(ROUNDS if closed else ALONE)
 
     sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
     starts = [_of_some(stack, kept) for kept in sets]
     starts = _closest(table, starts, model, eta_max, TRIED if closed else 1)
-    found = descended(table, starts, model, eta_max, DARKEST)
+    found = descended(table, starts, model, eta_max, DARKEST, films=False)
     # A model that is slow also descends by itself: the one that stands in for it leads far away from a close start
-    found += [] if closed else [itself(start) for start in starts]
+    found += [] if closed else [itself(start) for start in starts if not any(start.films)]
     if interfaces > 1:
         fewer = _simplest(stack, interfaces - 1, table, model, eta_max)[0]
         if fewer.cost <= min(end.cost for end in found):
