@@ -1,6 +1,8 @@
 """How a rough coat blurs, darkens and colours its base: rules in use and our formulas, against random walks.
 
-    python benchmarks/coat.py [--stacks 150] [--paths 100000] [--seed 0] [--json]
+    python benchmarks/coat.py [--stacks 150] [--paths 100000] [--seed 0] [--store STORE] [--json]
+
+Walks are a sweep; STORE keeps them, and one that was interrupted goes on.
 
 Coats have an index of 1.2 to 2 and an alpha of 0 to .5; the metals below have an alpha of .01 to .5, eta of .2 to 2
 and k of .7 to 5. The walk meets one facet per interface for the roughness, as renderers do, and any number for the
@@ -12,12 +14,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.progress import track
 
 import velatura as vt
 from velatura.optics import fresnel
@@ -124,6 +128,15 @@ def draw(rng: np.random.Generator) -> Coated:
     return Coated(rng.uniform(1.2, 2.0), coat, base, eta, k)
 
 
+def walked(stack: Stack, seed: int, paths: int) -> dict[str, Any]:
+    """What the metal reflects below the coat; the name of the stack is the seed of its walks."""
+    once, often = (
+        vt.reference.statistics(stack, COSINES, 0.0, paths, int(stack.name), microsurface)
+        for microsurface in (False, True)
+    )
+    return {"alpha": once.alpha[-1][0], "energy": often.energy[-1]}
+
+
 def _summary(errors: Array) -> list[str]:
     return [f"{abs(e).mean():.3f} {np.quantile(abs(e), 0.9):.3f} {e.mean():+.3f}" for e in errors.T]
 
@@ -133,17 +146,18 @@ def main() -> None:
     parser.add_argument("--stacks", type=int, default=150)
     parser.add_argument("--paths", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--store", type=Path, help="keeps the walks")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
 
     rng = np.random.default_rng(options.seed)
     drawn = [draw(rng) for _ in range(options.stacks)]
-    alphas, energies = [], []
-    for i, coated in enumerate(track(drawn, description="walking", disable=options.json)):
-        once = vt.reference.statistics(coated.stack(), COSINES, 0.0, options.paths, i)
-        often = vt.reference.statistics(coated.stack(), COSINES, 0.0, options.paths, i, microsurface=True)
-        alphas.append(once.alpha[-1][0])
-        energies.append(often.energy[-1])
+    stacks = [coated.stack().replace(name=str(number)) for number, coated in enumerate(drawn)]
+    space = vt.Space(material=stacks[0], vary={"material": {"values": stacks}})
+    with tempfile.TemporaryDirectory() as folder:
+        store = options.store or Path(folder, "walks.zarr")
+        found = vt.sweep(space, walked, store=store, chunk=1, paths=options.paths).load()
+    alphas, energies = found.alpha.values, found.energy.values
 
     blurs = {
         name: np.array([np.log(rule(c, COSINES) / true) for c, true in zip(drawn, alphas)])

@@ -1,6 +1,8 @@
 """How rough models say that the base of a stack looks, against random walks through stacks drawn at random.
 
-    python benchmarks/random_stacks.py [--stacks 90] [--paths 300000] [--seed 0]
+    python benchmarks/random_stacks.py [--stacks 90] [--paths 300000] [--seed 0] [--store STORE]
+
+Walks are a sweep; STORE keeps them, and one that was interrupted goes on.
 
 Stacks have one to three dielectrics, of an index in 1.1 to 2.2, over a metal of eta in 0.2 to 2 and k in 1 to 5; every
 alpha lies in 0.01 to 0.5. Of the lobe of the metal, the equivalent alpha at four cosines of incidence is compared with
@@ -11,6 +13,8 @@ that of every named model, and with that of two roughness maps for which all els
 from __future__ import annotations
 
 import argparse
+import tempfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,19 +37,29 @@ def random_stack(rng: np.random.Generator) -> Stack:
     return Stack([*coats, Interface(eta=rng.uniform(0.2, 2.0), k=rng.uniform(1.0, 5.0), alpha=rng.uniform(0.01, 0.5))])
 
 
+def walked(stack: Stack, seed: int, paths: int, walks: int) -> dict[str, Any]:
+    """The roughness of the metal's lobe, and its standard error; `walks` is their seed, the same for all stacks."""
+    found = vt.reference.statistics(stack, COSINES, paths=paths, seed=walks)
+    assert found.standard_error
+    return {"alpha": found.alpha[-1][0], "error": found.standard_error.alpha[-1][0]}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stacks", type=int, default=90)
     parser.add_argument("--paths", type=int, default=300_000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--store", type=Path, help="keeps the walks")
     options = parser.parse_args()
 
     # Walk
     rng = np.random.default_rng(options.seed)
     stacks = [random_stack(rng) for _ in range(options.stacks)]
-    truths = [vt.reference.statistics(stack, COSINES, paths=options.paths, seed=options.seed) for stack in stacks]
-    alphas = np.array([truth.alpha[-1][0] for truth in truths])
-    noise = np.array([truth.standard_error.alpha[-1][0] for truth in truths if truth.standard_error]) / alphas
+    space = vt.Space(material=stacks[0], vary={"material": {"values": stacks}})
+    with tempfile.TemporaryDirectory() as folder:
+        store = options.store or Path(folder, "walks.zarr")
+        truth = vt.sweep(space, walked, store=store, chunk=1, paths=options.paths, walks=options.seed).load()
+    alphas, noise = truth.alpha.values, truth.error.values / truth.alpha.values
     print(f"{options.stacks} stacks, {options.paths} paths each; the truth's noise {noise.mean():.4f}, relative")
 
     # Compare

@@ -27,7 +27,7 @@ from typing import Any
 
 DOCS = Path(__file__).parents[1] / "docs"
 FIGURES = DOCS / "figures"
-SCRIPTS = ("recover.py", "recover_texture.py")
+SCRIPTS = ("recover.py", "recover_texture.py", "coats.py")
 PLACES = 3  # after the point
 
 

@@ -68,7 +68,7 @@ def main() -> None:
     """Sweep into a store, by a pool or the scheduler at an address."""
     store, executor = Path(sys.argv[1]), sys.argv[2]
     if executor == "pool":
-        with pool(2) as processes:
+        with pool(1) as processes:
             swept(store, processes)
     else:
         swept(store, executor)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import signal
 import subprocess
 import sys
@@ -27,6 +28,7 @@ SHARED = str(Path(__file__).parents[1] / "shared")
 QUIET = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": SHARED}
 FEW = 5  # chunks that are done before something is killed
 PATIENCE = 120.0  # seconds
+CONSTANTS = [1.577, 0.404, 1.70, 1.94]  # of the tutorial's fit
 
 
 def wait_for(condition: Callable[[], object]) -> Any:
@@ -110,7 +112,7 @@ def test_points_without_an_answer_have_their_reason(expected: Any) -> None:
 def test_a_pool_goes_on_after_kills_of_client_and_worker(expected: Any, tmp_path: Path) -> None:
     store = tmp_path / "points.zarr"
     killed_client(store, "pool")
-    with pool(2) as executor:
+    with pool(1) as executor:
         pid = executor.submit(os.getpid).result()
         with pytest.raises(vt.VelaturaError, match=r"points\.zarr: the executor broke down .* goes on from there"):
             swept(store, executor, progress=Killer(pid))
@@ -162,3 +164,45 @@ def test_an_interrupt_ends_in_one_line_and_a_scheduler_goes_on(
     alone = found.sel(layer0_alpha=0.5, layer0_rotation=30)
     stack = vt.load("bare-gold").replace(layer0_alpha=0.5, layer0_rotation=30)
     assert np.array_equal(alone.energy, np.array(vt.lobes(stack, [1, 0.5], model="belcour2018").energy))
+
+
+def test_a_point_that_ends_its_process_is_recorded(tmp_path: Path) -> None:
+    """Expected: a reason in place of numbers, and those of all other points, by new processes of dask."""
+    import dask
+    import distributed  # noqa: F401  (has the configuration that is changed)
+
+    def deadly(stack: vt.Stack, seed: int) -> dict[str, float]:
+        if stack.flat()["layer0_alpha_u"] == 0.3:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return {"x": 1.0}
+
+    space = vt.Space(material="bare-gold", vary={"layer0_alpha": {"values": [0.1, 0.2, 0.3, 0.4]}})
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        found = vt.sweep(space, deadly, store=tmp_path / "a.zarr", workers=1, chunk=4)
+    assert found.status.values.tolist() == [1, 1, 0, 1]
+    assert found.reason.values[2] == "the process that looked at it ended"
+    assert np.isnan(found.x.values[2]) and np.nansum(found.x.values) == 3
+
+
+def test_jobs_of_submitit_are_an_executor(tmp_path: Path) -> None:
+    """Expected: its jobs, processes here as they are jobs of SLURM elsewhere, fill the store."""
+    import submitit
+
+    executor = submitit.LocalExecutor(folder=tmp_path / "jobs")
+    executor.update_parameters(timeout_min=1)
+    space = vt.Space(material="bare-gold", vary={"layer0_alpha": {"values": [0.1, 0.2]}})
+    options: dict[str, Any] = {"cos_theta": [1.0], "model": "belcour2018"}
+    found = vt.sweep(space, "albedo", store=tmp_path / "a.zarr", executor=executor, workers=1, chunk=2, **options)
+    assert found.status.values.tolist() == [1, 1] and (found.reflected > 0.3).all()
+
+
+def test_the_tutorial_fits_a_slice_of_its_map(tmp_path: Path) -> None:
+    """Expected: of 8 by 8 coats, the constants that 100 by 100 give, within 5 %, and a picture."""
+    script = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "coats.py"))
+    with ThreadPoolExecutor(1) as executor:
+        alpha = script["apparent"](script["coats"](tmp_path / "coats.zarr", steps=8, executor=executor))
+    constants, rest = script["fitted"](alpha)
+    assert constants == pytest.approx(CONSTANTS, rel=0.05)
+    assert float(abs(rest).mean()) < 0.03
+    script["draw"](alpha, constants, str(tmp_path / "map.png"))
+    assert (tmp_path / "map.png").stat().st_size > 10_000

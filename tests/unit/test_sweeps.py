@@ -114,6 +114,7 @@ def test_points_follow_from_their_number() -> None:
         space = vt.Space(material="coated-gold", vary=vary, sampling=sampling, count=50, seed=4)
         every = space.points(range(50))
         assert [space.points([n])[0] for n in (41, 3, 3, 40)] == [every[n] for n in (41, 3, 3, 40)]
+        assert space.points([5, 6, 9]) == [every[n] for n in (5, 6, 9)]
         assert len({str(point) for point in every}) == 50
         assert space.seeds([7]) == space.seeds(range(50))[7:8] and len(set(space.seeds(range(50)))) == 50
         other = vt.Space(material="coated-gold", vary=vary, sampling=sampling, count=50, seed=5)

@@ -59,8 +59,8 @@ class Plan(Space):
         what: `lobes`, `albedo`, `statistics`, `distribution`, `check`, `render` or `inverse`; or a function that is
             called with the stack and the seed of a point, and returns its arrays by name.
         options: keyword arguments of it.
-        chunk: points in a chunk of the store, at most, which is computed and written at once. By default, a quarter of
-            the root of the number of points.
+        chunk: points in a chunk of the store, at most, which is computed and written at once. By default, half the
+            root of the number of points.
     """
 
     what: Annotated[str | Callable[..., Any], Asked("what is asked of each point")] = "lobes"
@@ -96,12 +96,22 @@ def load_plan(path: str | Path) -> Plan:
     try:
         if not isinstance(fields, Mapping):
             raise InvalidInput(f"must hold the keys of a plan, material above all, got {show(fields)}")
-        folder, material = Path(path).parent, fields.get("material")
-        if isinstance(material, str) and Path(material).suffix:
-            fields = {**fields, "material": str(folder / material)}
-        return Plan.from_dict(fields)
+        return Plan.from_dict(_beside(Path(path).parent, fields))
     except InvalidInput as error:
         raise InvalidInput(f"{path}: {error}") from None
+
+
+def _beside(folder: Path, fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a plan, with files of materials relative to its folder."""
+
+    def found(material: Any) -> Any:
+        return str(folder / material) if isinstance(material, str) and Path(material).suffix else material
+
+    fields, vary = {**fields, "material": found(fields.get("material"))}, fields.get("vary")
+    axis = vary.get("material") if isinstance(vary, Mapping) else None
+    if isinstance(vary, Mapping) and isinstance(axis, Mapping) and isinstance(axis.get("values"), list):
+        fields["vary"] = {**vary, "material": {**axis, "values": [found(each) for each in axis["values"]]}}
+    return fields
 
 
 def versions() -> dict[str, str]:

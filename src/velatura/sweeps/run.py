@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SHORTEST, RATE = 1.0, 100  # seconds of a task at least, and how many end in a second, of all workers, at most
 AHEAD = 2  # tasks that are submitted for each worker
+ATTEMPTS = 2  # at a point alone, where a process has ended
 TRIED = 16  # points that are looked at for one that shows what is found
 
 Progress = Callable[[int, int], None]
@@ -55,7 +56,7 @@ def sweep(
         executor: where it runs: None, one process of dask for each core of this machine; the address of a scheduler of
             dask, or its client; or any executor in the style of `concurrent.futures`.
         workers: processes of this machine; or how many tasks an executor runs at once, if it does not report it.
-        chunk: points that are computed and written at once; by default, a quarter of the root of their number.
+        chunk: points that are computed and written at once; by default, half the root of their number.
         progress: called with (points done, all points); by default a bar with the time left.
         options: keyword arguments of `what` (`cos_theta=[1, 0.5]`).
 
@@ -193,10 +194,12 @@ class _Course:
         return int(points)
 
     def _alone(self, number: int) -> work.Answered:
-        """What a point gives that may end its process."""
-        try:
-            (answer,) = self._runs.submit(work.look, self._packed, (number,)).result()
-        except self._runs.fatal:
-            return "the process that looked at it ended"
-        found: work.Answered = answer
-        return found
+        """What a point gives that may end its process; one that ends while others begin is asked again."""
+        for _ in range(ATTEMPTS):
+            try:
+                (answer,) = self._runs.submit(work.look, self._packed, (number,)).result()
+            except self._runs.fatal:
+                continue
+            found: work.Answered = answer
+            return found
+        return "the process that looked at it ended"

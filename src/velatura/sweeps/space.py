@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import json
 import math
 import threading
 import warnings
@@ -202,12 +203,12 @@ class Coordinate:
     def stored(self, value: Any) -> Any:
         """A value as it is written."""
         if self.form == "text":
-            return str(value)
+            return (value.name or json.dumps(value.to_dict())) if isinstance(value, Stack) else str(value)
         return np.broadcast_to(np.asarray(value, float), {"colour": (3,), "pair": (2,)}.get(self.form, ()))
 
 
 class Axes(Parameter):
-    """Flat names of values, and how they vary."""
+    """Flat names of values, or `material`, and how they vary."""
 
     what = "flat names with values, range or distribution"
 
@@ -217,13 +218,16 @@ class Axes(Parameter):
         return {str(name): self._axis(str(name), entry) for name, entry in value.items()}
 
     def _axis(self, name: str, entry: Any) -> Axis:
-        if isinstance(entry, Axis):
-            return entry
-        if not isinstance(entry, Mapping):
+        if not isinstance(entry, Mapping | Axis):
             raise ValueError(f"{name}: must hold values, range or distribution, got {show(entry)}")
         try:
-            return Axis.from_dict(entry)
-        except InvalidInput as error:
+            axis = entry if isinstance(entry, Axis) else Axis.from_dict(entry)
+            if name != "material":
+                return axis
+            if axis.values is None:
+                raise InvalidInput("needs values")
+            return Axis(values=tuple(Base("a material").check(each) for each in axis.values))
+        except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
     def json_schema(self) -> dict[str, Any]:
@@ -235,7 +239,8 @@ class Space(Record):
 
     Args:
         material: a stack, a file, the name of a preset, or the mapping of a file.
-        vary: by flat name (`layer0_alpha`, as `Stack.replace` takes them) an `Axis`, or its mapping.
+        vary: by flat name (`layer0_alpha`, as `Stack.replace` takes them) an `Axis`, or its mapping. The values of
+            `material` are materials in place of that one.
         sampling: `grid`, all combinations; `random`, independent points; `sobol`, points of a scrambled Sobol sequence,
             which fill the space evenly.
         count: points of the latter two.
@@ -280,7 +285,7 @@ class Space(Record):
             raise ValueError(f"{where}: per_channel: only of a value that may differ between colours")
         for value in axis.extremes:
             try:
-                self.material.replace(**{name: value})
+                self.stack({name: value})
             except InvalidInput as error:
                 raise ValueError(f"vary: {error}" if str(error).startswith(name) else f"{where}: {error}") from None
 
@@ -311,11 +316,17 @@ class Space(Record):
         return Coordinate(form, address.declared.unit if address else "", address.declared.doc if address else "")
 
     def points(self, numbers: Sequence[int]) -> list[dict[str, Any]]:
-        """Values by flat name of points by their numbers, which ascend, as they stand in the array in C order."""
+        """Values by flat name of points by their numbers, which ascend; those of a grid in C order."""
         if self.sampling == "grid":
             indices = zip(*(i.tolist() for i in np.unravel_index(list(numbers), self.shape)))
             return [{name: axis.grid[i] for (name, axis), i in zip(self.vary.items(), each)} for each in indices]
         return [self._point(u) for u in self._uniform(numbers)]
+
+    def stack(self, values: Mapping[str, Any]) -> Stack:
+        """The stack of a point."""
+        others = {name: value for name, value in values.items() if name != "material"}
+        base: Stack = values.get("material", self.material)
+        return base.replace(**others) if others else base
 
     def seeds(self, numbers: Sequence[int]) -> list[int]:
         """The seed of each point, below 2^32: by its number, independent of all others."""
@@ -330,7 +341,8 @@ class Space(Record):
         """Uniform numbers (n, d) of points."""
         count = sum(axis.numbers for axis in self.vary.values())
         if self.sampling == "sobol":
-            return np.array([_sobol(count, self.seed).at(n) for n in numbers])
+            first, last = numbers[0], numbers[-1] + 1
+            return _sobol(count, self.seed).points(first, last - first)[np.subtract(numbers, first)]
         return np.array([np.random.default_rng(self._sequence(n).spawn(1)[0]).random(count) for n in numbers])
 
     def _sequence(self, number: int) -> np.random.SeedSequence:
@@ -363,15 +375,15 @@ def _bounds(name: str) -> tuple[float, float]:
 
 
 class _Sobol:
-    """A scrambled Sobol sequence, cheap to ask for one point after another."""
+    """A scrambled Sobol sequence, cheap to ask for what comes after what was asked before."""
 
     def __init__(self, dimensions: int, seed: int) -> None:
         from scipy.stats import qmc
 
         self._engine, self._next, self._lock = qmc.Sobol(dimensions, seed=seed), 0, threading.Lock()
 
-    def at(self, number: int) -> Array:
-        """One point (d,)."""
+    def points(self, number: int, count: int) -> Array:
+        """Some points (n, d), from the one of that number."""
         with self._lock, warnings.catch_warnings():
             if number < self._next:
                 self._engine.reset()
@@ -379,8 +391,8 @@ class _Sobol:
             warnings.simplefilter("ignore", UserWarning)  # any number of points is asked for
             if number > self._next:
                 self._engine.fast_forward(number - self._next)
-            self._next = number + 1
-            return np.asarray(self._engine.random(1)[0])
+            self._next = number + count
+            return np.asarray(self._engine.random(count))
 
 
 @functools.lru_cache(4)

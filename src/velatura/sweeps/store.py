@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 LARGEST = 2**26  # bytes of a chunk of points
-SHARE = 4  # of the root of the number of points, in a chunk
+SHARE = 2  # part of the root of the number of points, in a chunk
 DONE, FAILED, MISSING = 1, 0, -1  # values of `status`
 OWN = ("seed", "status", "reason")  # variables of every store
 

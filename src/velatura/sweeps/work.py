@@ -83,7 +83,7 @@ def look(packed: bytes, numbers: Sequence[int]) -> list[Answered]:
     found: list[Answered] = []
     for values, seed in zip(plan.points(numbers), plan.seeds(numbers)):
         try:
-            found.append(_named(ask(plan.material.replace(**values), seed, **plan.options)))
+            found.append(_named(ask(plan.stack(values), seed, **plan.options)))
         except MissingTool:
             raise
         except VelaturaError as error:
