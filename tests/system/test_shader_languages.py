@@ -25,9 +25,11 @@ from agreement import (
     together,
 )
 from machines import MACHINES, SLOTS
+from spirv import counts
 
 import velatura as vt
 from velatura.shader import constant, record, shader
+from velatura.shader.glsl import Vulkan
 from velatura.shader.program import prefixed
 
 # Patterns that together have every kind of layer and every shape; merged lobes, films, brushed `velatura`, and the form
@@ -99,6 +101,43 @@ def test_one_program_holds_two_materials(name: str) -> None:
         assert max(apart.value, apart.density) < 1e-3
 
 
+BAKED = {
+    "glsl450": ("coated-gold", "belcour2018"),
+    "vulkan": ("varnished-paint", "weier2020"),
+    "hlsl": ("frosted-glass", "yamaguchi2019"),
+    "slang": ("varnished-paint", "realtime"),
+    "wgsl": ("coated-gold", "weier2020"),
+}
+
+
+@pytest.mark.parametrize("name", BAKED)
+def test_lobes_of_any_model_may_be_baked(name: str) -> None:
+    """Expected: for 99 of 100 directions energies within 1e-3 and alphas within 2e-3 of what is worked out; the text
+    holds no layers, and samples are those of the lobes read."""
+    machine, (preset, model) = MACHINES[name], BAKED[name]
+    if why := machine.missing():
+        pytest.skip(why)
+    stack = vt.preset(preset)
+    below = "dielectric" if stack.transmits else "conductor"
+    case = Case(stack, {}, random_case(((below,), "round"), 300, np.random.default_rng(3)).directions)
+    recording = record(stack, model, baking=True)
+    made = shader(stack, model, printer=machine.printer, baking=True)
+    assert made.columns is not None and made.uniforms == {}
+    assert "vt_tables" not in made.text and "sigma" not in made.text
+    found, truth = on_machine(case, recording, made, machine), in_numpy(case, recording)
+    assert np.quantile(np.abs(found.energy - truth.energy).max(axis=(0, 1)), 0.99) < 1e-3
+    lit = truth.energy.max(axis=1) > 1e-3
+    assert np.quantile(np.where(lit, np.abs(found.alpha - truth.alpha).max(axis=1), 0).max(axis=0), 0.99) < 2e-3
+    assert np.quantile(np.abs(found.drawn - truth.drawn), 0.9) < 5e-3
+
+
+def test_what_varies_is_not_baked(tmp_path: Path) -> None:
+    (tmp_path / "rough.png").touch()
+    stack = vt.Stack([vt.Interface(eta=1.5, k=1, alpha={"texture": str(tmp_path / "rough.png")})])
+    with pytest.raises(vt.InvalidInput, match="baked: only for materials without textures"):
+        vt.export(stack, "wgsl", "belcour2018", baked=True)
+
+
 @pytest.mark.parametrize("name", MACHINES)
 def test_textures_are_read_where_the_material_is(name: str, tmp_path: Path) -> None:
     """Expected: lobes, values and samples are those of the numbers that textures hold, and of the way of brushing."""
@@ -139,3 +178,24 @@ def test_textures_are_read_where_the_material_is(name: str, tmp_path: Path) -> N
     apart = differences(truth, called.results(found))
     assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
     assert max(apart.value, apart.density) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("preset", "model", "exclusive"),
+    [
+        ("coated-gold", "velatura", 0),
+        ("coated-gold", "belcour2018", 8),  # whichever side light that is reflected within comes from
+        ("varnished-paint", "weier2020", 0),
+        ("varnished-paint", "realtime", 0),
+        ("frosted-glass", "yamaguchi2019", 0),
+    ],
+)
+def test_the_texels_of_the_head_are_those_of_compiled_code(preset: str, model: str, exclusive: int) -> None:
+    """Expected: what SPIR-V fetches in all rounds of loops, less what the smaller sides of choices read."""
+    if why := MACHINES["vulkan"].missing():
+        pytest.skip(why)
+    made = shader(vt.preset(preset), model, printer=Vulkan())
+    found = counts(made.text)
+    assert {name: fetched for name, (_, fetched) in found.items()} == {
+        name: cost.texels + (exclusive if name == "vt_lobes" else 0) for name, cost in made.costs.items()
+    }

@@ -47,6 +47,10 @@ def export(
     binding: Annotated[
         int | None, typer.Option(min=0, help=f"For {_BOUND}: the binding of the first texture; default: 0.")
     ] = None,
+    baked: Annotated[
+        bool,
+        typer.Option("--baked", help="For shaders, without textures: read the lobes over direction from a texture."),
+    ] = False,
     half: Annotated[bool, typer.Option("--half", help="For shaders: write textures as halves of floats.")] = False,
     tables: Annotated[
         Path | None,
@@ -63,7 +67,7 @@ def export(
     if tables is not None:
         files.check_writable(tables, "tables", (".bin",))
     chosen: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
-    chosen |= {"half": half or None, "tables": tables}
+    chosen |= {"baked": baked or None, "half": half or None, "tables": tables}
     chosen = {name: value for name, value in chosen.items() if value is not None}
     for name in chosen:
         if name not in FORMATS[to.value].options:

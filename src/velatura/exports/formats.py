@@ -46,7 +46,7 @@ _BAKES = {
     "mitsuba-principled": (".xml",),
 }
 LICENCE = "BSD-3-Clause"  # of code that is written
-_OF_SHADERS = frozenset({"constant", "prefix", "half", "tables"})
+_OF_SHADERS = frozenset({"constant", "prefix", "half", "tables", "baked"})
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
 
 
@@ -130,6 +130,7 @@ def export(
     prefix: str | None = None,
     group: int | None = None,
     binding: int | None = None,
+    baked: bool = False,
     half: bool = False,
     tables: str | Path | None = None,
     folder: str | Path | None = None,
@@ -148,6 +149,7 @@ def export(
             default.
         group, binding: for shaders, but glsl: where the first texture is bound (or the default of the macro that says
             so), the set in Vulkan and the space in HLSL being the group; the next ones follow. 0 by default.
+        baked: for shaders of materials without textures, reads lobes over direction from a texture, of any model.
         half: for shaders, writes textures as halves of floats.
         tables: for shaders, a file of all tables, which shaders of any materials share, in place of one for each.
         folder: where the text will lie, so that a scene may name its textures relative to it.
@@ -163,7 +165,7 @@ def export(
     if to not in FORMATS:
         raise InvalidInput(unknown("format", to, FORMATS))
     asked: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
-    asked |= {"half": half or None, "tables": tables}
+    asked |= {"baked": baked or None, "half": half or None, "tables": tables}
     options = {name: value for name, value in asked.items() if value is not None}
     for name in options:
         if name not in FORMATS[to].options:

@@ -30,7 +30,13 @@ def write(request: Request) -> Export:
     printer = LANGUAGES[request.to](options.get("group", 0), options.get("binding", 0), half)
     prefix = options.get("prefix", PREFIX)
     made = shader(
-        request.stack, request.model, request.constants, printer=printer, prefix=prefix, shared=shared is not None
+        request.stack,
+        request.model,
+        request.constants,
+        printer=printer,
+        prefix=prefix,
+        shared=shared is not None,
+        baking=options.get("baked", False),
     )
 
     # Write its textures

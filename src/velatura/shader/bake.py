@@ -7,11 +7,13 @@ cosine, and over the azimuth where an interface is anisotropic.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from velatura import ops
 from velatura.model import bsdf, precomputed_lobes
@@ -25,6 +27,8 @@ from velatura.sampling import directional_grid
 from velatura.shader.symbol import Operand, Symbol, component, number, operand
 from velatura.shader.tape import Tape, tape
 from velatura.stack import Material
+
+Apart = Callable[[Value], Iterable[Value]]  # the channels of a colour
 
 _OF_BASE = 6  # columns: its scale and its energy
 PLANE = (95, 49)  # nodes over the cosine, twice as dense as those of most tables, and the azimuth
@@ -45,13 +49,15 @@ class Bake:
     base transmit, if there is one, then the lobes.
 
     `body` reads its lobes from the texture. A line of texels holds one of them for all cosines; lines go over azimuths,
-    sides and texels. `nodes` are those over the cosine and maybe the azimuth.
+    sides and texels. `nodes` are those over the cosine and maybe the azimuth. Of known values the texture is known, and
+    there are no columns.
     """
 
     columns: Sequence[Operand]
     body: bsdf.Lobed
     nodes: tuple[int, ...]
     groups: Sequence[Group]
+    texels: np.ndarray | None = None  # (height, nodes over the cosine, 4)
 
     @property
     def sides(self) -> int:
@@ -61,7 +67,7 @@ class Bake:
     @property
     def height(self) -> int:
         """Lines of the texture."""
-        return len(self.columns) // 4 * self.sides * prod(self.nodes[1:])
+        return sum(group.texels for group in self.groups) * self.sides * prod(self.nodes[1:])
 
     @cached_property
     def tape(self) -> Tape:
@@ -80,15 +86,50 @@ def bake(material: Material, body: bsdf.Lobed) -> Bake:
 
     # Compute the lobes seen in a direction
     columns, lobes = _seen(material, body, w)
-    base, groups = body.base(w), []
-    if base:
-        groups, through = [Group("through", 0, 1)], _apart(base.through(w))
-        columns = [*through, 0.0, *_apart(base.scale), *_apart(base.energy), *columns]
-    columns += [0.0] * (-len(columns) % 4)
-    groups.append(Group("lobes", len(groups), len(columns) // 4 - len(groups)))
+    base = body.base(w)
+    columns = _with_base(base, w, columns, _apart) if base else columns
+    groups = _groups(base is not None, len(columns))
+    columns += [0.0] * (4 * sum(group.texels for group in groups) - len(columns))
 
     # And read it
     return Bake([operand(x) for x in columns], _read(body, nodes, groups, lobes), nodes, groups)
+
+
+def bake_known(body: bsdf.Lobed, known: bsdf.Lobed) -> Bake:
+    """The lobes of a body, which are `known` in NumPy, over direction."""
+    nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
+    turns = prod(nodes[1:])
+    w = directional_grid.directions(nodes, None)
+
+    def apart(colour: Value) -> Iterable[Value]:
+        return np.broadcast_to(colour, (3, prod(nodes)))
+
+    def on(lobes: precomputed_lobes.Lobes) -> list[Value]:
+        columns, _ = _columns(lobes, known, w, apart)
+        base = known.base(w)
+        return _with_base(base, w, columns, apart) if base else columns
+
+    # Compute the lobes at the nodes
+    sides = [on(known.lobes_above), *([] if known.below is None else [on(known.lobes_below)])]
+    groups = _groups(known.above.base is not None, len(sides[0]))
+    texels = np.zeros((4 * sum(group.texels for group in groups), len(sides), *nodes[:1], turns), np.float32)
+    for side, columns in enumerate(sides):
+        for k, column in enumerate(columns):
+            texels[k, side] = np.broadcast_to(column, prod(nodes)).reshape(nodes[0], turns)
+    texture = texels.reshape(-1, 4, *texels.shape[1:]).transpose(0, 2, 4, 3, 1).reshape(-1, nodes[0], 4)
+    _, lobes = _columns(known.lobes_above, known, w, apart)
+    return Bake([], _read(body, nodes, groups, lobes), nodes, groups, texture)
+
+
+def _with_base(base: Base, w: Direction, columns: list[Value], apart: Apart) -> list[Value]:
+    """The columns of lobes after those of a base: what the layers above it transmit, its scale and its energy."""
+    return [*apart(base.through(w)), 0.0, *apart(base.scale), *apart(base.energy), *columns]
+
+
+def _groups(base: bool, columns: int) -> list[Group]:
+    """Texels of a base, and of lobes, of so many columns in all."""
+    first = [Group("through", 0, 1)] if base else []
+    return [*first, Group("lobes", len(first), -(-columns // 4) - len(first))]
 
 
 def _seen(material: Material, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], int]:
@@ -107,10 +148,12 @@ def _seen(material: Material, body: bsdf.Lobed, w: Direction) -> tuple[list[Valu
     return [ops.select(above, a, b) for a, b in zip(columns, _columns(body.lobes_below, body, w)[0])], count
 
 
-def _columns(lobes: precomputed_lobes.Lobes, body: bsdf.Lobed, w: Direction) -> tuple[list[Value], int]:
+def _columns(
+    lobes: precomputed_lobes.Lobes, body: bsdf.Lobed, w: Direction, apart: Apart | None = None
+) -> tuple[list[Value], int]:
     reflected, passed = lobes(w)
     seen = [*reflected, *([passed] if body.below is not None and passed is not None else [])]
-    columns = [column for lobe in seen for column in precomputed_lobes.columns(lobe, body.above, _apart)]
+    columns = [column for lobe in seen for column in precomputed_lobes.columns(lobe, body.above, apart or _apart)]
     return columns, len(seen)
 
 

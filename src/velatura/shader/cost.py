@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import prod
 
 from velatura import tables
 from velatura.shader import atlas
@@ -29,16 +29,31 @@ class Cost:
 
 def cost(outputs: Sequence[Operand], axes: int) -> Cost:
     """The cost of working out values together; `axes` are those of the texture that lobes are read from."""
-    order = in_order(outputs)
-    bound = inside(order)
-    loop_of = {name: symbol for symbol in order if symbol.kind == "loop" for name in symbol.detail.bound}
     operations, texels = 0, dict[Symbol, int]()
-    for symbol in order:
-        times = prod(loop.detail.times for loop in {loop_of[name] for name in bound[symbol]})
+    for symbol, times in _rounds(outputs).items():
         operations += times * work(symbol) * (3 if is_colour(symbol) else 1)
         if read := times * _texels(symbol, axes):
             texels[symbol] = read
     return Cost(operations, most(texels, needed(outputs)))
+
+
+def _rounds(outputs: Sequence[Operand]) -> Counter[Symbol]:
+    """How often each value is worked out: in loops once for every round, of every loop that works it out."""
+    order = in_order(outputs)
+    bound = inside(order)
+    found = Counter(x for x in order if not bound[x])
+
+    def enter(loop: Symbol, times: int, around: frozenset[str]) -> None:
+        own, times = around.union(loop.detail.bound), times * loop.detail.times
+        for x in in_order(loop.args):
+            if bound[x].intersection(loop.detail.bound) and bound[x] <= own:
+                found[x] += times
+                if x.kind == "loop":
+                    enter(x, times, own)
+
+    for x in [x for x in found if x.kind == "loop"]:
+        enter(x, 1, frozenset())
+    return found
 
 
 def _texels(symbol: Symbol, axes: int) -> int:

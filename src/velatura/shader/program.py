@@ -68,10 +68,12 @@ class Shader:
 
     @property
     def columns(self) -> np.ndarray | None:
-        """The texture `vt_baked` of a material that is solved, float32 of shape (height, width, 4)."""
-        if self.baked is None or isinstance(self.baked, Bake) or self.baked.solved is None:
+        """The texture `vt_baked` of known values, float32 of shape (height, width, 4)."""
+        if self.baked is None:
             return None
-        return self.baked.solved.texels
+        if isinstance(self.baked, Bake):
+            return self.baked.texels
+        return None if self.baked.solved is None else self.baked.solved.texels
 
     @cached_property
     def key(self) -> str:
@@ -88,6 +90,7 @@ def shader(
     printer: Printer = GLSL,
     prefix: str = PREFIX,
     shared: bool = False,
+    baking: bool = False,
     **switches: str,
 ) -> Shader:
     """A material as shader code: the structs `VtMaterial` and `VtLobes`, and functions on them.
@@ -103,6 +106,7 @@ def shader(
         prefix: begins the names of functions, structs, textures and macros, so that one program may hold several
             materials: `vt` of `vt_lobes`, `VtLobes` and `VT_TABLES_BINDING`.
         shared: whether the texture of tables holds all of them, so that it is the same for all materials.
+        baking: whether lobes are read from a texture over direction for any model, of values that never change.
 
     Raises:
         InvalidInput: as `record`; a prefix that names cannot begin with.
@@ -110,7 +114,7 @@ def shader(
     if not _PREFIX.fullmatch(prefix):
         raise InvalidInput(f"prefix: must be letters, digits and single underscores, a letter first, not {prefix!r}")
     stack = load(stack)
-    recording = record(stack, model, constant, values == "uniforms", **switches)
+    recording = record(stack, model, constant, values == "uniforms", baking, **switches)
     baked, read, shown = recording.baked, list(recording.read), recording.shown
     looked_up = {symbol.detail for symbol in recording.symbols if symbol.op in ("texels", "value")}
     layouts, filled = (
@@ -121,7 +125,7 @@ def shader(
     name = "A material" if shown else " ".join(stack.name.split()) or "A material"
     costs = _costs(recording)
     parts = [
-        printer.header(name, described(recording.model), bool(recording.energies), costs),
+        printer.header(name, described(recording.model), not recording.read, costs),
         printer.structs(material.structs(stack, read)),
         *([printer.parameters(len(shown), *_changing(baked))] if shown else []),
         printer.material(filled),

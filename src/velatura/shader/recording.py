@@ -19,8 +19,9 @@ from velatura.model.prepare import PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
+from velatura.sampling import coated
 from velatura.shader import films, material, symbol
-from velatura.shader.bake import Bake, bake
+from velatura.shader.bake import Bake, bake, bake_known
 from velatura.shader.graph import Graph, known_before
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
 from velatura.stack import Address, Material, Stack, Varying, as_described
@@ -85,16 +86,18 @@ def record(
     model: str | Model = DEFAULT,
     constant: Collection[str] = (),
     parameters: bool = False,
+    baking: bool = False,
     **switches: str,
 ) -> Recording:
     """The model's functions for a stack; the values named `constant` as they are, all others as inputs.
 
     With `parameters`, for a program whose user changes values and looks at single lobes: as general as the `structure`
-    of the stack, with a weight for every lobe, and, without textures, with lobes that are read.
+    of the stack, with a weight for every lobe, and, without textures, with lobes that are read. With `baking`,
+    lobes are read of any model, and all values are as they are.
 
     Raises:
         InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture; films
-            over a diffuse base in closed form.
+            over a diffuse base in closed form; `baking` values that vary.
     """
     chosen, flat = drawn_by(stack, named(model, **switches)), stack.flat()
     check_constant(stack, constant)
@@ -102,8 +105,11 @@ def record(
 
     # Run the model
     uniform = is_uniform(stack)
+    if baking and not uniform:
+        raise InvalidInput("baked: only for materials without textures, since lobes are those of one point")
     solved = not chosen.recursion.closed_form
-    constants = flat if solved and not parameters else {*constant, *([] if parameters else films.beside(stack))}
+    fixed = (solved or baking) and not parameters
+    constants = flat if fixed else {*constant, *([] if parameters else films.beside(stack))}
     recorded = films.recorded(symbols(stack, constants), stack, parameters)
     kind = structure(stack) if parameters else variance(stack)
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
@@ -114,6 +120,10 @@ def record(
         baked = tabulated(stack, recorded, chosen, kind, general=parameters)
     elif uniform and parameters:
         baked = bake(recorded, prepared())
+    elif baking and stack.interfaces:
+        numbers = Material.of(stack)
+        numbers = numbers.coated(coated.of(numbers))
+        baked = bake_known(prepared(), bsdf.body(numbers, chosen, kind, at_a_point()))
     shown: list[str] = []
     with ops.readable():
         energies: list[Value] = []
