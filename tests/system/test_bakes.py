@@ -19,8 +19,10 @@ from velatura import kernel
 from velatura.bakes import TARGETS, Bake, bake
 from velatura.bakes.look import Described
 from velatura.bakes.lost import lost
+from velatura.bakes.sampled import Sampled
 from velatura.checks.probe import Probe
 from velatura.model import named
+from velatura.optics.directions import directions
 from velatura.stack import Material
 from velatura.targets import gltf
 from velatura.targets.parameters import complete
@@ -214,3 +216,56 @@ def test_pictures_show_the_bake_that_can_be_rendered() -> None:
         vt.InvalidInput, match="pictures: not with openpbr, gltf; of the bakes, only mitsuba-principled"
     ):
         vt.compare(SHEEN, ["openpbr", "velatura", "gltf"], paths=100, pictures=True)
+
+
+# Round trips ----------------------------------------------------------------------------------------------------------
+
+FOREIGN: dict[str, dict[str, Any]] = {
+    "metal": {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.6, 0.3, 1.0], "roughnessFactor": 0.5}},
+    "plastic": {
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.2, 0.1, 1.0], "metallicFactor": 0, "roughnessFactor": 0.4},
+        "extensions": {"KHR_materials_ior": {"ior": 1.7}},
+    },
+    "coated": {
+        "pbrMetallicRoughness": {"baseColorFactor": [0.7, 0.7, 0.7, 1.0], "roughnessFactor": 0.6},
+        "extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.2}},
+    },
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_gltf_comes_back_from_a_stack(name: str) -> None:
+    """Expected: the stack exactly, and parameters by which the material looks as it did, in glTF's own formulas."""
+    stack = vt.imports.from_gltf(FOREIGN[name]).stack
+    entry = json.loads(vt.export(stack, "gltf").text)["materials"][0]
+    assert vt.imports.from_gltf(entry).stack == stack
+    # By its values, in glTF's own formulas: there, rough metals lose light, and coats do not blur what is below
+    flat = dict(FOREIGN[name]["pbrMetallicRoughness"])
+    for part in FOREIGN[name].get("extensions", {}).values():
+        flat |= part
+    flat["baseColorFactor"] = flat["baseColorFactor"][:3]
+    model = named("velatura")
+    shown = Sampled.of(Described.of(Material.of(stack), model), model, directions([1.0, 0.7, 0.35]), 2**14)
+    before, after = (gltf.value(values, shown.pair) for values in (flat, bake(stack, "gltf").values))
+    apart = np.abs(shown.distribution(after) - shown.distribution(before)).mean(axis=0).sum(axis=(1, 2))
+    assert np.all(0.5 * apart / shown.energy(before).mean(axis=0) < 0.2)
+    assert np.all(np.abs(shown.energy(after) - shown.energy(before)) < 0.12)
+
+
+@pytest.mark.parametrize("target, ending", [("gltf", ".gltf"), ("openpbr", ".mtlx"), ("mitsuba-principled", ".xml")])
+def test_files_hold_their_stack_until_they_are_changed(files, target: str, ending: str, tmp_path: Path) -> None:
+    path = files(target, ending)
+    found = vt.imports.read(path)
+    assert found.stack == SHEEN and ["which is read" in each.why for each in found.left] == [True]
+    value = next(v for v in bake(SHEEN, target).values.values() if isinstance(v, float) and 0.01 < v < 0.99)
+    changed = tmp_path / path.name
+    changed.write_text(path.read_text().replace(f'"{value:g}"', '"0.5"').replace(f": {value!r}", ": 0.5"))
+    assert changed.read_text() != path.read_text()
+    assert vt.imports.read(changed).stack != SHEEN
+
+
+def test_names_and_texts_of_any_kind_stand_in_files(tmp_path: Path) -> None:
+    stack = vt.Stack(SHEEN.layers, name="Paint -- <old> & \"new\" --> {'a'}\n")
+    for target, ending in (("openpbr", ".mtlx"), ("mitsuba-principled", ".xml"), ("gltf", ".gltf")):
+        path = vt.export(stack, target).save(tmp_path / f"paint{ending}")[0]
+        assert vt.imports.read(path).stack == stack

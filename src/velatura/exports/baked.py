@@ -10,6 +10,7 @@ from velatura import __version__
 from velatura.bakes import TARGETS, Bake, bake
 from velatura.exports.formats import Export, Request
 from velatura.stack import dumps
+from velatura.targets import embedded
 from velatura.targets.openpbr import TURNS
 from velatura.targets.parameters import RGB, Parameter
 
@@ -66,22 +67,19 @@ def _openpbr(made: Bake, material: Any) -> str:
         inputs.append(f'    <input name="{name}" type="vector3" nodename="{name}" />')
     if made.thin:
         inputs.append('    <input name="geometry_thin_walled" type="boolean" value="true" />')
-    return "\n".join(
-        [
-            '<?xml version="1.0"?>',
-            '<materialx version="1.39" colorspace="lin_rec709">',
-            *_xml_comment(_comment(made), "  "),
-            *nodes,
-            '  <open_pbr_surface name="surface" type="surfaceshader">',
-            *inputs,
-            "  </open_pbr_surface>",
-            '  <surfacematerial name="material" type="material">',
-            '    <input name="surfaceshader" type="surfaceshader" nodename="surface" />',
-            "  </surfacematerial>",
-            "</materialx>",
-            "",
-        ]
-    )
+    body = [
+        *nodes,
+        '  <open_pbr_surface name="surface" type="surfaceshader">',
+        *inputs,
+        "  </open_pbr_surface>",
+        '  <surfacematerial name="material" type="material">',
+        '    <input name="surfaceshader" type="surfaceshader" nodename="surface" />',
+        "  </surfacematerial>",
+        "</materialx>",
+        "",
+    ]
+    head = ['<?xml version="1.0"?>', '<materialx version="1.39" colorspace="lin_rec709">']
+    return _xml(head, made, material, body)
 
 
 def _gltf(made: Bake, material: Any) -> str:
@@ -102,8 +100,8 @@ def _gltf(made: Bake, material: Any) -> str:
         "albedo": made.albedo.T.round(4).tolist(),
         "baked_albedo": made.baked_albedo.T.round(4).tolist(),
     }
-    about = {"comment": _comment(made), "model": made.model, "loss": loss, "material": material}
-    written["extras"] = {"velatura": about}
+    about = {"comment": _comment(made), "model": made.model, "loss": loss, **embedded.in_gltf(material, written)}
+    written["extras"] = {embedded.KEY: about}
     document: dict[str, Any] = {"asset": {"version": "2.0", "generator": f"Velatura {__version__}"}}
     if extensions:
         document["extensionsUsed"] = list(extensions)
@@ -137,17 +135,14 @@ def _mitsuba(made: Bake, material: Any) -> str:
         f'        <{"rgb" if isinstance(value, tuple) else "float"} name="{parameter.name}" value="{_text(value)}"/>'
         for parameter, value in _written(made)
     ]
-    return "\n".join(
-        [
-            '<scene version="3.0.0">',
-            *_xml_comment(_comment(made), "    "),
-            '    <bsdf type="principled" id="material">',
-            *values,
-            "    </bsdf>",
-            "</scene>",
-            "",
-        ]
-    )
+    body = ['    <bsdf type="principled" id="material">', *values, "    </bsdf>", "</scene>", ""]
+    return _xml(['<scene version="3.0.0">'], made, material, body)
+
+
+def _xml(head: list[str], made: Bake, material: Any, body: list[str]) -> str:
+    """A document with the loss in a comment, and the stack in another."""
+    above = "\n".join([*head, *_xml_comment(_comment(made), "  ")])
+    return f"{above}\n  {embedded.in_xml(material, chr(10).join(body))}"
 
 
 _PRINTERS: dict[str, Callable[[Bake, Any], str]] = {

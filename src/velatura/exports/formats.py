@@ -142,7 +142,8 @@ def export(
         material: a stack, a file, or a preset's name.
         to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
             shader of closures, "osl", or "blender", a script that makes a material of it; "json", the material with its
-            numbers; "mitsuba-xml", a scene to be included; "python", a script that renders it.
+            numbers; "mitsuba-xml", a scene to be included; "python", a script that renders it; fitted parameters in
+            "openpbr", "gltf", "blender-principled" or "mitsuba-principled".
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Mapping
 from importlib import import_module
@@ -9,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from velatura.errors import Incomplete, InvalidInput
-from velatura.imports.result import Imported, Notes
-from velatura.stack import Stack
+from velatura.imports.result import Imported, Left, Notes
+from velatura.stack import Stack, loads
 from velatura.stack.io import foreign
 from velatura.stack.schema import show, unknown
+from velatura.targets import embedded
 
 FORMATS = {
     ".mtlx": "velatura.imports.materialx",
@@ -20,6 +22,8 @@ FORMATS = {
     ".glb": "velatura.imports.gltf_file",
     ".xml": "velatura.imports.mitsuba_xml",
 }
+
+BAKED = (".mtlx", ".xml")  # files whose bakes hold their stack in a comment
 
 
 def read(path: str | Path, material: str | None = None) -> Imported:
@@ -45,8 +49,18 @@ def read(path: str | Path, material: str | None = None) -> Imported:
     name = next(iter(found)) if material is None else material
     if name not in found:
         raise InvalidInput(f"{file}: {unknown('material', name, found)}")
-    imported: Imported = found[name](Notes())
+    held = _held(Path(file)) if ending in BAKED and len(found) == 1 else None
+    imported: Imported = held or found[name](Notes())
     return imported
+
+
+def _held(path: Path) -> Imported | None:
+    """The stack that the only material of a file was baked from; None of any other file."""
+    held = embedded.of_xml(path.read_text(encoding="utf-8", errors="replace"))
+    if held is None:
+        return None
+    stack = loads(json.dumps(held), f"{path}: the stack in it.json", path.parent)
+    return Imported(stack, (Left("comment", embedded.KEY, embedded.READ),))
 
 
 def load(path: str) -> Stack:

@@ -18,6 +18,7 @@ from velatura.imports.result import Imported, Notes, shown
 from velatura.imports.values import changed
 from velatura.stack import Texture, loads
 from velatura.stack.schema import show
+from velatura.targets import embedded
 from velatura.targets.gltf import PARAMETERS as FACTORS
 
 LARGEST = 2**28  # bytes of a file
@@ -69,12 +70,9 @@ def _reader(
 ) -> Callable[[Notes], Imported]:
     def read(notes: Notes) -> Imported:
         try:
-            if str(document["asset"].get("generator", "")).startswith("Velatura "):
-                baked = entry.get("extras", {}).get("velatura", {}).get("material")
-                if baked is not None:
-                    notes.add("extras", "velatura", "holds the stack that the parameters were fitted to, which is read")
-                    return Imported(loads(json.dumps(baked), "material.json", path.parent), tuple(notes.left))
-            return of_material(entry, name, notes, lambda reference: _file(reference, path, document))
+            ours = str(document["asset"].get("generator", "")).startswith("Velatura ")
+            held = entry if ours else {key: value for key, value in entry.items() if key != "extras"}
+            return of_material(held, name, notes, lambda reference: _file(reference, path, document), path.parent)
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {name}: {error}") from None
         except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
@@ -84,9 +82,20 @@ def _reader(
 
 
 def of_material(
-    material: Mapping[str, Any], name: str, notes: Notes, find: Callable[[Mapping[str, Any]], Path | str]
+    material: Mapping[str, Any],
+    name: str,
+    notes: Notes,
+    find: Callable[[Mapping[str, Any]], Path | str],
+    folder: Path = Path(),
 ) -> Imported:
-    """The stack of an entry of `materials`; `find` gives the file of an image, or the reason why it has none."""
+    """The stack of an entry of `materials`: the one that it was baked from, or the nearest one.
+
+    `find` gives the file of an image, or the reason why it has none; `folder` is that of the file.
+    """
+    held = embedded.of_gltf(material)
+    if held is not None:
+        notes.add("extras", embedded.KEY, embedded.READ)
+        return Imported(loads(json.dumps(held), "the stack in extras.json", folder), tuple(notes.left))
     extensions = dict(material.get("extensions", {}))
     parts = {"pbrMetallicRoughness": material.get("pbrMetallicRoughness", {}), **extensions}
     values: dict[str, Any] = {}

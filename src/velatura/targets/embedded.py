@@ -1,0 +1,54 @@
+"""The stack that a bake was made of, inside its file, for as long as nothing else in the file is changed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+KEY = "velatura"
+READ = "holds the stack that the parameters were fitted to, which is read"
+_COMMENT = re.compile(rf"<!-- {KEY} (\{{.*\}}) -->\n(.*)", re.DOTALL)
+
+
+def in_xml(material: Any, body: str) -> str:
+    """A comment with a material as its file has it, and the text that follows, which it holds for."""
+    text = json.dumps({"digest": _digest(body), "material": material})
+    # Comments of XML hold no two hyphens in a row
+    return f"<!-- {KEY} {text.replace('--', '-' + chr(92) + 'u002d')} -->\n{body}"
+
+
+def of_xml(text: str) -> Any | None:
+    """The material in a text of `in_xml`; None without one, or where what follows it was changed."""
+    found = _COMMENT.search(text)
+    try:
+        held = json.loads(found[1]) if found else {}
+    except ValueError:
+        return None
+    return held.get("material") if found and held.get("digest") == _digest(found[2]) else None
+
+
+def in_gltf(material: Any, entry: Mapping[str, Any]) -> dict[str, Any]:
+    """What `extras` hold of a material, for an entry of `materials` without them."""
+    return {"digest": _digest(_values(entry)), "material": material}
+
+
+def of_gltf(entry: Mapping[str, Any]) -> Any | None:
+    """The material in an entry with what `in_gltf` gives; None without one, or where the entry was changed."""
+    extras = entry.get("extras")
+    held = extras.get(KEY) if isinstance(extras, Mapping) else None
+    if not isinstance(held, Mapping) or held.get("digest") != _digest(_values(entry)):
+        return None
+    return held.get("material")
+
+
+def _values(entry: Mapping[str, Any]) -> str:
+    """The entry without its name and extras, in one order."""
+    kept = {key: value for key, value in entry.items() if key not in ("name", "extras")}
+    return json.dumps(kept, sort_keys=True)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.strip().encode()).hexdigest()[:16]
