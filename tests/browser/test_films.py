@@ -243,8 +243,21 @@ def test_cards_of_films_are_accessible_and_fit(
     assert page.complaints == []
 
 
-def test_an_interface_with_films_is_fixed_in_appearance(visit: Open) -> None:
+def test_lobes_of_a_material_with_films_are_dragged(visit: Open) -> None:
+    """Expected: the lobe has the blur that was asked for, all films stay, and the panel says why there is no map."""
     page = visit(COATED)
+    before = [layer["keys"]["films"] for layer in page.state("layers")]
     page.page.get_by_role("tab", name="Appearance").click()
-    page.page.get_by_text("layer 0: has thin films, and stays as it is").wait_for()
+    look = page.page.locator("section.appearance")
+    look.locator(".lobe").nth(1).click()
+    look.get_by_text("Lobe 2: has no map of its class, since thin films").wait_for()
+    blur = look.get_by_label("Blur", exact=True)
+    blur.fill("0.25")
+    blur.press("Enter")
     page.settled()
+    page.page.wait_for_function("() => !velatura.store.dragging")
+    assert look.locator(".refused").count() == 0
+    assert [layer["keys"]["films"] for layer in page.state("layers")] == before
+    material = {"layers": [{layer["kind"]: layer["keys"]} for layer in page.state("layers")]}
+    read = vt.lobes(vt.Stack.from_dict(material), 1.0, model=page.state("model"))
+    assert read.alpha[1][0, 0] == pytest.approx(0.25, abs=1e-4)

@@ -45,7 +45,11 @@ SMOOTH = 1e-10  # variance below which an interface is smooth
 REFLECTANCE_MAX = 0.95  # of a dielectric
 DEEP = 50.0  # an optical depth that nothing passes
 CLEARED, OUTSIDE = 1e-7, 1e-4  # optical depths below 0: that are none, and that are read on the way
-SHIFT, FLAT = 0.01, 0.1  # share of an index by which it is changed, and of that by which what films reflect follows
+SHIFT, FLAT, TURN = (
+    0.01,
+    0.2,
+    3.0,
+)  # share of an index by which it is changed, and of that by which what films reflect follows
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,8 @@ class InterfaceCoordinates:
     scatters: the medium above, if that scatters; it stays, and absorbs as the coordinates say.
     films: on it; then the index of a dielectric follows from the reflectance of the channel `reference`: that of least
     absorption, or where nothing absorbs that in which an index shows most. darkest: the least reflectances (3, 1) of a
-    conductor; what is to reflect less is below more that absorbs.
+    conductor; what is to reflect less is below more that absorbs. turn: by which its tint (3, 1) changes with the
+    logarithm of its reflectance over `pivot`, where films let that alone change nothing.
     variance, depth, reflectances, log_index: indices of the entries of the variance, of the factor on `kept` (None
     where that is pinned), of the reflectances by channel or the one of all (None where the index itself is a
     coordinate), and of the logarithm of the index.
@@ -79,6 +84,8 @@ class InterfaceCoordinates:
     films: tuple[Film, ...] = ()
     reference: int = 0
     darkest: Array | None = None
+    turn: Array | None = None
+    pivot: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -386,7 +393,10 @@ def _conductor(own: InterfaceCoordinates, reflectances: Array) -> tuple[Array, A
     """Relative eta and kappa of conductors, and what absorbs where they cannot reflect as little."""
     darkest = CONDUCTOR_MIN + 1e-12 if own.darkest is None else own.darkest
     u = np.clip(reflectances, darkest, CONDUCTOR_MAX)
-    n = conductor_index(u, own.tint)
+    tint = own.tint
+    if own.turn is not None and own.pivot is not None:
+        tint = np.clip(tint + own.turn * np.log(u / own.pivot), 0.0, 1.0)
+    n = conductor_index(u, tint)
     return n, np.maximum(conductor_extinction(u, n), n), 0.5 * np.log(u / np.minimum(reflectances, u))
 
 
@@ -506,22 +516,30 @@ class Reader:
         span = self._colour(k, reflectances, why, low, float(CONDUCTOR_MAX))
         depth = self._coordinate(k, 1.0, "absorption", 0.0, 1.0) if values["absorbs"] else None
         values["tint"] = np.broadcast_to(conductor_tint(ratio, kappa), (3, 1))
-        if values["films"] and values["absorbs"]:
-            flat = self._flat(reflectance, values)
-            darker = np.where(flat, np.exp(-2 * values["kept"]), 1.0)[:, 0]
-            self.x[span] = (np.array(self.x[span]) * darker).tolist()
-            values["darkest"] = np.where(flat, reflectance, CONDUCTOR_MIN + 1e-12)
-            values["kept"] = np.where(flat, 0.0, values["kept"])
+        if values["films"]:
+            by_u, by_tint = self._responses(reflectance, values)
+            flat = np.abs(by_u) < FLAT
+            if values["absorbs"]:
+                absorbed = (by_u < FLAT) & (values["kept"] > 0)
+                darker = np.where(absorbed, np.exp(-2 * values["kept"]), 1.0)[:, 0]
+                self.x[span] = (np.array(self.x[span]) * darker).tolist()
+                values["darkest"] = np.where(absorbed, reflectance, CONDUCTOR_MIN + 1e-12)
+                values["kept"] = np.where(absorbed, 0.0, values["kept"])
+                flat = flat & ~absorbed
+            values["turn"] = np.where(flat, np.clip(ops.divide(1 - by_u, by_tint), -TURN, TURN), 0.0)
+            values["pivot"] = reflectance
         return InterfaceCoordinates(**values, depth=depth, reflectances=span)
 
-    def _flat(self, reflectance: Array, values: dict[str, Any]) -> Array:
-        """In which channels (3, 1) what absorbs makes a conductor dark, since no other reflects less with its films."""
-        u = np.clip(reflectance, CONDUCTOR_MIN, CONDUCTOR_MAX) * np.array([[1, 1 + SHIFT]])
-        eta = conductor_index(np.clip(u, CONDUCTOR_MIN + 1e-12, CONDUCTOR_MAX), values["tint"])
+    def _responses(self, reflectance: Array, values: dict[str, Any]) -> tuple[Array, Array]:
+        """Changes (3, 1) of the logarithm of what a conductor below films reflects: by that of its own reflectance, and
+        by its tint."""
+        tint, own = values["tint"], films.values(values["films"])
+        u = np.clip(reflectance, CONDUCTOR_MIN + 1e-12, CONDUCTOR_MAX / (1 + SHIFT)) * np.array([[1, 1 + SHIFT, 1]])
+        turned = np.where(tint > 0.5, -SHIFT, SHIFT)
+        eta = conductor_index(u, tint + turned * np.array([[0, 0, 1]]))
         kappa = np.maximum(conductor_extinction(u, eta), eta)
-        own = films.values(values["films"])
-        r = films.AtNormal(own, self.eta_1, eta * self.eta_1, kappa * self.eta_1).at(1.0, None)
-        return (r[:, 1:] - r[:, :1] < FLAT * SHIFT * r[:, :1]) & (values["kept"] > 0)
+        r = np.log(films.AtNormal(own, self.eta_1, eta * self.eta_1, kappa * self.eta_1).at(1.0, None) + ENERGY_MIN)
+        return (r[:, 1:2] - r[:, :1]) / np.log1p(SHIFT), (r[:, 2:] - r[:, :1]) / turned
 
     def _blur(self, lobe: int, roughness: Roughness) -> slice:
         """The entries of a variance."""
