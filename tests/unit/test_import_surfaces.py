@@ -10,6 +10,7 @@ import pytest
 
 import velatura as vt
 from velatura import imports
+from velatura.imports import gltf, openpbr, principled, standard_surface
 
 
 def fresnel(cosine: float, index: Any) -> Any:
@@ -278,6 +279,26 @@ def test_values_beyond_their_range_take_its_end() -> None:
     found = vt.from_openpbr(base_color=(1.5, 0.5, 0.5), subsurface_radius_scale=(2, 0, 0))
     assert "outside 0 to 1" in str(found.left[0]) and len(found.left) == 1
     assert found.stack.base and found.stack.base.albedo[0] == 1
+
+
+@pytest.mark.parametrize("source", [openpbr, standard_surface, gltf, principled])
+def test_all_values_in_range_become_a_stack(source: Any) -> None:
+    """Expected: of parameters drawn from their ranges and their ends a stack that a file can hold."""
+    random = np.random.default_rng(0)
+
+    def drawn(parameter: Any) -> float:
+        high = parameter.high if np.isfinite(parameter.high) else 10.0
+        low = parameter.low if np.isfinite(parameter.low) else -10.0
+        return float(random.choice([low, high, random.uniform(low, high)]))
+
+    for _ in range(12):
+        values = {
+            each.name: tuple(drawn(each) for _ in range(3)) if each.is_colour else drawn(each)
+            for each in source.PARAMETERS
+            if random.random() < 0.5 and each.name != "specular" * (source is principled)
+        }
+        stack = source.read(values).stack
+        assert vt.stack.loads(vt.stack.dumps(stack)) == stack
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from velatura.imports.given import Given
+from velatura.imports.given import ROUNDING, Given
 from velatura.imports.result import Notes, shown
 from velatura.imports.surface import INDICES, Coat, weighed
 from velatura.imports.values import Array, Value, changed
@@ -48,7 +48,9 @@ def coated(notes: Notes, name: str, weight: float, coat: Coat) -> Coat | None:
 
 def tinted(given: Given, name: str, factor: float, tint: RGB) -> RGB:
     """Factors on the reflectance of a dielectric at the normal, by colours."""
-    if len(set(tint)) > 1:
+    if max(tint) - min(tint) < ROUNDING:
+        tint = (sum(tint) / 3,) * 3
+    else:
         given.notes.add(name, given[name], "as an index by colour, with no tint towards the edge")
     red, green, blue = (factor * each for each in tint)
     return red, green, blue

@@ -20,6 +20,7 @@ from velatura.stack import RGB, Diffuse, Film, Interface, Layer, Medium, Stack, 
 from velatura.stack.coatings import STEP_MIN
 
 INDICES = (0.1, 10.0)  # of dielectrics
+BRIGHTEST = 0.95  # reflectance of a dielectric at the normal
 SMOOTH = 1e-3  # roughness of a base that stands for one from a texture of roughness below it
 DARKEST = 1e-4  # transmittance in place of a smaller one
 THICKEST_NM = 5000.0  # of films, as `stack` has it
@@ -94,7 +95,7 @@ def imported(surface: Surface, notes: Notes, name: str = "", source: str = "") -
 def weighed(eta: float, outside: float, weight: float) -> float:
     """The index that reflects `weight` times as much at the normal, below a medium (OpenPBR 1.1, "Dielectric base")."""
     ratio = eta / outside
-    epsilon = np.sign(ratio - 1) * np.sqrt(min(weight * fresnel.normal_incidence(ratio), MOST))
+    epsilon = np.sign(ratio - 1) * np.sqrt(min(weight * fresnel.normal_incidence(ratio), BRIGHTEST))
     return rounded(float(outside * (1 + epsilon) / (1 - epsilon)))
 
 
