@@ -148,8 +148,10 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     sin = np.minimum(p / n, np.sqrt(1 - GRAZING**2))[:, None]
     # Light comes from wi, and travels to -wi
     wi = (-sin * np.cos(psi)[:, None], -sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin))
-    # Azimuths from the plane of incidence: the same normals from all sides, where facets have no axes
-    h = ggx.sample_visible(wi, *alpha, (u_2 + psi[:, None] / (2 * np.pi)) % 1, u_1[None])
+    # The same normals from all sides where facets have no axes, with azimuths from the plane of incidence; else about
+    # the normal, where light has no side
+    turns = psi[:, None] / (2 * np.pi) if facets.alpha_u == facets.alpha_v else np.zeros((1, 1))
+    h = ggx.sample_visible(wi, *alpha, (u_2 + turns) % 1, u_1[None])
     cosine = np.minimum(ggx.dot(wi, h), 1.0)
     share = 1 / u_1.size
 
