@@ -85,7 +85,10 @@ def test_flat_names_change_films_and_add_them() -> None:
             "{eta: 1.5, films: [{eta: 1.4, thickness_nm: 6000}]}",
             "films: film 0: thickness_nm: must lie in 0 to 5000, got 6000",
         ),
-        ("{conductor: mirror, films: [{eta: 2, thickness_nm: 9}]}", "films: not on a mirror, which reflects all light"),
+        (
+            "{conductor: mirror, films: [{eta: 2, thickness_nm: 9}]}",
+            "films: not on a mirror, which has no index; eta: 1 and k: 10000 make one",
+        ),
         ("{eta: 1.5, films: 3}", "films: must be a list of films, got 3"),
         (
             "{eta: 1, alpha: 0.1, films: [{eta: 1.4, thickness_nm: 9}]}",
@@ -224,6 +227,38 @@ def test_averages_of_the_papers_are_those_of_the_films(name: str, reflectance: s
         assert found.passed == pytest.approx(truth.transmitted.energy, abs=4e-3)
 
 
+@pytest.mark.parametrize(
+    ("interfaces", "accuracy"),
+    [
+        ([vt.Interface(eta=1.5, alpha=0.1, films=[vt.Film(eta=2.2, thickness_nm=250)])], 3e-3),
+        ([vt.Interface(eta=1.5, alpha=0.1, films=[vt.Film(eta=0.4, k=2.6, thickness_nm=10)])], 7e-3),
+        (
+            [
+                vt.Interface(eta=1.5, alpha=0.1),
+                vt.Interface(eta=1.8, alpha=0.3, films=[vt.Film(eta=2.4, thickness_nm=60)]),
+            ],
+            0.03,
+        ),
+    ],
+)
+def test_models_of_the_papers_have_films_over_a_diffuse_base(interfaces: list[vt.Interface], accuracy: float) -> None:
+    """Below the first interface, films act at the nodes of directions; the noise of the walk is below .002."""
+    stack = vt.Stack([*interfaces, vt.Diffuse(albedo=[0.2, 0.5, 0.9])])
+    truth = vt.reference.statistics(stack, COSINES, paths=100_000, seed=6, microsurface=True)
+    found = vt.lobes(stack, COSINES, model="belcour2018")
+    assert np.sum(found.energy, axis=0) + found.remainder == pytest.approx(np.sum(truth.energy, axis=0), abs=accuracy)
+
+
+def test_a_mirror_under_films_is_a_conductor_of_great_extinction() -> None:
+    """Clear films change nothing there; one that absorbs takes the colours of its own depth."""
+    clear, tinted = (
+        vt.Stack([vt.Interface(eta=1, k=10000, alpha=0.1, films=[vt.Film(eta=1.5, k=k, thickness_nm=300)])])
+        for k in (0.0, 0.1)
+    )
+    assert vt.lobes(clear, COSINES, reflectance="fgd-multi").energy[0] == pytest.approx(np.ones((3, 3)), abs=2e-3)
+    assert vt.lobes(tinted, 1.0, reflectance="fgd-multi").energy[0].max() < 0.8
+
+
 SOAP = """
 layers:
   - interface: {eta: 1, films: [{eta: 1.33, thickness_nm: 400}]}
@@ -360,11 +395,6 @@ def test_a_scene_may_name_films(mi: Any) -> None:
 def test_what_has_no_films_says_so(mi: Any) -> None:
     with pytest.raises(vt.InvalidInput, match=r"layer 0 \(interface\): films: .* no thin films yet"):
         vt.bsdf(loads(COATED), model="weidlich_wilkie")
-
-
-def test_models_of_the_papers_have_none_over_a_diffuse_base() -> None:
-    with pytest.raises(vt.InvalidInput, match="films: belcour2018 has none over a diffuse base"):
-        vt.lobes(loads(OVER_DIFFUSE), 1.0, model="belcour2018")
 
 
 def test_an_index_beside_films_has_no_texture(mi: Any, tmp_path: Path) -> None:

@@ -352,10 +352,16 @@ layers:
   - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 1.3, k: 0.5, thickness_nm: 90}]}
   - interface: {eta: 1, alpha: 0.2, films: [{eta: 2.1, thickness_nm: 250}]}
 """
+OVER_DIFFUSE = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.1, films: [{eta: 1.3, thickness_nm: 90}]}
+  - interface: {eta: 1.7, alpha: 0.1, films: [{eta: 0.4, k: 2.6, thickness_nm: 10}]}
+  - diffuse: {albedo: [0.2, 0.5, 0.9]}
+"""
 
 
 @pytest.mark.parametrize("textured", [False, True])
-@pytest.mark.parametrize("text", [UNDER_A_COAT, PANE, TINTED])
+@pytest.mark.parametrize("text", [UNDER_A_COAT, PANE, TINTED, OVER_DIFFUSE])
 @pytest.mark.parametrize("model", ["belcour2018", "weier2020", "realtime"])
 def test_films_may_change(text: str, model: str, textured: bool, tmp_path: Path) -> None:
     """A shader of one stack, given the films and the values of another, has the lobes of that, from either side."""
@@ -408,8 +414,6 @@ def test_indices_beside_films_are_worked_in() -> None:
     read = shader(loads(UNDER_A_COAT), "weier2020")
     assert read.film_tables == ["film0", "film2"]
     assert read.films is not None and read.films.shape == (2, 257, 4)
-    with pytest.raises(InvalidInput, match="films: belcour2018 has none over a diffuse base"):
-        shader(vt.Stack([loads(UNDER_A_COAT).layers[0], vt.Diffuse(albedo=0.5)]), "belcour2018")
 
 
 # Tapes

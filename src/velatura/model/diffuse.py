@@ -14,14 +14,14 @@ from math import pi
 
 import numpy as np
 
-from velatura import ops
-from velatura.errors import InvalidInput
+from velatura import ops, tables
 from velatura.model import operators
 from velatura.model.context import as_it_is
 from velatura.model.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.ops import Value
-from velatura.optics import phase
+from velatura.optics import fresnel, phase
 from velatura.optics.ggx import Direction
+from velatura.sampling.coated import Either, OfInterface
 from velatura.tables import Tables, diffuse_nodes
 
 Settle = Callable[[Value], Value]
@@ -29,6 +29,7 @@ Row = Sequence[Value]  # of values at the nodes of a medium
 Media = Sequence[tuple[PreparedMedium, Value]]  # with their optical depths along the normal
 
 SWEEPS = 6  # down the stack and up; what is missing then follows from how fast they converge
+OPAQUE = 1e-3  # transmittance below which light of a node is taken to be totally reflected
 SLOWEST = 0.95  # ratio of the last two sweeps
 
 # Cosines and weights of the mean over directions above; what the stack does is smooth in the cosine
@@ -70,15 +71,9 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     """`prepared` with what the stack does to diffuse light from the base, and what its nodes are worth.
 
     `settle` is applied to every cosine, row and energy: a renderer evaluates them, so that one kernel serves all nodes.
-
-    Raises:
-        InvalidInput: thin films, of which the tables of diffuse light know nothing.
     """
     if prepared.base is None:
         return prepared
-    if any(isinstance(layer, PreparedInterface) and layer.films for layer in prepared.layers):
-        others = "velatura without textures and the reference do"
-        raise InvalidInput(f"films: {prepared.model.name} has none over a diffuse base; {others}")
     inside, nodes = _Inside.of(prepared), [node for node, _ in _NODES]
     measures = [2 * weight * node for node, weight in _NODES]
 
@@ -119,6 +114,8 @@ def _entered(prepared: Prepared, wi: Direction) -> Row:
     layer = next(layer for layer in prepared.layers if isinstance(layer, PreparedInterface))
     cosine, alpha = operators.fetched(prepared, layer.roughness, wi[2], wi)
     r = ops.clip(operators.reflectance(prepared, layer, wi[2], layer.roughness, wi), 0.0, 1.0)
+    if layer.absorbed is not None:
+        r = r + ops.clip(layer.absorbed(cosine, alpha), 0.0, 1 - r)
     return [(1 - r) * x for x in diffuse_nodes.entering(prepared.tables, cosine, alpha, layer.n12)]
 
 
@@ -156,7 +153,9 @@ class _Inside:
         kept = [[_passed(media, c) for c in diffuse_nodes.node_cosines(n)] for n, media in below]
         exchanges = [self._exchange(k, settle) for k in range(1, len(self.interfaces))]
         back = diffuse_nodes.returning(self.tables, _roughness(self.interfaces[0]), self.indices[0])
-        back = settle(_balanced(back, leaves))
+        first = self.interfaces[0]
+        films = _Films.on(first, self.tables, above=False)
+        back = settle(_balanced(back, _gone(leaves, films, self.indices[0], first.absorbed is not None)))
 
         def up(going_down: Sequence[Row]) -> list[Row]:
             """Worth of light that comes to each interface from below; `going_down` that of light from above."""
@@ -199,14 +198,16 @@ class _Inside:
 
     def _exchange(self, k: int, settle: Settle) -> _Exchange:
         """Scattering matrices of the interface between two media."""
-        alpha, above, below = _roughness(self.interfaces[k]), self.indices[k - 1], self.indices[k]
-        found, ratio = self.tables, self.interfaces[k].n12
-        down = settle(diffuse_nodes.between(found.passing, alpha, above, ratio))
-        up = settle(diffuse_nodes.between(found.passing, alpha, below, 1 / ratio))
+        layer, above, below = self.interfaces[k], self.indices[k - 1], self.indices[k]
+        alpha, found, ratio = _roughness(layer), self.tables, layer.n12
+        absorbs, (upper, lower) = layer.absorbed is not None, (_Films.on(layer, found, side) for side in (True, False))
+        down = settle(_by_films(diffuse_nodes.between(found.passing, alpha, above, ratio), upper, above))
+        up = settle(_by_films(diffuse_nodes.between(found.passing, alpha, below, 1 / ratio), lower, below))
         staying_above = diffuse_nodes.between(found.staying, alpha, above, ratio)
         staying_below = diffuse_nodes.between(found.staying, alpha, below, 1 / ratio)
-        staying_above = settle(_balanced(staying_above, [_sum(row) for row in down]))
-        staying_below = settle(_balanced(staying_below, [_sum(row) for row in up]))
+        gone_above, gone_below = ([_sum(row) for row in rows] for rows in (down, up))
+        staying_above = settle(_balanced(staying_above, _gone(gone_above, upper, above, absorbs)))
+        staying_below = settle(_balanced(staying_below, _gone(gone_below, lower, below, absorbs)))
         return _Exchange(down, up, staying_above, staying_below)
 
 
@@ -218,6 +219,59 @@ class _Exchange:
     up: Sequence[Row]
     staying_above: Sequence[Row]
     staying_below: Sequence[Row]
+
+
+@dataclass(frozen=True)
+class _Films:
+    """Films on an interface of a relative index, by colour and for all, as diffuse light from one side meets them."""
+
+    tables: Tables
+    films: Either | OfInterface
+    eta: Value
+    n12: Value
+    alpha: Value
+
+    @classmethod
+    def on(cls, layer: PreparedInterface, found: Tables, above: bool) -> _Films | None:
+        """Those on an interface, None without any, for light from above, or below."""
+        films, eta, n12, alpha = layer.films, layer.eta, layer.n12, _roughness(layer)
+        if films is None or eta is None:
+            return None
+        return cls(found, films, eta, n12, alpha) if above else cls(found, films.reversed(), 1 / eta, 1 / n12, alpha)
+
+    def more(self, n: Value) -> Row:
+        """What passes of the light of each node of a medium of index n, over that without films."""
+        with_films = self._means(n, self._passing)
+        without = self._means(n, lambda c: 1 - fresnel.dielectric_between(c, self._beyond(c), self.eta))
+        return [ops.select(bare > OPAQUE, x / ops.maximum(bare, OPAQUE), 1.0) for x, bare in zip(with_films, without)]
+
+    def lost(self, n: Value) -> Row:
+        """What films absorb of the light of each node of a medium of index n."""
+        absorbed = self._means(n, lambda c: 1 - self.films.between(c, self._beyond(c), self.eta) - self._passing(c))
+        return [ops.clip(x, 0.0, 1.0) for x in absorbed]
+
+    def _passing(self, cosine: Value) -> Value:
+        return self.films.passing(cosine, self._beyond(cosine), self.eta)
+
+    def _beyond(self, cosine: Value) -> Value:
+        return fresnel.cos_transmitted(cosine, self.n12)
+
+    def _means(self, n: Value, share: Callable[[float], Value]) -> Row:
+        """Over facets, at the nodes of a medium of index n."""
+        average = tables.over_facets(self.tables, share)
+        return [average(cosine, self.alpha) for cosine in diffuse_nodes.node_cosines(n)]
+
+
+def _by_films(passing: Sequence[Row], films: _Films | None, n: Value) -> Sequence[Row]:
+    """Rows of what passes an interface from a medium of index n, by what films on it let pass."""
+    if films is None:
+        return passing
+    return [[x * more for x in row] for row, more in zip(passing, films.more(n))]
+
+
+def _gone(leaving: Row, films: _Films | None, n: Value, absorbs: bool) -> Row:
+    """What leaves a medium of index n through an interface, and what is absorbed there."""
+    return _added(leaving, films.lost(n)) if films and absorbs else leaving
 
 
 def _balanced(staying: Sequence[Row], leaving: Row) -> Sequence[Row]:

@@ -96,8 +96,8 @@ def record(
     lobes are read of any model, and all values are as they are.
 
     Raises:
-        InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture; films
-            over a diffuse base in closed form; `baking` values that vary.
+        InvalidInput: an unknown model or switch; a constant that the stack does not have, or that is a texture;
+            `baking` values that vary.
     """
     chosen, flat = drawn_by(stack, named(model, **switches)), stack.flat()
     check_constant(stack, constant)

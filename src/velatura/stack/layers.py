@@ -208,7 +208,7 @@ class Interface(LayerRecord):
         if self.k is None and isinstance(self.eta, str) and self.eta in names()[0]:
             raise ValueError(f"eta: {self.eta} is a metal; write conductor: {self.eta}")
         if self.films and self.kind == "mirror":
-            raise ValueError("films: not on a mirror, which reflects all light")
+            raise ValueError("films: not on a mirror, which has no index; eta: 1 and k: 10000 make one")
         if self.films and isinstance(self.eta, Texture) | isinstance(self.k, Texture):
             raise ValueError("films: not over an index from a texture")
         return self
