@@ -59,6 +59,7 @@ FORMATS: dict[str, Format] = {
     **{name: _shader(name) for name in _SHADERS},
     "osl": Format((".osl",), "velatura.exports.osl", options=frozenset({"constant"})),
     "blender": Format((".py",), "velatura.exports.blender"),
+    "mtlx": Format((".mtlx",), "velatura.exports.mtlx"),
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
@@ -141,9 +142,9 @@ def export(
     Args:
         material: a stack, a file, or a preset's name.
         to: one of `FORMATS`: a shader in "glsl" (ES 3.00), "glsl450", "vulkan" (GLSL), "hlsl", "slang" or "wgsl"; a
-            shader of closures, "osl", or "blender", a script that makes a material of it; "json", the material with its
-            numbers; "mitsuba-xml", a scene to be included; "python", a script that renders it; fitted parameters in
-            "openpbr", "gltf", "blender-principled" or "mitsuba-principled".
+            shader of closures, "osl", or "blender", a script that makes a material of it; "mtlx", a graph of MaterialX;
+            "json", the material with its numbers; "mitsuba-xml", a scene to be included; "python", a script that
+            renders it; fitted parameters in "openpbr", "gltf", "blender-principled" or "mitsuba-principled".
         model: a named model or its name (None for the default), its choices changed by `switches`.
         constant: for shaders, flat names of values that never change (`layer0_eta`), or ["all"].
         prefix: for shaders, begins all names in the code, so that one program may hold several materials; "vt" by

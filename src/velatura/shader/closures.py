@@ -155,8 +155,9 @@ def _variance(kind: Kind, variance: type[Variance]) -> type[Variance]:
     return variance if kind == "reflection" else Isotropic
 
 
-def tabulated(material: Material, model: Model) -> Tabulated:
-    """The closures of a material with values in NumPy, as `velatura.lobes` reports its lobes."""
+def tabulated(material: Material, model: Model, conserving: bool = False) -> Tabulated:
+    """The closures of a material with values in NumPy, as `velatura.lobes` reports its lobes; for renderers whose
+    reflections are `conserving`, all light that facets block leaves again."""
     isotropic = variance_kind(material) is Isotropic
     shape, variance = (LINE, PerAxis) if isotropic else (PLANE, Covariance)
     x, y, z = (np.ravel(w) for w in directional_grid.directions(shape, None))
@@ -165,19 +166,21 @@ def tabulated(material: Material, model: Model) -> Tabulated:
     w = x * scale, y * scale, z
     sides = [material, material.reversed()] if material.transmits else [material]
     etas = [float(np.mean(side.below) / np.mean(side.exterior)) if material.transmits else 1.0 for side in sides]
-    each = [_of_statistics(model.recursion.statistics(side, model, w), w, eta) for side, eta in zip(sides, etas)]
+    each = [
+        _of_statistics(model.recursion.statistics(side, model, w), w, eta, conserving) for side, eta in zip(sides, etas)
+    ]
     kept = [k for k, closures in enumerate(zip(*each)) if max(np.max(c.weight) for c in closures) > FAINT]
     rows = np.array([np.concatenate([_columns(closures[k], variance) for k in kept]).T for closures in each])
     return Tabulated([each[0][k].kind for k in kept], variance, shape, etas, rows.astype(np.float32).astype(float))
 
 
-def _of_statistics(lobes: StackLobes, w: Direction, eta: float) -> list[Closure]:
+def _of_statistics(lobes: StackLobes, w: Direction, eta: float, conserving: bool) -> list[Closure]:
     """Closures of the energies of lobes at directions (N,)."""
 
     def facets(energy: Array, alpha: Array, rotation: Array) -> Closure:
         own = _bounded(Roughness(alpha[0], alpha[1], rotation))
         closure = Closure("reflection", energy, own)
-        return closure._replace(weight=energy / albedo(closure, w))
+        return closure if conserving else closure._replace(weight=energy / albedo(closure, w))
 
     found = [facets(*each) for each in zip(lobes.energy, lobes.alpha, lobes.rotation)]
     found.append(Closure("diffuse", np.maximum(lobes.remainder, 0.0)))
