@@ -139,7 +139,7 @@ def scheduler(point: Any) -> None:
 
     plan = Plan.from_dict({**space(10**8).to_dict(), "what": point, "options": {"seconds": 0.001}})
     layout = {"x": Variable((), (), "<f8")}
-    packed = work.Job(plan, Path("/shared/runs/coats.zarr"), layout, work.here(), versions()).packed()
+    packed = work.Job(plan, Path("/shared/runs/coats.zarr"), layout, versions()).packed()
     print(f"scheduler: the job of a task has {len(packed)} bytes")
     for count in (2, MANY):
         with tempfile.TemporaryDirectory() as folder:

@@ -191,9 +191,23 @@ def _drjit() -> ModuleType:
 def use_threads(count: int) -> None:
     """Let Dr.Jit use that many threads of this process, from now on or as soon as it is loaded."""
     global _threads
-    _threads = count
-    if "drjit" in sys.modules:
-        sys.modules["drjit"].set_thread_count(count)
+    if _threads != count:
+        _threads = count
+        if "drjit" in sys.modules:
+            sys.modules["drjit"].set_thread_count(count)
+
+
+@contextlib.contextmanager
+def threads_restored() -> Iterator[None]:
+    """Undo `use_threads` at the end of the block."""
+    global _threads
+    before = sys.modules["drjit"].thread_count() if "drjit" in sys.modules else os.cpu_count()
+    try:
+        yield
+    finally:
+        if _threads is not None and "drjit" in sys.modules:
+            sys.modules["drjit"].set_thread_count(before)
+        _threads = None
 
 
 @contextlib.contextmanager

@@ -299,6 +299,22 @@ def test_unknown_questions_and_options_are_refused(tmp_path: Path) -> None:
         assert message in str(caught.value)
 
 
+def test_one_thread_renders_and_the_session_keeps_its_own(tmp_path: Path) -> None:
+    """Rationale: sums of several threads are rounded by chance. Expected: equal pictures; as many threads as before."""
+    import drjit as dr
+
+    before = dr.thread_count()
+    options: dict[str, Any] = {"size": [16, 16], "spp": 4, "model": "belcour2018"}
+    pictures = [swept(GOLD, "render", tmp_path / f"{n}.zarr", **options).image for n in range(2)]
+    assert dr.thread_count() == before and pictures[0].values.tobytes() == pictures[1].values.tobytes()
+
+    def threads(stack: vt.Stack, seed: int) -> dict[str, Any]:
+        return {"x": dr.thread_count()}
+
+    assert swept(GOLD, threads, tmp_path / "c.zarr").x.values.tolist() == [1, 1]
+    assert dr.thread_count() == before
+
+
 # Engines and plans ---------------------------------------------------------------------------------------------------
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from velatura import kernel
 from velatura.errors import InvalidInput, VelaturaError
 from velatura.progress import bar
 from velatura.sweeps import work
@@ -91,8 +92,8 @@ def carry_out(
     path = Path(store).absolute()
     found = existing(path, plan)
     if found is None or len(found.done()) < math.prod(found.grid):
-        with engine(executor, workers) as runs:
-            job = work.Job(plan, path, None, work.here(), versions())
+        with kernel.threads_restored(), engine(executor, workers) as runs:
+            job = work.Job(plan, path, None, versions())
             if found is None:
                 found = create(path, plan, _looked(runs, job.packed(), plan))
             course = _Course(runs, found, replace(job, layout=found.layout()).packed())

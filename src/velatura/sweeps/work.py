@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import functools
-import os
-import socket
+import gc
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -30,13 +29,12 @@ class Job:
 
     Args:
         path: the store; layout: what is found at every point, None as long as it is not known.
-        home: the process that asks.
+        versions: those of the process that asks.
     """
 
     plan: Plan
     path: Path
     layout: Layout | None
-    home: tuple[str, int]
     versions: Mapping[str, str]
 
     def packed(self) -> bytes:
@@ -58,11 +56,6 @@ class Job:
         return Store(self.path, self.plan)
 
 
-def here() -> tuple[str, int]:
-    """This process."""
-    return socket.gethostname(), os.getpid()
-
-
 @functools.lru_cache(2)
 def _unpacked(packed: bytes) -> Job:
     import cloudpickle
@@ -71,8 +64,6 @@ def _unpacked(packed: bytes) -> Job:
     for name, version in versions().items():
         if version != job.versions[name]:
             raise InvalidInput(f"a worker has {name} {version}, and this is {job.versions[name]}")
-    if job.home != here():
-        kernel.use_threads(1)  # workers share the machine
     return job
 
 
@@ -80,6 +71,7 @@ def look(packed: bytes, numbers: Sequence[int]) -> list[Answered]:
     """What points give."""
     job = _unpacked(packed)
     plan, ask = job.plan, job.plan.question.ask
+    kernel.use_threads(1)  # workers share the machine, and sums of several threads are rounded by chance
     found: list[Answered] = []
     for values, seed in zip(plan.points(numbers), plan.seeds(numbers)):
         try:
@@ -100,8 +92,10 @@ def fill(packed: bytes, chunks: Sequence[int]) -> tuple[int, float]:
         answers = look(packed, store.points(chunk))
         keep(packed, chunk, answers)
         points += len(answers)
-        if "drjit" in sys.modules:
-            sys.modules["drjit"].flush_malloc_cache()
+    # Keep memory flat
+    gc.collect()
+    if "drjit" in sys.modules:
+        sys.modules["drjit"].flush_malloc_cache()
     return points, time.perf_counter() - start
 
 
