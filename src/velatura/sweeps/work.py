@@ -19,6 +19,9 @@ from velatura.sweeps.plan import Plan, versions
 from velatura.sweeps.questions import Array
 from velatura.sweeps.store import Layout, Store
 
+TIDY = 10.0  # seconds between collections of garbage
+_tidied = 0.0
+
 #: What one point gave: arrays with the names of their dimensions, or the reason why it gave none.
 Answered = Mapping[str, tuple[tuple[str, ...], Array]] | str
 
@@ -92,11 +95,17 @@ def fill(packed: bytes, chunks: Sequence[int]) -> tuple[int, float]:
         answers = look(packed, store.points(chunk))
         keep(packed, chunk, answers)
         points += len(answers)
-    # Keep memory flat
-    gc.collect()
-    if "drjit" in sys.modules:
-        sys.modules["drjit"].flush_malloc_cache()
+    _tidy()
     return points, time.perf_counter() - start
+
+
+def _tidy() -> None:
+    """Keep memory flat, now and then: both take a tenth of a second."""
+    global _tidied
+    if "drjit" in sys.modules and time.monotonic() > _tidied + TIDY:
+        gc.collect()
+        sys.modules["drjit"].flush_malloc_cache()
+        _tidied = time.monotonic()
 
 
 def keep(packed: bytes, chunk: int, answers: Sequence[Answered]) -> None:
