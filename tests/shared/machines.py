@@ -42,6 +42,10 @@ class Machine(ABC):
         """What must be installed before anything can run, or nothing."""
 
     @abstractmethod
+    def compile(self, text: str) -> None:
+        """Refuse a program that is not of the language."""
+
+    @abstractmethod
     def declarations(self, count: int) -> str:
         """The texture `vt_given`, and the array `results`."""
 
@@ -115,6 +119,9 @@ class _OnVulkan(Machine):
         for each in (results, *(view.texture for view in views)):
             each.destroy()
         return found
+
+    def compile(self, text: str) -> None:
+        _device().create_shader_module(code=self.code(text))
 
     @abstractmethod
     def code(self, text: str) -> str | bytes:
@@ -197,6 +204,9 @@ class InOpenGl(Machine):
         if find_spec("moderngl") is None:
             return f"moderngl is missing: {INSTALLED}"
         return "" if _context() else "there is no OpenGL 4.5 without a window: apt-get install -y libegl1"
+
+    def compile(self, text: str) -> None:
+        _context().compute_shader(f"#version 450\n{text}").release()
 
     def declarations(self, count: int) -> str:
         return (

@@ -139,6 +139,24 @@ def test_what_varies_is_not_baked(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", MACHINES)
+def test_values_that_change_stand_in_a_block(name: str) -> None:
+    """Expected: compilers take a program whose material, weights, remainder and layout change."""
+    machine = MACHINES[name]
+    if why := machine.missing():
+        pytest.skip(why)
+    for preset, model in (("frosted-glass", "velatura"), ("varnished-paint", "weier2020")):
+        made = shader(vt.preset(preset), model, values="uniforms", printer=machine.printer)
+        called = machine.printer.declared("colour", "wi", machine.printer.colour(["0.0", "0.0", "1.0"]))
+        at = f"vt_material({machine.printer.type('vec2')}(0.5, 0.5))"
+        lines = [
+            called,
+            machine.printer.variable("VtMaterial", "m", at),
+            "results[row] = vt_eval_pdf(m, vt_lobes(m, wi), wi, wi);",
+        ]
+        machine.compile("\n".join([made.text, machine.declarations(1), machine.main(lines)]))
+
+
+@pytest.mark.parametrize("name", MACHINES)
 def test_textures_are_read_where_the_material_is(name: str, tmp_path: Path) -> None:
     """Expected: lobes, values and samples are those of the numbers that textures hold, and of the way of brushing."""
     machine = MACHINES[name]

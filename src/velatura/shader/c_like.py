@@ -281,7 +281,7 @@ class CLike(Printer):
             + self.texture(name, MAPS + k)
             for k, (name, image) in enumerate(filled.samplers.items())
         ]
-        begin = self.declared("VtMaterial", "m", PARAMETERS if filled.parameters else "")
+        begin = self.variable("VtMaterial", "m", self.input(PARAMETERS) if filled.parameters else "")
         lines = [f"m.{entry.place} = {self._entry(entry)};" for entry in filled.entries]
         made = self._function("VtMaterial vt_material(vec2 uv)", [begin, *lines, "return m;"])
         return "".join([*maps, self.sampler() if maps else "", made])

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from velatura.shader.c_like import SAMPLER, VALUES, CLike
+from velatura.shader.material import PARAMETERS
 from velatura.shader.printer import ATOM, Field
+from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN
 
 _TYPES = {"float": "f32", "int": "i32", "bvec3": "vec3<bool>"}
 _TYPES |= {f"{short}vec{n}": f"vec{n}{end}" for short, end in (("", "f"), ("i", "i")) for n in (2, 3, 4)}
@@ -37,7 +39,7 @@ class Wgsl(CLike):
         return f"let {name} = {text};" if text else f"var {name}: {self.type(kind)};"
 
     def variable(self, kind: str, name: str, text: str) -> str:
-        return f"var {name} = {text};"
+        return f"var {name} = {text};" if text else self.declared(kind, name)
 
     def array(self, kind: str, name: str, values: Sequence[str] | int, constant: bool = False) -> str:
         if isinstance(values, int):
@@ -65,7 +67,7 @@ class Wgsl(CLike):
 
     def uniforms(self, material: str, arrays: Sequence[tuple[str, str, int]]) -> str:
         """A buffer, since arrays of numbers in uniforms take four times the room."""
-        fields = [Field("material", "VtMaterial"), *(Field(name[3:], kind, length) for kind, name, length in arrays)]
+        fields = [Field("material", "VtMaterial"), *(Field(name, kind, length) for kind, name, length in arrays)]
         lines = "\n".join(["struct VtParameters {", *self.members(fields), "}", ""])
         return f"{lines}{self._bound(VALUES)} var<storage, read> {material}: VtParameters;\n"
 
@@ -73,6 +75,11 @@ class Wgsl(CLike):
         return f"@group({self.group}) @binding({self.binding + place})"
 
     # Values
+
+    def input(self, place: str) -> str:
+        if place == PARAMETERS:
+            return f"{PARAMETERS}.material"
+        return f"{PARAMETERS}.{place}" if place.startswith((SHOWN, REMAINDER, LAYOUT)) else place
 
     def each_channel(self, op: str, a: str, b: str) -> str:
         return f"(({a}) & ({b}))" if op == "both" else super().each_channel(op, a, b)
