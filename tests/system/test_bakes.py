@@ -20,6 +20,7 @@ from velatura.bakes import TARGETS, Bake, bake
 from velatura.bakes.look import Described
 from velatura.bakes.lost import lost
 from velatura.bakes.sampled import Sampled
+from velatura.bakes.textured import COLOURS, ROUGHNESSES
 from velatura.checks.probe import Probe
 from velatura.model import named
 from velatura.optics.directions import directions
@@ -192,6 +193,60 @@ def test_the_command_says_the_loss_beside_the_file(run: Run, tmp_path: Path) -> 
     assert "total variation:" in said and "not held: layer 1: absorption is part of the base's colour" in said
     status, _, said = run("export", "varnished-paint", "--to", "gltf", "-o", str(tmp_path / "paint.xml"))
     assert status == 2 and ".gltf" in said
+
+
+# Textures -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def painted(tmp_path_factory) -> vt.Stack:
+    """Paint with an image in sRGB below an interface whose roughness is one, too."""
+    folder, mi = tmp_path_factory.mktemp("images"), kernel.mitsuba()
+    colours = np.full((4, 4, 3), (150, 100, 60), np.uint8)
+    colours[:2] //= 2
+    mi.Bitmap(colours).write(str(folder / "paint.png"))
+    mi.Bitmap(np.full((4, 4, 1), 51, np.uint8)).write(str(folder / "rough.png"))
+    rough = vt.Texture(texture=folder / "rough.png", scale=0.5)
+    paint = vt.Texture(texture=folder / "paint.png", channel="rgb", encoding="srgb")
+    return vt.Stack([vt.Interface(eta=1.5, alpha=rough), vt.Diffuse(albedo=paint)])
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_means_are_fitted_and_images_stay_where_they_can(painted: vt.Stack, target: str) -> None:
+    """Expected: the light of the material with its means; a factor on an image, whose mean is then that number."""
+    texels = [((np.array((150, 100, 60)) // part / 255 + 0.055) / 1.055) ** 2.4 for part in (1, 2)]
+    mean = np.mean(texels, axis=0)
+    made = bake(painted, target)
+    plain = bake(painted.replace(layer0_alpha=0.1, layer1_albedo=tuple(mean)), target)
+    colour, rough = COLOURS.get(target), ROUGHNESSES.get(target)
+    assert made.baked_albedo == pytest.approx(plain.baked_albedo, abs=2e-3)
+    assert set(made.images) == {colour, rough} - {None}
+    said = [line for line in made.lost if "image" in line]
+    assert said == [
+        *([] if rough else ["layer0_alpha: the image is replaced by its mean"]),
+        *([] if colour else ["layer1_albedo: the image is replaced by its mean"]),
+    ]
+    if colour:
+        assert np.array(made.images[colour].factor) * mean == pytest.approx(np.array(made.values[colour]), rel=1e-2)
+    if rough:
+        assert made.images[rough].factor * 0.2**0.5 == pytest.approx(made.values[rough], rel=1e-3)
+
+
+def test_files_name_their_images(painted: vt.Stack, tmp_path: Path) -> None:
+    paths = {}
+    for target, ending in (("gltf", ".gltf"), ("openpbr", ".mtlx")):
+        paths[target] = vt.export(painted, target, folder=tmp_path).save(tmp_path / f"paint{ending}")[0]
+        read = vt.imports.read(paths[target]).stack.flat()["layer1_albedo"]
+        assert isinstance(read, vt.Texture) and read.texture.resolve().exists()
+    document = json.loads(paths["gltf"].read_text())
+    assert (tmp_path / document["images"][0]["uri"]).exists()
+    assert document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0}
+    root = ElementTree.parse(paths["openpbr"]).getroot()
+    inputs = {each.get("name"): each.get("nodename") for each in root.find("open_pbr_surface") or ()}
+    nodes = {each.get("name"): each for each in root}
+    for name, reader in (("base_color", "base_color_image"), ("specular_roughness", "specular_roughness_image")):
+        assert nodes[inputs[name]].tag == "multiply"
+        assert (tmp_path / str(nodes[reader][0].get("value"))).exists()
 
 
 # Comparisons ----------------------------------------------------------------------------------------------------------

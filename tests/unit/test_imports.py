@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "plugins": "stack optics tables model ops kernel binding sampling",
     "shader": "stack optics tables model ops sampling",
     "targets": "optics sampling",
-    "bakes": "stack optics sampling model targets reference",
+    "bakes": "stack optics sampling model targets reference binding kernel",
     "exports": "__init__ stack model shader bakes targets",
     "imports": "stack optics model kernel binding targets",
     "inverse": "stack optics tables model ops sampling kernel",

@@ -2,5 +2,6 @@
 
 from velatura.bakes.fit import Bake, bake, distribution
 from velatura.bakes.targets import TARGETS
+from velatura.bakes.textured import Carried
 
-__all__ = ["TARGETS", "Bake", "bake", "distribution"]
+__all__ = ["TARGETS", "Bake", "Carried", "bake", "distribution"]

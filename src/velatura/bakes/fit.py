@@ -12,6 +12,7 @@ from velatura.bakes.look import Array, Described
 from velatura.bakes.lost import lost
 from velatura.bakes.sampled import Sampled
 from velatura.bakes.targets import TARGETS, UNIT, Range, Target
+from velatura.bakes.textured import Carried, carried, means
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named
 from velatura.optics.directions import directions
@@ -37,7 +38,8 @@ class Bake:
 
     For the N cosines of incidence `cos_theta`, in the target's own formulas against the model: total_variation (N,),
     the share of the reflected light in wrong places, as `compare` measures it; albedo, baked_albedo (3, N); passed,
-    baked_passed (3, N), what leaves below. lost: what the target does not hold. thin: light passes without refraction.
+    baked_passed (3, N), what leaves below. lost: what the target does not hold. images: in place of numbers, by
+    parameter. thin: light passes without refraction.
     """
 
     target: str
@@ -51,6 +53,7 @@ class Bake:
     passed: Array
     baked_passed: Array
     lost: tuple[str, ...]
+    images: dict[str, Carried]
     thin: bool
 
     @property
@@ -85,19 +88,25 @@ def _off(true: Array, found: Array, cosines: tuple[float, ...]) -> str:
 
 
 def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **switches: str) -> Bake:
-    """Fit a target's parameters to the light of a stack.
+    """Fit a target's parameters to the light of a stack; to that of its mean where it has textures.
 
     Raises:
-        InvalidInput: not a valid material, an unknown target, model or switch, a texture.
+        InvalidInput: not a valid material, an unknown target, model or switch, an image that cannot be read.
+        MissingTool: there are textures, and LLVM is missing or too old.
     """
     if target not in TARGETS:
         raise InvalidInput(unknown("target", target, TARGETS))
     chosen, stack, kind = named(model, **switches), load(material), TARGETS[target]
-    described = Described.of(Material.of(stack), chosen)
+    found = means(stack)
+    described = Described.of(Material.of(stack.replace(**found)), chosen)
     azimuths = np.radians(AZIMUTHS if described.brushed else AZIMUTHS[:1])
     cosines, turns = (x.ravel() for x in np.meshgrid(FITTED, azimuths))
     sampled = Sampled.of(described, chosen, directions(cosines, turns), NODES)
     values = _fitted(kind, described, sampled)
+
+    varying = dict(carried(stack, found, target, values))
+    left = [f"{name}: {what}" for name, what in varying.items() if isinstance(what, str)]
+    images = {name: image for name, image in varying.items() if isinstance(image, Carried)}
 
     shown = Sampled.of(described, chosen, directions(COSINES), REPORTED)
     light = kind.value(values, shown.pair, described.thin)
@@ -114,7 +123,8 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
         baked_albedo=shown.energy(light),
         passed=shown.energy(shown.value, up=False),
         baked_passed=shown.energy(light, up=False),
-        lost=tuple(lost(described, target)),
+        lost=(*lost(described, target), *left),
+        images=images,
         thin=described.thin,
     )
 
@@ -122,6 +132,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
 def distribution(made: Bake, material: MaterialLike, cos_theta: Sequence[float]) -> Array:
     """Energies (3, N, bins, bins) of light that a bake of a material reflects, over the projected disc."""
     stack, chosen = load(material), named(made.model)
+    stack = stack.replace(**means(stack))
     shown = Sampled.of(Described.of(Material.of(stack), chosen), chosen, directions(cos_theta), COMPARED)
     return shown.distribution(TARGETS[made.target].value(made.values, shown.pair, made.thin))
 

@@ -28,7 +28,7 @@ def lost(stack: Described, target: str) -> Iterator[str]:
     surfaces = [n for n, layer in enumerate(layers) if not isinstance(layer, MediumValues)]
     if np.max(np.abs(np.asarray(stack.material.exterior) - 1)) > 1e-6:
         yield "exterior: indices are taken relative to it, so that the material stands in air"
-    coated = len(surfaces) > 1 and interfaces[0][1].kind == "dielectric"
+    coated = len(interfaces) > 1 and interfaces[0][1].kind == "dielectric"
     if len(surfaces) > 2:
         yield f"layers {', '.join(map(str, surfaces[coated:]))}: merged into one base"
     for n, each in interfaces:
