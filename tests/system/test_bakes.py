@@ -254,15 +254,15 @@ def test_files_name_their_images(painted: vt.Stack, tmp_path: Path) -> None:
 
 def test_bakes_are_compared_with_the_truth_beside_the_models() -> None:
     """Expected: the numbers of the bake itself, against walks in place of the model."""
-    names = ["velatura", *TARGETS]
-    found = vt.compare(SHEEN, names, [1.0, 0.35], paths=100_000)
-    assert list(found.models) == names
-    for target in TARGETS:
+    targets = ["gltf", "mitsuba-principled"]
+    found = vt.compare(SHEEN, ["velatura", *targets], [0.35], paths=100_000)
+    assert list(found.models) == ["velatura", *targets]
+    for target in targets:
         made = bake(SHEEN, target)
-        assert found.models[target].evaluated == pytest.approx(made.baked_albedo[:, ::2], abs=1e-3)
+        assert found.models[target].evaluated == pytest.approx(made.baked_albedo[:, 2:], abs=1e-3)
         assert np.isnan(found.models[target].lobes[0].energy).all()
         # By way of the model, whose distance from the truth is mostly the noise of walks
-        bound = made.total_variation[::2] + found.total_variation["velatura"]
+        bound = made.total_variation[2:] + found.total_variation["velatura"]
         assert np.all(found.total_variation[target] < bound + 0.01)
 
 

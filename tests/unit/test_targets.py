@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -120,6 +121,33 @@ def test_coats_are_tinted_as_their_manuals_say() -> None:
         over = albedo(blender, {**blend, "Coat Tint": BLACK}, cosine, 0.02)
         # Coat Tint is light that crosses the coat: along the view, at the depth that Snell's law gives
         assert (whole - over) / (clear - over) == pytest.approx(np.array(tint) ** (1 / inside), rel=1e-3)
+
+
+#: Albedos that Cycles (Blender 5.0.1) renders under a white sky, of 512 paths in 64 pixels, at cosines 1, .7 and .35.
+CYCLES: list[tuple[dict[str, Any], list[list[float]]]] = [
+    ({"Base Color": (0.8, 0.3, 0.1), "Metallic": 1.0, "Roughness": 0.4},
+     [[0.794, 0.293, 0.097], [0.792, 0.293, 0.100], [0.799, 0.334, 0.160]]),
+    ({"Base Color": (0.6, 0.3, 0.1), "Roughness": 0.4, "IOR": 1.6},
+     [[0.621, 0.336, 0.146], [0.626, 0.344, 0.157], [0.655, 0.395, 0.221]]),
+    ({"Base Color": (0.6, 0.3, 0.1), "Roughness": 0.4, "Specular IOR Level": 0.9, "Specular Tint": (1, 0.5, 0.2)},
+     [[0.628, 0.314, 0.107], [0.632, 0.324, 0.120], [0.661, 0.378, 0.191]]),
+    ({"Base Color": (0.6, 0.3, 0.1), "Roughness": 0.5, "Diffuse Roughness": 0.8, "Specular IOR Level": 0.0},
+     [[0.526, 0.248, 0.081], [0.540, 0.258, 0.085], [0.569, 0.278, 0.092]]),
+    ({"Base Color": (0.6, 0.5, 0.4), "Metallic": 1.0, "Roughness": 0.3, "Coat Weight": 1.0, "Coat Roughness": 0.2,
+      "Coat IOR": 1.5, "Coat Tint": (0.9, 0.5, 0.2)},
+     [[0.556, 0.279, 0.116], [0.555, 0.266, 0.111], [0.623, 0.348, 0.209]]),
+    ({"Base Color": (0.6, 0.5, 0.4), "Metallic": 0.5, "Roughness": 0.3, "Coat Weight": 0.5, "Coat Roughness": 0.5,
+      "Coat IOR": 1.8},
+     [[0.621, 0.527, 0.433], [0.625, 0.532, 0.440], [0.668, 0.586, 0.505]]),
+    ({"Base Color": BLACK, "Roughness": 0.3, "Thin Film Thickness": 300.0, "Thin Film IOR": 1.4},
+     [[0.023, 0.018, 0.036], [0.048, 0.033, 0.030], [0.149, 0.139, 0.113]]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("values, rendered", CYCLES)
+def test_albedos_of_blender_are_those_that_cycles_renders(values, rendered) -> None:
+    for cosine, expected in zip((1.0, 0.7, 0.35), rendered):
+        assert albedo(blender, values, cosine, 0.1) == pytest.approx(np.array(expected), abs=0.005)
 
 
 @pytest.mark.parametrize(

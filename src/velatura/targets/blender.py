@@ -70,9 +70,9 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     once = closures.albedo(cos_i, mean, 1.0)
     share = (closures.dielectric_albedo(cos_i, mean, eta) - f_0 * once) / (1 - f_0)
     whole = f_0 * tint * once + (1 - f_0 * tint) * share
-    kept = np.clip(1 - whole * closures.compensation(cos_i, mean, f_0 * tint), 0, 1)
+    kept = np.clip(1 - (whole * closures.compensation(cos_i, mean, f_0 * tint)).max(axis=0), 0, 1)
     clear = v["Transmission Weight"]
-    diffuse = closures.oren_nayar(pair, base, v["Diffuse Roughness"])
+    diffuse = closures.oren_nayar(pair, base, v["Diffuse Roughness"], again=base)
     through = np.sqrt(base) * closures.refracted(pair, 1.0 if thin else eta, au, av, turn)
     dielectric = over + kept * ((1 - clear) * diffuse + clear * through)
     metal_part = f_metal * closures.compensation(cos_i, mean, f_metal) * lobe

@@ -101,8 +101,8 @@ def lambert(pair: Pair) -> Array:
     return np.asarray(pair.reflected * pair.cos_o / pi)
 
 
-def oren_nayar(pair: Pair, colour: Array, roughness: float) -> Array:
-    """Energy-preserving Oren-Nayar (Portsmouth et al. 2024, EON)."""
+def oren_nayar(pair: Pair, colour: Array, roughness: float, again: Number = 1.0) -> Array:
+    """Energy-preserving Oren-Nayar (Portsmouth et al. 2024, EON); `again` is a factor on light scattered many times."""
     if roughness < 1e-6:
         return np.asarray(colour * lambert(pair))
     c_1, c_2 = 0.5 - 2 / (3 * pi), 2 / 3 - 28 / (15 * pi)
@@ -117,8 +117,8 @@ def oren_nayar(pair: Pair, colour: Array, roughness: float) -> Array:
         g = sine * (np.arccos(np.clip(cosine, -1, 1)) - sine * cosine) + 2 / 3 * (over * (1 - sine**3) - sine)
         return np.asarray(1 - scale * (1 + roughness / pi * g))
 
-    again = colour**2 * mean / (1 - colour * (1 - mean)) * lost(pair.cos_o) * lost(pair.cos_i) / (1 - mean)
-    return np.asarray((colour * scale * (1 + roughness * s) + again) * lambert(pair))
+    often = again * colour**2 * mean / (1 - colour * (1 - mean)) * lost(pair.cos_o) * lost(pair.cos_i) / (1 - mean)
+    return np.asarray((colour * scale * (1 + roughness * s) + often) * lambert(pair))
 
 
 def schlick(cosine: Number, f_0: Number, f_90: Number = 1.0) -> Array:
