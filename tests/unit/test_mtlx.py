@@ -15,9 +15,7 @@ from velatura.shader.polynomials import Fit
 from velatura.stack import Material
 
 
-@pytest.mark.parametrize(
-    ("preset", "model"), [("three-dielectrics-over-metal", "velatura"), ("coated-gold", "weier2020")]
-)
+@pytest.mark.parametrize(("preset", "model"), [("frosted-metal", "weier2020"), ("coated-gold", "weier2020")])
 def test_all_generators_make_code_of_the_graph(preset: str, model: str) -> None:
     """A reflection for each lobe that has light; only the reflections of genosl have other weights."""
     text = vt.export(preset, "mtlx", model).text
@@ -31,7 +29,7 @@ def test_all_generators_make_code_of_the_graph(preset: str, model: str) -> None:
     assert body.count("mx_generalized_schlick_bsdf(") == lobes
 
 
-@pytest.mark.parametrize(("preset", "off"), [("three-dielectrics-over-metal", 0.01), ("turned-brushing", 0.1)])
+@pytest.mark.parametrize(("preset", "off"), [("frosted-metal", 0.01), ("turned-brushing", 0.1)])
 def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float) -> None:
     """Weights within .01; roughness too, but of brushed lobes, which changes fast at some azimuths."""
     baked = tabulated(Material.of(vt.preset(preset)), named("velatura"))
