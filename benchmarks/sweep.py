@@ -193,7 +193,7 @@ async def serve(file: str, count: int) -> None:
 def store(point: Any) -> None:
     from velatura.sweeps.questions import lobes
 
-    print("store: points  a chunk  chunks   files of 17 variables  bytes of a file of energies")
+    print("store: points  a chunk  chunks   files of variables  bytes of a file of energies")
     answer = lobes(vt.load("coated-gold"), 0, cos_theta=[1.0, 0.5], model="belcour2018")
     layout = {name: Variable.of(*array) for name, array in answer.items()}
     found = {name: array for name, (_, array) in answer.items()}

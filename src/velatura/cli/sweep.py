@@ -20,7 +20,7 @@ def sweep(
             "-o",
             parser=options.folder,
             metavar="STORE",
-            help="The Zarr store; a begun one is gone on with.",
+            help="The Zarr store; one that was begun is continued.",
         ),
     ],
     scheduler: Annotated[

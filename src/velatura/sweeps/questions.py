@@ -35,7 +35,7 @@ LOBE = {
     "own_alpha": ("axis",),
     "own_rotation": (),
 }
-#: By name, whatever comes before it: the unit and the meaning of a quantity.
+#: The unit and the meaning of a quantity, by name without `transmitted_` and `_error`.
 MEANINGS = {
     "own_alpha": ("1", "GGX roughness in the medium that the lobe is drawn in"),
     "own_rotation": ("rad", "angle from the tangent to the first axis, in that medium"),

@@ -208,7 +208,7 @@ def _fill(path: Path, plan: Plan, layout: Layout) -> None:
     """Everything but the points."""
     import zarr
 
-    # Format 2, whatever the version: its text has one encoding, and the files of a variable lie in one folder
+    # Format 2 in every version of Zarr: its text has one encoding, and the files of a variable lie in one folder
     format: dict[str, Any] = {} if zarr.__version__ < "3" else {"zarr_format": 2}
     group = zarr.open_group(str(path), mode="w-", **format)
     chunk, dims = _chunk(plan, layout), plan.dims
