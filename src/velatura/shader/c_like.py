@@ -21,7 +21,7 @@ from velatura.shader.bake import Bake, Group
 from velatura.shader.cost import Cost
 from velatura.shader.films import WIDTH as LINE_OF_FILMS
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
-from velatura.shader.printer import Field, Output, Printer, Struct
+from velatura.shader.printer import FUNCTIONS, Field, Output, Printer, Struct
 from velatura.shader.statements import assignments, statements
 from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
 from velatura.stack import Texture
@@ -35,32 +35,7 @@ TABLES, FILMS, VALUES, SAMPLER, MAPS = range(5)
 LINE = 120  # characters of declarations
 
 _KINDS: dict[str, str] = {"number": "float", "colour": "vec3", "condition": "bool", "conditions": "bvec3"}
-_FUNCTIONS = {
-    "exp": "exp",
-    "log": "log",
-    "sin": "vt_sin",
-    "cos": "vt_cos",
-    "sqrt": "vt_sqrt",
-    "absolute": "abs",
-    "mean": "vt_mean",
-    "power": "pow",
-    "arctan2": "atan2",
-    "minimum": "min",
-    "maximum": "max",
-    "clip": "clamp",
-}
-_WITH_WIDE = ("sin", "cos", "sqrt")  # those of our own that colours have a function for
-_OPERATORS = {  # with how strongly they bind
-    "add": ("+", 5),
-    "subtract": ("-", 5),
-    "multiply": ("*", 6),
-    "divide": ("/", 6),
-    "less": ("<", 3),
-    "greater": (">", 3),
-    "at_most": ("<=", 3),
-    "at_least": (">=", 3),
-    "both": ("&&", 2),
-}
+_OWN = ("sin", "cos", "sqrt")  # functions of our own, with one for colours each
 # Words of GLSL, HLSL, Slang and WGSL, and functions that statements call
 _WORDS = """
     abs abstract acos active alias all any array as asin asm associatedtype async atan atan2 attribute auto await
@@ -104,8 +79,7 @@ class CLike(Printer):
     first_lines: ClassVar[str] = ""
     words = frozenset(_WORDS.split())
     branches: ClassVar[bool] = True
-    functions: ClassVar[Mapping[str, str]] = _FUNCTIONS
-    operators: ClassVar[Mapping[str, tuple[str, int]]] = _OPERATORS
+    functions: ClassVar[Mapping[str, str]] = FUNCTIONS | {op: f"vt_{op}" for op in _OWN}
 
     # What a dialect states
 
@@ -183,7 +157,7 @@ class CLike(Printer):
     def call(self, op: str, args: Sequence[str], wide: bool) -> str:
         if wide and op == "clip":
             args = [args[0], *(self.colour([x]) for x in args[1:])]
-        return f"{self.functions[op]}{'3' if wide and op in _WITH_WIDE else ''}({', '.join(args)})"
+        return f"{self.functions[op]}{'3' if wide and op in _OWN else ''}({', '.join(args)})"
 
     def each_channel(self, op: str, a: str, b: str) -> str:
         return f"vt_both({a}, {b})" if op == "both" else f"({a} {self.operators[op][0]} {b})"

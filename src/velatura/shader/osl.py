@@ -40,26 +40,6 @@ LARGE = 1e3  # limit of a parameter that is not stated, nor one beyond it
 Array = NDArray[np.floating]
 
 _TYPES: dict[str, str] = {"number": "float", "colour": "color", "condition": "int", "conditions": "color"}
-_FUNCTIONS = {op: op for op in ("exp", "log", "sin", "cos", "sqrt")} | {
-    "absolute": "abs",
-    "mean": "vt_mean",
-    "power": "pow",
-    "arctan2": "atan2",
-    "minimum": "min",
-    "maximum": "max",
-    "clip": "clamp",
-}
-_OPERATORS = {  # with how strongly they bind
-    "add": ("+", 5),
-    "subtract": ("-", 5),
-    "multiply": ("*", 6),
-    "divide": ("/", 6),
-    "less": ("<", 4),
-    "greater": (">", 4),
-    "at_most": ("<=", 4),
-    "at_least": (">=", 4),
-    "both": ("&&", 2),
-}
 # Words of the language, its globals and functions, and names of the shader
 _WORDS = """
     and bool break case catch char class closure color const continue default delete do double else emit enum extern
@@ -77,8 +57,6 @@ class Osl(Language):
     """The spelling of Open Shading Language; its conditions of colours are colours of 0 and 1."""
 
     words = frozenset(_WORDS.split())
-    functions = _FUNCTIONS
-    operators = _OPERATORS
 
     def input(self, place: str) -> str:
         if place.startswith("m."):

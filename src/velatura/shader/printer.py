@@ -25,6 +25,28 @@ Output: TypeAlias = tuple[Operand, Kind]  # a value, and the kind as which it is
 ATOM, NEGATIVE = 9, 7  # how strongly a text binds: nothing needs parentheses, a sign
 CONDITION = 2  # how strongly the condition of a choice has to bind
 
+# What languages of C's grammar have in common
+FUNCTIONS = {op: op for op in ("exp", "log", "sin", "cos", "sqrt")} | {
+    "absolute": "abs",
+    "mean": "vt_mean",
+    "power": "pow",
+    "arctan2": "atan2",
+    "minimum": "min",
+    "maximum": "max",
+    "clip": "clamp",
+}
+OPERATORS = {  # with how strongly they bind
+    "add": ("+", 5),
+    "subtract": ("-", 5),
+    "multiply": ("*", 6),
+    "divide": ("/", 6),
+    "less": ("<", 3),
+    "greater": (">", 3),
+    "at_most": ("<=", 3),
+    "at_least": (">=", 3),
+    "both": ("&&", 2),
+}
+
 
 class Field(NamedTuple):
     """A member of a struct: its kind, or the name of its struct; an array where `length` is not 0."""
@@ -56,8 +78,8 @@ class Language(ABC):
     """
 
     words: ClassVar[frozenset[str]]
-    functions: ClassVar[Mapping[str, str]]
-    operators: ClassVar[Mapping[str, tuple[str, int]]]
+    functions: ClassVar[Mapping[str, str]] = FUNCTIONS
+    operators: ClassVar[Mapping[str, tuple[str, int]]] = OPERATORS
     branches: ClassVar[bool] = False
 
     # Values
