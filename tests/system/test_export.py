@@ -65,6 +65,15 @@ def test_without_tables_there_is_one_file(run: Run, tmp_path: Path) -> None:
     assert "vt_tables" not in path.read_text()
 
 
+def test_shared_tables_that_code_does_not_read_are_reported(run: Run, tmp_path: Path) -> None:
+    """Expected: a solved material has tables of its own alone; one line, and no file of shared ones."""
+    shared, path = tmp_path / "shared.bin", tmp_path / "lacquer.glsl"
+    options = ["--to", "glsl", "--tables", str(shared), "-o", str(path)]
+    status, _, err = run("export", "glossy-plastic", *options)
+    assert (status, err) == (0, f"{shared}: not written, since this code reads no tables that materials share\n")
+    assert not shared.exists()
+
+
 def test_code_says_where_it_comes_from(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: the material, the model with its changed switches, version, date and licence; no textures, said so."""
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")

@@ -65,7 +65,7 @@ def export(
     if output is not None:
         check_writable(output, to.value)
     if tables is not None:
-        files.check_writable(tables, "tables", (".bin",))
+        files.check_writable(tables, "a file of tables", (".bin",))
     chosen: dict[str, Any] = {"constant": constant or None, "prefix": prefix, "group": group, "binding": binding}
     chosen |= {"baked": baked or None, "half": half or None, "tables": tables}
     chosen = {name: value for name, value in chosen.items() if value is not None}

@@ -50,6 +50,8 @@ def made(plugin: Plugin, stack: Stack, microsurface: bool) -> Any:
         raise InvalidInput(f"models: plugins are compared in llvm_ad_rgb or the like, not in {mi.variant()}")
     if isinstance(plugin, str) and plugin in api.PLUGINS:
         return api.bsdf(stack, plugin, **({"microsurface": microsurface} if plugin == "reference" else {}))
+    if not plugin:
+        raise InvalidInput("models: a name is empty")
     try:
         bsdf = _from_file(mi, plugin) if _is_file(plugin) else _from_type(mi, plugin)
     except RuntimeError as error:

@@ -96,7 +96,8 @@ class Request:
 class Export:
     """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
 
-    costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in sentences.
+    costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in
+    sentences; of code, shared tables that it does not read.
     apart: files that several exports share, by path.
     """
 

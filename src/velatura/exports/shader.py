@@ -44,4 +44,6 @@ def write(request: Request) -> Export:
     textures = {".tables.bin": read, ".films.bin": made.films}
     beside = {end: x.astype("<f2" if half else "<f4").tobytes() for end, x in textures.items() if x is not None}
     apart = {Path(shared): beside.pop(".tables.bin")} if shared is not None and made.looked_up else {}
-    return Export(headed(made.text), beside, {name: str(cost) for name, cost in made.costs.items()}, apart=apart)
+    notes = (f"{shared}: not written, since this code reads no tables that materials share",)
+    costs = {name: str(cost) for name, cost in made.costs.items()}
+    return Export(headed(made.text), beside, costs, notes if shared is not None and not apart else (), apart)

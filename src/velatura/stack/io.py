@@ -24,6 +24,7 @@ _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 _LARGEST = 100_000  # values in a file
 _PATHS = ("texture", "spectrum")  # keys
 FOREIGN = (".mtlx", ".gltf", ".glb", ".xml")  # of other programs, which `velatura.imports` reads
+ENDINGS = (*_FORMATS, *FOREIGN)  # of all files that hold a material
 
 #: What names a material wherever one is asked for: a stack, a file, or the name of a preset.
 MaterialLike: TypeAlias = Stack | str | Path
@@ -54,7 +55,7 @@ def load(material: MaterialLike) -> Stack:
     if foreign(str(material)):
         imported: Stack = import_module("velatura.imports").load(str(material))  # by name, as it stands below
         return imported
-    _format(path)
+    _format(path, "a material file", ENDINGS)
     return loads(_text(path), name=str(path), folder=path.parent)
 
 
@@ -127,7 +128,7 @@ def preset(name: str) -> Stack:
     """
     if name not in presets():
         unknown_name = unknown("preset", name, presets(), "`velatura presets` lists all")
-        raise InvalidInput(f"{unknown_name}; a material file ends in {', '.join(_FORMATS)}")
+        raise InvalidInput(f"{unknown_name}; a material file ends in {', '.join(ENDINGS)}")
     return loads((_PRESETS / f"{name}.yaml").read_text(encoding="utf-8"), name=f"{name}.yaml")
 
 
@@ -275,7 +276,8 @@ def _with_paths(node: Any, rewrite: Callable[[str], str]) -> Any:
     return [_with_paths(entry, rewrite) for entry in node] if isinstance(node, list) else node
 
 
-def _format(path: Path, what: str = "a material file") -> str:
+def _format(path: Path, what: str = "a material file", endings: Iterable[str] = _FORMATS) -> str:
+    """The format of a file by its ending; `endings` are those that may stand in its place."""
     if path.suffix.lower() not in _FORMATS:
-        raise InvalidInput(f"{path}: {what} ends in {', '.join(_FORMATS)}")
+        raise InvalidInput(f"{path}: {what} ends in {', '.join(endings)}")
     return _FORMATS[path.suffix.lower()]
