@@ -45,6 +45,7 @@ NORMAL = (0.0, 0.0, 1.0)
 MANY = 256  # interfaces that are worth sorting
 CLEAR = 1e-9  # an optical depth below this is written as no medium at all
 SAME = 1e-9  # share of a colour by which channels of a grey differ
+ROUND = 1e-6  # share of a roughness by which that along another axis differs by rounding
 
 
 class Batch:
@@ -244,8 +245,16 @@ def read_whole(path: Sequence[Layers], exterior: float, model: Model) -> StackLo
     from velatura.model.solution import plain  # loads SciPy
 
     # Nothing passes that would be summed up
-    material = dataclasses.replace(material, layers=(*material.layers, DiffuseValues(0.0)))
+    layers = (*(_unbrushed(layer) for layer in material.layers), DiffuseValues(0.0))
+    material = dataclasses.replace(material, layers=layers)
     return model.recursion.statistics(plain(material), model, normal)
+
+
+def _unbrushed(layer: LayerValues) -> LayerValues:
+    """With one roughness where two differ by rounding: others are solved at one azimuth, with other errors."""
+    if isinstance(layer, InterfaceValues) and np.allclose(layer.alpha_u, layer.alpha_v, rtol=ROUND, atol=0):
+        return dataclasses.replace(layer, alpha_v=layer.alpha_u)
+    return layer
 
 
 def _interface(layers: Layers, above: Value | None) -> InterfaceValues:

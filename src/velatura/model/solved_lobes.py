@@ -20,7 +20,9 @@ from velatura.model.transport.adding import Part, parts
 from velatura.model.transport.energies import Energies, energies
 from velatura.model.transport.interfaces import Facets
 from velatura.model.transport.media import Slab
+from velatura.model.turned import Frame
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
+from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.stack import InterfaceValues, Material, MediumValues
 
@@ -37,20 +39,26 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
     outside; its own roughness is that of the unscattered light, in the medium above the interface. The transmitted lobe
     has all that passes, and one roughness, that in the medium beyond.
     """
-    cos_theta, phi = wi[2], np.arctan2(wi[1], wi[0])
     nothing = _without_steps(material)
     if nothing:
         others = replace(material, layers=tuple(x for place, x in enumerate(material.layers) if place not in nothing))
-        return _with_dark(solved_lobes(others, model, wi), material, model, nothing, phi)
+        return _with_dark(solved_lobes(others, model, wi), material, model, nothing, np.arctan2(wi[1], wi[0]))
+
+    # Brushed materials are solved in their own axes, as for rendering
+    frame = Frame.of(material)
+    turn = np.radians(frame.degrees(material))
+    axis = nearer_axis(material, np.arctan2(wi[1], wi[0]))
+    material, wi = frame.back(material), ggx.rotate(wi, turn)
+    cos_theta, phi = wi[2], np.arctan2(wi[1], wi[0])
     often = tables.load() if model.microsurface else None
     solved, found = energies(material, cos_theta, phi, often, widths.nearly_straight, incidences=NONE), parts(material)
     kind = variance_kind(material)
     # Symmetry has the axes of isotropic stacks in the plane of incidence
     in_plane = phi if kind is Isotropic else None
-    axis = nearer_axis(material, phi)
 
     def collect(energy: Array, own: Roughness, seen: Roughness) -> LobeStatistics:
-        return _lobe(energy, with_axes_named(own, axis), with_axes_named(seen, axis), model)
+        own, seen = (with_axes_named(_turned(each, turn), axis) for each in (own, seen))
+        return _lobe(energy, own, seen, model)
 
     layout = layout_of([material])
     facets = [place for place, part in enumerate(found) if isinstance(part, Facets)]
@@ -75,6 +83,12 @@ def _lobe(energy: Array, own: Roughness, seen: Roughness, model: Model) -> LobeS
     covariance = np.array(Covariance.of(seen, MAPS[model.map]).matrix())
     colours = _colours(energy, seen.rotation)
     return LobeStatistics(colours, covariance, np.array(seen[:2]), seen.rotation, np.array(own[:2]), own.rotation)
+
+
+def _turned(roughness: Roughness, angle: float) -> Roughness:
+    """Anticlockwise; rotations stay within a quarter turn to either side."""
+    rotation = roughness.rotation + angle
+    return roughness._replace(rotation=rotation - np.pi * np.round(rotation / np.pi))
 
 
 def _without_steps(material: Material) -> list[int]:
