@@ -67,7 +67,7 @@ def invert(
       interfaces  that make it: 1, or a pair, 2
       base        dielectric or, of the last lobe, conductor
       tint        of a conductor, 0 (strongest edge tint) to 1
-      fixed       {eta, k, alpha, tau, films}: what each interface keeps, or null: [1.5]
+      fixed       {eta, k, alpha, tau, films}: of each interface, or null: [1.5]
     Of the whole: exterior (1), eta_max (4), channels (mean or separate), name;
       start       a material, as a file has it, with which the search begins
     """

@@ -45,7 +45,6 @@ NORMAL = (0.0, 0.0, 1.0)
 MANY = 256  # interfaces that are worth sorting
 CLEAR = 1e-9  # an optical depth below this is written as no medium at all
 SAME = 1e-9  # share of a colour by which channels of a grey differ
-ROUND = 1e-6  # share of a roughness by which that along another axis differs by rounding
 
 
 class Batch:
@@ -251,8 +250,8 @@ def read_whole(path: Sequence[Layers], exterior: float, model: Model) -> StackLo
 
 
 def _unbrushed(layer: LayerValues) -> LayerValues:
-    """With one roughness where two differ by rounding: others are solved at one azimuth, with other errors."""
-    if isinstance(layer, InterfaceValues) and np.allclose(layer.alpha_u, layer.alpha_v, rtol=ROUND, atol=0):
+    """With one roughness where two differ by rounding, so that stacks are solved in the axes of the others."""
+    if isinstance(layer, InterfaceValues) and np.allclose(layer.alpha_u, layer.alpha_v, rtol=0, atol=ROUND):
         return dataclasses.replace(layer, alpha_v=layer.alpha_u)
     return layer
 

@@ -33,6 +33,7 @@ STRAIGHT = {True: 0.09, False: 0.01}
 GRAZING = 1e-4  # least cosine of light that meets an interface
 ALPHA_MIN = 1e-3
 BLOCK = 1 << 15  # samples at a time
+BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
 DIGITS = 9  # of lengths of momentum that are alike
 SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
 OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
@@ -149,8 +150,8 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     # Light comes from wi, and travels to -wi
     wi = (-sin * np.cos(psi)[:, None], -sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin))
     # The same normals from all sides where facets have no axes, with azimuths from the plane of incidence; else about
-    # the normal, where light has no side
-    turns = psi[:, None] / (2 * np.pi) if facets.alpha_u == facets.alpha_v else np.zeros((1, 1))
+    # the normal, where light has no side; and with a steady change between
+    turns = max(1 - facets.brushed / BRUSHED, 0) * psi[:, None] / (2 * np.pi)
     h = ggx.sample_visible(wi, *alpha, (u_2 + turns) % 1, u_1[None])
     cosine = np.minimum(ggx.dot(wi, h), 1.0)
     share = 1 / u_1.size
