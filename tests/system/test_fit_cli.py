@@ -107,6 +107,7 @@ def test_paint_without_an_interface_is_coated(run: Run, folder: Path) -> None:
         (["fit", "table.csv", "none.yaml"], 2, "none.yaml"),
         (["fit", "table.csv", "target.yaml", "-o", "found.txt"], 2, "found.txt: a material file ends in"),
         (["simplify", "pair.yaml", "--interfaces", "3"], 2, "interfaces: must be at least 1, and fewer than the 3"),
+        (["simplify", "bare-gold", "--interfaces", "1"], 2, "interfaces: the material has one, and none"),
         (["simplify", "pair.yaml", "--interfaces", "0"], 2, "--interfaces"),
         (["simplify", "pair.yaml"], 2, "--interfaces"),
     ],

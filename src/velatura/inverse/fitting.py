@@ -101,6 +101,8 @@ def simplify(
     """
     chosen, stack = named(model, **switches), load(stack)
     count = len(stack.interfaces)
+    if count == 1:
+        raise InvalidInput("interfaces: the material has one, and none can have fewer")
     if not 1 <= interfaces < count:
         raise InvalidInput(
             f"interfaces: must be at least 1, and fewer than the {count} that there are, got {interfaces}"

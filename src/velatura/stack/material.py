@@ -25,7 +25,8 @@ def number(address: Address, value: Any) -> Value:
     """
     import numpy as np
 
-    plain = address.plain(value, f"lobes are those of one point; replace it, as in --set {address.name}=0.1")
+    both = address.name.removesuffix("_u").removesuffix("_v")  # axes, as one texture mostly gives them
+    plain = address.plain(value, f"lobes are those of one point; replace it, as in --set {both}=0.1")
     return np.broadcast_to(np.asarray(plain, float), (3,))[:, None] if address.colour else float(plain)  # type: ignore[arg-type]
 
 
