@@ -56,9 +56,9 @@ def changed(**keys: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("to", list(FORMATS))
 def test_a_material_is_exported_as_the_command_line_does(to: str) -> None:
     for fixed in (False, True):
-        answer = VERBS["export"]({"material": COAT, "to": to, "fixed": fixed, "model": "belcour2018"})
+        answer = VERBS["export"]({"material": COAT, "to": to, "fixed": fixed, "model": "realtime"})
         constant = ["all"] if fixed and "constant" in FORMATS[to].options else []
-        made = export(Stack.from_dict(COAT), to, "belcour2018", constant=constant, folder=".")
+        made = export(Stack.from_dict(COAT), to, "realtime", constant=constant, folder=".")
         assert answer["text"] == made.text
         assert {ending: decoded(data).tobytes() for ending, data in answer["beside"].items()} == dict(made.beside)
         assert answer["ending"] == FORMATS[to].endings[0]
