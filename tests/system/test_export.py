@@ -81,7 +81,7 @@ def test_code_says_where_it_comes_from(run: Run, monkeypatch: pytest.MonkeyPatch
     first, second = out.split("\n")[:2]
     assert first == "// Coated brushed gold as the model belcour2018 (tir=off) has it; Slang."
     assert second == f"// Velatura {vt.__version__}, 2023-11-14; SPDX-License-Identifier: BSD-3-Clause"
-    assert (status, err) == (0, "not written without -o: .tables.bin, which the code reads\n")
+    assert (status, err) == (0, "not written without -o: the tables that the code reads (.tables.bin)\n")
 
 
 def test_names_and_bindings_may_be_chosen(run: Run) -> None:

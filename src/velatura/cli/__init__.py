@@ -179,7 +179,7 @@ def _explain(error: BaseException) -> int:
         _complain(str(error))
         return error.exit_status
     if isinstance(error, typer.TyperException):  # a wrong option
-        _complain(" ".join(error.format_message().split()))
+        _complain(" ".join(error.format_message().replace("Value error, ", "").split()))  # Pydantic's name for it
         return error.exit_code
     if isinstance(error, BrokenPipeError):  # the reader has gone (`velatura lobes ... | head`): print nothing more
         return 1

@@ -80,7 +80,7 @@ def export(
     if output is None:
         print(made.text, end="")
         if unwritten := [*made.beside, *map(str, made.apart)]:
-            print(f"not written without -o: {', '.join(unwritten)}, which the code reads", file=sys.stderr)
+            print(f"not written without -o: the tables that the code reads ({', '.join(unwritten)})", file=sys.stderr)
         return
     path, *beside = made.save(output)
     print(path if not beside else f"{path}, and its tables {', '.join(map(str, beside))}")
