@@ -18,7 +18,7 @@ demo: .venv/ready ## install, and render the preset coated-gold
 
 test: lint ## install, and run all checks: ruff, mypy, eslint, pytest
 	$(BIN)/pytest -q -n 2 --dist loadfile tests/unit tests/system
-	$(BIN)/pytest -q -n 2 --dist loadfile tests/browser
+	$(BIN)/pytest -q tests/browser
 
 lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
 	$(BIN)/ruff check

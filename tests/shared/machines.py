@@ -259,7 +259,7 @@ def spirv(text: str, *options: str) -> bytes:
         command = ["glslangValidator", *options, "-S", "comp", "-o", str(target), str(source)]
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
-            raise ValueError(done.stdout)
+            raise ValueError(f"{done.returncode}: {done.stdout}{done.stderr}")
         return target.read_bytes()
 
 
