@@ -412,6 +412,7 @@ def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
     page.page.evaluate("velatura.viewport.setSize(64, 48); velatura.viewport.setBudget({ samples: 16 })")
     page.page.wait_for_function("() => velatura.viewport.coming?.shader?.base")  # the last
     page.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")  # look no further
+    page.settled()
     known = page.page.evaluate(PREVIEWS)
     page.page.get_by_role("button", name="Interface", exact=True).click()
     page.settled()
