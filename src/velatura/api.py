@@ -100,7 +100,7 @@ def render(
     scene: str = "ball",
     env: str | None = None,
     spp: int = 64,
-    size: tuple[int, int] | None = None,
+    size: int | tuple[int, int] | None = None,
     model: str | Model = DEFAULT,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
@@ -113,10 +113,11 @@ def render(
             be replaced.
         env: "studio", "sky", "furnace", a photograph ("lobby"), or an .exr or .hdr file.
         spp: samples per pixel.
+        size: pixels of a side, or (width, height); by default those of the scene file, or else 512.
         progress: called with (samples per pixel done, spp) now and then.
 
     Raises:
-        InvalidInput, MissingTool: as `bsdf`; also an unknown scene or environment.
+        InvalidInput, MissingTool: as `bsdf`; also an unknown scene or environment, or an impossible size.
     """
     from velatura import scenes
 

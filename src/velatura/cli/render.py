@@ -12,8 +12,6 @@ import typer
 from velatura.cli import options, progress
 from velatura.errors import InvalidInput
 
-LARGEST = 16384  # pixels along one side
-
 
 def render(
     material: options.Material,
@@ -62,6 +60,8 @@ def render(
 
 def _size(text: str) -> tuple[int, int]:
     """Width and height from `N` or `WxH`."""
+    from velatura.scenes.stage import LARGEST
+
     match = re.fullmatch(r"(\d{1,5})(?:x(\d{1,5}))?", text)
     width, height = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):

@@ -23,7 +23,7 @@ def render(
     scene: Name = "ball",
     env: Name | None = None,
     spp: int = 64,
-    size: tuple[int, int] | None = None,
+    size: int | tuple[int, int] | None = None,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
     zoom: float = 1.0,

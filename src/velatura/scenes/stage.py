@@ -23,6 +23,7 @@ MATERIAL_ID = "material"
 
 #: Longest path in surfaces met; enough for light to leave the ball's cavity.
 MAX_DEPTH = 6
+LARGEST = 16384  # pixels of a side
 
 #: A photographer's grey card.
 _GREY = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.18}}
@@ -33,7 +34,7 @@ def scene_dict(
     scene: Name = "ball",
     env: Name | None = None,
     bsdf: Any = None,
-    size: tuple[int, int] | None = None,
+    size: int | tuple[int, int] | None = None,
     zoom: float = 1.0,
 ) -> dict[str, Any]:
     """A scene for `mi.load_dict`, to be rendered unchanged or after changes.
@@ -44,18 +45,19 @@ def scene_dict(
         env: one of `ENVIRONMENTS`, or an .exr or .hdr file; None means a scene file's own lights, or else the
             studio. In the furnace the object floats alone, so that a material that loses no light vanishes.
         bsdf: a `mi.BSDF`, or the dictionary of one.
-        size: width and height in pixels; None means a scene file's own, or else 512 x 512.
+        size: width and height in pixels, or one number for both; None means a scene file's own, or else 512 x 512.
         zoom: how much larger the object appears; at 1 the ball covers half of the picture, at 1.2 three quarters.
 
     Raises:
-        InvalidInput: an unknown scene or environment, a file that cannot be read, a scene file without a "material",
-            without integrator, sensor or pixels, or that Mitsuba refuses.
+        InvalidInput: an unknown scene or environment, an impossible size, a file that cannot be read, a scene file
+            without a "material", without integrator, sensor or pixels, or that Mitsuba refuses.
         MissingTool: as `kernel.mitsuba`.
     """
+    pixels = None if size is None else width_and_height(size)
     mi = kernel.mitsuba()
     material = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
     if is_file(scene):
-        return _from_file(mi, os.fspath(scene), env, material, size)
+        return _from_file(mi, os.fspath(scene), env, material, pixels)
     if scene not in OBJECTS:
         raise InvalidInput(f"unknown scene {scene!r}: give {', '.join(OBJECTS)}, or a Mitsuba scene file (.xml)")
 
@@ -63,11 +65,19 @@ def scene_dict(
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": MAX_DEPTH},
-        "sensor": _camera(mi, chosen.view, size or (512, 512), zoom),
+        "sensor": _camera(mi, chosen.view, pixels or (512, 512), zoom),
         "light": emitter(mi, chosen_env),
         "object": mesh(mi, chosen.surface(), material),
         **_surroundings(mi, chosen_env),
     }
+
+
+def width_and_height(size: Any) -> tuple[int, int]:
+    """The pixels of a picture along both sides, given as a pair or as one number. Raises InvalidInput."""
+    sides = size if isinstance(size, (tuple, list)) else (size, size)
+    if len(sides) != 2 or not all(isinstance(side, (int, np.integer)) and 1 <= side <= LARGEST for side in sides):
+        raise InvalidInput(f"size is {size!r}, and must be pixels, or (width, height), each from 1 to {LARGEST}")
+    return int(sides[0]), int(sides[1])
 
 
 def is_file(scene: Name) -> bool:
