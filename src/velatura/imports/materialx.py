@@ -11,7 +11,7 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.imports import gltf, openpbr, principled, standard_surface, xml
 from velatura.imports.result import Imported, Notes
-from velatura.imports.values import Value, changed, colour
+from velatura.imports.values import Value, changed, colour, linear
 from velatura.imports.xml import Element
 from velatura.stack import Texture
 from velatura.stack.schema import show
@@ -344,7 +344,7 @@ def _literal(entry: Element) -> Value:
         raise _Unread(f"{show(text)} is no number and no colour")
     rgb, space = np.array(numbers[:3]), _space(entry)
     if space == "srgb_texture":
-        rgb = np.where(rgb <= 0.04045, rgb / 12.92, ((np.maximum(rgb, 0) + 0.055) / 1.055) ** 2.4)
+        rgb = linear(rgb)
     elif space in ("acescg", "lin_ap1", "lin_ap1_scene"):
         rgb = np.clip(LINEAR_FROM_ACESCG @ rgb, 0, None)
     elif space not in ("", *_SPACES):

@@ -11,6 +11,7 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.imports import principled, xml
 from velatura.imports.result import Imported, Notes
+from velatura.imports.values import linear
 from velatura.imports.xml import Element
 from velatura.stack import Texture
 from velatura.stack.schema import show
@@ -91,10 +92,9 @@ def _numbers(text: str) -> Any:
     """A number or a colour; None for other texts."""
     if text.startswith("#") and len(text) == 7:
         try:
-            encoded = np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])
+            return linear(np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])).tolist()
         except ValueError:
             return None
-        return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).tolist()
     try:
         numbers = [float(part) for part in text.replace(",", " ").split()]
     except ValueError:

@@ -35,6 +35,11 @@ def colour(value: float | RGB) -> RGB:
     return rounded(red), rounded(green), rounded(blue)
 
 
+def linear(encoded: Array) -> Array:
+    """Numbers that are encoded in sRGB, in linear sRGB (IEC 61966-2-1)."""
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4)
+
+
 def middle(value: Value) -> float:
     """One number for a value: the mean of its colours; of an image, the middle of what it may hold."""
     if isinstance(value, Texture):
