@@ -5,7 +5,7 @@ plane under a white world, and under one sun in twelve directions, of the same c
 What closures are off the model is another number, which stands in each file.
 
 A picture has cells of 8 by 8 pixels, and each is drawn twice: the difference of the two gives the variance of a cell
-with 64 degrees of freedom, whatever the gradient in it. A test fails by chance in ALARM of all runs (Sidak).
+with 64 degrees of freedom, regardless of its gradient. A test fails by chance in ALARM of all runs (Sidak).
 """
 
 from __future__ import annotations

@@ -20,7 +20,6 @@ from velatura.bakes import TARGETS, Bake, bake
 from velatura.bakes.look import Described
 from velatura.bakes.lost import lost
 from velatura.bakes.sampled import Sampled
-from velatura.bakes.textured import COLOURS, ROUGHNESSES
 from velatura.checks.probe import Probe
 from velatura.model import named
 from velatura.optics.directions import directions
@@ -91,7 +90,7 @@ def test_what_is_not_held_is_said() -> None:
         exterior=1.33,
     )
     described = Described.of(Material.of(stack), named("belcour2018"))
-    assert list(lost(described, "mitsuba-principled")) == [
+    assert list(lost(described, TARGETS["mitsuba-principled"])) == [
         "exterior: indices are taken relative to it, so that the material stands in air",
         "layers 2, 3: merged into one base",
         "layer 0: the coat's brushing is left out",
@@ -218,9 +217,9 @@ def test_means_are_fitted_and_images_stay_where_they_can(painted: vt.Stack, targ
     mean = np.mean(texels, axis=0)
     made = bake(painted, target)
     plain = bake(painted.replace(layer0_alpha=0.1, layer1_albedo=tuple(mean)), target)
-    colour, rough = COLOURS.get(target), ROUGHNESSES.get(target)
+    colour, rough = TARGETS[target].colour, TARGETS[target].roughness
     assert made.baked_albedo == pytest.approx(plain.baked_albedo, abs=2e-3)
-    assert set(made.images) == {colour, rough} - {None}
+    assert set(made.images) == {colour, rough} - {""}
     said = [line for line in made.lost if "image" in line]
     assert said == [
         *([] if rough else ["layer0_alpha: the image is replaced by its mean"]),

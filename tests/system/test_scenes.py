@@ -369,7 +369,7 @@ def test_a_full_disk_is_told_in_one_line(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_an_interrupt_is_one_whatever_the_renderer_makes_of_it(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_stays_one_if_the_renderer_raises_another_error(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rationale: Mitsuba, interrupted in a callback, raises a RuntimeError. Expected: any other error is reported."""
 
     def interrupted(*_: object, **__: object) -> None:

@@ -217,7 +217,7 @@ def test_what_is_no_value_is_refused_in_a_line(variant: str) -> None:
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb"], indirect=True)
-def test_a_texture_of_python_varies_whatever_it_says(variant: str) -> None:
+def test_a_texture_of_python_varies_even_if_it_denies_that(variant: str) -> None:
     class Halves(mi.Texture):
         def eval_1(self, si: Any, active: Any = True) -> Any:
             return dr.select(si.uv.x < 0.5, 0.2, 0.5)

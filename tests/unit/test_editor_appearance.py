@@ -396,7 +396,7 @@ def test_an_infeasible_wish_snaps_to_the_edge() -> None:
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("model", MODELS)
-def test_what_is_answered_is_what_the_stack_has_whatever_was_asked_before(model: str) -> None:
+def test_answers_describe_the_stack_regardless_of_earlier_questions(model: str) -> None:
     """Of stacks at the edge of what can be, every wish is answered by the lobes of the stack in the answer, the same
     again after other questions; a blur that is not asked to change stays."""
     asked = []

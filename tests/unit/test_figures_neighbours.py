@@ -41,7 +41,7 @@ def test_sums_over_orders_are_those_of_all_orders(
 def test_colours_of_a_metal_stand_for_its_index() -> None:
     """Expected: without a film, in a vacuum, they are reflected at the normal and at the edge."""
     bare = Metal(TITANIUM.eta, TITANIUM.k, 0.1, 1.0, 0.0)
-    cosines = np.array([1.0, neighbours.EDGE])
+    cosines = np.array([1.0, fresnel.EDGE])
     found = neighbours.interference(cosines, 1.0, bare, neighbours.tabled, by_colours=True)
     expected = [[fresnel.conductor(c, n, k) for n, k in zip(bare.eta, bare.k)] for c in cosines]
     assert found == pytest.approx(np.array(expected), abs=1e-6)

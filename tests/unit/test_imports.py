@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "binding": "stack sampling",
     "plugins": "stack optics tables model ops kernel binding sampling",
     "shader": "stack optics tables model ops sampling",
-    "targets": "optics sampling",
+    "targets": "stack optics sampling",
     "bakes": "stack optics sampling model targets reference binding kernel",
     "exports": "__init__ stack model shader bakes targets",
     "imports": "stack optics model kernel binding targets",

@@ -120,7 +120,7 @@ def test_a_nearly_smooth_interface_has_the_energies_of_fresnel(cos_theta: float,
 
 
 def test_a_pane_lets_light_out_as_it_came_in() -> None:
-    """Thin: into the index above, whatever index is written last; and a slab of both sides is the same from below."""
+    """Thin: into the index above, not into the one written last; and a slab of both sides is the same from below."""
     thin = body_of(vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=1.7, alpha=0.1)], thin=True))
     pane = body_of(vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=1.0, alpha=0.1)]))
     assert thin.eta == pane.eta == 1

@@ -104,7 +104,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
     sampled = Sampled.of(described, chosen, directions(cosines, turns), NODES)
     values = _fitted(kind, described, sampled)
 
-    varying = dict(carried(stack, found, target, values))
+    varying = dict(carried(stack, found, kind, values))
     left = [f"{name}: {what}" for name, what in varying.items() if isinstance(what, str)]
     images = {name: image for name, image in varying.items() if isinstance(image, Carried)}
 
@@ -123,7 +123,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
         baked_albedo=shown.energy(light),
         passed=shown.energy(shown.value, up=False),
         baked_passed=shown.energy(light, up=False),
-        lost=(*lost(described, target), *left),
+        lost=(*lost(described, kind), *left),
         images=images,
         thin=described.thin,
     )

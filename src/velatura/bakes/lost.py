@@ -7,21 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from velatura.bakes.look import Described
+from velatura.bakes.targets import Target
 from velatura.stack import InterfaceValues, MediumValues
-
-#: Targets whose coat has an index, a brushing, a colour, and one that deepens where light crosses it at an angle.
-WITH_INDEX = ("openpbr", "blender-principled")
-WITH_BRUSHED_COAT = ("openpbr",)
-WITH_COAT_COLOUR = ("openpbr", "blender-principled")
-WITH_COAT_ABSORPTION = ("blender-principled",)
-WITH_FILM = ("openpbr", "gltf", "blender-principled")
-WITH_TURN = ("openpbr", "gltf", "blender-principled")
-WITH_PANES = ("openpbr", "gltf", "blender-principled")
 
 TURNED = 0.5  # degrees
 
 
-def lost(stack: Described, target: str) -> Iterator[str]:
+def lost(stack: Described, target: Target) -> Iterator[str]:
     """One line for each property that is left out or replaced; layers are counted from the top, from 0."""
     layers = stack.material.layers
     interfaces = [(n, each) for n, each in enumerate(layers) if isinstance(each, InterfaceValues)]
@@ -37,33 +29,33 @@ def lost(stack: Described, target: str) -> Iterator[str]:
     for n, layer in enumerate(layers):
         if isinstance(layer, MediumValues):
             yield from (f"layer {n}: {what}" for what in _of_medium(layer, target))
-    if stack.thin and target not in WITH_PANES:
+    if stack.thin and not target.pane:
         yield "transmission: light is refracted as into a solid, and does not leave a pane"
 
 
-def _of_interface(each: InterfaceValues, coat: bool, target: str) -> Iterator[str]:
+def _of_interface(each: InterfaceValues, coat: bool, target: Target) -> Iterator[str]:
     brushed = abs(each.alpha_u - each.alpha_v) > 1e-6
-    if coat and brushed and target not in WITH_BRUSHED_COAT:
+    if coat and brushed and not target.coat_brushed:
         yield "the coat's brushing is left out"
-    if not coat and brushed and target not in WITH_TURN:
+    if not coat and brushed and not target.turned:
         along = each.rotation if each.alpha_u > each.alpha_v else each.rotation + 90
         if abs((along + 90) % 180 - 90) > TURNED:
             yield "brushing is held along the tangent only"
-    if coat and target not in WITH_INDEX:
+    if coat and not target.coat_eta:
         yield "the coat's index is 1.5; its reflectance is the coat's weight"
     if each.kind == "dielectric" and np.ptp(np.broadcast_to(each.eta, (3, 1))) > 1e-6:
         yield "one index for all colours"
-    if each.films and target not in WITH_FILM:
+    if each.films and not target.film:
         yield "thin films are replaced by a colour"
     elif each.films and (coat or len(each.films) > 1):
         yield "thin films are replaced by one film on the base"
 
 
-def _of_medium(each: MediumValues, target: str) -> Iterator[str]:
+def _of_medium(each: MediumValues, target: Target) -> Iterator[str]:
     if np.any(np.asarray(each.sigma_s) * each.depth > 0):
         yield "scattering is part of the base's colour"
     if np.any(np.asarray(each.sigma_a) * each.depth > 0):
-        if target not in WITH_COAT_COLOUR:
+        if not target.coat_colour:
             yield "absorption is part of the base's colour, at all angles alike"
-        elif target not in WITH_COAT_ABSORPTION:
+        elif not target.coat_depth:
             yield "absorption does not deepen with the angle"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from velatura.bakes.look import Described
 from velatura.model import Model, bsdf, variance_kind
 from velatura.model.context import Context
-from velatura.optics import ggx
+from velatura.optics import fresnel, ggx, refraction
 from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import square
 from velatura.targets.closures import ALPHA_MIN, Pair
@@ -115,42 +115,32 @@ def _nodes(wi: Array, eta: float, count: int, lobes: Sequence[Facets]) -> tuple[
         wo = wo[:, wo[2] * side > 1e-4]
         return wo, 1 / (share * (np.sum(facets(wo), axis=0) + np.abs(wo[2]) / pi))
 
-    above = weighed([np.stack(ggx.reflect((x, y, z), h)) for h in halves], 1.0, lambda wo: _reflecting(wi, wo, lobes))
+    above = weighed([np.stack(ggx.reflect((x, y, z), h)) for h in halves], 1.0, lambda wo: _densities(wi, wo, 1, lobes))
     if not eta:
         return above
     if abs(eta - 1) < 1e-3:
         mirror = np.array([[1], [1], [-1]])
         return np.concatenate([above[0], above[0] * mirror], axis=1), np.tile(above[1], 2)
-    below = weighed([_refract(wi, np.stack(h), eta) for h in halves], -1.0, lambda wo: _refracting(wi, wo, eta, lobes))
+    below = weighed([_refract(wi, np.stack(h), eta) for h in halves], -1.0, lambda wo: _densities(wi, wo, eta, lobes))
     return np.concatenate([above[0], below[0]], axis=1), np.concatenate([above[1], below[1]])
-
-
-def _visible(wi: Array, h: Array, lobe: Facets) -> Array:
-    """Density of normals h among those of a lobe that are visible from wi, times its cosine over that to h."""
-    u, v, turn = lobe
-    normal, w = ggx.rotate(tuple(h), turn), ggx.rotate(tuple(wi[:, None]), turn)
-    return np.asarray(ggx.ndf(normal, u, v) * ggx.masking(w, u, v) / wi[2])
-
-
-def _reflecting(wi: Array, wo: Array, lobes: Sequence[Facets]) -> list[Array]:
-    """Densities of wo reflected by the visible facets of each lobe."""
-    h = wi[:, None] + wo
-    h = h / np.linalg.norm(h, axis=0)
-    return [0.25 * _visible(wi, h, lobe) for lobe in lobes]
 
 
 def _refract(wi: Array, h: Array, eta: float) -> Array:
     """Refracted directions; a cosine of 0, which is left out, under total reflection."""
     cosine = wi @ h
-    cos2 = 1 - (1 - cosine**2) / eta**2
-    wo = (cosine / eta - np.sqrt(np.maximum(cos2, 0))) * h - wi[:, None] / eta
-    return np.where((cos2 > 0) & (cosine > 0), wo, 0.0)
+    passes = (cosine > 0) & (fresnel.cos_transmitted(cosine, eta) > 0)
+    return np.where(passes, np.stack(refraction.refract(tuple(wi), tuple(h), eta)), 0.0)
 
 
-def _refracting(wi: Array, wo: Array, eta: float, lobes: Sequence[Facets]) -> list[Array]:
-    """As `_reflecting`, of wo refracted (Walter 2007, Eq. 17)."""
-    h = wi[:, None] + eta * wo
-    h = h / np.linalg.norm(h, axis=0) * np.where(h[2] < 0, -1.0, 1.0)
-    i_h, o_h = wi @ h, np.sum(wo * h, axis=0)
-    jacobian = (i_h > 0) * (o_h < 0) * eta**2 * np.abs(o_h * i_h) / (i_h + eta * o_h) ** 2
-    return [jacobian * _visible(wi, h, lobe) for lobe in lobes]
+def _densities(wi: Array, wo: Array, eta: float, lobes: Sequence[Facets]) -> list[Array]:
+    """Densities of wo sent there by the visible facets of each lobe: by refraction, or by reflection where eta = 1."""
+    i, o = tuple(wi[:, None]), tuple(wo)
+    h = refraction.half_vector(i, o, eta)
+    cos_i, cos_o = ggx.dot(i, h), ggx.dot(o, h)
+    kept = (cos_i > 0) & ((cos_o > 0) == (eta == 1))
+    scale = kept * cos_i * refraction.jacobian(cos_i, cos_o, eta) / wi[2]
+
+    def visible(u: float, v: float, turn: float) -> Array:
+        return np.asarray(ggx.ndf(ggx.rotate(h, turn), u, v) * ggx.masking(ggx.rotate(i, turn), u, v))
+
+    return [scale * visible(*lobe) for lobe in lobes]

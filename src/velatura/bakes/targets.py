@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from velatura.bakes.look import Look
+from velatura.optics import fresnel
 from velatura.targets import blender, closures, gltf, openpbr, principled
 from velatura.targets.closures import Array, Pair
 from velatura.targets.parameters import RGB, Parameter, Values
@@ -20,7 +21,13 @@ Range: TypeAlias = tuple[float, float]
 class Target:
     """A program's material: its formulas, the parameters of a look, and the ranges of those that are fitted.
 
-    always: fitted for every stack; others only where a stack has what they stand for.
+    always: fitted for every stack; others only where a stack has what they stand for; no film: the program has none.
+    coat_eta, coat_brushed, coat_colour, coat_depth: whether the coat has an index, a brushing, a colour, and one that
+        deepens where light crosses it at an angle.
+    turned, pane: whether brushing can be turned, and light pass without refraction.
+    colour, roughness: the parameter that takes an image of a diffuse base's colour, where `metal` is less than .5, and
+        of the root of the one interface's alpha; none if empty.
+    images: endings of the files that it reads, which are then in sRGB; any where there are none.
     """
 
     title: str
@@ -31,6 +38,16 @@ class Target:
     brushed: dict[str, Range]
     clear: dict[str, Range]
     film: dict[str, Range]
+    coat_eta: bool = False
+    coat_brushed: bool = False
+    coat_colour: bool = False
+    coat_depth: bool = False
+    turned: bool = False
+    pane: bool = False
+    metal: str = ""
+    colour: str = ""
+    roughness: str = ""
+    images: tuple[str, ...] = ()
 
 
 UNIT = (0.0, 1.0)
@@ -102,7 +119,7 @@ def _gltf(look: Look) -> dict[str, float | RGB]:
         "transmissionFactor": look.clear,
     }
     if look.coat_eta > 1:
-        share = closures.f_0_of(look.coat_eta) / gltf.COAT_F_0
+        share = fresnel.normal_incidence(look.coat_eta) / gltf.COAT_F_0
         values |= {
             "clearcoatFactor": min(share, 1.0),
             "clearcoatRoughnessFactor": _roughness(_mean(look.coat_alpha)),
@@ -150,7 +167,7 @@ def _principled(look: Look) -> dict[str, float | RGB]:
         alpha = _mean(look.coat_alpha)
         smooth, rough = principled.COAT_ALPHA[1], principled.COAT_ALPHA[0]
         values |= {
-            "clearcoat": min(closures.f_0_of(look.coat_eta) / principled.COAT_F_0, 1.0),
+            "clearcoat": min(fresnel.normal_incidence(look.coat_eta) / principled.COAT_F_0, 1.0),
             "clearcoat_gloss": float(np.clip((rough - alpha) / (rough - smooth), 0, 1)),
         }
     return values
@@ -189,6 +206,14 @@ TARGETS: dict[str, Target] = {
         },
         clear={"transmission_weight": UNIT, "transmission_color": UNIT},
         film={"thin_film_weight": UNIT, "thin_film_ior": (1.001, 3.0), "thin_film_thickness": (0.01, 2.0)},
+        coat_eta=True,
+        coat_brushed=True,
+        coat_colour=True,
+        turned=True,
+        pane=True,
+        metal="base_metalness",
+        colour="base_color",
+        roughness="specular_roughness",
     ),
     "gltf": Target(
         "glTF",
@@ -212,6 +237,11 @@ TARGETS: dict[str, Target] = {
             "iridescenceIor": (1.001, 3.0),
             "iridescenceThicknessMaximum": (10.0, 2000.0),
         },
+        turned=True,
+        pane=True,
+        metal="metallicFactor",
+        colour="baseColorFactor",
+        images=(".png", ".jpg", ".jpeg"),
     ),
     "blender-principled": Target(
         "Blender's Principled BSDF",
@@ -234,6 +264,14 @@ TARGETS: dict[str, Target] = {
         brushed={"Anisotropic": UNIT, "Anisotropic Rotation": (-1.0, 2.0)},
         clear={"Transmission Weight": UNIT},
         film={"Thin Film IOR": (1.001, 3.0), "Thin Film Thickness": (10.0, 2000.0)},
+        coat_eta=True,
+        coat_colour=True,
+        coat_depth=True,
+        turned=True,
+        pane=True,
+        metal="Metallic",
+        colour="Base Color",
+        roughness="Roughness",
     ),
     "mitsuba-principled": Target(
         "Mitsuba's principled",

@@ -9,17 +9,11 @@ from typing import TypeAlias
 import numpy as np
 
 from velatura import binding, kernel
+from velatura.bakes.targets import Target
 from velatura.stack import Address, Brushing, Stack, Texture, Varying
 from velatura.targets.parameters import RGB, Values
 
 Means: TypeAlias = dict[str, "float | RGB"]
-
-#: By target: the parameter of a diffuse base's colour, the share of metal, and the roughness of the one interface of a
-#: stack, where the program can take the root of an image.
-COLOURS = {"openpbr": "base_color", "gltf": "baseColorFactor", "blender-principled": "Base Color"}
-METALS = {"openpbr": "base_metalness", "gltf": "metallicFactor", "blender-principled": "Metallic"}
-ROUGHNESSES = {"openpbr": "specular_roughness", "blender-principled": "Roughness"}
-OF_GLTF = (".png", ".jpg", ".jpeg")
 
 
 @dataclass(frozen=True)
@@ -58,7 +52,7 @@ def _mean(address: Address, value: Varying) -> float | RGB:
     return r, g, b
 
 
-def carried(stack: Stack, found: Means, target: str, values: Values) -> Iterator[tuple[str, Carried | str]]:
+def carried(stack: Stack, found: Means, target: Target, values: Values) -> Iterator[tuple[str, Carried | str]]:
     """Each varying value: its parameter and the image, or its flat name and what stands for it."""
     flat = stack.flat()
     for address, value in stack.values():
@@ -75,23 +69,22 @@ def carried(stack: Stack, found: Means, target: str, values: Values) -> Iterator
 
 
 def _taken(
-    stack: Stack, address: Address, image: Texture, found: Means, target: str, values: Values
+    stack: Stack, address: Address, image: Texture, found: Means, target: Target, values: Values
 ) -> tuple[str, Carried] | None:
     """The parameter of the target that is one to one with a value, and the image for it."""
     if image.offset or image.curve or image.scale <= 0:
         return None
     mean = np.maximum(found[address.name], 1e-6)
-    if stack.base and address.key == "albedo" and target in COLOURS and values[METALS[target]] < 0.5:  # type: ignore[operator]
-        factor = np.broadcast_to(image.scale * np.asarray(values[COLOURS[target]]) / mean, 3)
-        if target == "gltf" and (
-            image.encoding != "srgb" or image.texture.suffix.lower() not in OF_GLTF or factor.max() > 1.001
-        ):
+    if stack.base and address.key == "albedo" and target.colour and values[target.metal] < 0.5:  # type: ignore[operator]
+        factor = np.broadcast_to(image.scale * np.asarray(values[target.colour]) / mean, 3)
+        plain = image.encoding == "srgb" and image.texture.suffix.lower() in target.images and factor.max() <= 1.001
+        if target.images and not plain:
             return None
         r, g, b = (float(f"{x:.6g}") for x in factor)
-        return COLOURS[target], Carried(image, (r, g, b))
+        return target.colour, Carried(image, (r, g, b))
     flat = stack.flat()
     isotropic = address.key == "alpha_u" and flat[address.name[:-1] + "v"] == image
-    if target in ROUGHNESSES and len(stack.interfaces) == 1 and isotropic:
-        root = float(np.sqrt(image.scale / mean) * values[ROUGHNESSES[target]])
-        return ROUGHNESSES[target], Carried(image, float(f"{root:.6g}"))
+    if target.roughness and len(stack.interfaces) == 1 and isotropic:
+        root = float(np.sqrt(image.scale / mean) * values[target.roughness])
+        return target.roughness, Carried(image, float(f"{root:.6g}"))
     return None

@@ -40,7 +40,6 @@ Array = NDArray[Any]
 Sensitivity = Callable[[Array], Array]
 
 ORDERS = 3  # of interference
-EDGE = 1 / 7  # cosine of the second colour of a metal (Kutz et al. 2021)
 ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 GRAZING = 1e-3  # least cosine that a model is asked for
 
@@ -166,7 +165,7 @@ def _amplitudes(n_1: Any, n_2: Any, sin2: Array) -> tuple[Array, Array]:
 
 def _from_colours(eta: Array, k: Array) -> tuple[tuple[Array, Array], Array]:
     """n and k from the reflectances in a vacuum at the normal and at the edge, and the latter (Gulbrandsen 2014)."""
-    f_0, f_edge = (np.asarray(fresnel.conductor(c, eta, k)) for c in (1.0, EDGE))
+    f_0, f_edge = (np.asarray(fresnel.conductor(c, eta, k)) for c in (1.0, fresnel.EDGE))
     root = np.sqrt(f_0)
     n = (1 + root) / (1 - root) * (1 - f_edge) + (1 - f_0) / (1 + f_0) * f_edge
     return (n, np.sqrt(np.maximum((f_0 * (n + 1) ** 2 - (n - 1) ** 2) / (1 - f_0), 0))), f_edge
@@ -174,8 +173,8 @@ def _from_colours(eta: Array, k: Array) -> tuple[tuple[Array, Array], Array]:
 
 def _by_edge(cosine: Array, f_0: Array, f_edge: Array) -> Array:
     """Schlick's curve less a term that makes it `f_edge` at the edge (Kutz et al. 2021)."""
-    term = cosine * (1 - cosine) ** 6 / (EDGE * (1 - EDGE) ** 6)
-    return np.clip(fresnel.schlick(cosine, f_0) - term * (fresnel.schlick(EDGE, f_0) - f_edge), 0, 1)
+    term = cosine * (1 - cosine) ** 6 / (fresnel.EDGE * (1 - fresnel.EDGE) ** 6)
+    return np.clip(fresnel.schlick(cosine, f_0) - term * (fresnel.schlick(fresnel.EDGE, f_0) - f_edge), 0, 1)
 
 
 def fitted(path_nm: Array) -> Array:

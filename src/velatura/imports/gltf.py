@@ -17,6 +17,7 @@ from velatura.imports.parts import (
     OPAQUE,
     UNDISPERSED,
     absorbed,
+    alike,
     alphas,
     coated,
     index,
@@ -25,7 +26,7 @@ from velatura.imports.parts import (
 )
 from velatura.imports.result import Imported, Notes
 from velatura.imports.surface import WHITE, Coat, Metal, Surface, imported
-from velatura.imports.values import Value, changed
+from velatura.imports.values import Value
 from velatura.targets import gltf
 from velatura.targets.parameters import GREATEST, Parameter
 
@@ -64,12 +65,9 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
             albedo = given["baseColorFactor"]
     thickness_nm = given["iridescenceThicknessMaximum"]  # without an image, which is between both
     strength, weight = given.number("anisotropyStrength"), given.number("clearcoatFactor")
-    # KHR_materials_anisotropy: alpha across stays as it is
-    alpha = alphas(given["roughnessFactor"], 1.0, 1.0)
-    along = changed(alpha[0], lambda a: a + strength**2 * (1 - a)) if strength else alpha[0]
-    coat = Coat(COAT, alphas(given["clearcoatRoughnessFactor"], 1.0, 1.0) if weight else (0.0, 0.0))
+    coat = Coat(COAT, alike(given["clearcoatRoughnessFactor"]) if weight else (0.0, 0.0))
     surface = Surface(
-        alpha=(along, alpha[1]),
+        alpha=alphas(given["roughnessFactor"], lambda r: gltf.alphas(r, strength)),
         rotation=float(np.degrees(given.number("anisotropyRotation"))) if strength else 0.0,
         metal=metal,
         eta=index(given, "ior"),

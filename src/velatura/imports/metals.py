@@ -7,13 +7,12 @@ import numpy as np
 from velatura.imports.values import Array
 from velatura.optics import fresnel
 
-EDGE = 1 / 7  # cosine of the second colour, about 82 degrees (Kutz et al. 2021)
 BRIGHT = 0.7  # metals that reflect more have k above n
 MOST = 1 - 2e-3  # reflectance at the normal of which indices are sought
 
 
 def of_edge(reflectance: Array, edge: Array) -> tuple[Array, Array]:
-    """Index n + i k relative to the medium above, by its reflectances at the normal and at the cosine `EDGE`.
+    """Index n + i k relative to the medium above, by its reflectances at the normal and at the cosine `fresnel.EDGE`.
 
     For a given reflectance at the normal, that at the edge falls as n grows, from the smallest n to where k is 0, or n
     for what is brighter than `BRIGHT`. What lies beyond takes the nearest.
@@ -24,7 +23,7 @@ def of_edge(reflectance: Array, edge: Array) -> tuple[Array, Array]:
     most = np.where(r > BRIGHT, equal, most)
     for _ in range(60):
         n = 0.5 * (least + most)
-        brighter = np.asarray(fresnel.conductor(EDGE, n, _extinction(r, n))) > edge
+        brighter = np.asarray(fresnel.conductor(fresnel.EDGE, n, _extinction(r, n))) > edge
         least, most = np.where(brighter, n, least), np.where(brighter, most, n)
     return n, _extinction(r, n)
 
@@ -34,7 +33,7 @@ def of_f82_tint(reflectance: Array, tint: Array) -> tuple[Array, Array]:
 
     (Kutz et al. 2021)
     """
-    return of_edge(reflectance, tint * np.asarray(fresnel.schlick(EDGE, np.clip(reflectance, 0, MOST))))
+    return of_edge(reflectance, tint * np.asarray(fresnel.schlick(fresnel.EDGE, np.clip(reflectance, 0, MOST))))
 
 
 def of_edge_tint(reflectance: Array, tint: Array) -> tuple[Array, Array]:

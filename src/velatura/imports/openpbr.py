@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from velatura.imports.given import Given
-from velatura.imports.metals import EDGE, of_f82_tint
+from velatura.imports.metals import of_f82_tint
 from velatura.imports.parts import (
     BELOW,
     COVERS,
@@ -72,7 +72,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
             given.leave("geometry_thin_walled", OPAQUE)
     weight, eta = given.number("coat_weight"), index(given, "coat_ior")
     surface = Surface(
-        alpha=stretched(given["specular_roughness"], given.number("specular_roughness_anisotropy")),
+        alpha=_alpha(given, "specular_roughness"),
         rotation=given.number("geometry_tangent"),
         metal=metal,
         eta=index(given, "specular_ior"),
@@ -87,7 +87,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
             weight,
             Coat(
                 eta,
-                stretched(given["coat_roughness"], given.number("coat_roughness_anisotropy")) if weight else (0.0, 0.0),
+                _alpha(given, "coat_roughness") if weight else (0.0, 0.0),
                 given.number("geometry_coat_tangent"),
                 colour=given["coat_color"] if weight else WHITE,
                 darkening=given.number("coat_darkening"),
@@ -100,18 +100,18 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
     return imported(surface, notes, name, "imported from OpenPBR")
 
 
-def stretched(roughness: Value, anisotropy: float) -> tuple[Value, Value]:
-    """GGX alpha along the tangent and the bitangent (OpenPBR 1.1, "Microfacet model")."""
-    longer = float(np.sqrt(2 / (1 + (1 - anisotropy) ** 2)))
-    return alphas(roughness, longer, (1 - anisotropy) * longer)
+def _alpha(given: Given, roughness: str) -> tuple[Value, Value]:
+    anisotropy = given.number(f"{roughness}_anisotropy")
+    return alphas(given[roughness], lambda r: openpbr.alphas(r, anisotropy))
 
 
 def _metal(given: Given) -> Metal:
     weight = given.number("base_weight") * given.number("specular_weight")
     reflectance, tint = changed(given["base_color"], lambda c: weight * c), given.colour("specular_color")
     if isinstance(reflectance, tuple):
-        shown = np.array(tint) * fresnel.schlick(EDGE, np.array(reflectance))
-        missed = np.asarray(fresnel.conductor(EDGE, *of_f82_tint(np.array(reflectance), np.array(tint)))) - shown
+        shown = np.array(tint) * fresnel.schlick(fresnel.EDGE, np.array(reflectance))
+        nearest = of_f82_tint(np.array(reflectance), np.array(tint))
+        missed = np.asarray(fresnel.conductor(fresnel.EDGE, *nearest)) - shown
         if np.max(missed) > MISSED:
             given.notes.add(
                 "specular_color", tint, "no metal reflects so little towards the edge: the nearest is taken"

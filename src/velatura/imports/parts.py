@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -29,10 +30,15 @@ def index(given: Given, name: str) -> float:
     return float(np.clip(given.number(name), *INDICES))
 
 
-def alphas(roughness: Value, u: float, v: float) -> tuple[Value, Value]:
-    """alpha as multiples of the square of a roughness, at most 1."""
-    along, across = (changed(roughness, lambda r, x=x: np.minimum(x * r * r, 1)) for x in (u, v))  # type: ignore[misc]
+def alphas(roughness: Value, of: Callable[[Array], tuple[Array, Array]]) -> tuple[Value, Value]:
+    """alpha along the tangent and across it, at most 1, as a function `of` the roughness."""
+    along, across = (changed(roughness, lambda r, n=n: np.minimum(of(r)[n], 1)) for n in (0, 1))  # type: ignore[misc]
     return along, across
+
+
+def alike(roughness: Value) -> tuple[Value, Value]:
+    """alpha along both axes, the square of a roughness."""
+    return alphas(roughness, lambda r: (r * r, r * r))
 
 
 def coated(notes: Notes, name: str, weight: float, coat: Coat) -> Coat | None:

@@ -17,6 +17,7 @@ from velatura.imports.values import Value, changed
 from velatura.stack import RGB
 from velatura.stack.spectra import LUMINANCE
 from velatura.targets import principled
+from velatura.targets.closures import burley
 from velatura.targets.parameters import Parameter
 
 PARAMETERS = (*principled.PARAMETERS, Parameter("specular", 0.5))
@@ -48,11 +49,12 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
             tint = changed(given["base_color"], np.sqrt)  # of each crossing
         else:
             albedo = given["base_color"]
-    aspect = float(np.sqrt(1 - 0.9 * given.number("anisotropic")))
+    anisotropic = given.number("anisotropic")
     gloss = given.number("clearcoat_gloss")
-    blur = 0.1 + gloss * (0.001 - 0.1)
+    rough, smooth = principled.COAT_ALPHA
+    blur = rough + gloss * (smooth - rough)
     surface = Surface(
-        alpha=alphas(given["roughness"], 1 / aspect, aspect),
+        alpha=alphas(given["roughness"], lambda r: burley(r, anisotropic)),
         metal=metal,
         eta=float(eta),
         specular=specular,

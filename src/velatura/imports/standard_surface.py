@@ -132,7 +132,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
 def _alpha(roughness: Value, anisotropy: float) -> tuple[Value, Value]:
     """GGX alpha along the axes (`roughness_anisotropy` of MaterialX)."""
     aspect = float(np.sqrt(1 - min(anisotropy, 1 - LEAST_ASPECT)))
-    return alphas(roughness, 1 / aspect, aspect)
+    return alphas(roughness, lambda r: (r * r / aspect, r * r * aspect))
 
 
 def _tint(given: Given, pane: bool) -> Value:

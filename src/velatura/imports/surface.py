@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura.imports.metals import EDGE, MOST, of_edge
+from velatura.imports.metals import MOST, of_edge
 from velatura.imports.result import Imported, Notes
 from velatura.imports.values import Array, Value, changed, middle, rounded
 from velatura.model.stack_lobes import stack_lobes
@@ -144,9 +144,9 @@ def _metal(surface: Surface, metal: Metal, outside: float | None, notes: Notes) 
         n, k = metal.index(reflectance, tint)
         if outside is None or delta == 1:
             return n, k
-        below = [np.asarray(fresnel.conductor(c, n / outside, k / outside)) for c in (1.0, EDGE)]
+        below = [np.asarray(fresnel.conductor(c, n / outside, k / outside)) for c in (1.0, fresnel.EDGE)]
         inside = float(fresnel.normal_incidence(outside))
-        kept = [reflectance, np.asarray(fresnel.conductor(EDGE, n, k))]
+        kept = [reflectance, np.asarray(fresnel.conductor(fresnel.EDGE, n, k))]
         kept = [r / (1 - inside + r * inside) for r in kept]
         r, edge = (there + delta * (here - there) for here, there in zip(below, kept))
         n, k = of_edge(r, edge)

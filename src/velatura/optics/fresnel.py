@@ -13,6 +13,7 @@ from velatura.ops import Value
 
 Complex = tuple[Value, Value]
 
+EDGE = 1 / 7  # cosine at which metals have a second colour, about 82 degrees (Kutz et al. 2021)
 SMALL = 1e-18  # fourth power of cosines at which all is reflected
 
 

@@ -30,12 +30,6 @@ PARAMETERS = (
 )
 
 
-def alphas(roughness: float, anisotropic: float) -> tuple[float, float]:
-    """GGX roughness along the tangent and across it (Burley 2012)."""
-    aspect = np.sqrt(1 - 0.9 * anisotropic)
-    return roughness**2 / aspect, roughness**2 * aspect
-
-
 def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     """f |cos theta_o| (3, N) of the node with multiple scattering: no subsurface, sheen or emission.
 
@@ -44,12 +38,12 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     v = complete(PARAMETERS, given)
     base, tint, coat_tint = (np.reshape(v[name], (3, 1)) for name in ("Base Color", "Specular Tint", "Coat Tint"))
     cos_i = pair.cos_i
-    au, av = closures.anisotropic(*alphas(v["Roughness"], v["Anisotropic"]))
+    au, av = closures.anisotropic(*closures.burley(v["Roughness"], v["Anisotropic"]))
     mean, turn = float(np.sqrt(au * av)), 2 * np.pi * v["Anisotropic Rotation"]
     lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
 
     # Index scaled by its level, where .5 leaves it as it is
-    f_0 = float(np.clip(2 * v["Specular IOR Level"] * closures.f_0_of(v["IOR"]), 0, 0.99))
+    f_0 = float(np.clip(2 * v["Specular IOR Level"] * fresnel.normal_incidence(v["IOR"]), 0, 0.99))
     eta = (1 + np.sqrt(f_0)) / (1 - np.sqrt(f_0))
     share = (fresnel.dielectric(pair.cos_d, eta) - f_0) / (1 - f_0)
     f_dielectric: Array = np.clip(f_0 * tint + (1 - f_0 * tint) * share, 0, 1)
@@ -82,7 +76,7 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     coat, eta_c = v["Coat Weight"], v["Coat IOR"]
     tinted = coat_tint ** (1 / np.maximum(fresnel.cos_transmitted(cos_i, eta_c), 1e-3))
     alpha = max(v["Coat Roughness"] ** 2, closures.ALPHA_MIN)
-    f_0 = closures.f_0_of(eta_c)
+    f_0 = fresnel.normal_incidence(eta_c)
     f_coat = fresnel.dielectric(pair.cos_d, eta_c) if eta_c != 1 else 0 * pair.cos_d
     top = (
         f_coat * closures.compensation(cos_i, alpha, f_coat) * pair.reflected * closures.microfacets(pair, alpha, alpha)

@@ -14,14 +14,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.optics import fresnel, ggx
+from velatura.optics import fresnel, ggx, refraction
 from velatura.sampling.low_discrepancy import square
 
 Array: TypeAlias = NDArray[np.floating]
 Number: TypeAlias = Any  # a float or an array
 
 ALPHA_MIN = 1e-3  # as the models evaluate smooth lobes
-F82 = 1 / 7  # cosine at which the colour of a metal's edge is given
 
 
 @dataclass(frozen=True)
@@ -60,6 +59,12 @@ class Pair:
         return np.clip(np.sum(self.wi * self.h, axis=0), 0, 1)
 
 
+def burley(roughness: Number, anisotropic: float) -> tuple[Number, Number]:
+    """GGX roughness along the tangent and across it (Burley 2012)."""
+    aspect = np.sqrt(1 - 0.9 * anisotropic)
+    return roughness**2 / aspect, roughness**2 * aspect
+
+
 def anisotropic(alpha_u: Number, alpha_v: Number) -> tuple[Number, Number]:
     """Roughnesses that can be evaluated."""
     return np.clip(alpha_u, ALPHA_MIN, 1), np.clip(alpha_v, ALPHA_MIN, 1)
@@ -70,31 +75,42 @@ def microfacets(pair: Pair, alpha_u: Number, alpha_v: Number, turn: float = 0.0,
 
     `turn`: of the first axis from the tangent, radians; `correlated`: in height (Heitz 2014, Eq. 99), or separable.
     """
-    wi, wo, h = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, pair.h))
+    return _facets(pair, pair.h, alpha_u, alpha_v, turn, correlated) / 4
+
+
+def refracted(
+    pair: Pair,
+    eta: float,
+    alpha_u: Number,
+    alpha_v: Number,
+    turn: float = 0.0,
+    correlated: bool = True,
+    passing: Callable[[Array], Array] = np.ones_like,
+) -> Array:
+    """Light that rough facets refract into a medium of relative index eta (Walter 2007, Eq. 21).
+
+    Where eta is 1, facets do not deflect light; it is then blurred as by a mirror. `passing`: the transmittance of a
+    facet by the cosine to its normal.
+    """
+    below = 1 - pair.reflected
+    if abs(eta - 1) < 1e-3:
+        return below * microfacets(pair, alpha_u, alpha_v, turn, correlated)
+    wi, wo = tuple(pair.wi), tuple(pair.wo)
+    h = refraction.half_vector(wi, wo, eta)
+    cos_i, cos_o = ggx.dot(wi, h), ggx.dot(wo, h)
+    kept = below * (cos_i > 0) * (cos_o < 0) * passing(np.maximum(cos_i, 0))
+    scale = kept * np.abs(cos_i) * refraction.jacobian(cos_i, cos_o, eta)
+    return np.asarray(scale * _facets(pair, np.stack(h), alpha_u, alpha_v, turn, correlated))
+
+
+def _facets(pair: Pair, h: Array, alpha_u: Number, alpha_v: Number, turn: float, correlated: bool) -> Array:
+    """D G / cos theta_i of the normals h, that are seen from wi and from `straight`."""
+    wi, wo, normal = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, h))
     visible_i, visible_o = ggx.masking(wi, alpha_u, alpha_v), ggx.masking(wo, alpha_u, alpha_v)
     both = visible_i * visible_o
     if correlated:
         both = both / np.maximum(visible_i + visible_o - both, 1e-12)
-    return np.asarray(ggx.ndf(h, alpha_u, alpha_v) * both / (4 * pair.cos_i))
-
-
-def refracted(pair: Pair, eta: float, alpha_u: Number, alpha_v: Number, turn: float = 0.0) -> Array:
-    """Light that rough facets refract, of transmittance 1, into a medium of relative index eta (Walter 2007, Eq. 21).
-
-    Where eta is 1, facets do not deflect light; it is then blurred as by a mirror.
-    """
-    below = 1 - pair.reflected
-    if abs(eta - 1) < 1e-3:
-        return np.asarray(below * microfacets(pair, alpha_u, alpha_v, turn))
-    h = pair.wi + eta * pair.wo
-    h = h / np.sqrt(np.maximum(np.sum(h * h, axis=0), 1e-12)) * np.where(h[2] < 0, -1.0, 1.0)
-    i_h, o_h = np.sum(pair.wi * h, axis=0), np.sum(pair.wo * h, axis=0)
-    wi, wo, turned = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, h))
-    visible_i, visible_o = ggx.masking(wi, alpha_u, alpha_v), ggx.masking(wo, alpha_u, alpha_v)
-    both = visible_i * visible_o / np.maximum(visible_i + visible_o - visible_i * visible_o, 1e-12)
-    scale = eta**2 * np.abs(i_h * o_h) / (pair.cos_i * np.maximum((i_h + eta * o_h) ** 2, 1e-12))
-    kept = below * (i_h > 0) * (o_h < 0)
-    return np.asarray(kept * ggx.ndf(turned, alpha_u, alpha_v) * both * scale)
+    return np.asarray(ggx.ndf(normal, alpha_u, alpha_v) * both / pair.cos_i)
 
 
 def lambert(pair: Pair) -> Array:
@@ -128,12 +144,9 @@ def schlick(cosine: Number, f_0: Number, f_90: Number = 1.0) -> Array:
 
 def tinted(cosine: Array, f_0: Array, f_82: Array) -> Array:
     """Schlick's reflectance of a metal, times f_82 at about 82 degrees (Kutz et al. 2021)."""
-    at_82 = schlick(F82, f_0) * (1 - f_82) / (F82 * (1 - F82) ** 6)
+    edge = fresnel.EDGE
+    at_82 = schlick(edge, f_0) * (1 - f_82) / (edge * (1 - edge) ** 6)
     return np.asarray(np.clip(schlick(cosine, f_0) - at_82 * cosine * (1 - cosine) ** 6, 0, 1))
-
-
-def f_0_of(eta: float) -> float:
-    return ((eta - 1) / (eta + 1)) ** 2
 
 
 NODES = 20  # of cosines, of roughnesses, and of indices
@@ -234,7 +247,7 @@ def film_by_schlick(cosine: Array, eta: float, thickness_nm: float, f_0: Array) 
     cos_2 = fresnel.cos_transmitted(cosine, eta)
     root = np.sqrt(np.minimum(f_0 + 1e-4, 0.9999))
     base = (1 + root) / (1 - root)
-    r_12 = np.broadcast_to(schlick(cosine, f_0_of(eta)), (3, *np.shape(cosine)))
+    r_12 = np.broadcast_to(schlick(cosine, fresnel.normal_incidence(eta)), (3, *np.shape(cosine)))
     r_23 = schlick(cos_2, ((base - eta) / (base + eta)) ** 2)
     phase = pi + np.where(base < eta, pi, 0.0)
     return np.maximum(_interference(r_12, r_23, 2 * eta * thickness_nm * cos_2, phase, _TO_RGB, 1e-5), 0)

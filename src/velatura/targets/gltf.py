@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from velatura.optics import fresnel
 from velatura.targets import closures
-from velatura.targets.closures import Array, Pair
+from velatura.targets.closures import Array, Number, Pair
 from velatura.targets.parameters import GREATEST, Parameter, Values, complete
 
 CORE = "pbrMetallicRoughness"
@@ -42,7 +43,7 @@ PARAMETERS = (
 COAT_F_0 = 0.04  # of an index of 1.5
 
 
-def alphas(roughness: float, strength: float) -> tuple[float, float]:
+def alphas(roughness: Number, strength: float) -> tuple[Number, Number]:
     """GGX roughness along the direction of anisotropy and across it (KHR_materials_anisotropy)."""
     return roughness**2 * (1 - strength**2) + strength**2, roughness**2
 
@@ -56,7 +57,7 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
 
     # Fresnel reflectance of both bases, with the film's
-    f_0 = np.minimum(closures.f_0_of(v["ior"]) * tint, 1.0) * v["specularFactor"]
+    f_0 = np.minimum(fresnel.normal_incidence(v["ior"]) * tint, 1.0) * v["specularFactor"]
     f_dielectric = closures.schlick(pair.cos_d, f_0, v["specularFactor"])
     f_metal = closures.schlick(pair.cos_d, base)
     if v["iridescenceFactor"] > 0 and v["iridescenceThicknessMaximum"] > 0:

@@ -6,7 +6,7 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.targets import closures
-from velatura.targets.closures import Array, Pair
+from velatura.targets.closures import Array, Number, Pair
 from velatura.targets.parameters import GREATEST, Parameter, Values, complete
 
 #: Of the node `open_pbr_surface`; emission, opacity, normals and thin walls are no numbers of the interface.
@@ -53,7 +53,7 @@ TURNS = (
 )
 
 
-def alphas(roughness: float, anisotropy: float) -> tuple[float, float]:
+def alphas(roughness: Number, anisotropy: float) -> tuple[Number, Number]:
     """GGX roughness along the tangent and across it (section Microfacet model)."""
     along = roughness**2 * np.sqrt(2 / (1 + (1 - anisotropy) ** 2))
     return along, along * (1 - anisotropy)
@@ -81,7 +81,7 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     # Index of the dielectric base under the coat, scaled by its weight
     ratio = v["specular_ior"] / v["coat_ior"]
     eta = (1 - coat) * v["specular_ior"] + coat * max(ratio, 1 / ratio)
-    epsilon = np.sign(eta - 1) * np.sqrt(np.clip(v["specular_weight"] * closures.f_0_of(eta), 0, 0.99999))
+    epsilon = np.sign(eta - 1) * np.sqrt(np.clip(v["specular_weight"] * fresnel.normal_incidence(eta), 0, 0.99999))
     eta = float((1 + epsilon) / (1 - epsilon))
 
     # Metal, and dielectric over a diffuse or transparent base
@@ -104,7 +104,8 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     metal_part = v["specular_weight"] * f_metal * closures.compensation(cos_i, mean, f_metal) * lobe
     shown = closures.compensation(cos_i, mean, f_dielectric)
     over = specular * f_dielectric * shown * lobe
-    kept = 1 - closures.dielectric_albedo(cos_i, mean, eta) * closures.compensation(cos_i, mean, closures.f_0_of(eta))
+    f_0 = fresnel.normal_incidence(eta)
+    kept = 1 - closures.dielectric_albedo(cos_i, mean, eta) * closures.compensation(cos_i, mean, f_0)
     diffuse = v["base_weight"] * closures.oren_nayar(pair, base, v["base_diffuse_roughness"])
     through = transmitted * closures.refracted(pair, 1.0 if thin else eta, au, av, turn)
     clear = v["transmission_weight"]
@@ -113,7 +114,7 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
 
     # Coat: darkening, absorption, and its own reflection on top
     eta_c = v["coat_ior"]
-    f_0 = closures.f_0_of(eta_c)
+    f_0 = fresnel.normal_incidence(eta_c)
     inside = 1 - (1 - f_0) / eta_c**2
     metal_albedo = base * v["specular_weight"]
     estimate = (1 - v["base_metalness"]) * base + v["base_metalness"] * metal_albedo

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from velatura.optics import fresnel, ggx
+from velatura.optics import fresnel
+from velatura.stack.spectra import LUMINANCE
 from velatura.targets import closures
 from velatura.targets.closures import Array, Pair
 from velatura.targets.parameters import GREATEST, Parameter, Values, complete
@@ -25,16 +26,9 @@ PARAMETERS = (
     Parameter("clearcoat_gloss", 0.0),
 )
 
-LUMINANCE = np.array([[0.212671], [0.715160], [0.072169]])
 COAT_ALPHA = (0.1, 0.001)  # of a gloss of 0 and of 1
 COAT_F_0, COAT_MASKING = 0.04, 0.25
 UNRESOLVED = 0.01  # excess of an index over 1
-
-
-def alphas(roughness: float, anisotropic: float) -> tuple[float, float]:
-    """GGX roughness along the tangent and across it (Burley 2012)."""
-    aspect = np.sqrt(1 - 0.9 * anisotropic)
-    return max(0.001, roughness**2 / aspect), max(0.001, roughness**2 * aspect)
 
 
 def value(given: Values, pair: Pair, thin: bool = False) -> Array:
@@ -43,16 +37,16 @@ def value(given: Values, pair: Pair, thin: bool = False) -> Array:
     base = np.reshape(v["base_color"], (3, 1))
     # The plugin takes an index of 1 for 1.001 where light passes
     eta = 1.001 if v["eta"] == 1 and v["spec_trans"] else v["eta"]
-    luminance = float((LUMINANCE * base).sum())
+    luminance = float(np.dot(LUMINANCE, v["base_color"]))
     hue = base / luminance if luminance > 0 else np.ones((3, 1))
     metallic = v["metallic"]
     brdf, glass = (1 - metallic) * (1 - v["spec_trans"]), (1 - metallic) * v["spec_trans"]
-    au, av = alphas(v["roughness"], v["anisotropic"])
+    au, av = np.maximum(closures.burley(v["roughness"], v["anisotropic"]), closures.ALPHA_MIN)
     cos_i, cos_o, cos_d, up = pair.cos_i, pair.cos_o, pair.cos_d, pair.reflected
 
     # Reflection of metal, and of a dielectric whose reflectance may be tinted
     f = fresnel.dielectric(cos_d, eta) if eta != 1 else 0 * cos_d
-    f_tinted = closures.schlick(cos_d, hue * closures.f_0_of(eta))
+    f_tinted = closures.schlick(cos_d, hue * fresnel.normal_incidence(eta))
     reflectance = (1 - metallic) * ((1 - v["spec_tint"]) * f + v["spec_tint"] * f_tinted)
     reflectance = reflectance + metallic * closures.schlick(cos_d, base)
     found = up * (f > 0) * reflectance * closures.microfacets(pair, au, av, correlated=False)
@@ -87,16 +81,12 @@ def value(given: Values, pair: Pair, thin: bool = False) -> Array:
 
 
 def _refracted(pair: Pair, eta: float, alpha_u: float, alpha_v: float) -> Array:
-    """As energy, with the Fresnel transmittance of each facet, and separable masking.
-
-    Facets that hardly deflect light leave a lobe too narrow to be resolved; it then has that of the least roughness.
-    """
+    """Facets that hardly deflect light leave a lobe too narrow to be resolved; it then has that of the least
+    roughness."""
     if eta - 1 < UNRESOLVED:
         return closures.refracted(pair, 1.0, closures.ALPHA_MIN, closures.ALPHA_MIN)
-    h = pair.wi + eta * pair.wo
-    h = h / np.sqrt(np.maximum(np.sum(h * h, axis=0), 1e-12)) * np.where(h[2] < 0, -1.0, 1.0)
-    i_h, o_h = np.sum(pair.wi * h, axis=0), np.sum(pair.wo * h, axis=0)
-    masking = ggx.masking(tuple(pair.wi), alpha_u, alpha_v) * ggx.masking(tuple(pair.straight), alpha_u, alpha_v)
-    scale = eta**2 * np.abs(i_h * o_h) / (pair.cos_i * np.maximum((i_h + eta * o_h) ** 2, 1e-12))
-    kept = (1 - pair.reflected) * (i_h > 0) * (o_h < 0) * (1 - fresnel.dielectric(np.maximum(i_h, 0), eta))
-    return np.asarray(kept * ggx.ndf(tuple(h), alpha_u, alpha_v) * masking * scale)
+
+    def passing(cosine: Array) -> Array:
+        return np.asarray(1 - fresnel.dielectric(cosine, eta))
+
+    return closures.refracted(pair, eta, alpha_u, alpha_v, correlated=False, passing=passing)
