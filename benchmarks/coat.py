@@ -7,7 +7,7 @@ Walks are a sweep; STORE keeps them, and one that was interrupted goes on.
 Coats have an index of 1.2 to 2 and an alpha of 0 to .5; the metals below have an alpha of .01 to .5, eta of .2 to 2
 and k of .7 to 5. The walk meets one facet per interface for the roughness, as renderers do, and any number for the
 energy. Printed: of log(alpha / true alpha) and of energy / true energy - 1 the mean and the 90th percentile of their
-sizes, and the bias. The formulas are those of docs/coat.md.
+sizes, and the bias. The formulas are those of docs/explanation/coat.md.
 """
 
 from __future__ import annotations

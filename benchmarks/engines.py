@@ -2,7 +2,7 @@
 
 Instructions are those of SPIR-V that compute, on vectors counted once, as glslangValidator writes them, in all rounds
 of loops and on both sides of branches; bytes are those of fetched texels. Of a pixel with one light: `vt_lobes` and
-`vt_eval_pdf`, once each. Prints the table of docs/engines.md.
+`vt_eval_pdf`, once each. Prints the table of docs/how-to/engines.md.
 
     python benchmarks/engines.py [--presets coated-gold,varnished-paint,frosted-glass]
 """

@@ -3,7 +3,7 @@
 GLSL ES runs in headless Chromium, the others as tests/shared/machines.py says. Of a model that solves materials code
 holds a single one: then there is one stack to a pattern, and 10^4 directions. For each language and model the largest
 difference in energy, alpha, value and density, where it was met, and what a shader costs: time to record and print, its
-lines, and time to compile and run it. At the end the tables of docs/shaders.md.
+lines, and time to compile and run it. At the end the tables of docs/how-to/shaders.md.
 
     python benchmarks/shader.py [--language all] [--models belcour2018,velatura] [--count 10000] [--seed 0] [--textured]
 """

@@ -1,15 +1,14 @@
-"""MkDocs hooks: insert the program's own help and numbers into the manual, so that the two cannot disagree.
+"""A Sphinx extension: insert the program's own help and numbers into the manual, so that the two cannot disagree.
 
 `<!-- parameters -->` becomes the table of a material's parameters, `<!-- help VERB -->` the output of
 `velatura VERB --help`.
-
-`<!-- source of recover.py -->` becomes the text of a script in docs/, `<!-- output of recover.py -->` what it prints.
-The build runs it with the path of a picture, which pages know as `images/recover.png`.
 
 `{{belcour2018-13: rmse/forward}}` becomes a number of `docs/figures/belcour2018-13.json`, which `make figures`
 computes. After the figure's name stand the keys that lead to the number; an item of a list has an index or its name. A
 number with a standard error (`x` beside `x_error`) is printed with it, others to three places, or to as many as ` to 2`
 asks for.
+
+A link to a script in `docs/examples` becomes one to its page in the gallery, where it stands with its picture.
 """
 
 from __future__ import annotations
@@ -19,7 +18,6 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 from functools import cache
 from math import floor, log10
 from pathlib import Path
@@ -27,25 +25,24 @@ from typing import Any
 
 DOCS = Path(__file__).parents[1] / "docs"
 FIGURES = DOCS / "figures"
-SCRIPTS = ("recover.py", "recover_texture.py", "coats.py")
 PLACES = 3  # after the point
 
 
-def on_files(files: Any, config: Any) -> Any:
-    """Adds the pictures of the scripts."""
-    from mkdocs.structure.files import File
-
-    for script in SCRIPTS:
-        files.append(File.generated(config, f"images/{Path(script).stem}.png", content=_ran(script)[1]))
-    return files
+def setup(app: Any) -> dict[str, bool]:
+    app.connect("source-read", _on_source_read)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Replaces the placeholders of a page."""
+def _on_source_read(app: Any, page: str, source: list[str]) -> None:
+    if app.env.doc2path(page).suffix == ".md":
+        source[0] = replaced(source[0])
+
+
+def replaced(markdown: str) -> str:
+    """A page with its placeholders replaced."""
     markdown = re.sub(r"<!-- parameters -->", lambda _: _parameters(), markdown)
-    markdown = re.sub(r"<!-- source of (\S+) -->", lambda match: _source(match[1]), markdown)
-    markdown = re.sub(r"<!-- output of (\S+) -->", lambda match: f"```text\n{_ran(match[1])[0]}\n```", markdown)
     markdown = re.sub(r"\{\{(.*?)\}\}", lambda match: _number(match[1]), markdown)
+    markdown = re.sub(r"\]\(((?:\.\./)*)examples/(\w+)\.py\)", r"](\1gallery/\2.rst)", markdown)
     return re.sub(r"<!-- help( \w+)? -->", lambda match: _help((match[1] or "").split()), markdown)
 
 
@@ -53,21 +50,6 @@ def _parameters() -> str:
     from velatura.stack import parameter_table
 
     return parameter_table()
-
-
-def _source(script: str) -> str:
-    return f"```python\n{(DOCS / script).read_text().rstrip()}\n```"
-
-
-@cache
-def _ran(script: str) -> tuple[str, bytes]:
-    """What a script prints, and the picture that it makes. Raises CalledProcessError where it fails."""
-    with tempfile.TemporaryDirectory() as folder:
-        picture = Path(folder, "picture.png")
-        run = subprocess.run(
-            [sys.executable, DOCS / script, picture], check=True, capture_output=True, text=True, cwd=folder
-        )
-        return run.stdout.rstrip(), picture.read_bytes()
 
 
 def _help(verb: list[str]) -> str:

@@ -28,7 +28,7 @@ mi: Any = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
 Run = Callable[..., tuple[int, str, str]]
-DOCS = Path(__file__).parents[2] / "docs" / "laws.md"
+DOCS = Path(__file__).parents[2] / "docs" / "explanation" / "laws.md"
 
 
 class Made(mi.BSDF):

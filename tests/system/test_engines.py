@@ -1,4 +1,4 @@
-"""The code of docs/engines.md, run against integrals of the shader that it uses."""
+"""The code of docs/how-to/engines.md, run against integrals of the shader that it uses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import velatura as vt
 from velatura.shader import shader
 from velatura.shader.glsl import Vulkan
 
-PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "engines.md"
 
 # An engine by brute force: GGX of reflectance 1 with separable masking, an environment, and a light that is a cone
 ENGINE = """

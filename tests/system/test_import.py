@@ -137,7 +137,7 @@ def test_images_are_rendered_by_their_curves(tmp_path: Path) -> None:
 
 def test_the_examples_of_the_manual_run(tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """Expected: the page's file is read by its commands and its code."""
-    page = (Path(__file__).parents[2] / "docs" / "imports.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "how-to" / "imports.md").read_text()
     monkeypatch.chdir(tmp_path)
     (document,) = re.findall(r"```xml\n(.*?)```", page, re.DOTALL)
     Path("varnished.mtlx").write_text(document)
@@ -152,7 +152,7 @@ def test_the_table_of_the_manual_is_that_of_the_benchmark() -> None:
     """Expected: energies and roughness within .002, of one metal and one paint."""
     root = Path(__file__).parents[2]
     benchmark = runpy.run_path(str(root / "benchmarks" / "imports.py"))
-    page = (root / "docs" / "imports.md").read_text()
+    page = (root / "docs" / "how-to" / "imports.md").read_text()
     for name in ("copper, smooth coat", "paint, coat"):
         parameters = benchmark["MATERIALS"][name]
         theirs, ours = (

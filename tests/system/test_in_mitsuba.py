@@ -1,4 +1,4 @@
-"""The manual's page on Mitsuba: its script finds what it looks for."""
+"""The examples of gradients: they find what they look for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-DOCS = Path(__file__).parents[2] / "docs"
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
 def test_the_worked_optimisation_comes_close(tmp_path: Path) -> None:
@@ -16,7 +16,7 @@ def test_the_worked_optimisation_comes_close(tmp_path: Path) -> None:
     """
     code = f"""
 import runpy
-script = runpy.run_path({str(DOCS / "recover.py")!r})
+script = runpy.run_path({str(EXAMPLES / "recover.py")!r})
 found = script["recover"](size=16, spp=16, steps=12)
 for name, true in script["TRUE"].items():
     assert abs(found[name] - true) < abs(script["START"][name] - true) / 2, found
@@ -28,7 +28,7 @@ def test_a_texture_below_a_coat_is_found(tmp_path: Path) -> None:
     """In a smaller form: texels come from .098 to .06 or nearer, in 8 steps."""
     code = f"""
 import runpy
-script = runpy.run_path({str(DOCS / "recover_texture.py")!r})
+script = runpy.run_path({str(EXAMPLES / "recover_texture.py")!r})
 found = script["difference"](script["recover"](size=24, spp=16, steps=8))
 assert found < 0.06, found
 """

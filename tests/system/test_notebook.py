@@ -14,7 +14,7 @@ nbformat = pytest.importorskip("nbformat")
 nbclient = pytest.importorskip("nbclient")
 pytest.importorskip("anywidget")
 
-NOTEBOOK = Path(__file__).parents[2] / "docs" / "inverse-design.ipynb"
+NOTEBOOK = Path(__file__).parents[2] / "docs" / "tutorials" / "inverse-design.ipynb"
 LARGEST = 600_000  # bytes
 
 

@@ -197,12 +197,10 @@ def test_jobs_of_submitit_are_an_executor(tmp_path: Path) -> None:
 
 
 def test_the_tutorial_fits_a_slice_of_its_map(tmp_path: Path) -> None:
-    """Expected: of 8 by 8 coats, the constants that 100 by 100 give, within 5 %, and a picture."""
-    script = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "coats.py"))
+    """Expected: of 8 by 8 coats, the constants that 100 by 100 give, within 5 %."""
+    script = runpy.run_path(str(Path(__file__).parents[2] / "docs" / "examples" / "coats.py"))
     with ThreadPoolExecutor(1) as executor:
         alpha = script["apparent"](script["coats"](tmp_path / "coats.zarr", steps=8, executor=executor))
     constants, rest = script["fitted"](alpha)
     assert constants == pytest.approx(CONSTANTS, rel=0.05)
     assert float(abs(rest).mean()) < 0.03
-    script["draw"](alpha, constants, str(tmp_path / "map.png"))
-    assert (tmp_path / "map.png").stat().st_size > 10_000

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
-import subprocess
 from pathlib import Path
 from types import ModuleType
 
@@ -47,20 +46,11 @@ def example(hooks: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     ],
 )
 def test_a_placeholder_becomes_a_number(example: ModuleType, placeholder: str, printed: str) -> None:
-    assert example.on_page_markdown(f"| {{{{{placeholder}}}}} |") == f"| {printed} |"
+    assert example.replaced(f"| {{{{{placeholder}}}}} |") == f"| {printed} |"
 
 
-def test_a_script_is_shown_with_what_it_printed(
-    hooks: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(hooks, "DOCS", tmp_path)
-    (tmp_path / "some.py").write_text("import sys\nprint('found 7')\nopen(sys.argv[1], 'w').write('a picture')\n")
-    page = hooks.on_page_markdown("<!-- source of some.py -->\n<!-- output of some.py -->")
-    assert page.startswith("```python\nimport sys\n") and page.endswith("```text\nfound 7\n```")
-    assert hooks._ran("some.py") == ("found 7", b"a picture")
-    (tmp_path / "wrong.py").write_text("import sys\nsys.exit(1)\n")
-    with pytest.raises(subprocess.CalledProcessError):
-        hooks.on_page_markdown("<!-- output of wrong.py -->")
+def test_a_link_to_a_script_becomes_one_to_its_page(hooks: ModuleType) -> None:
+    assert hooks.replaced("[a](../examples/some_coat.py)") == "[a](../gallery/some_coat.rst)"
 
 
 @pytest.mark.parametrize(
@@ -69,32 +59,33 @@ def test_a_script_is_shown_with_what_it_printed(
 )
 def test_an_unknown_placeholder_ends_the_build(example: ModuleType, placeholder: str) -> None:
     with pytest.raises(LookupError, match=re.escape(f"{{{{{placeholder}}}}}")):
-        example.on_page_markdown(f"{{{{{placeholder}}}}}")
+        example.replaced(f"{{{{{placeholder}}}}}")
 
 
 def test_every_placeholder_of_the_page_of_figures_resolves(hooks: ModuleType) -> None:
-    page = (ROOT / "docs" / "figures.md").read_text()
-    assert "{{" not in hooks.on_page_markdown(page)
+    page = (ROOT / "docs" / "reference" / "figures.md").read_text()
+    assert "{{" not in hooks.replaced(page)
 
 
 def test_the_page_prints_from_every_file_of_numbers() -> None:
-    page = (ROOT / "docs" / "figures.md").read_text()
+    page = (ROOT / "docs" / "reference" / "figures.md").read_text()
     printed = set(re.findall(r"\{\{([a-z0-9-]+): ", page))
     assert printed <= set(FIGURES)
     assert printed == {path.stem for path in (ROOT / "docs" / "figures").glob("*.json")}
 
 
-def test_the_first_page_lists_all_pages() -> None:
-    docs = ROOT / "docs"
-    pages = {path.relative_to(docs).as_posix() for path in (*docs.glob("*.md"), *docs.glob("*.ipynb"))}
-    linked = set(re.findall(r"\]\(([^)#]+)\)", (docs / "index.md").read_text()))
+@pytest.mark.parametrize("part", ["tutorials", "how-to", "explanation", "reference"])
+def test_the_first_page_of_a_part_lists_its_pages(part: str) -> None:
+    folder = ROOT / "docs" / part
+    pages = {path.name for path in (*folder.glob("*.md"), *folder.glob("*.ipynb"))}
+    linked = set(re.findall(r"\]\(([^)#]+)\)", (folder / "index.md").read_text()))
     assert pages - {"index.md"} <= linked
 
 
 def test_the_editor_in_the_manual_is_where_the_build_writes_it() -> None:
-    """Expected: the pages of the manual are folders, side by side with that of the editor."""
-    page, makefile = (ROOT / "docs" / "editor.md").read_text(), (ROOT / "Makefile").read_text()
-    assert 'src="../try/"' in page
+    """Expected: the parts of the manual are folders, side by side with that of the editor."""
+    page, makefile = (ROOT / "docs" / "how-to" / "editor.md").read_text(), (ROOT / "Makefile").read_text()
+    assert 'src="../try/index.html"' in page
     assert "velatura edit --static site/try\n" in makefile
 
 

@@ -1,15 +1,18 @@
-"""Sweep over 10^4 coats on a metal, map how rough the metal looks below them, and fit a formula to the map.
+"""
+A sweep over 10,000 coats
+=========================
 
-python coats.py [PICTURE]   prints the fit; PICTURE (a .png) shows the map, and the contours of the fit on it
+How rough a metal looks below a rough coat: a map over both roughnesses, and a formula of four constants fitted to it.
+White contours are those of the map, dashed ones those of the fit.
 """
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -52,13 +55,10 @@ def fitted(alpha: Any) -> tuple[Any, Any]:
     return constants, rest(constants)
 
 
-def draw(alpha: Any, constants: Any, path: str) -> None:
+def draw(alpha: Any, constants: Any) -> None:
     """The map, and the contours of the fit."""
-    from matplotlib.figure import Figure
-
     coat, base = (alpha[name].values for name in ("layer0_alpha", "layer1_alpha"))
-    figure = Figure(figsize=(6, 4.6), layout="constrained")
-    axes = figure.subplots()
+    figure, axes = plt.subplots(figsize=(6, 4.6), layout="constrained")
     filled = axes.pcolormesh(base, coat, alpha, cmap="viridis", shading="nearest", rasterized=True)
     levels = np.arange(0.1, 0.8, 0.1)
     style: dict[str, Any] = {"levels": levels, "linewidths": 1.2}
@@ -67,7 +67,6 @@ def draw(alpha: Any, constants: Any, path: str) -> None:
     axes.clabel(fit, fmt="%.1f")
     axes.set(xlabel="alpha of the metal", ylabel="alpha of the coat")
     figure.colorbar(filled, label="alpha of the metal's lobe")
-    figure.savefig(path, dpi=110)
 
 
 if __name__ == "__main__":
@@ -77,5 +76,4 @@ if __name__ == "__main__":
     print(f"{alpha.size} coats, apparent alpha {float(alpha.min()):.3f} to {float(alpha.max()):.3f}")
     print("scale {:.3f}, share {:.3f}, power {:.2f}, bend {:.2f}".format(*constants))
     print(f"error: {100 * float(abs(rest).mean()):.1f} % in the mean, {100 * float(abs(rest).max()):.1f} % at most")
-    if len(sys.argv) > 1:
-        draw(alpha, constants, sys.argv[1])
+    draw(alpha, constants)

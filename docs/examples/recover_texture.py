@@ -1,13 +1,16 @@
-"""Recover the roughness of gold below a coat, texel by texel, from a picture of a coated square under three lamps.
+"""
+A roughness below a coat, texel by texel
+========================================
 
-python recover_texture.py [PICTURE]   prints how far the texels are off; PICTURE (a .png) shows target, start and answer
+A texture of the roughness of gold below a coat, recovered from a picture of a coated square under three lamps. The
+pictures are the target, the start and the answer.
 """
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
+import matplotlib.pyplot as plt
 import mitsuba as mi
 import numpy as np
 
@@ -86,6 +89,7 @@ def recover(size: int = 48, spp: int = 16, steps: int = 60) -> Any:
 
 if __name__ == "__main__":
     found = recover()
-    if len(sys.argv) > 1:
-        pictures = [np.array(mi.render(scene_of(texels, 192), spp=256)) for texels in (TRUE, START, found)]
-        mi.util.write_bitmap(sys.argv[1], np.concatenate(pictures, axis=1))
+    pictures = [np.array(mi.render(scene_of(texels, 192), spp=256)) for texels in (TRUE, START, found)]
+    plt.figure(figsize=(9, 3), layout="constrained")
+    plt.imshow(np.clip(np.concatenate(pictures, axis=1), 0, 1) ** (1 / 2.2))
+    plt.axis("off")

@@ -1,14 +1,16 @@
-"""Recover the depth of a coat and the roughness of the gold below it from a picture.
+"""
+A coat and its base from a picture
+==================================
 
-python recover.py [PICTURE]   prints what is found; PICTURE (a .png) shows target, start and answer side by side
+The depth of a coat and the roughness of the gold below it, recovered from one picture by gradients through Mitsuba.
+The pictures are the target, the start and the answer.
 """
 
 from __future__ import annotations
 
-import sys
-import time
 from typing import Any
 
+import matplotlib.pyplot as plt
 import mitsuba as mi
 import numpy as np
 
@@ -58,7 +60,6 @@ def recover(size: int = 64, spp: int = 16, steps: int = 60) -> dict[str, float]:
     scene = scene_of(**START, size=size)
     parameters = mi.traverse(scene)
     optimiser = mi.ad.Adam(lr=0.01, beta_1=0.85, params={name: mi.Float(value) for name, value in START.items()})
-    begin = time.perf_counter()
     for step in range(steps + 1):
         for name, keys in PARAMETERS.items():
             for key in keys:
@@ -68,7 +69,7 @@ def recover(size: int = 64, spp: int = 16, steps: int = 60) -> dict[str, float]:
         loss = dr.mean(dr.square((image - target) / (target + 0.1)), axis=None)
         if step % 10 == 0:
             values = ", ".join(f"{name} {optimiser[name][0]:.3f}" for name in TRUE)
-            print(f"step {step:3}: {values}, loss {loss.array[0]:.4f} ({time.perf_counter() - begin:.1f} s)")
+            print(f"step {step:3}: {values}, loss {loss.array[0]:.4f}")
         dr.backward(loss)
         optimiser.set_learning_rate({name: rate * 0.98**step for name, rate in RATES.items()})
         optimiser.step()
@@ -78,6 +79,7 @@ def recover(size: int = 64, spp: int = 16, steps: int = 60) -> dict[str, float]:
 if __name__ == "__main__":
     found = recover()
     print("true:    ", ", ".join(f"{name} {value}" for name, value in TRUE.items()))
-    if len(sys.argv) > 1:
-        pictures = [np.array(mi.render(scene_of(**values, size=192), spp=256)) for values in (TRUE, START, found)]
-        mi.util.write_bitmap(sys.argv[1], np.concatenate(pictures, axis=1))
+    pictures = [np.array(mi.render(scene_of(**values, size=192), spp=256)) for values in (TRUE, START, found)]
+    plt.figure(figsize=(9, 3), layout="constrained")
+    plt.imshow(np.clip(np.concatenate(pictures, axis=1), 0, 1) ** (1 / 2.2))
+    plt.axis("off")

@@ -1,0 +1,64 @@
+"""The manual's build by Sphinx: `make docs`."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))  # for docs_hooks
+
+project = "Velatura"
+author = "The Velatura authors"
+copyright = author
+
+extensions = [
+    "docs_hooks",
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+]
+nitpicky = True  # with -W, a reference to nothing ends the build
+exclude_patterns = ["examples", "figures", "gallery/*.ipynb"]
+
+# Pages in Markdown. The notebook is stored as it ran, which a test repeats.
+myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+myst_links_external_new_tab = False
+nb_execution_mode = "off"
+suppress_warnings = ["myst-nb.mime_priority"]  # widgets, which a stored notebook cannot show
+
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",  # all are run
+    "download_all_examples": False,
+    "plot_gallery": True,
+    "abort_on_example_error": True,
+    "show_memory": False,
+    "write_computation_times": False,
+    "show_signature": False,
+    "remove_config_comments": True,
+}
+
+html_title = "Velatura"
+html_theme = "pydata_sphinx_theme"
+html_theme_options = {
+    "secondary_sidebar_items": ["page-toc"],
+    "show_prev_next": False,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+html_show_sourcelink = False
+
+# Formulas are typeset by a file of the site, whose glyphs are paths, so that neither a server nor fonts are needed.
+_mathjax = find_spec("sphinx-mathjax-offline")
+assert _mathjax and _mathjax.origin
+html_static_path = ["_static", str(Path(_mathjax.origin).with_name("static") / "mathjax" / "tex-svg.js")]
+html_css_files = ["manual.css"]
+mathjax_path = "tex-svg.js"
