@@ -6,6 +6,9 @@ import re
 import unicodedata
 from pathlib import Path
 
+from velatura import __version__, citations
+from velatura.model import MODELS
+
 ROOT = Path(__file__).parents[2]
 
 # One author, two, or several, and a year; lines are joined before they are searched
@@ -100,7 +103,7 @@ def numbers(listed: str) -> list[int]:
 
 
 def test_every_citation_has_an_entry() -> None:
-    entries = set(re.findall(r"^@\w+\{(\w+),", (ROOT / "references.bib").read_text(encoding="utf-8"), re.MULTILINE))
+    entries = set(re.findall(r"^@\w+\{(\w+),", citations.bibliography(), re.MULTILINE))
     cited = {(key(m[1], m[2]), file) for file, text in source().items() for m in CITATION.finditer(text)}
     assert len({found for found, _ in cited}) > 10
     assert sorted(pair for pair in cited if pair[0] not in entries) == []
@@ -122,3 +125,30 @@ def test_equations_name_their_paper() -> None:
     """No `Eq. 5` alone, for which a reader would have to look further up."""
     for file, text in source().items():
         assert not UNNAMED.search(PARTS.sub("", text)), file
+
+
+def test_every_model_has_its_papers_and_every_picture_its_programs() -> None:
+    for model in [*(model.name for model in MODELS), *citations.PAPERS]:
+        found = citations.entries([model])
+        assert list(found)[-2:] == ["velatura", "mitsuba3"]
+        assert {*found} >= {*citations.PAPERS.get(model, (model,))}
+        assert all(entry.count("{") == entry.count("}") for entry in found.values())
+    assert list(citations.entries(["bati2021", "realtime", "belcour2018"]))[:3] == [
+        "bati2021",
+        "belcour2018",
+        "weier2020",
+    ]
+    assert f"version = {{{__version__}}}" in citations.entries()["velatura"]
+
+
+def test_text_of_an_entry_has_accents_and_no_tex() -> None:
+    """Every entry of the file; two as a bibliography prints them."""
+    everything = re.findall(r"^@\w+\{\w+,\n.*?^\}", citations.bibliography(), re.MULTILINE | re.DOTALL)
+    for entry in everything:
+        assert not re.search(r"[{}\\]|--|  ", citations.text(entry)), citations.text(entry)
+    assert len(everything) == citations.bibliography().count("\n@")
+    assert citations.text(citations.entries(["bati2021"])["bati2021"]) == (
+        "Bati, Mégane; Barla, Pascal; Pacanowski, Romain (2021). An Inverse Method for the Exploration of Layered "
+        "Material Appearance. ACM Transactions on Graphics 40(4), 176:1–176:15. https://hal.inria.fr/hal-03255469"
+    )
+    assert "Guo, Yu; Hašan, Miloš; Zhao, Shuang (2018). " in citations.text(citations.entries(["reference"])["guo2018"])

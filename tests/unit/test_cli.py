@@ -78,6 +78,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     model = SimpleNamespace(DEFAULT="plain", SWITCHES={"tir": ("off", "published"), "map": ("belcour", "weier")})
     monkeypatch.setitem(sys.modules, "velatura.model", model)
     monkeypatch.setitem(sys.modules, "velatura.scenes", scenes)
+    monkeypatch.setitem(sys.modules, "velatura.scenes.stage", SimpleNamespace(LARGEST=16384))
     for name, stub in {"model": model, "scenes": scenes, "lobes": lobes, "render": render}.items():
         monkeypatch.setitem(vars(velatura), name, stub)
     return seen
@@ -245,6 +246,14 @@ def test_doctor_says_the_command_that_mends(run: Run, monkeypatch: pytest.Monkey
 
 def test_version(run: Run) -> None:
     assert run("--version") == (0, f"velatura {velatura.__version__}\n", "")
+
+
+def test_cite_prints_entries_of_the_default_model_and_of_others(run: Run) -> None:
+    assert [line[:10] for line in run("cite")[1].splitlines() if line.startswith("@")] == ["@software{"] * 2
+    status, out, _ = run("cite", "weier2020", "--format", "text")
+    assert status == 0
+    assert [line.split()[0] for line in out.splitlines()] == ["Weier,", "The", "Jakob,"]
+    assert run("cite", "weier")[0] == 2
 
 
 def test_help_lists_the_models() -> None:

@@ -22,6 +22,7 @@ import typer
 from velatura import __version__
 from velatura.cli import (
     check,
+    cite,
     coat,
     compare,
     doctor,
@@ -72,6 +73,7 @@ for verb in (
     presets.presets,
     schema.schema,
     tables.tables,
+    cite.cite,
     doctor.doctor,
 ):
     app.command(verb.__name__.rstrip("_"))(verb)

@@ -1,0 +1,37 @@
+"""`velatura cite`: what to cite for a picture."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated
+
+import typer
+
+from velatura.cli import options
+
+
+class Format(str, Enum):
+    """How entries are printed."""
+
+    bibtex = "bibtex"
+    text = "text"
+
+
+def cite(
+    models: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[MODEL]...",
+            help=f"{options.MODELS}; reference, the walk; weidlich_wilkie, the baseline. Default: velatura.",
+        ),
+    ] = None,
+    form: Annotated[Format, typer.Option("--format", help="BibTeX, or a line of text for each.")] = Format.bibtex,
+) -> None:
+    """Print what to cite for a picture.
+
+    The papers of its models, Velatura itself in its version, and Mitsuba.
+    """
+    from velatura import citations
+
+    found = citations.entries(models or ()).values()
+    print("\n\n".join(found) if form is Format.bibtex else "\n".join(map(citations.text, found)))
