@@ -40,11 +40,15 @@ def document(text: str) -> Any:
     return made
 
 
-def generated(made: Any, target: str) -> str:
+def generated(
+    made: Any,
+    target: str,
+    environment: Any = gen.HwSpecularEnvironmentMethod.SPECULAR_ENVIRONMENT_FIS,
+) -> str:
     """The code of the first material of a document."""
     generator = GENERATORS[target].create()
     context = gen.GenContext(generator)
     context.registerSourceCodeSearchPath(mx.getDefaultDataSearchPath())
     generator.registerTypeDefs(made)
-    context.getOptions().hwSpecularEnvironmentMethod = gen.HwSpecularEnvironmentMethod.SPECULAR_ENVIRONMENT_FIS
+    context.getOptions().hwSpecularEnvironmentMethod = environment
     return str(generator.generate("material", made.getMaterialNodes()[0], context).getSourceCode(gen.PIXEL_STAGE))
