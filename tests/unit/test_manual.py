@@ -67,11 +67,10 @@ def test_every_placeholder_of_the_page_of_figures_resolves(hooks: ModuleType) ->
     assert "{{" not in hooks.replaced(page)
 
 
-def test_the_page_prints_from_every_file_of_numbers() -> None:
+def test_the_page_prints_numbers_of_figures_that_are_there() -> None:
     page = (ROOT / "docs" / "reference" / "figures.md").read_text()
     printed = set(re.findall(r"\{\{([a-z0-9-]+): ", page))
-    assert printed <= set(FIGURES)
-    assert printed == {path.stem for path in (ROOT / "docs" / "figures").glob("*.json")}
+    assert printed <= {path.stem for path in (ROOT / "docs" / "figures").glob("*.json")} <= set(FIGURES)
 
 
 @pytest.mark.parametrize("part", ["tutorials", "how-to", "explanation", "reference"])

@@ -113,6 +113,22 @@ def test_textures_are_not_mirrored(name: str) -> None:
     assert np.all(np.sum(np.cross(dp_du, dp_dv) * normal, axis=1) < 0.0)
 
 
+@pytest.mark.parametrize("name", OBJECTS)
+def test_texture_coordinates_lie_within_one_image(name: str) -> None:
+    uv = OBJECTS[name].surface().uv
+    assert uv.min() > -1e-12
+    assert uv.max() < 1 + 1e-12
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_tangents_are_orthogonal_to_normals(name: str) -> None:
+    """Expected: so within the angle that a triangle of a curved surface turns by; 2 degrees on the average."""
+    dp_du, _, normal = tangents(OBJECTS[name].surface())
+    lengths = np.linalg.norm(dp_du, axis=1) * np.linalg.norm(normal, axis=1)
+    tilt = np.degrees(np.arcsin(np.abs(np.sum(dp_du * normal, axis=1)) / lengths))
+    assert tilt.mean() < 2.0 and tilt.max() < 32.0
+
+
 def test_brush_marks_run_around_the_lathe() -> None:
     """Anticlockwise seen from above; within half a segment's turn, and a little more where triangles narrow."""
     dp_du, _, normal = tangents(OBJECTS["sphere"].surface())

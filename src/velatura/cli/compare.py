@@ -51,7 +51,9 @@ def compare(
             help="Follow polarisation in the truth, and report what leaving it out costs; not with --pictures.",
         ),
     ] = False,
-    plot: Annotated[Path | None, typer.Option(metavar="F", help="A figure of the results (PNG, PDF or SVG).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="F", help="A figure of the results (PNG, WebP, PDF or SVG).")
+    ] = None,
     pictures: Annotated[
         bool, typer.Option("--pictures", help="Also render spheres, for their errors and the figure.")
     ] = False,

@@ -22,7 +22,8 @@ def render(
         ),
     ] = None,
     scene: Annotated[
-        str, typer.Option(metavar="NAME|F", help="ball, sphere, teapot, plane, wedges, lid, or a Mitsuba scene (.xml).")
+        str,
+        typer.Option(metavar="NAME|F", help="ball, sphere, teapot, urn, plane, wedges, lid, or a Mitsuba .xml."),
     ] = "ball",
     env: Annotated[
         str | None,

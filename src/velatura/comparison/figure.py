@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = (".png", ".pdf", ".svg")
+SUFFIXES = (".png", ".webp", ".pdf", ".svg")
 
 _TRUTH: dict[str, Any] = {"color": "black", "fmt": "o", "markersize": 4, "capsize": 3, "label": "truth"}
 _HEADROOM = 1.3  # over the bars, for their legend
@@ -36,7 +36,7 @@ def check_figure(path: str | Path) -> Path:
 
 
 def save_figure(comparison: Comparison, path: str | Path) -> None:
-    """Draw a comparison into a PNG, PDF or SVG, written whole or not at all.
+    """Draw a comparison into a PNG, WebP, PDF or SVG, written whole or not at all.
 
     Above: energy and roughness of every lobe, the truth with its standard errors, the models as lines (dashed along the
     second axis of roughness). Then total variation, and the distribution in the plane of incidence. Below, if

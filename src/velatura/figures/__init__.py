@@ -92,7 +92,7 @@ class Figure(Protocol):
         """The numbers; `progress` is called with (steps done, all steps)."""
 
     def draw(self, numbers: dict[str, Any], path: str | Path) -> None:
-        """A picture of the numbers as a PNG, PDF or SVG, written whole or not at all."""
+        """A picture of the numbers as a PNG, WebP, PDF or SVG, written whole or not at all."""
 
 
 def figure(name: str) -> Figure:

@@ -21,6 +21,8 @@ Item = TypeVar("Item")
 
 SIZE, SAMPLES = 128, 128  # of a picture: pixels along a side, and samples of each
 PASSES = 8  # of a picture, each of its own random numbers: the noise of an error is that between them
+DPI = 120  # of what is drawn
+WIDEST = 1200  # pixels of a .webp, which stands on a web page
 PASS_SAMPLES = 16  # of a pixel in a pass, where there are so many: a pass has a cost of its own
 #: Of every model: light meets one facet of an interface at a time, as in the reference that it is compared with.
 CHOICES: dict[str, Any] = {"reflectance": "fgd"}
@@ -177,5 +179,6 @@ def show_difference(axes: Any, image: ArrayLike, truth: ArrayLike, bound: float,
 def save(figure: Any, path: str | Path) -> None:
     """Write a matplotlib figure whole or not at all. Raises InvalidInput where that cannot be done."""
     target = check_figure(path)
+    dpi = min(DPI, WIDEST / figure.get_figwidth()) if target.suffix.lower() == ".webp" else DPI
     with files.whole(target) as unfinished:
-        figure.savefig(unfinished, dpi=120)
+        figure.savefig(unfinished, dpi=dpi)

@@ -128,17 +128,33 @@ def draw(numbers: dict[str, Any], path: str | Path, exposure: float = 1.0, bound
     """
     cells = numbers["cells"]
     titles = [title for title in numbers["pictures"][0] if title != "reference"]
-    count = 1 + 2 * len(titles)
-    # Let cells be columns where they are many, else rows
-    wide = len(cells) >= count
-    rows, columns = (count, len(cells)) if wide else (len(cells), count)
+    grid = _layout(len(cells), len(titles))
+    rows, columns = 1 + grid[..., 0].max(), 1 + grid[..., 1].max()
     figure = canvas.canvas(2.4 * columns + 0.6, 2.5 * rows)
-    axes = figure.subplots(rows, columns, squeeze=False)
-    for line, cell, seen in zip(axes.T if wide else axes, cells, numbers["pictures"]):
+    every = figure.subplots(rows, columns, squeeze=False)
+    for axes in every.flat:
+        axes.set_axis_off()
+    for places, cell, seen in zip(grid, cells, numbers["pictures"]):
+        line = [every[tuple(place)] for place in places]
         canvas.show(line[0], exposure * np.array(seen["reference"]), f"reference, {cell['name']}")
         for n, title in enumerate(titles):
             canvas.show(line[2 * n + 1], exposure * np.array(seen[title]), title)
             error = canvas.error_label(cell, title)
             drawn = canvas.show_difference(line[2 * n + 2], seen[title], seen["reference"], bound, error)
-    figure.colorbar(drawn, ax=axes[-1, :], shrink=0.8, label="minus the reference")
+    figure.colorbar(drawn, ax=every[-1, :], shrink=0.8, label="minus the reference")
     canvas.save(figure, path)
+
+
+def _layout(cells: int, models: int) -> Any:
+    """Rows and columns (cells, 1 + 2 models, 2) of a cell's truth, and of each model's picture and difference by turns.
+
+    Cells are columns where they are many. Where models are many, differences stand below their pictures.
+    """
+    cell, part = np.indices((cells, 1 + 2 * models))
+    if cells > 2 * models:
+        row, column = part, cell
+    elif models > 2:
+        row, column = 2 * cell + (part % 2 == 0) * (part > 0), (part + 1) // 2
+    else:
+        row, column = cell, part
+    return np.stack([row, column], axis=-1)

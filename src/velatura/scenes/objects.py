@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from velatura.scenes import teapot as newell
+from velatura.scenes import urn as carved
 from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, flattened, join, lathe, rounded
 
 
@@ -82,6 +83,12 @@ def teapot() -> Surface:
 
 
 @functools.cache
+def urn() -> Surface:
+    """A carved urn: relief, ribs, beads, edges and a hollow."""
+    return carved.urn()
+
+
+@functools.cache
 def plinth() -> Surface:
     """The plinth under an object: a low round table, its top at y = 0."""
     return lathe(np.concatenate([arc((1.65, -0.06), 0.06, -90.0, 90.0, step=15.0), [[0.0, 0.0]]]))
@@ -98,6 +105,7 @@ OBJECTS = {
     "ball": Object(ball, View((0.0, 2.6, 7.2), (0.0, 1.0, 0.0), 19.5)),
     "sphere": Object(sphere, View((0.0, 2.2, 7.2), (0.0, 0.95, 0.0), 19.5)),
     "teapot": Object(teapot, View((0.0, 2.6, 7.2), (0.0, 0.6, 0.0), 19.5)),
+    "urn": Object(urn, View((0.0, 2.9, 7.2), (0.0, 0.98, 0.0), 18.5)),
     "plane": Object(plane, View((0.0, 4.2, 5.8), (0.0, 0.0, 0.0), 24.0)),
     "wedges": Object(wedges, View((2.6, 2.6, 6.6), (0.0, 0.4, 0.0), 23.0)),
     "lid": Object(lid, View((0.0, 6.0, 4.0), (0.0, 0.1, 0.0), 21.0)),

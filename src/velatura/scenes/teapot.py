@@ -44,7 +44,7 @@ _SPOUT = [
 
 def teapot() -> Surface:
     """The whole teapot, its spout along +x."""
-    turned = (lathe(_curve(SCALE * np.array(profile))[0]) for profile in (_POT, _LID))
+    turned = (lathe(curve(SCALE * np.array(profile))[0]) for profile in (_POT, _LID))
     groove = lathe(SCALE * np.array(_GROOVE))
     return join(*turned, groove, _tube(_HANDLE), _tube(_SPOUT))
 
@@ -57,7 +57,7 @@ def _bernstein(t: Array) -> tuple[Array, Array]:
     return values, slopes
 
 
-def _curve(points: Array, steps: int = 24) -> tuple[Array, Array]:
+def curve(points: Array, steps: int = 24) -> tuple[Array, Array]:
     """Points on a chain of cubic curves, and their tangents, from control points of shape (3 n + 1, ...)."""
     parts = [points[start : start + 4] for start in range(0, len(points) - 1, 3)]
     values, slopes = _bernstein(np.linspace(0.0, 1.0, steps + 1))
@@ -70,7 +70,7 @@ def _tube(rings: list[tuple[tuple[float, float], tuple[float, float], float]]) -
     """A tube through rings, the two halves of it mirrored at z = 0, and closed at both ends."""
     # Lay out the control points of the half with z > 0, (along, around, 3)
     control = [[(*begin, 0.0), (*begin, half), (*end, half), (*end, 0.0)] for begin, end, half in rings]
-    along, d_along = _curve(SCALE * np.array(control))
+    along, d_along = curve(SCALE * np.array(control))
     positions, d_around = _around(along)
     normals = np.cross(d_around, _around(d_along)[0])
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
