@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -45,10 +45,13 @@ MATERIALS: dict[str, dict[str, Any]] = {
         "coat_roughness": 0.4,
     },
     "paint, half a coat": {**PAINT, "coat_weight": 0.5},
+    "paint, film of 300 nm": {**PAINT, "thin_film_weight": 1.0, "thin_film_thickness": 0.3},
 }
 COSINES = (1.0, 0.5)
 SAMPLES = 2**15  # of each of three densities
 LEAST = 1e-3  # alpha of lobes that are evaluated
+LOBES = ("coat", "base", "diffuse", "darkening")
+Lobes = dict[str, tuple[float, float | None]]
 
 
 def main() -> None:
@@ -108,23 +111,36 @@ def differences() -> None:
     heads = [f"{what}, {cosine:g}" for what in ("energy", "alpha") for cosine in COSINES]
     print(f"| material | lobe | {' | '.join(heads)} |\n|---|---|{'---|' * len(heads)}")
     for name, parameters in MATERIALS.items():
-        stack = vt.from_openpbr(**parameters).stack
-        ours = [of_stack(stack, parameters, cosine) for cosine in COSINES]
-        theirs = [of_formulas(parameters, cosine) for cosine in COSINES]
-        for lobe in sorted({lobe for each in (*ours, *theirs) for lobe in each}, key=["coat", "base", "diffuse"].index):
-            cells = []
-            for kind in (0, 1):
-                for a, b in zip(theirs, ours):
-                    pair = [each.get(lobe, (0.0, None))[kind] for each in (a, b)]
-                    cells.append(", ".join("" if x is None else f"{x:.3f}".lstrip("0") for x in pair))
+        theirs, ours = ([of(parameters, cosine) for cosine in COSINES] for of in (of_formulas, of_stack))
+        if parameters.get("coat_weight") and parameters.get("coat_darkening") != 0:
+            for of, found in ((of_formulas, theirs), (of_stack, ours)):
+                for cosine, lobes in zip(COSINES, found):
+                    lobes["darkening"] = darkening(of, parameters, lobes, cosine), None
+        for lobe in (name for name in LOBES if any(name in each for each in (*ours, *theirs))):
+            cells = [
+                cell([each.get(lobe, (0.0, None))[kind] for each in pair])
+                for kind in (0, 1)
+                for pair in zip(theirs, ours)
+            ]
             print(f"| {name} | {lobe} | {' | '.join(cells)} |")
 
 
-Lobes = dict[str, tuple[float, float | None]]
+def cell(pair: Sequence[float | None]) -> str:
+    """Both numbers, with what there is of them."""
+    texts = ["" if x is None else f"{x:.3f}".removeprefix("0") for x in pair]
+    return ", ".join(texts) if any(texts) else ""
 
 
-def of_stack(stack: vt.Stack, parameters: Mapping[str, Any], cosine: float) -> Lobes:
-    """Energies, in the mean of colours, and roughness of the lobes of a stack."""
+def darkening(of: Callable[..., Lobes], parameters: Mapping[str, Any], lobes: Lobes, cosine: float) -> float:
+    """The energy of what lies below the coat over that without darkening."""
+    plain = of({**parameters, "coat_darkening": 0.0}, cosine)
+    below, bright = (sum(energy for name, (energy, _) in each.items() if name != "coat") for each in (lobes, plain))
+    return below / bright
+
+
+def of_stack(parameters: Mapping[str, Any], cosine: float) -> Lobes:
+    """Energies, in the mean of colours, and roughness of the lobes of an imported stack."""
+    stack = vt.from_openpbr(**parameters).stack
     found = vt.lobes(stack, cosine)
     names = ["coat", "base"] if parameters.get("coat_weight") else ["base"]
     lobes: Lobes = {
@@ -143,7 +159,7 @@ def of_formulas(parameters: Mapping[str, Any], cosine: float) -> Lobes:
     def energy(**changed: float) -> float:
         return float(np.mean(openpbr.value({**parameters, **changed}, pair) / density))
 
-    coat = energy(base_weight=0.0, specular_weight=0.0)
+    coat = energy(base_weight=0.0, specular_weight=0.0, thin_film_weight=0.0)
     metal = parameters.get("base_metalness", 0.0) == 1
     over = (energy() if metal else energy(base_weight=0.0)) - coat
     rough, coat_rough = alphas(parameters)

@@ -189,6 +189,20 @@ def test_a_coat_need_not_darken(base: dict[str, Any]) -> None:
     assert (coated[0] > coated[1]).all() and (coated[1] > coated[2]).all()
 
 
+@pytest.mark.parametrize("coat, base", [(1.5, 1.5), (1.9, 1.9)])
+def test_a_coat_darkens_paint_as_a_lambertian_base(coat: float, base: float) -> None:
+    """Expected: E_c = F0 + E_b (1 - F0) (1 - K) / (1 - E_b K) with K = 1 - (1 - E_F) / n^2, which is exact for a
+    Lambertian base of the colour below a smooth coat (OpenPBR 1.1, "Darkening"); E_F by quadrature.
+    """
+    colour = np.array([0.9, 0.5, 0.2])
+    found = vt.from_openpbr(base_color=colour, specular_ior=base, coat_weight=1, coat_ior=coat)
+    cosine = (np.arange(2000) + 0.5) / 2000
+    mean = np.mean([2 * c * fresnel(c, coat) for c in cosine])
+    kept, f = 1 - (1 - mean) / coat**2, fresnel(1.0, coat)
+    expected = f + colour * (1 - f) * (1 - kept) / (1 - colour * kept)
+    np.testing.assert_allclose(reflected(found.stack), expected, atol=3e-3)
+
+
 def test_a_coat_that_covers_a_part_is_weaker() -> None:
     """Expected: it reflects at the normal as much less, with the mixed colour, and the list says so."""
     found = vt.from_openpbr(base_metalness=1, coat_weight=0.25, coat_color=0.6)
@@ -196,6 +210,18 @@ def test_a_coat_that_covers_a_part_is_weaker() -> None:
     np.testing.assert_allclose(fresnel(1.0, coat.eta), 0.25 * fresnel(1.0, 1.6), rtol=1e-3)  # type: ignore[union-attr]
     np.testing.assert_allclose(np.exp(-2 * np.array(medium.sigma_a)), 0.9, rtol=1e-4)  # type: ignore[union-attr]
     assert [each.parameter for each in found.left] == ["coat_weight"]
+
+
+def test_a_coat_that_covers_half_darkens_half_as_much() -> None:
+    """Expected: of paint, in the mean of colours, within three tenths (OpenPBR 1.1, "Darkening")."""
+    lost = []
+    for weight in (0.5, 1.0):
+        bright, dark = (
+            reflected(vt.from_openpbr(base_color=(0.6, 0.3, 0.1), coat_weight=weight, coat_darkening=d).stack)
+            for d in (0.0, 1.0)
+        )
+        lost.append(np.mean(bright - dark))
+    assert lost[0] == pytest.approx(0.5 * lost[1], rel=0.3)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from velatura.imports.given import ROUNDING, Given
 from velatura.imports.result import Notes, shown
 from velatura.imports.surface import INDICES, Coat, weighed
 from velatura.imports.values import Array, Value, changed
+from velatura.optics import fresnel
 from velatura.stack import RGB
 
 # Reasons why a stack does not carry a parameter
@@ -42,14 +43,22 @@ def alike(roughness: Value) -> tuple[Value, Value]:
 
 
 def coated(notes: Notes, name: str, weight: float, coat: Coat) -> Coat | None:
-    """A coat of that coverage: one that covers a part becomes one that reflects as much less, and absorbs so."""
+    """A coat of that coverage: one that covers a part becomes one that reflects, absorbs and darkens as much less."""
     if weight == 0:
         return None
     if weight == 1:
         return coat
     notes.add(name, weight, "a stack is no mixture: a coat of a lower index, which reflects and absorbs as much less")
     colour = changed(coat.colour, lambda c: 1 + weight * (c - 1))
-    return replace(coat, eta=weighed(coat.eta, 1.0, weight), colour=colour)
+    weaker = weighed(coat.eta, 1.0, weight)
+    share = min(1.0, weight * _darkened(coat.eta) / max(_darkened(weaker), 1e-6))
+    return replace(coat, eta=weaker, colour=colour, darkening=share * coat.darkening)
+
+
+def _darkened(eta: float) -> float:
+    """The share of its light that a base of albedo one half loses below a coat (OpenPBR 1.1, "Darkening")."""
+    kept = 1 - (1 - fresnel.normal_incidence(eta)) / eta**2
+    return float(np.clip(1 - (1 - kept) / (1 - 0.5 * kept), 0, 1))
 
 
 def tinted(given: Given, name: str, factor: float, tint: RGB) -> RGB:

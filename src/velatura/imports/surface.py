@@ -206,37 +206,43 @@ def _diffuse(surface: Surface, albedo: Value, above: list[Interface], base: list
     """The albedo of the diffuse base that gives the colour seen.
 
     Of the light that enters, (1 - K) rho / (1 - K rho) leaves, with K the share that interfaces send back down. The
-    colour is that share for the bare base at the normal (OpenPBR 1.1, "Glossy-diffuse"). Under a coat that does not
-    darken, the same shall be added to what the coat reflects (OpenPBR 1.1, "Coat"); between the two, rho is mixed.
+    colour is that share for the base below air, or below the medium of a coat, at the normal (OpenPBR 1.1,
+    "Glossy-diffuse"): light that bounces in a coat then darkens it, as over a Lambertian base of this colour ("Coat,
+    Darkening"). Under a coat that does not darken, what the base adds in air shall be added to what the coat reflects;
+    between the two, rho is mixed.
     """
-    bare = [_plain(each) for each in _dielectric(surface, 1.0, Notes())]
-    reflected, kept = _above_diffuse(bare)
+    covers = [_plain(each) for each in base if isinstance(each, Interface)]
+    outside = float(above[0].eta) if above else 1.0  # type: ignore[arg-type]
+    _, kept = _above_diffuse(covers, outside)
     delta = _darkening(surface) if above else 1.0
-    coated = [_plain(each) for each in (*above, *base) if isinstance(each, Interface)]
-    whole, inside = _above_diffuse(coated) if delta < 1 else (reflected, kept)
-    coat = float(fresnel.normal_incidence(float(above[0].eta))) if above else 0.0  # type: ignore[arg-type]
+    if delta == 1:
+        return changed(albedo, lambda seen: _inside(seen, kept))
+    reflected, _ = _above_diffuse([_plain(each) for each in _dielectric(surface, 1.0, Notes())])
+    whole, sent_back = _above_diffuse([*(_plain(each) for each in above), *covers])
+    coat = float(fresnel.normal_incidence(outside))
 
-    def rho(seen: Array) -> Array:
-        seen = np.clip(seen, 0, 1)
-        darkened = seen / (1 - kept + seen * kept)
-        if delta == 1:
-            return np.asarray(darkened)
+    def mixed(seen: Array) -> Array:
         shown = coat + (1 - coat) * (reflected + (1 - reflected) * seen)
-        entered = np.clip((shown - whole) / (1 - whole), 0, 1)
-        plain = entered / (1 - inside + entered * inside)
-        return np.asarray(plain + delta * (darkened - plain))
+        plain = _inside((shown - whole) / (1 - whole), sent_back)
+        return np.asarray(plain + delta * (_inside(seen, kept) - plain))
 
-    return changed(albedo, rho)
+    return changed(albedo, mixed)
 
 
-def _above_diffuse(layers: list[Interface]) -> tuple[float, float]:
-    """What interfaces reflect at the normal, over a black base, and the share K of light from a diffuse one that they
-    send back down."""
+def _inside(left: Array, kept: float) -> Array:
+    """The albedo of a diffuse base, by the share of the light that enters it which leaves again."""
+    left = np.clip(left, 0, 1)
+    return np.asarray(left / (1 - kept + left * kept))
+
+
+def _above_diffuse(layers: list[Interface], outside: float = 1.0) -> tuple[float, float]:
+    """What interfaces below a medium reflect at the normal, over a black base, and the share K of light from a diffuse
+    one that they send back down."""
     if not layers:
         return 0.0, 0.0
 
     def total(albedo: float) -> float:
-        found = stack_lobes(Stack([*layers, Diffuse(albedo=albedo)]), 1.0)
+        found = stack_lobes(Stack([*layers, Diffuse(albedo=albedo)], exterior=outside), 1.0)
         return float(np.mean(np.sum([energy[:, 0] for energy in found.energy], axis=0) + found.remainder[:, 0]))
 
     black = total(0.0)
