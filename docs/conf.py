@@ -23,8 +23,18 @@ extensions = [
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
 ]
+templates_path = ["_templates"]
+default_role = "code"  # single backticks in docstrings
+
+# The reference of the Python package
+autodoc_member_order = "bysource"
+autodoc_default_options = {"exclude-members": "model_config, record"}
+autodoc_typehints_format = "short"
+autosummary_generate = ["reference/api.rst"]
+maximum_signature_line_length = 100
+nitpick_ignore_regex = [("py:(class|obj|data|exc|func|attr)", r".*")]
 nitpicky = True  # with -W, a reference to nothing ends the build
-exclude_patterns = ["examples", "figures", "gallery/*.ipynb"]
+exclude_patterns = ["_templates", "examples", "figures", "gallery/*.ipynb"]
 
 # Pages in Markdown. The notebook is stored as it ran, which a test repeats.
 myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
@@ -36,6 +46,10 @@ suppress_warnings = ["myst-nb.mime_priority"]  # widgets, which a stored noteboo
 sphinx_gallery_conf = {
     "examples_dirs": "examples",
     "gallery_dirs": "gallery",
+    "backreferences_dir": "gallery/backreferences",
+    "doc_module": ("velatura",),
+    "reference_url": {"velatura": None},
+    "within_subsection_order": "docs_hooks.ExampleOrder",
     "filename_pattern": r"\.py$",  # all are run
     "download_all_examples": False,
     "plot_gallery": True,
@@ -49,7 +63,7 @@ sphinx_gallery_conf = {
 html_title = "Velatura"
 html_theme = "pydata_sphinx_theme"
 html_theme_options = {
-    "secondary_sidebar_items": ["page-toc"],
+    "secondary_sidebar_items": ["page-toc", "sg_download_links"],
     "show_prev_next": False,
     "footer_start": ["copyright"],
     "footer_end": [],

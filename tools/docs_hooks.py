@@ -9,6 +9,8 @@ number with a standard error (`x` beside `x_error`) is printed with it, others t
 asks for.
 
 A link to a script in `docs/examples` becomes one to its page in the gallery, where it stands with its picture.
+
+Records of a material's parameters (`Interface`, ...) are shown with the signature and the ranges that they declare.
 """
 
 from __future__ import annotations
@@ -27,15 +29,77 @@ DOCS = Path(__file__).parents[1] / "docs"
 FIGURES = DOCS / "figures"
 PLACES = 3  # after the point
 
+EXAMPLES = (
+    "first_render",
+    "lobes",
+    "compare",
+    "coat_law",
+    "films",
+    "brushed",
+    "textured",
+    "glass",
+    "polarised",
+    "inverse",
+    "fit",
+    "simplify",
+    "recover",
+    "recover_texture",
+    "coats",
+    "export_wgsl",
+    "bake",
+    "openpbr",
+)  # in the order of the gallery
+
+
+class ExampleOrder:
+    """A key that sorts scripts as `EXAMPLES` lists them. Raises ValueError where one is missing there."""
+
+    def __init__(self, folder: str) -> None:
+        pass
+
+    def __call__(self, script: str) -> int:
+        return EXAMPLES.index(Path(script).stem)
+
 
 def setup(app: Any) -> dict[str, bool]:
+    app.setup_extension("sphinx.ext.autodoc")
     app.connect("source-read", _on_source_read)
+    app.connect("autodoc-process-signature", _on_signature)
+    app.connect("autodoc-process-docstring", _on_docstring)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def _on_source_read(app: Any, page: str, source: list[str]) -> None:
     if app.env.doc2path(page).suffix == ".md":
         source[0] = replaced(source[0])
+
+
+def _on_signature(app: Any, what: str, name: str, item: Any, *_: Any) -> tuple[str, str] | None:
+    if not _is_record(item):
+        return None
+    fields = (
+        f"{key}{'' if field.is_required() else f'={field.default!r}'}" for key, field in item.model_fields.items()
+    )
+    return f"(*, {', '.join(fields)})", ""
+
+
+def _on_docstring(app: Any, what: str, name: str, item: Any, options: Any, lines: list[str]) -> None:
+    if _is_record(item):
+        from velatura.stack.schema import parameters
+
+        lines += ["", "Args:", *(f"    {key}: {_described(each)}" for key, each in parameters(item).items())]
+
+
+def _is_record(item: Any) -> bool:
+    from velatura.stack.schema import Record
+
+    return isinstance(item, type) and issubclass(item, Record)
+
+
+def _described(parameter: Any) -> str:
+    """The meaning of a parameter, and in brackets its range and unit."""
+    range_and_unit = " ".join(text for text in (parameter.bounds, parameter.unit) if text)
+    return f"{parameter.doc} ({range_and_unit})" if range_and_unit else parameter.doc
 
 
 def replaced(markdown: str) -> str:

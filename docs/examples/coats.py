@@ -1,9 +1,10 @@
 """
-A sweep over 10,000 coats
-=========================
+A sweep over coats
+==================
 
-How rough a metal looks below a rough coat: a map over both roughnesses, and a formula of four constants fitted to it.
-White contours are those of the map, dashed ones those of the fit.
+How rough a metal looks below a rough coat: a map over both roughnesses, computed by `vt.sweep` into a Zarr store, and a
+formula of four constants fitted to it. With `steps=100` it takes minutes, and finds the
+same constants within 1 %. White contours are those of the map, dashed ones those of the fit.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import velatura as vt
 METAL = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=0.2, k=3.9, alpha=0.1)])
 
 
-def coats(store: Path, steps: int = 100, executor: Any = None) -> Any:
+def coats(store: Path, steps: int = 16, executor: Any = None) -> Any:
     """Lobes of coats of every roughness on metals of every roughness."""
     vary = {
         "layer0_alpha": {"range": [0.0, 0.5], "steps": steps},

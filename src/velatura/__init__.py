@@ -9,8 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from velatura import bakes as bakes
     from velatura import checks as checks
     from velatura import comparison as comparison
+    from velatura import exports as exports
     from velatura import imports as imports
     from velatura import inverse as inverse
     from velatura import kernel as kernel
@@ -92,8 +94,10 @@ __all__ = [
 
 
 _PARTS = (
+    "bakes",
     "checks",
     "comparison",
+    "exports",
     "imports",
     "inverse",
     "kernel",

@@ -47,22 +47,21 @@ def lobes(
     Returns:
         For each interface k from the top, of what is reflected, in double precision, by C = 3 colours and N directions:
 
-        energy[k]: (C, N), fraction of the incident energy;
-        covariance[k]: (3, N), xx, xy and yy in the space of the model's roughness map, in the shading frame;
-        alpha[k]: (2, N), GGX roughness along two axes;
-        rotation[k]: (N,), the angle from the tangent to the first of them, radians anticlockwise seen from outside.
-
-        own_alpha[k], own_rotation[k]: likewise, in the medium that the lobe is drawn in. For `velatura` that is the one
-            above the interface, and light that media scatter does not count; all other models draw lobes outside.
+        - `energy[k]`: (C, N), fraction of the incident energy;
+        - `covariance[k]`: (3, N), xx, xy and yy in the space of the model's roughness map, in the shading frame;
+        - `alpha[k]`: (2, N), GGX roughness along two axes;
+        - `rotation[k]`: (N,), the angle from the tangent to the first of them, radians anticlockwise seen from outside;
+        - `own_alpha[k]`, `own_rotation[k]`: likewise, in the medium that the lobe is drawn in. For `velatura` that is
+          the one above the interface, and light that media scatter does not count; all other models draw lobes outside.
 
         `transmitted` holds the same of what leaves below, by half-vectors with the direction that a smooth stack would
         refract light to; None where nothing leaves. With `channels="separate"` all but energies have a leading axis of
         colours. A diffuse base is no lobe. All other light is in
 
-        remainder: (C, N), reflected in no lobe: by the diffuse base; for `velatura` also what media scatter, and what
-            interfaces do other than a facet of each;
-        passed: (C, N), leaves below;
-        absorbed: (C, N), what is left, which for models that lose light holds that, too.
+        - `remainder`: (C, N), reflected in no lobe: by the diffuse base; for `velatura` also what media scatter, and
+          what interfaces do other than a facet of each;
+        - `passed`: (C, N), leaves below;
+        - `absorbed`: (C, N), what is left, which for models that lose light holds that, too.
 
     Raises:
         InvalidInput: not a valid material, a cosine outside its range, lists of different lengths, an unknown model or

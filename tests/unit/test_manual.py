@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import operator
 import re
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+import velatura
 from velatura.figures import FIGURES
 
 ROOT = Path(__file__).parents[2]
@@ -104,3 +106,14 @@ def test_the_files_that_contributing_names_exist() -> None:
         for name, path in re.findall(r"`(\w+)` of `([\w/.-]+)`", row):
             file = package / path if (package / path).exists() else ROOT / path
             assert re.search(rf"\b{name}\b", file.read_text()), (name, path)
+
+
+def test_the_reference_has_every_public_name() -> None:
+    listed = re.findall(r"^   velatura\.(\S+)$", (ROOT / "docs" / "reference" / "api.rst").read_text(), re.MULTILINE)
+    assert {*velatura.__all__, "Editor"} <= set(listed)
+    for name in listed:
+        assert operator.attrgetter(name)(velatura) is not None
+
+
+def test_the_gallery_orders_every_example(hooks: ModuleType) -> None:
+    assert sorted(hooks.EXAMPLES) == sorted(path.stem for path in (ROOT / "docs" / "examples").glob("*.py"))

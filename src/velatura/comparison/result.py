@@ -113,7 +113,7 @@ class Comparison:
 
     @cached_property
     def roughness_error(self) -> Mapping[str, float]:
-        """By model: mean |log(alpha / true alpha)| over directions, axes, and lobes of an energy above `ENERGY_MIN`.
+        """By model: mean `|log(alpha / true alpha)|` over directions, axes, and lobes of an energy above `ENERGY_MIN`.
 
         Roughness is clamped to the least one that a model evaluates. NaN if there is no such lobe.
         """
