@@ -31,6 +31,7 @@ PLACES = 3  # after the point
 
 EXAMPLES = (
     "first_render",
+    "one_look",
     "lobes",
     "compare",
     "coat_law",

@@ -14,7 +14,7 @@ from velatura.model import DEFAULT
 PLACES = 4
 
 
-def distances(preset: str, paths: int = 3_000_000) -> dict[str, float]:
+def distances(preset: str, paths: int = 1_000_000) -> dict[str, float]:
     """How far the default model is from `paths` walks for each direction of incidence."""
     found = vt.compare(preset, [DEFAULT], paths=paths)
     model = found.models[DEFAULT]
