@@ -29,7 +29,7 @@ def stage() -> Iterator[viewport.Stage]:
 
 @pytest.mark.parametrize(
     ("preset", "scene", "size", "samples", "spp"),
-    [("turned-brushing", "ball", 32, 512, 1024), ("frosted-glass", "sphere", 6, 24576, 24576)],
+    [("turned-brushing", "ball", 32, 512, 1024), ("frosted-glass", "sphere", 4, 24576, 24576)],
 )
 def test_a_still_converges_to_mitsuba(
     preset: str, scene: str, size: int, samples: int, spp: int, stage: viewport.Stage

@@ -393,13 +393,13 @@ def test_a_material_is_checked_with_what_its_model_declares() -> None:
 
 
 EVERYTHING = [(model.name, form, name) for model in vt.MODELS for form in SWITCHES["form"] for name in vt.presets()]
-SLICE = [EVERYTHING[k] for k in np.random.default_rng(7).choice(len(EVERYTHING), 12, replace=False)]
+SLICE = [EVERYTHING[k] for k in np.random.default_rng(7).choice(len(EVERYTHING), 6, replace=False)]
 
 
 @pytest.mark.parametrize(("model", "form", "name"), SLICE)
 def test_models_keep_what_they_do_not_declare(model: str, form: str, name: str) -> None:
     """Rationale: a slice of all models, forms and presets; `benchmarks/laws.py` walks all. Expected: nothing is broken;
-    false alarms 1.2 % for all twelve, but the seed is fixed."""
+    false alarms .6 % for all six, but the seed is fixed."""
     report = vt.check(name, model=model, form=form)
     assert report.passed, {law: report[law] for law in report.broken}
 

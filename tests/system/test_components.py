@@ -95,21 +95,23 @@ def test_components_sum_to_the_whole_and_are_sampled_alone(name: str, form: str)
     bsdf, n = loaded(name, form=form, **({"layer1_alpha": 0.2} if pane else {})), 20_000
     si = interactions(random_directions(n, -1 if pane else 0.05), n)
     wo = random_directions(n, -1)
-    values = [bsdf.eval_pdf(context(component=k), si, wo) for k in range(bsdf.component_count())]
+    contexts = [context(component=k) for k in range(bsdf.component_count())]
+    values = [bsdf.eval_pdf(asked, si, wo) for asked in contexts]
     whole = bsdf.eval(mi.BSDFContext(), si, wo)
+    dr.eval(values, whole)  # in one kernel
     np.testing.assert_allclose(np.sum([np.array(value) for value, _ in values], axis=0), whole, rtol=1e-4)
 
     # Sample each, and all
     u1, u2 = mi.Float(RNG.random(n)), mi.Point2f(RNG.random((2, n)))
-    for k in range(bsdf.component_count()):
-        asked = context(component=k)
-        bs, weight = bsdf.sample(asked, si, u1, u2)
-        value, pdf = bsdf.eval_pdf(asked, si, bs.wo)
+    drawn = [bsdf.sample(asked, si, u1, u2) for asked in contexts]
+    seen = [bsdf.eval_pdf(asked, si, bs.wo) for asked, (bs, _) in zip(contexts, drawn)]
+    dr.eval(drawn, seen)
+    for k, ((bs, weight), (value, pdf)) in enumerate(zip(drawn, seen)):
         assert np.all(np.array(bs.sampled_component) == k)
         assert np.all(np.array(bs.sampled_type) & bsdf.flags(k) == np.array(bs.sampled_type))
         np.testing.assert_allclose(bs.pdf, pdf, rtol=1e-4)
         np.testing.assert_allclose(np.array(weight) * np.array(pdf), value, rtol=1e-3, atol=1e-6)
-        one, other = np.array(weight)[0], (np.array(bsdf.eval(asked, si, wo)) * (4 * np.pi))[0]
+        one, other = np.array(weight)[0], (np.array(values[k][0]) * (4 * np.pi))[0]
         error = np.hypot(one.std(), other.std()) / np.sqrt(n)
         assert abs(one.mean() - other.mean()) < 5 * error
 

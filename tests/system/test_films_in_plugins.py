@@ -48,6 +48,7 @@ def lit(mi: Any, cosine: float, u: Any = 0.5) -> Any:
 
     si = dr.zeros(mi.SurfaceInteraction3f, np.size(u))
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0.0, cosine)
+    dr.make_opaque(si.wi)  # one kernel for all angles
     si.uv = mi.Point2f(mi.Float(np.atleast_1d(u).astype(np.float32)), 0.5)
     return si
 

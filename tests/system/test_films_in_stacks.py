@@ -304,6 +304,7 @@ def albedo(mi: Any, bsdf: Any, cosine: float) -> np.ndarray:
 
     si = dr.zeros(mi.SurfaceInteraction3f, 1)
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0.0, cosine)
+    dr.make_opaque(si.wi)  # one kernel for all angles
     return np.array(bsdf.eval_diffuse_reflectance(si)).ravel()
 
 
@@ -365,6 +366,7 @@ def sampled(mi: Any, bsdf: Any, cosine: float) -> np.ndarray:
     count = 40_000
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0.0, cosine)
+    dr.make_opaque(si.wi)  # one kernel for all angles
     rng = mi.PCG32(count)
     u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
     bs, weight = bsdf.sample(mi.BSDFContext(), si, *u)

@@ -59,6 +59,7 @@ def light(bsdf: Any, cosine: float) -> np.ndarray:
     z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-9))
     si, sine, found = dr.zeros(mi.SurfaceInteraction3f, x.size), float(np.sqrt(1 - cosine * cosine)), []
     si.uv, si.wi = mi.Point2f(U, 0.5), mi.Vector3f(0.8 * sine, 0.6 * sine, cosine)
+    dr.make_opaque(si.wi)  # one kernel for all angles
     for side in (z, -z):
         wo = mi.Vector3f(x.ravel(), y.ravel(), side.ravel())
         value = np.array(bsdf.eval(mi.BSDFContext(), si, wo)) / z.ravel()
@@ -271,6 +272,7 @@ def test_samples_have_the_energy_of_values() -> None:
     for cosine in (0.9, 0.35, -0.6):
         si, random = dr.zeros(mi.SurfaceInteraction3f, count), mi.PCG32(count)
         si.uv, si.wi = mi.Point2f(U, 0.5), mi.Vector3f(float(np.sqrt(1 - cosine * cosine)), 0, cosine)
+        dr.make_opaque(si.wi)  # one kernel for all angles
         pair = mi.Point2f(random.next_float32(), random.next_float32())
         weights = np.array(bsdf.sample(ctx, si, random.next_float32(), pair)[1])
         even = mi.warp.square_to_uniform_sphere(mi.Point2f(random.next_float32(), random.next_float32()))

@@ -17,6 +17,7 @@ from velatura.model.widths import nearly_straight
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
+import drjit as dr  # noqa: E402
 
 ROUNDS = 8
 FALSE_ALARMS = 1e-4
@@ -75,6 +76,7 @@ def albedo(stack: vt.Stack, cos_theta: float, form: str, side: int = 1, n: int =
     context.mode = mi.TransportMode.Importance
     si = mi.SurfaceInteraction3f()
     si.wi = mi.Vector3f(mi.Float(np.sqrt(1 - cos_theta**2)), 0, side * cos_theta)
+    dr.make_opaque(si.wi)  # one kernel for all angles
     u, u_1, u_2, v, v_1, v_2 = (rng.next_float32() for _ in range(6))
     drawn, _ = bsdf.sample(context, si, v_1, mi.Point2f(v_2, u), True)
     spread = mi.warp.square_to_cosine_hemisphere(mi.Point2f(u_1, u_2))

@@ -22,6 +22,7 @@ PLAIN = {"model": "belcour2018", "reflectance": "fresnel", "tir": "off"}
 def interaction(cos_theta: Any, count: int = 1) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     cosine = mi.Float(cos_theta)
+    dr.make_opaque(cosine)  # one kernel for all angles
     si.wi = mi.Vector3f(dr.sqrt(1 - cosine * cosine), 0, cosine)
     si.sh_frame, si.n = mi.Frame3f([0, 0, 1]), mi.Normal3f(0, 0, 1)
     return si

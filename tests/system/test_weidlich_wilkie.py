@@ -31,9 +31,10 @@ def direction(cos_theta: float, phi: float) -> list[float]:
 
 
 def value_and_density(bsdf: Any, wi: list[float], wo: list[float]) -> tuple[np.ndarray, float]:
-    si = dr.zeros(mi.SurfaceInteraction3f)
+    si, towards = dr.zeros(mi.SurfaceInteraction3f), mi.Vector3f(*wo)
     si.wi = mi.Vector3f(*wi)
-    value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, mi.Vector3f(*wo))
+    dr.make_opaque(si.wi, towards)  # one kernel for all directions
+    value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, towards)
     return value.numpy()[:, 0], float(pdf[0])
 
 
