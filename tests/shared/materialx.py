@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import MaterialX as mx
@@ -11,6 +12,10 @@ import MaterialX.PyMaterialXGenMsl as msl
 import MaterialX.PyMaterialXGenOsl as osl
 import MaterialX.PyMaterialXGenShader as gen
 import MaterialX.PyMaterialXGenSlang as slang
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
 
 GENERATORS = {
     "glsl": glsl.GlslShaderGenerator,
@@ -52,3 +57,56 @@ def generated(
     generator.registerTypeDefs(made)
     context.getOptions().hwSpecularEnvironmentMethod = environment
     return str(generator.generate("material", made.getMaterialNodes()[0], context).getSourceCode(gen.PIXEL_STAGE))
+
+
+# Values of graphs: of vectors and colours the parts (k, N), of numbers (N,)
+
+
+OPERATIONS: dict[str, Callable[..., Array]] = {
+    "add": np.add,
+    "subtract": np.subtract,
+    "multiply": np.multiply,
+    "divide": np.divide,
+    "power": np.power,
+    "max": np.maximum,
+    "sqrt": np.sqrt,
+    "clamp": np.clip,
+    "extract": lambda vector, index: vector[int(index)],
+    "dotproduct": lambda a, b: np.sum(a * b, axis=0),
+    "crossproduct": lambda a, b: np.cross(a, b, axis=0),
+}
+
+
+def evaluated(graph: Any, given: Mapping[str, Array]) -> dict[str, Array]:
+    """Outputs of a graph of standard nodes, by NumPy.
+
+    Args:
+        graph: the nodegraph.
+        given: values of its interface, and of the nodes without inputs, such as `viewdirection`.
+    """
+    known: dict[str, Array] = {}
+
+    def of(name: str) -> Array:
+        node = graph.getNode(name)
+        if name not in known:
+            known[name] = np.asarray(
+                given[node.getCategory()]
+                if node.getCategory() in given
+                else OPERATIONS[node.getCategory()](*map(value, _in_order(node)))
+            )
+        return known[name]
+
+    def value(port: Any) -> Array:
+        if port.getInterfaceName():
+            return np.asarray(given[port.getInterfaceName()])
+        if port.getNodeName():
+            return of(port.getNodeName())
+        parts = np.array([float(x) for x in port.getValueString().split(",")])
+        return parts[:, None] if len(parts) > 1 else parts[0]
+
+    return {output.getName(): of(output.getNodeName()) for output in graph.getOutputs()}
+
+
+def _in_order(node: Any) -> list[Any]:
+    """Inputs in the order of the node's definition."""
+    return [node.getInput(each.getName()) for each in node.getNodeDef().getActiveInputs()]
