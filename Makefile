@@ -27,8 +27,8 @@ blender: .venv/ready-dev .venv-blender/ready ## compare what Cycles renders of e
 	$(BIN)/pytest -q -s tests/blender
 	@echo "Pictures of both renderers are in $(CURDIR)/site/blender"
 
-bench: .venv/ready ## measure speed and start-up times
-	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+bench: .venv/ready-dev ## measure into site/bench/report.md; hours, or ONLY='render startup'
+	@$(BIN)/python tools/bench.py $(ONLY)
 
 mutants: .venv/ready-mutants ## change formulas, and list the changes that no test notices; hours, or MUTANTS='velatura.optics*'
 	OPENBLAS_NUM_THREADS=1 $(BIN)/mutmut run $(MUTANTS:%='%')

@@ -15,6 +15,7 @@ import time
 from typing import Any
 
 import numpy as np
+from rows import row
 
 STEPS = 10
 GOLD = {"conductor": "Au", "alpha": 0.2}
@@ -36,7 +37,8 @@ def main() -> None:
             command = [sys.executable, __file__, name]
             run = subprocess.run(command, env={**os.environ, "HOME": home}, check=True, stdout=subprocess.PIPE)
         first, later = json.loads(run.stdout)
-        print(f"{name:40} first {first:5.1f} s, then {later:5.2f} s", flush=True)
+        row("first step", name, first)
+        row("later steps", name, later)
 
 
 def measure(name: str) -> tuple[float, float]:

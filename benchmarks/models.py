@@ -11,10 +11,10 @@ point (`textured`). Medians over rounds of the ratio of two renders of the same 
 from __future__ import annotations
 
 import argparse
-from statistics import median
 from typing import Any
 
 import render
+from rows import row
 
 import velatura as vt
 from velatura import kernel
@@ -78,7 +78,7 @@ def main() -> None:
     times = render.timed(jobs, arguments.rounds)
     for over, under in wanted:
         label = " ".join(a if a == b else f"{a}/{b}" for a, b in zip(over, under))
-        print(f"{label:40s} {median(a / b for a, b in zip(times[over], times[under])):.3f}", flush=True)
+        row("render", label, [a / b for a, b in zip(times[over], times[under])], "x")
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
     python benchmarks/preparation.py [--rounds 15]
 
-One roughness of a preset is changed, the BSDF is made and evaluated once. Medians over changes of the processor's and
-the clock's seconds, without the first two, which compile. Below, the same for three interfaces of every kind, by
+One roughness of a preset is changed, the BSDF is made and evaluated once. Seconds of the clock, and as a remark of the
+processor, without the first two changes, which compile; then the same for three interfaces of every kind, by
 `velatura`, where facets are met once, and often.
 """
 
@@ -15,6 +15,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from rows import row
 
 import velatura as vt
 from velatura.checks.probe import Probe
@@ -62,8 +63,7 @@ WI = np.array([[0.6, 0.0, 0.8]])
 WO = np.array([[-0.6, 0.0, 0.8]])
 
 
-def seconds(stack: Stack, choices: dict[str, Any], rounds: int) -> tuple[float, float]:
-    """Seconds of the processor and of the clock."""
+def report(label: str, stack: Stack, choices: dict[str, Any], rounds: int) -> None:
     name = next(name for name in stack.flat() if "_alpha" in name)
     spent = []
     for i in range(rounds + 2):
@@ -71,21 +71,23 @@ def seconds(stack: Stack, choices: dict[str, Any], rounds: int) -> tuple[float, 
         processor, clock = time.process_time(), time.perf_counter()
         Probe(vt.bsdf(changed, **choices)).eval_pdf(WI, WO)
         spent.append((time.process_time() - processor, time.perf_counter() - clock))
-    return median(s[0] for s in spent[2:]), median(s[1] for s in spent[2:])
+    processor = median(s[0] for s in spent[2:])
+    row("preparation", label, [s[1] for s in spent[2:]], remark=f"{processor:.2f} s of the processor")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=15)
-    rounds = parser.parse_args().rounds
-    print(f"{'processor, clock (s)':24s}" + "".join(f"{preset:>20s}" for preset in PRESETS))
-    for name, choices in MODELS.items():
-        cells = (seconds(vt.load(preset), choices, rounds) for preset in PRESETS)
-        print(f"{name:24s}" + "".join(f"{p:13.2f}, {c:5.2f}" for p, c in cells))
-    print(f"\n{'processor, clock (s)':24s}{'once':>20s}{'often':>20s}")
-    for kind, stack in KINDS.items():
-        cells = (seconds(stack, {"model": "velatura", "reflectance": x}, rounds) for x in ("fgd", "fgd-multi"))
-        print(f"{kind:24s}" + "".join(f"{p:13.2f}, {c:5.2f}" for p, c in cells))
+    parser.add_argument("--presets", nargs="*", default=list(PRESETS))
+    parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), metavar="KIND")
+    options = parser.parse_args()
+    rounds, presets, kinds = options.rounds, options.presets, options.kinds
+    for preset in presets:
+        for name, choices in MODELS.items():
+            report(f"{preset}, {name}", vt.load(preset), choices, rounds)
+    for kind in kinds:
+        for word, reflectance in (("once", "fgd"), ("often", "fgd-multi")):
+            report(f"{kind}, {word}", KINDS[kind], {"model": "velatura", "reflectance": reflectance}, rounds)
 
 
 if __name__ == "__main__":

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import argparse
 import time
-from statistics import median
 from typing import Any
 
 import numpy as np
+from rows import row
 
 import velatura as vt
 from velatura import kernel
@@ -83,13 +83,6 @@ def timed(jobs: dict, rounds: int) -> dict[Any, list[float]]:
             job(number + 1)
             times[name].append(time.perf_counter() - start)
     return times
-
-
-def interleaved(jobs: dict, rounds: int) -> dict[str, float]:
-    """Median over rounds of each job's time over the first one's in the same round."""
-    times = timed(jobs, rounds)
-    first = next(iter(times.values()))
-    return {name: median(t / f for t, f in zip(values, first)) for name, values in times.items()}
 
 
 def furnace(mi, bsdf, spp: int = 1024) -> tuple[float, float]:
@@ -194,6 +187,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--size", type=int, default=512)
+    parser.add_argument("--count", type=int, default=1 << 22, help="evaluations")
     parser.add_argument("--variant", default="llvm_ad_rgb")
     parser.add_argument("--model", default=DEFAULT)
     parser.add_argument("--solids", action="store_true", help="solids of rough glass, and noise")
@@ -207,7 +201,7 @@ def main() -> None:
         return
     materials = bsdfs(mi, arguments.model)
 
-    def evaluation(bsdf, count: int = 1 << 22):
+    def evaluation(bsdf, count: int = arguments.count):
         rng = mi.PCG32(count)
 
         def job(seed: int) -> None:
@@ -224,9 +218,9 @@ def main() -> None:
         return picture(mi, bsdf, arguments.size, arguments.spp)
 
     for title, make in (("render", render), ("eval_pdf", evaluation)):
-        ratios = interleaved({name: make(bsdf) for name, bsdf in materials.items()}, arguments.rounds)
-        for name, ratio in ratios.items():
-            print(f"{title:10s} {name:16s} {ratio:.3f}", flush=True)
+        times = timed({name: make(bsdf) for name, bsdf in materials.items()}, arguments.rounds)
+        for name, seconds in times.items():
+            row(title, name, [t / first for t, first in zip(seconds, times["principled"])], "x principled")
 
 
 if __name__ == "__main__":

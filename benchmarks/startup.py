@@ -1,4 +1,4 @@
-"""Time to the first answer: `--help`, `lobes`, the demo's first picture, the editor. Medians of fresh processes.
+"""Time to the first answer: `--help`, `lobes`, the demo's first picture, the editor. Fresh processes, by turns.
 
 python benchmarks/startup.py [--rounds 5]
 """
@@ -12,7 +12,8 @@ import tempfile
 import time
 import urllib.request
 from pathlib import Path
-from statistics import median
+
+from rows import row
 
 COMMANDS = {
     "velatura --help": ["--help"],
@@ -25,17 +26,22 @@ REACH_S = {"velatura --help": 0.5, "velatura lobes": 1.0, "first picture": 10.0,
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=5)
-    rounds = parser.parse_args().rounds
+    parser.add_argument("--only", nargs="+", choices=list(REACH_S), default=list(REACH_S), metavar="COMMAND")
+    options = parser.parse_args()
+    times: dict[str, list[float]] = {name: [] for name in options.only}
     with tempfile.TemporaryDirectory() as folder:
-        for name, arguments in COMMANDS.items():
-            times = []
-            for _ in range(rounds):
-                start = time.perf_counter()
-                command = [sys.executable, "-m", "velatura", *arguments]
-                subprocess.run(command, cwd=Path(folder), check=True, capture_output=True)
-                times.append(time.perf_counter() - start)
-            report(name, times)
-        report("velatura edit", [edit(Path(folder)) for _ in range(rounds)])
+        for _ in range(options.rounds):
+            for name, seconds in times.items():
+                seconds.append(ended(COMMANDS[name], Path(folder)) if name in COMMANDS else edit(Path(folder)))
+    for name, seconds in times.items():
+        row("start-up", name, seconds, remark=f"reach {REACH_S[name]} s")
+
+
+def ended(arguments: list[str], folder: Path) -> float:
+    """Seconds that a command takes."""
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "velatura", *arguments], cwd=folder, check=True, capture_output=True)
+    return time.perf_counter() - start
 
 
 def edit(folder: Path) -> float:
@@ -53,10 +59,6 @@ def edit(folder: Path) -> float:
         took = time.perf_counter() - start
         process.terminate()
     return took
-
-
-def report(name: str, times: list[float]) -> None:
-    print(f"{name:18s} {median(times):6.2f} s   (reach {REACH_S[name]} s)")
 
 
 if __name__ == "__main__":
