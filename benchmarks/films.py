@@ -2,7 +2,8 @@
 
 - smooth: random stacks of coherent films between thick media, absorbing or clear, s and p apart: the largest error.
 - rough: energies of a model minus those of walks, for random stacks with films and for the same ones without, by kind.
-- cost: CPU time of a render, of `eval_pdf` and of preparation with films over those without, interleaved.
+- cost: CPU time of a render, and of `eval_pdf`, with films over that without, interleaved; and of an index of films
+  from a texture over that of a thickness from one.
 
     python benchmarks/films.py [--smooth 10000] [--stacks 12] [--paths 300000] [--rounds 7] [--seed 0] [--model NAME]
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -71,6 +73,18 @@ def glass(rng: np.random.Generator) -> Interface:
     return Interface(eta=float(rng.uniform(1.2, 2.2)), alpha=alpha(rng), films=films(rng))
 
 
+def gilt(rng: np.random.Generator) -> Interface:
+    """A dielectric whose films absorb: of metals below 40 nm, or tinted."""
+    tinted = Film(
+        eta=float(rng.uniform(1.2, 2.6)), k=float(rng.uniform(0, 0.5)), thickness_nm=float(rng.uniform(0, 500))
+    )
+    metals = Film(
+        eta=float(rng.uniform(0.2, 2.0)), k=float(rng.uniform(1.5, 5.0)), thickness_nm=float(rng.uniform(0, 40))
+    )
+    both = (tinted, metals) if rng.random() < 0.5 else (tinted,)
+    return glass(rng).model_copy(update={"films": both})
+
+
 def coated(rng: np.random.Generator) -> list[Layer]:
     medium = [Medium(sigma_a=tuple(map(float, rng.uniform(0, 0.5, 3))))] if rng.random() < 0.5 else []
     return [glass(rng), *medium, metal(rng)]
@@ -88,7 +102,9 @@ KINDS: dict[str, Callable[[np.random.Generator], list[Layer]]] = {
     "metal": lambda rng: [metal(rng)],
     "brushed metal": lambda rng: [metal(rng).model_copy(update={"alpha": (alpha(rng), alpha(rng))})],
     "glass": lambda rng: [glass(rng)],
+    "glass, films absorb": lambda rng: [gilt(rng)],
     "coated metal": coated,
+    "metal under films that absorb": lambda rng: [gilt(rng), metal(rng)],
     "pane": pane,
     "two coats over metal": many,
 }
@@ -143,7 +159,7 @@ COSTS = {
 }
 
 
-def evaluation(mi: Any, bsdf: Any, count: int = 1 << 21) -> Callable[[int], None]:
+def evaluation(mi: Any, bsdf: Any, count: int) -> Callable[[int], None]:
     """What evaluates random pairs of directions on the sphere."""
     import drjit as dr
 
@@ -173,14 +189,30 @@ def ratio(jobs: list[Callable[[int], None]], rounds: int) -> float:
     return median(ratios[1:])  # the first one compiles
 
 
+def textured(mi: Any, folder: str) -> Iterator[tuple[str, list[Stack]]]:
+    """Stacks of `COSTS` whose lowest film has an index from a texture, and a thickness."""
+    image = Path(folder) / "ramp.exr"
+    mi.util.write_bitmap(str(image), np.linspace(0, 1, 16, dtype=np.float32).reshape(4, 4, 1), write_async=False)
+    for name in ("metal", "glass", "coated metal"):
+        film = f"layer{len(COSTS[name].layers) - 1}_film0_"
+        eta = {"texture": image, "scale": 0.5, "offset": 1.5}
+        thickness = {"texture": image, "scale": 200.0, "offset": 100.0}
+        yield (
+            f"{name}, textured",
+            [COSTS[name].replace(**x) for x in ({film + "eta": eta}, {film + "thickness_nm": thickness})],
+        )
+
+
 def cost(model: str, rounds: int) -> None:
     mi = kernel.mitsuba("llvm_ad_rgb")
-    for name, stack in COSTS.items():
-        both = [stack, without(stack)]
-        bsdfs = [vt.bsdf(each, model=model) for each in both]
-        render = ratio([picture(mi, bsdf, 256, 32) for bsdf in bsdfs], rounds)
-        evaluated = ratio([evaluation(mi, bsdf) for bsdf in bsdfs], rounds)
-        print(f"cost, {name:22s} render {render:.2f}  eval_pdf {evaluated:.2f}", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        found = [(name, [stack, without(stack)], 32) for name, stack in COSTS.items()]
+        found += [(name, both, 4) for name, both in textured(mi, folder)]
+        made = [(name, [vt.bsdf(each, model=model) for each in both], spp) for name, both, spp in found]
+    for name, bsdfs, spp in made:
+        render = ratio([picture(mi, bsdf, 256, spp) for bsdf in bsdfs], rounds)
+        evaluated = ratio([evaluation(mi, bsdf, spp << 16) for bsdf in bsdfs], rounds)
+        print(f"cost, {name:24s} render {render:.2f}  eval_pdf {evaluated:.2f}", flush=True)
 
 
 def main() -> None:

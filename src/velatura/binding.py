@@ -257,27 +257,20 @@ class Binding:
         return value
 
     def _coatings(self) -> Sequence[Any]:
-        """The films on each layer, worked out.
-
-        Raises:
-            InvalidInput: several of one layer have thicknesses from textures.
-        """
+        """The films on each layer, worked out."""
         import drjit as dr
 
         mi = self.mi
         if not any(self.stack.films) or mi.is_spectral:
             return ()
-        spans: dict[int, tuple[int, int, float, float]] = {}
-        for name in self.images:
-            address = self.addresses[name]
-            if address.film is not None and address.layer is not None:
-                if address.layer in spans:
-                    raise InvalidInput(f"{name}: only one of the films on an interface may have a texture")
-                texels = self._texels(address, {address.role: coated.UNKNOWN_NM})
-                spans[address.layer] = address.layer, address.film, float(texels.min()), float(texels.max())
+        spans = []
+        for address in (self.addresses[name] for name in self.images):
+            if address.role in coated.UNKNOWN:
+                texels = self._texels(address, coated.UNKNOWN)
+                spans.append(coated.Span(address, float(texels.min()), float(texels.max())))
         number = mi.Float if dr.is_jit_v(mi.Float) else None
         some = {**dict.fromkeys(self.images, 0.0), **self._colours()}
-        return coated.constant(Material.from_flat(self.stack, some, self._light), list(spans.values()), number)
+        return coated.constant(Material.from_flat(self.stack, some, self._light), spans, number)
 
     @property
     def interferes(self) -> bool:

@@ -107,6 +107,16 @@ def grey(mi: Any, path: Path, ends: tuple[float, float]) -> str:
     return str(path)
 
 
+Spans = dict[str, tuple[float, float]]
+
+
+def of_textures(stack: vt.Stack, spans: Spans, image: str, share: float = 0.5) -> tuple[vt.Stack, vt.Stack]:
+    """A stack at a share of spans, each an offset and a scale, and with textures that have them."""
+    uniform = {name: offset + share * scale for name, (offset, scale) in spans.items()}
+    textures = {name: {"texture": image, "offset": low, "scale": scale} for name, (low, scale) in spans.items()}
+    return stack.replace(**uniform), stack.replace(**textures)
+
+
 @pytest.mark.parametrize("model", ["velatura", "belcour2018"])
 def test_a_texture_of_thickness_is_the_material_of_each_thickness(mi: Any, model: str, tmp_path: Path) -> None:
     """Of four fringes; energies and values within .003 of what is reflected the most."""
@@ -122,26 +132,88 @@ def test_a_texture_of_thickness_is_the_material_of_each_thickness(mi: Any, model
         assert values[:, k] == pytest.approx(np.array(value(mi, uniform))[:, 0], abs=3e-3 * float(values.max()))
 
 
-def test_the_walk_has_textures_of_thickness(mi: Any, tmp_path: Path) -> None:
-    """Its paths are the same as those of the uniform material, to rounding."""
-    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.0, 1.0)), "scale": 500.0, "offset": 100.0}
-    reference = {"layer2_film0_thickness_nm": 350.0}, {"layer2_film0_thickness_nm": texture}
-    uniform, textured = (vt.bsdf(COATED.replace(**values), model="reference") for values in reference)
+@pytest.mark.parametrize(
+    ("stack", "cosine", "spans"),
+    [
+        (COATED, 0.8, {"layer2_film0_thickness_nm": (100.0, 500.0)}),
+        (COATED, 0.8, {"layer0_eta": (1.2, 0.6), "layer2_film0_eta": (1.3, 0.5)}),
+        (GILT, -0.6, {"layer0_film0_k": (2.0, 1.0)}),
+    ],
+)
+def test_the_walk_has_textures_of_films(mi: Any, stack: vt.Stack, cosine: float, spans: Spans, tmp_path: Path) -> None:
+    """Its paths are the same as those of the uniform material, to rounding and to the error of the fixed quadrature."""
+    uniform, textured = (
+        vt.bsdf(each, model="reference") for each in of_textures(stack, spans, grey(mi, tmp_path / "t.exr", (0.0, 1.0)))
+    )
     count, found = 20_000, []
     for bsdf in (uniform, textured):
         rng = mi.PCG32(count)
         u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-        found.append(np.mean(np.array(bsdf.sample(mi.BSDFContext(), lit(mi, 0.8, np.full(count, 0.5)), *u)[1]), axis=1))
+        weight = bsdf.sample(mi.BSDFContext(), lit(mi, cosine, np.full(count, 0.5)), *u)[1]
+        found.append(np.mean(np.array(weight), axis=1))
     assert found[0] == pytest.approx(found[1], abs=1e-3)
 
 
-def test_texels_of_thickness_have_gradients(mi: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("model", "stack", "spans"),
+    [
+        ("velatura", OXIDE, {"layer0_film0_eta": (1.3, 0.9)}),
+        ("velatura", OXIDE, {"layer0_eta": (1.0, 1.0), "layer0_film0_k": (0.0, 0.5)}),
+        ("velatura", PANE, {"layer1_film0_eta": (2.0, 0.5)}),
+        ("velatura", COATED, {"layer0_eta": (1.3, 0.5)}),
+        ("velatura", PANE, {"layer1_film0_thickness_nm": (140.0, 30.0), "layer1_film1_thickness_nm": (80.0, 20.0)}),
+        ("belcour2018", OXIDE, {"layer0_film0_eta": (1.3, 0.9)}),
+        ("belcour2018", COATED, {"layer0_eta": (1.3, 0.5)}),
+    ],
+)
+def test_textures_of_films_are_the_material_of_each_value(
+    mi: Any, model: str, stack: vt.Stack, spans: Spans, tmp_path: Path
+) -> None:
+    """Energies within .003, and values within .003 of the largest."""
+    image = grey(mi, tmp_path / "t.exr", (0.0, 1.0))
+    uniform, textured = (
+        vt.bsdf(each, model=model, reflectance="fgd") for each in of_textures(stack, spans, image, 0.33)
+    )
+    u = 0.25 + 0.5 * 0.33
+    for cosine in (1.0, 0.4):
+        assert albedo(mi, textured, cosine, u) == pytest.approx(albedo(mi, uniform, cosine), abs=3e-3)
+    expected = np.array(value(mi, uniform))
+    assert np.array(value(mi, textured, u)) == pytest.approx(expected, abs=3e-3 * float(expected.max()))
+
+
+def test_each_colour_has_its_own_index_from_a_texture(mi: Any, tmp_path: Path) -> None:
+    texels = np.array([[[0.1, 0.5, 0.9]]] * 2, np.float32)
+    mi.util.write_bitmap(str(tmp_path / "t.exr"), texels, write_async=False)
+    texture = {"texture": str(tmp_path / "t.exr"), "scale": 0.5, "offset": 1.4}
+    textured, uniform = (
+        vt.bsdf(OXIDE.replace(layer0_film0_eta=eta)) for eta in (texture, tuple((1.4 + 0.5 * texels[0, 0]).tolist()))
+    )
+    assert np.array(value(mi, textured)) == pytest.approx(np.array(value(mi, uniform)), rel=2e-3)
+
+
+@pytest.mark.parametrize("film", [0, 2])
+def test_light_from_below_meets_the_film_that_has_a_texture(mi: Any, film: int, tmp_path: Path) -> None:
+    """Among others, in either order."""
+    films = [vt.Film(eta=eta, thickness_nm=120) for eta in (2.2, 1.38, 1.8)]
+    stack = vt.Stack([vt.Interface(eta=1.5, alpha=0.1, films=films)])
+    image = grey(mi, tmp_path / "t.exr", (0.0, 1.0))
+    spans = {f"layer0_film{film}_thickness_nm": (100.0, 200.0)}
+    uniform, textured = (vt.bsdf(each, model="weier2020") for each in of_textures(stack, spans, image))
+    si, wo = lit(mi, -0.8), mi.Vector3f(-0.6, 0.02, -0.8)
+    found, expected = (np.array(bsdf.eval(mi.BSDFContext(), si, wo)) for bsdf in (textured, uniform))
+    assert found == pytest.approx(expected, abs=0.02 * float(expected.max()))
+
+
+@pytest.mark.parametrize(
+    ("key", "offset", "scale"), [("film0_thickness_nm", 100.0, 300.0), ("film0_eta", 1.4, 0.5), ("eta", 1.0, 0.5)]
+)
+def test_texels_beside_films_have_gradients(mi: Any, key: str, offset: float, scale: float, tmp_path: Path) -> None:
     import drjit as dr
 
-    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.45, 0.55)), "scale": 300.0, "offset": 100.0}
-    bsdf = vt.bsdf(OXIDE.replace(layer0_film0_thickness_nm=texture))
+    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.45, 0.55)), "scale": scale, "offset": offset}
+    bsdf = vt.bsdf(OXIDE.replace(layer0_k=5.0, layer0_eta=1.0).replace(**{f"layer0_{key}": texture}))
     parameters = mi.traverse(bsdf)
-    name = "layer0_film0_thickness_nm.data"
+    name = f"layer0_{key}.data"
     texels = np.array(parameters[name])
 
     def at(step: float) -> np.ndarray:
@@ -157,12 +229,6 @@ def test_texels_of_thickness_have_gradients(mi: Any, tmp_path: Path) -> None:
     found = value(mi, bsdf)
     dr.forward(step)
     assert np.ravel(dr.grad(found)) == pytest.approx(expected, rel=0.05, abs=5e-3)
-
-
-def test_one_film_of_an_interface_has_a_texture(mi: Any, tmp_path: Path) -> None:
-    texture = {"texture": grey(mi, tmp_path / "t.exr", (0.0, 1.0))}
-    with pytest.raises(vt.InvalidInput, match=r"layer1_film1_thickness_nm: only one of the films on an interface"):
-        vt.bsdf(PANE.replace(layer1_film0_thickness_nm=texture, layer1_film1_thickness_nm=texture))
 
 
 @pytest.mark.parametrize("model", ["velatura", "belcour2018", "reference"])

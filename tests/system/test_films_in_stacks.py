@@ -386,9 +386,9 @@ def test_a_scene_may_name_films(mi: Any) -> None:
     flat = {"layer0_conductor": "Al", "layer0_alpha": 0.2, "layer0_film0_eta": 1.7, "layer0_film0_thickness_nm": 90}
     named = kernel.load_dict({"type": "layered", **flat})
     assert albedo(mi, named, 0.6) == pytest.approx(albedo(mi, vt.bsdf(vt.Stack.from_flat(None, flat)), 0.6), abs=1e-5)
-    texture = {"type": "checkerboard"}
-    with pytest.raises(vt.InvalidInput, match="layer0_film0_eta: must be a number"):
-        kernel.load_dict({"type": "layered", **flat, "layer0_film0_eta": texture})
+    texture = {"type": "bitmap", "bitmap": mi.Bitmap(np.full((2, 2, 1), 1.7, np.float32)), "raw": True}
+    textured = kernel.load_dict({"type": "layered", **flat, "layer0_film0_eta": texture})
+    assert albedo(mi, named, 0.6) == pytest.approx(albedo(mi, textured, 0.6), abs=1e-3)
 
 
 # What has no films yet
@@ -397,13 +397,6 @@ def test_a_scene_may_name_films(mi: Any) -> None:
 def test_what_has_no_films_says_so(mi: Any) -> None:
     with pytest.raises(vt.InvalidInput, match=r"layer 0 \(interface\): films: .* no thin films yet"):
         vt.bsdf(loads(COATED), model="weidlich_wilkie")
-
-
-def test_an_index_beside_films_has_no_texture(mi: Any, tmp_path: Path) -> None:
-    mi.util.write_bitmap(str(tmp_path / "index.png"), np.full((2, 2, 3), 0.5), write_async=False)
-    texture = {"texture": str(tmp_path / "index.png")}
-    with pytest.raises(vt.InvalidInput, match="films: not over an index from a texture"):
-        vt.Interface(eta=texture, films=[{"eta": 1.4, "thickness_nm": 90}])
 
 
 def test_fresnel_without_films_stays() -> None:

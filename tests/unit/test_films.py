@@ -11,7 +11,7 @@ import tmm
 import velatura as vt
 from velatura import kernel
 from velatura.optics import films, fresnel
-from velatura.optics.coatings import Coating, ColouredFilm
+from velatura.optics.coatings import Coating, ColouredFilm, quadrature
 from velatura.optics.films import Film
 from velatura.sampling import coated
 from velatura.stack import Material
@@ -257,3 +257,22 @@ def test_of_light_between_facets_a_mirror_reflects_all_and_a_black_film_nothing(
     assert black == pytest.approx(np.zeros(3))
     assert np.all((half > 0.05) & (half < 0.95))
     assert mirror == pytest.approx(np.ones(3), abs=0.02)
+
+
+@pytest.mark.parametrize("thickest_nm", [300.0, 5000.0])
+def test_a_fixed_quadrature_has_the_colours_of_a_fine_one(thickest_nm: float) -> None:
+    """Of random films on metals and glass, some of which absorb."""
+    rng, off = np.random.default_rng(3), list[float]()
+    for _ in range(40):
+        k = float(rng.uniform(0, 1)) if rng.random() < 0.4 else 0.0
+        film = Film(float(rng.uniform(1.05, 3)), k, float(rng.uniform(0, thickest_nm)))
+        below = float(rng.uniform(1.1, 3)), float(rng.uniform(0, 5) * (rng.random() < 0.5))
+        cosine = np.array(rng.uniform(0.02, 1))
+
+        fine = 1 / np.linspace(1 / 830, 1 / 360, 1 << 14)[1:-1]
+        sensitivity = srgb_sensitivity(fine) * fine**2
+        exact = fine, sensitivity / sensitivity.sum(axis=1, keepdims=True)
+        both = (exact, quadrature(film.eta * film.thickness_nm, srgb_sensitivity))
+        a, b = (np.clip(w @ films.coherent(cosine, nm, 1.0, [film], *below).reflected, 0, 1) for nm, w in both)
+        off.append(float(np.abs(a - b).max()))
+    assert max(off) < 4e-3 and np.mean(off) < 4e-4

@@ -18,7 +18,7 @@ from velatura.optics.films import Film as FilmOfChannel
 from velatura.optics.films import coherent
 from velatura.sampling.coated import Coated
 from velatura.stack import FilmValues, Interface, Material, Stack, srgb_sensitivity
-from velatura.stack.values import Film, Texture
+from velatura.stack.values import Film
 from velatura.tables import Average
 
 Array = NDArray[np.float64]
@@ -34,11 +34,6 @@ def values(films: tuple[Film, ...]) -> tuple[FilmValues, ...]:
     """Films in the numbers of NumPy, without those of no thickness."""
     (layer,) = Material.of(Stack([Interface(eta=1.5, k=0.0, films=films)])).interfaces
     return tuple(film for film in layer.films if film.thickness_nm > 0)
-
-
-def varying(films: Sequence[Film]) -> bool:
-    """Whether a thickness differs from place to place."""
-    return any(isinstance(film.thickness_nm, Texture) for film in films)
 
 
 class AtNormal(Coated):

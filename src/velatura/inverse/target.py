@@ -15,7 +15,7 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import RGB, Stack, io
 from velatura.stack.schema import Parameter, Record, show
-from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text, Texture
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
 ROUND = 1e-6  # difference of roughnesses of a lobe that has no axes
@@ -176,8 +176,8 @@ class TargetLobe(Record):
             where = f"fixed: films: interface {n}, film {m}"
             if self.base == "mirror" and not dielectric:
                 raise ValueError(f"{where}: not on a mirror, which reflects all light")
-            if isinstance(film.thickness_nm, Texture):
-                raise ValueError(f"{where}: thickness_nm: must be one number, since a lobe is that of one point")
+            if film.varying:
+                raise ValueError(f"{where}: {film.varying}: must be no texture, since a lobe is that of one point")
 
     @property
     def axes(self) -> Roughness:

@@ -19,24 +19,24 @@ from velatura.stack import Address, Material
 Array = NDArray[np.floating]
 Range = tuple[Sequence[Address], float, float]  # values that one texture gives, its least and its greatest
 
-WAVING = "film_thickness_nm"  # a thickness, over which colours are waves: no table of it is coarser than others
-WAVES_MAX = {1: 161, 2: 81}  # nodes of it, likewise
+WAVING = frozenset({"film_thickness_nm", "film_eta"})  # over which colours are waves: no table is coarser than others
+WAVES_MAX = {1: 161, 2: 81}  # nodes of one, likewise,
+WAVES_OF_TWO = 25  # and of each of two
 NODES_MAX = {1: 17, 2: 7, 3: 7}  # by the number of axes of a table
 BESIDE = 9  # nodes of an axis in a table beside one that others resolve
 COARSE = 5  # nodes of an axis in a table that another one resolves
 FINE = {1: 3, 2: 3, 3: 2}  # likewise, places of a table from one node to the next
 FINE_WAVES = 4
-ROOTS = frozenset({"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k"})  # of which nodes are even in the root
+ROOTS = frozenset(
+    {"alpha_u", "alpha_v", "depth", "sigma_a", "sigma_s", "k", "film_k"}
+)  # of which nodes are even in the root
 STEPS = {"rotation": 22.5}
 STEP = 0.1
 COARSER = 1.2  # times, where there would be too many nodes
 QUARTER = 90.0  # of a turn, to either side
 
-#: What textures span that cannot be looked at, by key; values beyond take the nearest.
-UNKNOWN = {
-    **{"eta": (1.0, 2.5), "k": (0.0, 6.25), "depth": (0.0, 6.25), "sigma_a": (0.0, 6.25), "sigma_s": (0.0, 6.25)},
-    WAVING: coated.UNKNOWN_NM,
-}
+#: What textures span that cannot be looked at, by role; values beyond take the nearest.
+UNKNOWN = {**dict.fromkeys(("depth", "sigma_a", "sigma_s"), (0.0, 6.25)), **coated.UNKNOWN}
 
 
 @dataclass(frozen=True)
@@ -54,17 +54,17 @@ class Axis:
     fine: int = FINE[2]
 
     @classmethod
-    def of(cls, given: Range, together: int, step: float | None = None) -> Axis:
-        """The axis of a texture, in a table of so many axes; `step` is that between nodes where it is no usual one."""
+    def of(cls, given: Range, together: int, step: float | None = None, waves_max: int = 0) -> Axis:
+        """The axis of a texture, in a table of so many axes; of waves, with a `step` between nodes, and so many of
+        them at most."""
         addresses, *ends = given
         first = addresses[0]
         if first.key == "rotation":
             return cls(tuple(addresses), -QUARTER, QUARTER, round(2 * QUARTER / STEPS["rotation"]) + 1)
         least, most = (_coordinate(first, end) for end in first.declared.within)
         low, high = (_coordinate(first, end) for end in ends)
-        step = step or STEPS.get(first.key, STEP)
-        waving = first.role == WAVING
-        nodes_max = (WAVES_MAX if waving else NODES_MAX)[together]
+        step, waving = step or STEPS.get(first.key, STEP), first.role in WAVING
+        nodes_max = waves_max if waving else NODES_MAX[together]
         while (nodes := _around(low, high, step))[1] - nodes[0] >= nodes_max:
             step *= COARSER
         # Slopes of waves are those of splines at either end, too
@@ -92,8 +92,8 @@ class Axis:
 
     @property
     def waves(self) -> bool:
-        """Whether it is a thickness of films."""
-        return self.addresses[0].role == WAVING
+        """Whether it is a thickness of films, or their index."""
+        return self.addresses[0].role in WAVING
 
     def covers(self, other: Axis | Wavelengths) -> bool:
         return (
@@ -110,7 +110,7 @@ class Axis:
         return found
 
     def _values(self, coordinates: Array) -> Array:
-        return coordinates**2 if self.addresses[0].key in ROOTS else coordinates
+        return coordinates**2 if self.addresses[0].role in ROOTS else coordinates
 
     @property
     def places(self) -> int:
@@ -176,7 +176,7 @@ def _around(low: float, high: float, step: float) -> tuple[int, int]:
 
 
 def _coordinate(address: Address, value: Value) -> Value:
-    return ops.sqrt(value) if address.key in ROOTS else value
+    return ops.sqrt(value) if address.role in ROOTS else value
 
 
 def refined(values: Array, axes: Sequence[Axis | Wavelengths]) -> Array:

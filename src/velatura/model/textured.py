@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import axes, remainder, solution
-from velatura.model.axes import BESIDE, COARSE, Axis, Range, Wavelengths
+from velatura.model.axes import BESIDE, COARSE, WAVES_MAX, WAVES_OF_TWO, Axis, Range, Wavelengths
 from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
@@ -37,7 +37,7 @@ from velatura.sampling import coated, differences, directional_grid
 from velatura.sampling.directional_grid import Packed, Packing, Summed
 from velatura.sampling.packets import WIDTH, aligned
 from velatura.sampling.variables import Variables
-from velatura.stack import InterfaceValues, Material
+from velatura.stack import Address, InterfaceValues, Material
 
 Array = NDArray[np.floating]
 
@@ -195,7 +195,7 @@ def textured(
     `symbolic` is the same material with values that may be compared. `before`, of the same material, is returned where
     it has all that is needed.
     """
-    names = {address.name for given in ranges if not isinstance(given, Wavelengths) for address in given[0]}
+    names = {address.name for given in _textures(ranges) for address in given[0]}
     frame = Frame.of(symbolic, names)
     if frame.layer is None:
         return _tabulated(material, ranges, model, variance, context, before)
@@ -218,12 +218,14 @@ def _tabulated(
     isotropic = variance is Isotropic
     spectral = any(isinstance(x, Wavelengths) for x in ranges)
     # Waves are resolved by the first table, in which wavelengths come first
-    order = {id(x): 0 if isinstance(x, Wavelengths) else 1 if x[0][0].role == axes.WAVING else 2 for x in ranges}
-    ranges, films = sorted(ranges, key=lambda x: order[id(x)]), 1 in order.values()
+    order = {id(x): 0 if isinstance(x, Wavelengths) else 1 if x[0][0].role in axes.WAVING else 2 for x in ranges}
+    ranges, films = sorted(ranges, key=lambda x: order[id(x)]), [*order.values()].count(1)
     together = min(len(ranges), TOGETHER if isotropic and not spectral and not films else 2)
     material = material.solid()
     numbers = solution.plain(material)
-    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together, _waves(numbers, x)) for x in ranges]
+    spans = [coated.Span(at, *ends) for of, *ends in _textures(ranges) for at in of]
+    step, waves_max = partial(_step, coated.highest(numbers, spans)), WAVES_OF_TWO if films > 1 else WAVES_MAX[together]
+    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together, step(x[0][0]), waves_max) for x in ranges]
     start = axes.placed(numbers, spanned, [axis.middle for axis in spanned])
     solver = Solver.of(model, variance, context)
     grid = replace(solver.grid, cosines=COSINES[isotropic])
@@ -311,14 +313,17 @@ def _tabulated(
     return Tables(tuple(spanned), tuple(terms), tuple(adds), layouts, solver, point, fixed)
 
 
-def _waves(material: Material, given: Range) -> float | None:
-    """The step of an axis of thicknesses; None of others."""
-    address = given[0][0]
-    if address.film is None or address.layer is None:
+def _textures(ranges: Sequence[Range | Wavelengths]) -> list[Range]:
+    return [given for given in ranges if not isinstance(given, Wavelengths)]
+
+
+def _step(highest: Material, address: Address) -> float | None:
+    """Between nodes of an axis of waves, by the greatest values of textures; None of others."""
+    if address.role not in axes.WAVING or address.layer is None:
         return None
-    layer = material.layers[address.layer]
+    layer = highest.layers[address.layer]
     assert isinstance(layer, InterfaceValues)
-    return coated.step_nm(layer.films[address.film])
+    return coated.step(address, layer)
 
 
 Group = tuple[Axis | Wavelengths, ...]

@@ -29,7 +29,8 @@ Sensitivity: TypeAlias = Callable[[Array], Array]
 
 RANGE_NM = (360.0, 830.0)  # beyond it, sensitivities are 0
 COARSEST = 48  # wavenumbers at first,
-PER_PERIOD = 2.5  # or as many in a period of the thickest film's reflectance
+PER_PERIOD = 2.5  # or as many in a period of the thickest film's reflectance;
+PER_PERIOD_FIXED = 10.0  # where no colour is looked at
 CONVERGED = 1e-3  # change of a colour by half the step
 FINEST = 1 << 14  # wavenumbers at most
 BLOCK = 1 << 16  # cosines times wavenumbers at a time
@@ -131,7 +132,7 @@ def integrated(
     thickness_nm: optical thickness of all films.
     """
     low, high = 1 / RANGE_NM[1], 1 / RANGE_NM[0]
-    count = max(COARSEST, int(np.ceil(PER_PERIOD * 2 * thickness_nm * (high - low))))
+    count = _intervals(thickness_nm, PER_PERIOD)
     step = (high - low) / count
     total, whole = _summed(share, cosines, low + step * np.arange(1, count), sensitivity)
     while True:
@@ -140,6 +141,23 @@ def integrated(
         count, step = 2 * count, 0.5 * step
         if np.abs(total / whole - before).max() < CONVERGED or 2 * count > FINEST:
             return np.asarray(total / whole)
+
+
+def quadrature(thickness_nm: float, sensitivity: Sensitivity) -> tuple[Array, Array]:
+    """Wavelengths (N,) in nanometres, and weights (channels, N) that sum shares of light up to colours.
+
+    One fixed step for all films of an optical thickness, so that colours err by .004 at most, .0001 in the mean.
+    """
+    low, high = 1 / RANGE_NM[1], 1 / RANGE_NM[0]
+    wavelengths_nm = 1 / np.linspace(low, high, _intervals(thickness_nm, PER_PERIOD_FIXED) + 1)[1:-1]
+    weights = sensitivity(wavelengths_nm) * wavelengths_nm**2
+    return wavelengths_nm, weights / weights.sum(axis=1, keepdims=True)
+
+
+def _intervals(thickness_nm: float, per_period: float) -> int:
+    """Steps of wavenumbers, for films of an optical thickness."""
+    low, high = 1 / RANGE_NM[1], 1 / RANGE_NM[0]
+    return max(COARSEST, int(np.ceil(per_period * 2 * thickness_nm * (high - low))))
 
 
 def _summed(

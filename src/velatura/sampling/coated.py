@@ -1,5 +1,5 @@
 """Fresnel's reflectance of interfaces with thin films: sampled over the cosine, so that it is one fetch, for colours;
-at the wavelengths of a ray, worked out."""
+worked out where it is needed at the wavelengths of a ray, and of indices from textures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, pi
 from threading import Lock
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.optics.coatings import Coating, ColouredFilm
+from velatura.optics.coatings import Coating, ColouredFilm, quadrature
 from velatura.optics.films import Film, Response, coherent
 from velatura.sampling.differences import differentiable
-from velatura.sampling.packets import Packets, packets
+from velatura.sampling.packets import Packets, aligned, packets
 from velatura.sampling.variables import Variables, plain
-from velatura.stack import FilmValues, InterfaceValues, Material, luminance_sensitivity, srgb_sensitivity
+from velatura.stack import Address, FilmValues, InterfaceValues, Material, luminance_sensitivity, srgb_sensitivity
 
 Array = NDArray[np.floating]
 
@@ -34,8 +34,15 @@ Average: TypeAlias = Callable[[Value, Value], Value]
 Share: TypeAlias = Callable[[Coating, str, Array], Array]
 
 NODES = 257  # even over the cosine; between them no reflectance bends by more than 3e-4
-STEP_NM = 15.0  # optical, between thicknesses that are worked out,
-UNKNOWN_NM = (0.0, 1000.0)  # spanned by thicknesses that cannot be looked at
+STEP_NM = 15.0  # optical, between thicknesses that are worked out, or by a step of an index
+THIN_NM = 150.0  # of which steps of an index are .1: the least thickness that they are chosen for
+
+#: What textures of films and of indices span that cannot be looked at, by role.
+UNKNOWN = {
+    **{"film_thickness_nm": (0.0, 1000.0), "film_eta": (1.0, 2.5), "film_k": (0.0, 6.25)},
+    **{"eta": (1.0, 2.5), "k": (0.0, 6.25)},
+}
+
 MATCHED = 1e-6  # least square of the cosine at the critical angle
 FINE = 4  # and how many are interpolated, by splines, from one to the next
 
@@ -118,7 +125,7 @@ class Coated(Sampled):
         found._packets = {dialect: packets(flat, self.data.shape[-1], dialect)}
         return found
 
-    def of(self, layer: InterfaceValues) -> Coated:
+    def of(self, layer: InterfaceValues, above: Value) -> Coated:
         """For the thickness that a layer has."""
         return self._at(self.axis.place(layer.films[self.axis.film].thickness_nm)) if self.axis else self
 
@@ -127,6 +134,7 @@ class Coated(Sampled):
         if self._reversed is None:
             found = copy.copy(self)
             found.rarer, found.n12 = 3 - self.rarer, 1 / self.n12 if self.n12 else None
+            found.axis = self.axis and self.axis.reversed()
             self._reversed = found
         return self._reversed._at(*self.place)
 
@@ -233,7 +241,7 @@ class Absorbing(Coated):
 
 @dataclass(frozen=True)
 class Axis:
-    """Thicknesses of a film, by its number, on a fixed lattice."""
+    """Thicknesses of a film, by its number, on a fixed lattice; a negative number counts from the last film."""
 
     film: int
     low_nm: float
@@ -245,6 +253,10 @@ class Axis:
         # One node more at either end, so that slopes are those of splines
         begin, end = max(floor(low_nm / step_nm) - 1, 0), ceil(high_nm / step_nm) + 1
         return cls(film, begin * step_nm, end * step_nm, end - begin + 1)
+
+    def reversed(self) -> Axis:
+        """As seen from below."""
+        return replace(self, film=-1 - self.film)
 
     @property
     def nodes(self) -> Array:
@@ -262,6 +274,20 @@ class Axis:
 
 
 @dataclass(frozen=True)
+class Span:
+    """The least and the greatest value that a texture gives."""
+
+    address: Address
+    low: float
+    high: float
+
+    def axis(self, layer: InterfaceValues) -> Axis:
+        """That of a thickness."""
+        assert self.address.film is not None
+        return Axis.around(self.address.film, self.low, self.high, step(self.address, layer))
+
+
+@dataclass(frozen=True)
 class AtWavelengths:
     """As `Coated`, at the wavelengths of a ray; k_2 is None where the interface transmits."""
 
@@ -273,7 +299,12 @@ class AtWavelengths:
 
     known = False
 
-    def reversed(self) -> AtWavelengths:
+    @property
+    def absorbs(self) -> bool:
+        """Whether less may pass than is not reflected."""
+        return True
+
+    def reversed(self: At) -> At:
         """As seen from below."""
         return replace(self, eta_1=self.eta_2, films=self.films[::-1], eta_2=self.eta_1)
 
@@ -321,6 +352,99 @@ class AtWavelengths:
         # Functions of Dr.Jit may have taken a colour of Mitsuba's for an array
         kind: Any = type(self.wavelengths_nm)
         return kind(found)
+
+
+At = TypeVar("At", bound=AtWavelengths)
+
+
+@dataclass(frozen=True)
+class AtAPoint(AtWavelengths):
+    """As `Coated`, of values that differ from point to point: summed over the wavelengths of a `spectrum` each time."""
+
+    spectrum: Spectrum
+
+    @property
+    def absorbs(self) -> bool:
+        return self.spectrum.absorb
+
+    def _shares(self, cos_1: Value, cos_2: Value) -> tuple[Value, Value]:
+        if not self.absorbs:
+            (reflected,) = self._summed(lambda seen: seen._shares(cos_1, cos_2)[:1], 1)
+            return reflected, 1 - reflected
+
+        def both(seen: AtWavelengths) -> tuple[Value, ...]:
+            return *seen._shares(cos_1, cos_2), seen.reversed()._shares(cos_2, cos_1)[0]
+
+        reflected, passing, back = self._summed(both, 3)
+        return reflected, ops.minimum(passing, 1 - ops.maximum(reflected, back))
+
+    def at(self, cosine: Value, like: Value) -> Value:
+        return self._summed(lambda seen: [seen.at(cosine, like)], 1)[0]
+
+    def _summed(self, shares: Callable[[AtWavelengths], Sequence[Value]], count: int) -> list[Value]:
+        """Colours that light may have, of shares at one wavelength."""
+        found = self.spectrum.summed(lambda nm: shares(self._at(nm)), count)
+        return [ops.clip(x, 0.0, 1.0) for x in found]
+
+    def _at(self, nm: Value) -> AtWavelengths:
+        """At a wavelength, a colour of it."""
+        return AtWavelengths(nm, self.eta_1, self.films, self.eta_2, self.k_2)
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Wavelengths (N,), and their weights (C, N) in a renderer's colours, flat: numbers of a variant.
+
+    It stands for films of a layer whose values differ from point to point, which may `absorb`; `colour` is the type of
+    colours.
+    """
+
+    wavelengths_nm: Any
+    weights: Any
+    colour: Any
+    absorb: bool
+
+    @classmethod
+    def over(cls, thickness_nm: float, light: str, colour: Any, absorb: bool, number: Any) -> Spectrum:
+        """For films of an optical thickness at most; `number` is Dr.Jit's type, None in scalar variants."""
+        wavelengths_nm, weights = quadrature(thickness_nm, _SENSITIVITIES[light])
+        if number is None:
+            return cls(wavelengths_nm, weights.ravel(), colour, absorb)
+        return cls(number(aligned(wavelengths_nm)), number(aligned(weights.ravel())), colour, absorb)
+
+    def of(self, layer: InterfaceValues, above: Value) -> AtAPoint:
+        """For the values that a layer has."""
+        return AtAPoint(None, above, layer.films, layer.eta, layer.k if layer.kind == "conductor" else None, self)
+
+    def reversed(self) -> Spectrum:
+        """As seen from below."""
+        return self
+
+    def summed(self, shares: Callable[[Value], Sequence[Value]], count: int) -> list[Value]:
+        """As many shares of light as colours, by a function of the wavelength, a colour."""
+        import drjit as dr
+
+        kind, nodes = self.colour, len(self.wavelengths_nm)
+        channels = range(len(self.weights) // nodes)
+
+        def read(gather: Callable[[Any, Any], Value], i: Any) -> tuple[Value, Value]:
+            return kind(gather(self.wavelengths_nm, i)), kind([gather(self.weights, i + c * nodes) for c in channels])
+
+        if isinstance(self.weights, np.ndarray):
+            each = [read(lambda flat, i: float(flat[i]), i) for i in range(nodes)]
+            found = [[kind(weight * x) for x in shares(nm)] for nm, weight in each]
+            return [sum(x[1:], x[0]) for x in zip(*found)]
+        number = type(self.weights)
+        integer = sys.modules[number.__module__].UInt32
+
+        def more(i: Any, *sums: Value) -> tuple[Value, ...]:
+            nm, weight = read(functools.partial(dr.gather, number), i)
+            return i + 1, *(kind(dr.fma(weight, x, total)) for x, total in zip(shares(nm), sums))
+
+        start = integer(0), *(dr.zeros(kind) for _ in range(count))
+        # Sums alone pass from one wavelength to the next, so that gradients need none of the steps between
+        _, *found = dr.while_loop(start, lambda i, *_: i < nodes, more, max_iterations=-1)
+        return found
 
 
 @dataclass(frozen=True)
@@ -385,7 +509,7 @@ def dielectric_passing(films: Films, cos_1: Value, cos_2: Value, eta: Value) -> 
 
 def absorbs(films: Films) -> bool:
     """Whether films may absorb, by what is known of them."""
-    return isinstance(films, AtWavelengths | Either) or (films is not None and films.absorbs)
+    return isinstance(films, Either) or (films is not None and films.absorbs)
 
 
 def _joined(like: Value, channels: list[Value]) -> Value:
@@ -430,7 +554,7 @@ def _of(material: Material, may_absorb: Collection[int] = ()) -> list[Any]:
         films: OfInterface | None = None
         if isinstance(layer, InterfaceValues):
             if layer.films and layer.coating:
-                films = layer.coating.of(layer)
+                films = layer.coating.of(layer, above)
             elif layer.films:
                 films = _worked_out(layer, above, material.light, k in may_absorb)
             above = layer.eta
@@ -438,23 +562,31 @@ def _of(material: Material, may_absorb: Collection[int] = ()) -> list[Any]:
     return found
 
 
-def constant(material: Material, spans: Sequence[tuple[int, int, float, float]], number: Any) -> list[Coated | None]:
+def constant(material: Material, spans: Sequence[Span], number: Any) -> list[Coated | Spectrum | None]:
     """The films on each layer of a renderer's constants; differentiable.
 
     Args:
-        spans: layers and films with thicknesses from textures, and the least and the greatest of these.
+        spans: values from textures, of films and of indices, which then have any value in `material`.
         number: Dr.Jit's type of numbers, None in scalar variants.
     """
     given, start = Variables.of(material), plain(material)
-    axes: dict[int, Axis] = {}
-    for k, film, low, high in spans:
-        layer = start.layers[k]
-        assert isinstance(layer, InterfaceValues)
-        axes[k] = Axis.around(film, low, high, step_nm(layer.films[film]))
-
     # Where an extinction varies it may be 0
-    varying = (given.addresses[place] for variable in given.given for place, _ in variable.places)
+    varying = [given.addresses[place] for variable in given.given for place, _ in variable.places]
+    varying += [span.address for span in spans]
     may_absorb = {address.layer for address in varying if address.role == "film_k" and address.layer is not None}
+    axes, points = dict[int, Axis](), dict[int, Spectrum]()
+    most, above = highest(start, spans), None
+    for k, layer in enumerate(most.layers):
+        if not isinstance(layer, InterfaceValues):
+            continue
+        own = [x for x in spans if x.address.layer == k or (x.address.layer == above and x.address.key == "eta")]
+        if layer.films and [x.address.role for x in own] == ["film_thickness_nm"]:
+            axes[k] = own[0].axis(layer)
+        elif layer.films and own:
+            absorbs = k in may_absorb or any(np.any(film.k > 0) for film in layer.films)
+            points[k] = Spectrum.over(_thick_nm(layer), material.light, type(material.exterior), absorbs, number)
+            start = start.with_layer(k, films=())
+        above = k
 
     def made(numbers: list[float]) -> list[Coated | None]:
         changed = given.replaced(start, numbers)
@@ -463,15 +595,14 @@ def constant(material: Material, spans: Sequence[tuple[int, int, float, float]],
             found[k] = _over_thickness(changed, k, axis, may_absorb)
         return found
 
-    found = made([])
-    if not given.given or not any(found):
-        return found
-
     def arrays(numbers: list[float]) -> list[Array]:
         return [films.data.ravel() for films in made(numbers) if films]
 
-    flat = iter(differentiable(arrays, given.given, given.around, number))
-    return [films and films.reading(next(flat)) for films in found]
+    found = made([])
+    if given.given and any(found):
+        flat = iter(differentiable(arrays, given.given, given.around, number))
+        found = [films and films.reading(next(flat)) for films in found]
+    return [points.get(k, films) for k, films in enumerate(found)]
 
 
 def _over_thickness(material: Material, k: int, axis: Axis, may_absorb: Collection[int]) -> Coated:
@@ -488,15 +619,29 @@ def _over_thickness(material: Material, k: int, axis: Axis, may_absorb: Collecti
     return type(each[0])(found, each[0].rarer, each[0].n12, None, axis)
 
 
-def step_nm(film: FilmValues) -> float:
-    """Between thicknesses of a film, of values of NumPy, at which what it reflects is worked out."""
-    return STEP_NM / float(np.max(film.eta))
+def highest(material: Material, spans: Sequence[Span]) -> Material:
+    """A material with the greatest values of textures."""
+    most = {span.address.name: span.high for span in spans}
+    return material.each(lambda address, x: most.get(address.name, x))
+
+
+def step(address: Address, layer: InterfaceValues) -> float:
+    """Between thicknesses of a film, or between its indices, at which what it reflects is worked out: by the greatest
+    values of the layer."""
+    assert address.film is not None
+    film = layer.films[address.film]
+    if address.role == "film_thickness_nm":
+        return STEP_NM / float(np.max(film.eta))
+    return STEP_NM / max(film.thickness_nm, THIN_NM)
 
 
 def optical_nm(material: Material) -> float:
     """The greatest optical thickness of the films on an interface, of values of NumPy."""
-    each = (sum(float(np.max(x.eta)) * x.thickness_nm for x in layer.films) for layer in material.interfaces)
-    return max(each, default=0.0)
+    return max(map(_thick_nm, material.interfaces), default=0.0)
+
+
+def _thick_nm(layer: InterfaceValues) -> float:
+    return sum(float(np.max(x.eta)) * x.thickness_nm for x in layer.films)
 
 
 def _worked_out(layer: InterfaceValues, above: Value, light: Any, may_absorb: bool) -> OfInterface:

@@ -22,15 +22,14 @@ def check(stack: Stack) -> None:
         if not isinstance(layer, Interface):
             continue
         if layer.films:
-            where = f"layer {index} (interface): films"
-            if isinstance(above, Varying):
-                raise ValueError(f"{where}: not below an index from a texture")
-            if not layer.opaque and layer.alpha != 0:
-                below = stack.exterior if stack.thin and layer is stack.layers[-1] else layer.eta
-                if abs(_mean(below) / _mean(above) - 1) < STEP_MIN:
-                    raise ValueError(
-                        f"{where}: between media whose indices differ by less than {STEP_MIN:g} only where alpha is 0"
-                    )
+            below = stack.exterior if stack.thin and layer is stack.layers[-1] else layer.eta
+            rough = not layer.opaque and layer.alpha != 0
+            known = not isinstance(above, Varying) and not isinstance(below, Varying)
+            if rough and known and abs(_mean(below) / _mean(above) - 1) < STEP_MIN:
+                raise ValueError(
+                    f"layer {index} (interface): films: between media whose indices differ by less than {STEP_MIN:g} "
+                    "only where alpha is 0"
+                )
         above = layer.eta
 
 

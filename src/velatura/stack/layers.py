@@ -209,8 +209,6 @@ class Interface(LayerRecord):
             raise ValueError(f"eta: {self.eta} is a metal; write conductor: {self.eta}")
         if self.films and self.kind == "mirror":
             raise ValueError("films: not on a mirror, which has no index; eta: 1 and k: 10000 make one")
-        if self.films and isinstance(self.eta, Texture) | isinstance(self.k, Texture):
-            raise ValueError("films: not over an index from a texture")
         return self
 
     @property

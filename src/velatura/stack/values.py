@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import PrivateAttr, model_validator
 
-from velatura.stack.schema import Parameter, Record, show, unknown
+from velatura.stack.schema import Parameter, Record, parameters, show, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read, rgb
 
 RGB: TypeAlias = tuple[float, float, float]
@@ -428,24 +428,22 @@ class Film(Record):
     """A thin film: it changes what its interface reflects, by interference, and nothing else."""
 
     eta: Annotated[
-        float | RGB | str,
+        float | RGB | str | Spectrum | Texture,
         Index(
             "absolute index of refraction",
             low=INDEX_LOW,
             high=INDEX_HIGH,
             part="eta",
             typical=1.5,
-            texturable=False,
         ),
     ]
     k: Annotated[
-        float | RGB | str,
+        float | RGB | str | Spectrum | Texture,
         Index(
             "absolute extinction",
             low=0,
             high=INDEX_HIGH,
             part="k",
-            texturable=False,
         ),
     ] = 0.0
     thickness_nm: Annotated[float | Texture, Scalar("thickness", unit="nm", low=0, high=5000, typical=300.0)]
@@ -454,6 +452,11 @@ class Film(Record):
     def absorbs(self) -> bool:
         """Whether it may absorb light."""
         return self.k not in (0.0, (0.0, 0.0, 0.0))
+
+    @property
+    def varying(self) -> str | None:
+        """The key of a value that differs from point to point; None without one."""
+        return next((key for key in parameters(Film) if isinstance(getattr(self, key), Varying)), None)
 
 
 class Films(Parameter):
