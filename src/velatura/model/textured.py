@@ -46,6 +46,7 @@ SAMPLES = 377  # for the factors of the symmetric form, at each direction
 SHAPES = {True: (96,), False: (48, 33)}  # places over direction
 FAINTEST = 1e-4  # columns that are scaled from less than that are scaled by less
 MOST = 8.0  # times
+DARK = 0.003  # energies by which weights of lobes are smoothed, where there are films
 TOGETHER = 3  # axes of one table at most
 OF_PASSED = 0.05  # share of what passes by which each part of it is sampled at least, where terms are summed
 
@@ -250,6 +251,7 @@ def _tabulated(
         for done, node in enumerate(nodes):
             context.progress(done, len(nodes))
             sides = of_group.solve(node, layouts)
+            sides = [_smoothed(side) for side in sides] if any(material.films) else sides
             solves.append([_of_channels(of_group, side, solver.colours, wavelengths) for side in sides])
             if not reads:
                 reads.extend(side.groups_of(solver.colours) for side in sides)
@@ -353,6 +355,17 @@ def _beyond(values: Array, group: Group, known: Sequence[int]) -> Array:
     for k in known:
         found = found - found.take([group[k].middle_node], k)
     return found.reshape(values.shape)
+
+
+def _smoothed(side: SolvedSide) -> SolvedSide:
+    """A side whose weights of lobes tend to 1 where facets reflect less than `DARK`: films make that happen at single
+    nodes, where weights are quotients of small numbers, and splines would carry them to others."""
+    columns = side.columns
+    weights = [
+        w * (energy + DARK) / (energy + DARK * np.maximum(w, FAINT))
+        for w, energy in zip(columns.weights, columns.energies)
+    ]
+    return replace(side, columns=replace(columns, weights=weights))
 
 
 def _of_channels(solver: Solver, side: SolvedSide, colours: int, wavelengths: int) -> tuple[list[Array], list[Array]]:
