@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from velatura.errors import InvalidInput
-from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, film_key, has
+from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, PERFECT, film_key, has
 from velatura.stack.schema import parameters, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named
 from velatura.stack.values import RGB, Colour, Film, Scalar, Varying
@@ -196,7 +196,7 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
         fields = {key: value for key, value in fields.items() if key in new or key not in ("eta", "k")}
     elif "conductor" in old and ("eta" in new or "k" in new):
         metal = fields.pop("conductor")
-        fields = {"eta": metal, "k": metal, **fields}
+        fields = {**(PERFECT if metal == MIRROR else {"eta": metal, "k": metal}), **fields}
     metal = _name(fields.get("eta"), "eta")
     if metal and metal == _name(fields.get("k"), "k"):
         fields = {"conductor": metal, **{key: value for key, value in fields.items() if key not in ("eta", "k")}}

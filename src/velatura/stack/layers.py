@@ -105,6 +105,10 @@ def is_zero(value: object) -> bool:
     return isinstance(value, np.ndarray) and not value.any()
 
 
+#: Indices of a mirror under films, which absorbs less than 1e-6 of light.
+PERFECT = {"eta": 1.0, "k": INDEX_HIGH}
+
+
 # As they are written -------------------------------------------------------------------------------------------------
 
 
@@ -163,7 +167,7 @@ class Interface(LayerRecord):
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {
         "dielectric": ("k", "conductor"),
         "conductor": (),
-        "mirror": ("eta", "k", "films"),
+        "mirror": ("eta", "k"),
     }
     surface = True
     title = "interface"
@@ -207,8 +211,6 @@ class Interface(LayerRecord):
             raise ValueError("eta: missing; write eta, or eta and k, or conductor")
         if self.k is None and isinstance(self.eta, str) and self.eta in names()[0]:
             raise ValueError(f"eta: {self.eta} is a metal; write conductor: {self.eta}")
-        if self.films and self.kind == "mirror":
-            raise ValueError("films: not on a mirror, which has no index; eta: 1 and k: 10000 make one")
         return self
 
     @property
@@ -218,8 +220,8 @@ class Interface(LayerRecord):
 
     @property
     def kind(self) -> Kind:
-        """dielectric, conductor or mirror."""
-        if self.conductor == MIRROR:
+        """dielectric, conductor or mirror; a mirror under films is a conductor, whose index they need."""
+        if self.conductor == MIRROR and not self.films:
             return "mirror"
         return "conductor" if self.opaque else "dielectric"
 
@@ -235,11 +237,14 @@ class Interface(LayerRecord):
     @property
     def lossless(self) -> bool:
         """Whether it absorbs no light: it is no metal, and no film on it absorbs."""
-        return self.kind != "conductor" and not any(film.absorbs for film in self.films)
+        is_metal = self.opaque and self.conductor != MIRROR
+        return not is_metal and not any(film.absorbs for film in self.films)
 
     def written(self, key: str) -> Any:
-        """The value of a parameter as written: for the indices, the name of a conductor."""
+        """The value of a parameter as written: for the indices, the name of a conductor, or those of a mirror."""
         value = getattr(self, key)
+        if value is None and self.conductor == MIRROR:
+            return PERFECT.get(key)
         return self.conductor if value is None else value
 
 

@@ -36,8 +36,7 @@ export function parametersOf(layer, schema) {
   const all = Object.keys(schema[layer.kind]);
   if (layer.kind !== 'interface') return all;
   const hidden = Object.values(INDICES).flat();
-  const lacks = variantOf(layer) === 'mirror' ? ['films'] : [];
-  return [...INDICES[variantOf(layer)], ...all.filter((key) => ![...hidden, ...lacks].includes(key))];
+  return [...INDICES[variantOf(layer)], ...all.filter((key) => !hidden.includes(key))];
 }
 
 /** The colour of a medium, which is that of its absorption; nothing where an image or a table has it. */
