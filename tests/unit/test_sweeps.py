@@ -281,6 +281,14 @@ def test_every_question_has_an_answer(
         assert np.allclose(found.own_alpha[0], 0.2) and np.allclose(found.eta[0], 1.5)
 
 
+def test_the_inverse_of_a_stack_keeps_its_films(tmp_path: Path) -> None:
+    oxide = vt.Stack([vt.Interface(conductor="Al", alpha=0.1, films=[vt.Film(eta=2.4, thickness_nm=60)])])
+    varied = {"layer0_film0_thickness_nm": {"values": [60.0, 90.0]}}
+    found = swept({"material": oxide, "vary": varied}, "inverse", tmp_path / "a.zarr", model="weier2020")
+    assert found.reason.isnull().all()
+    assert np.allclose(found.energy, found.asked_energy, atol=2e-3)
+
+
 def test_unknown_questions_and_options_are_refused(tmp_path: Path) -> None:
     for what, options, message in [
         ("lobe", {}, "what: unknown question 'lobe' (did you mean lobes?)"),

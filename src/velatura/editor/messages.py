@@ -22,7 +22,7 @@ from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named
 from velatura.stack import Stack, dumps
 from velatura.stack.schema import Parameter, show
-from velatura.stack.values import Films, Flag, Scalar
+from velatura.stack.values import THICKEST_NM, Films, Flag, Scalar
 
 Body: TypeAlias = Mapping[str, Any]
 Answer: TypeAlias = dict[str, Any]
@@ -184,7 +184,7 @@ KEYS: dict[str, Parameter] = {
     "lobe": Whole("which lobe of the target", high=LOBES - 1),
     "layer": Whole("which layer of the material", high=LAYERS - 1),
     "film": Whole("which film of the layer", high=Films.most - 1),
-    "thickness_nm": Scalar("of a film", low=1, high=5000, texturable=False),
+    "thickness_nm": Scalar("of a film", low=1, high=THICKEST_NM, texturable=False),
     "interfaces": Several("interfaces of each lobe", entry=Whole("", low=1, high=2)),
     "point": Several("of a class", most=3),
     "map": Words("of a class"),

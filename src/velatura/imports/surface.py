@@ -18,12 +18,12 @@ from velatura.model.stack_lobes import stack_lobes
 from velatura.optics import fresnel
 from velatura.stack import RGB, Diffuse, Film, Interface, Layer, Medium, Stack, Texture
 from velatura.stack.coatings import STEP_MIN
+from velatura.stack.values import THICKEST_NM
 
 INDICES = (0.1, 10.0)  # of dielectrics
 BRIGHTEST = 0.95  # reflectance of a dielectric at the normal
 SMOOTH = 1e-3  # roughness of a base that stands for one from a texture of roughness below it
 DARKEST = 1e-4  # transmittance in place of a smaller one
-THICKEST_NM = 5000.0  # of films, as `stack` has it
 WHITE = (1.0, 1.0, 1.0)
 
 

@@ -38,6 +38,7 @@ from velatura.stack import (
     load,
 )
 from velatura.stack.layers import film_key
+from velatura.stack.values import THICKEST_NM
 
 STEP, STRIDE = 1e-5, 1e-3  # of a value, to see how a model changes: in closed form, and solved anew for each value
 MAPPED = 3  # readings by a model without a closed form, between descents of the one that stands in for it
@@ -47,7 +48,7 @@ ALONE = 20  # rounds of its own descent, from a start that is close
 ROUNDS, TOLERANCE, COARSE = 100, 1e-9, 1e-5
 CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
 DEPTH_MAX = 10.0  # of a medium
-THICKNESS_NM, OUTSIDE = (1.0, 5000.0), 1e3  # of a film, and errors where there is no material
+THINNEST_NM, OUTSIDE = 1.0, 1e3  # of a film, and errors where there is no material
 AS_WELL, EXACT = 1.05, 1e-6  # of the smallest error, and beside it: other stacks fit as well
 LIKELY, DRAWN = 0.95, 4000  # the probability of an interval, and the points that it is taken from
 SHARED = 1.25  # by which it is wider, for errors of the model that all angles share, as walked stacks ask for
@@ -523,7 +524,7 @@ def _of_films(n: int, layer: InterfaceValues, eta_max: float) -> list[Free]:
         channels = range(3) if np.ptp(film.eta) > 0 else (None,)
         high = max(eta_max, np.max(film.eta))
         found += [Free(n, (film_key(k, "eta"),), c, min(1.0, np.min(film.eta)), high, True) for c in channels]
-        found.append(Free(n, (film_key(k, "thickness_nm"),), None, *THICKNESS_NM, True))
+        found.append(Free(n, (film_key(k, "thickness_nm"),), None, THINNEST_NM, THICKEST_NM, True))
     return found
 
 

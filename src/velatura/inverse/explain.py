@@ -110,7 +110,7 @@ def infeasible(target: Target, model: Model) -> Infeasible:
 def _in_closed_form(target: Target, model: Model, pace: Pace = CLOSELY) -> Infeasible:
     """The same for a model in closed form."""
     search, found = Search(model, pace), list[Direction]()
-    total = float(np.sum([lobe.colour for lobe in target.lobes], axis=0).max())
+    total = target.brightness
     if total > 1:
         why, n, constraint = TOO_MUCH.format(total=total), -1, "sum"
         ways = [*_dimmed(target), *_capped(target)]
@@ -204,7 +204,7 @@ class Search:
 
     def possible(self, target: Target) -> bool:
         """Whether a target has a stack."""
-        if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
+        if target.brightness > 1:
             return False
         paths, (spread, keep) = stacks.beginning(target, self.model), EFFORT[0]
         for n, lobe in enumerate(target.lobes):
@@ -375,7 +375,7 @@ def _of_others(target: Target, n: int) -> Iterator[Way]:
 
 def _dimmed(target: Target) -> Iterator[Way]:
     """All lobes darker by the same factor, so that they sum to 1, and then less."""
-    total = np.sum([lobe.colour for lobe in target.lobes], axis=0).max() * (1 + ROUNDING)
+    total = target.brightness * (1 + ROUNDING)
 
     def darker(x: float) -> Target:
         changed = target

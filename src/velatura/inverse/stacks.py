@@ -146,7 +146,7 @@ def model_of(target: Target, model: str | Model, **switches: str) -> Model:
 
 def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Solution | None:
     """The preferred stack, of those found at the lowest effort that finds any."""
-    if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
+    if target.brightness > 1:
         return None
     if not exact(target, model):
         from velatura.inverse import refined  # which begins with this
@@ -167,7 +167,7 @@ def exact(target: Target, model: Model) -> bool:
 
 def in_closed_form(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Solution | None:
     """The preferred stack of a model in closed form, films on it known roughly."""
-    if np.sum([lobe.colour for lobe in target.lobes], axis=0).max() > 1:
+    if target.brightness > 1:
         return None
     paths = found(target, model, efforts)
     return next(solutions(target, model, paths, [int(np.argmin(paths.cost))]), None) if paths else None

@@ -251,6 +251,11 @@ class Target(Record):
         return kind_of(lobe.axes for lobe in self.lobes)
 
     @property
+    def brightness(self) -> float:
+        """The energy of all lobes, in the brightest colour."""
+        return float(np.sum([lobe.colour for lobe in self.lobes], axis=0).max())
+
+    @property
     def has_films(self) -> bool:
         """Whether an interface has thin films."""
         return any(lobe.fixed.films_of(n) for lobe in self.lobes for n in range(lobe.interfaces))

@@ -127,6 +127,9 @@ LARGEST = 1e9
 #: The range of an absolute index of refraction, and the upper end of extinction's: powers of ratios fit as well.
 INDEX_LOW, INDEX_HIGH = 1e-3, 1e4
 
+#: The greatest thickness of a film.
+THICKEST_NM = 5000.0
+
 
 @dataclass(frozen=True)
 class Scalar(Parameter):
@@ -446,7 +449,7 @@ class Film(Record):
             part="k",
         ),
     ] = 0.0
-    thickness_nm: Annotated[float | Texture, Scalar("thickness", unit="nm", low=0, high=5000, typical=300.0)]
+    thickness_nm: Annotated[float | Texture, Scalar("thickness", unit="nm", low=0, high=THICKEST_NM, typical=300.0)]
 
     @property
     def absorbs(self) -> bool:

@@ -16,7 +16,7 @@ from velatura.errors import InvalidInput
 from velatura.model import DEFAULT
 from velatura.model.stack_lobes import stack_lobes
 from velatura.optics.directions import directions
-from velatura.stack import InterfaceValues, Material, MediumValues, Stack, refuse_films
+from velatura.stack import InterfaceValues, Material, MediumValues, Stack
 
 Array = NDArray[Any]
 Answer: TypeAlias = dict[str, tuple[tuple[str, ...], Array]]
@@ -190,23 +190,23 @@ def render(
 
 
 def inverse(stack: Stack, seed: int, model: str = DEFAULT, **switches: str) -> Answer:
-    """The stack that inverse design finds for the lobes of a stack at normal incidence: as asked, and by interface."""
+    """The stack that inverse design finds for lobes of a stack at normal incidence, its films kept: as asked, and by
+    interface."""
     from velatura.inverse import invert_stack
     from velatura.inverse.target import ROUND
 
     if stack.base:
         raise InvalidInput("inverse: not of a stack with a diffuse base")
-    refuse_films(stack, "inverse design has")
     asked = stack_lobes(stack, 1.0, 0.0, model, **switches)
-    bases = [layer.kind for layer in stack.interfaces]
     wanted = [
         {
             "energy": tuple(energy[:, 0].tolist()),
             "alpha": tuple(alpha[:, 0].tolist()),
-            "base": base,
+            "base": layer.kind,
+            **({"fixed": {"films": [layer.films]}} if layer.films else {}),
             **({"rotation": float(np.degrees(rotation[0]))} if abs(alpha[0, 0] - alpha[1, 0]) > ROUND else {}),
         }
-        for energy, alpha, rotation, base in zip(asked.energy, asked.alpha, asked.rotation, bases)
+        for energy, alpha, rotation, layer in zip(asked.energy, asked.alpha, asked.rotation, stack.interfaces)
     ]
     solution = invert_stack({"lobes": wanted, "exterior": stack.exterior}, model, **switches)
     found = stack_lobes(solution.stack, 1.0, 0.0, model, **switches)
