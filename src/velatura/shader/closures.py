@@ -24,7 +24,7 @@ from velatura.model.mixture import ALPHA_MIN
 from velatura.model.roughness_maps import AS_IT_IS
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
-from velatura.optics import fresnel, ggx
+from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid
@@ -68,7 +68,7 @@ def of_body(body: bsdf.Lobed, wi: Direction, straight: bool) -> list[Closure]:
     that it comes from."""
     seen, w = bsdf.scattered(body, wi), bsdf.upright(wi, wi)
     found = [
-        Closure("reflection", lobe.energy * _separable(w, lobe.roughness), _bounded(lobe.roughness))
+        Closure("reflection", lobe.energy * _separable(w, lobe.roughness), bounded(lobe.roughness))
         for lobe in seen.reflected
     ]
     if seen.base:
@@ -94,7 +94,7 @@ def _separable(w: Direction, roughness: Roughness) -> Value:
 def _through(energy: Value, roughness: Roughness, w: Direction, eta: Value, straight: bool) -> Closure:
     """Light that passes, of a lobe about the refracted direction: to first order as wide in tangential momentum, but
     alike along all axes, since Cycles refracts so."""
-    u, v, _ = _bounded(roughness)
+    u, v, _ = bounded(roughness)
     alpha = ops.sqrt(u * v)
     if straight:
         alpha = ops.clip(SPREAD * alpha * ops.sqrt(w[2]), ALPHA_MIN, 1.0)
@@ -104,7 +104,8 @@ def _through(energy: Value, roughness: Roughness, w: Direction, eta: Value, stra
     return Closure("refraction", energy, Roughness(alpha, alpha, 0.0), eta)
 
 
-def _bounded(roughness: Roughness) -> Roughness:
+def bounded(roughness: Roughness) -> Roughness:
+    """A roughness that facets can have."""
     u, v, rotation = roughness
     return Roughness(ops.clip(u, ALPHA_MIN, 1.0), ops.clip(v, ALPHA_MIN, 1.0), rotation)
 
@@ -178,7 +179,7 @@ def _of_statistics(lobes: StackLobes, w: Direction, eta: float, conserving: bool
     """Closures of the energies of lobes at directions (N,)."""
 
     def facets(energy: Array, alpha: Array, rotation: Array) -> Closure:
-        own = _bounded(Roughness(alpha[0], alpha[1], rotation))
+        own = bounded(Roughness(alpha[0], alpha[1], rotation))
         closure = Closure("reflection", energy, own)
         return closure if conserving else closure._replace(weight=energy / albedo(closure, w))
 
@@ -251,14 +252,9 @@ def sample(closure: Closure, wi: Direction, u1: Value, u2: Value) -> Direction:
     u, v, _ = closure.roughness
     i = _into(closure, wi, wi)
     h = ggx.sample_visible(i, u, v, u1, u2)
-    eta, cosine = closure.eta, ggx.dot(i, h)
-    o = ggx.reflect(i, h)
-    if passes:
-        inside = fresnel.cos_transmitted(cosine, eta)
-        x, y, z = (ops.select(inside > 0, (cosine / eta - inside) * a - b / eta, 0.0) for a, b in zip(h, i))
-        o = x, y, z
-    x, y, z = _out_of(closure, wi, o)
-    there = (z < 0) & (o[2] < 0) if passes else z > 0
+    x, y, z = _out_of(closure, wi, refraction.refract(i, h, closure.eta) if passes else ggx.reflect(i, h))
+    through = fresnel.cos_transmitted(ggx.dot(i, h), closure.eta) > 0
+    there = (z < 0) & through if passes else z > 0
     return ops.select(there, x, 0.0), ops.select(there, y, 0.0), ops.select(there, z, 0.0)
 
 
@@ -268,32 +264,18 @@ def eval_pdf(closure: Closure, wi: Direction, wo: Direction) -> tuple[Value, Val
         cosine = ops.maximum(-wo[2] if closure.kind == "translucent" else wo[2], 0.0) / pi
         return cosine, cosine
     u, v, _ = closure.roughness
-    reflects, eta = closure.kind == "reflection", closure.eta
+    reflects = closure.kind == "reflection"
+    eta = 1.0 if reflects else closure.eta
     i, o = _into(closure, wi, wi), _into(closure, wi, wo)
-    there = (o[2] > 0) & (wo[2] > 0) if reflects else (o[2] < 0) & (wo[2] < 0)
-    h = ggx.normalize((i[0] + o[0], i[1] + o[1], i[2] + o[2]) if reflects else _facet(i, o, eta))
+    h = refraction.half_vector(i, o, eta)
     cos_i, cos_o = ggx.dot(i, h), ggx.dot(o, h)
-    if reflects:
-        jacobian = 0.25 / ops.maximum(cos_i, ops.TINY)
-    else:
-        there = there & (cos_i > 0) & (cos_o < 0)
-        jacobian = eta * eta * -cos_o / ops.maximum((cos_i + eta * cos_o) ** 2, ops.TINY)
-    lit, seen = _hidden(i, u, v), _hidden(o, u, v)
-    density = ggx.ndf(h, u, v) / (1 + lit) * ops.maximum(cos_i, 0.0) / ops.maximum(i[2], ops.TINY) * jacobian
-    return ops.select(there, density * (1 + lit) / (1 + lit + seen), 0.0), ops.select(there, density, 0.0)
-
-
-def _facet(i: Direction, o: Direction, eta: Value) -> Direction:
-    """The normal, up to its length, of a facet that refracts i to o."""
-    x, y, z = (-(a + eta * b) for a, b in zip(i, o))
-    sign = ops.select(z < 0, -1.0, 1.0)
-    return sign * x, sign * y, sign * z
-
-
-def _hidden(w: Direction, u: Value, v: Value) -> Value:
-    """Smith's Lambda (Heitz 2014, Eq. 86)."""
-    z = ops.maximum(ops.absolute(w[2]), 1e-6)
-    return 0.5 * (ops.sqrt(1 + ((u * w[0]) ** 2 + (v * w[1]) ** 2) / (z * z)) - 1)
+    there = (o[2] > 0) & (wo[2] > 0) if reflects else (o[2] < 0) & (wo[2] < 0) & (cos_i > 0) & (cos_o < 0)
+    lit, seen = ggx.masking(i, u, v), ggx.masking((o[0], o[1], ops.absolute(o[2])), u, v)
+    facing = ggx.ndf(h, u, v) * lit * ops.divide(ops.maximum(cos_i, 0.0), i[2])
+    density = facing * refraction.jacobian(cos_i, cos_o, eta)
+    # Masking is correlated by the height of facets (Heitz 2014, Eq. 99)
+    value = density * ops.divide(seen, lit + seen - lit * seen)
+    return ops.select(there, value, 0.0), ops.select(there, density, 0.0)
 
 
 def _into(closure: Closure, wi: Direction, w: Direction) -> Direction:
@@ -329,6 +311,9 @@ class Loss:
     cosine: float
     variation: float
     albedo: float
+
+    def __str__(self) -> str:
+        return f"cosine {self.cosine:g}: {self.variation:.3f} of the light, albedo {self.albedo:.4f}"
 
 
 def losses(material: Material, model: Model, closures: Closures) -> Iterator[Loss]:

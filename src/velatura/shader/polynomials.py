@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.mixture import ALPHA_MIN
-from velatura.model.variance import Roughness
 from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid
-from velatura.shader.closures import Closure, Tabulated
+from velatura.shader.closures import Closure, Tabulated, bounded
 
 DEGREE = 8
 MODES = 3  # of azimuth, the first a constant: cosines and sines of 2 and 4 times the angle
@@ -46,9 +44,7 @@ class Fit:
     def above(self, wi: Direction) -> list[Closure]:
         """The closures for light from above."""
         found = self.baked.at(wi, self.read, lambda *channels: np.stack(channels), self.baked.etas[0])
-        kept = []
-        for closure in found:
-            u, v, turned = closure.roughness
-            own = Roughness(np.clip(u, ALPHA_MIN, 1), np.clip(v, ALPHA_MIN, 1), turned)
-            kept.append(closure._replace(weight=np.maximum(closure.weight, 0), roughness=own))
-        return kept
+        return [
+            closure._replace(weight=np.maximum(closure.weight, 0), roughness=bounded(closure.roughness))
+            for closure in found
+        ]
