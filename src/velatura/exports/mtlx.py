@@ -6,7 +6,6 @@ the azimuth where lobes are brushed. Every generator turns the graph into code o
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
@@ -18,6 +17,7 @@ from velatura.errors import InvalidInput
 from velatura.exports.formats import Export, Request
 from velatura.model.mixture import ALPHA_MIN
 from velatura.shader import closures, recording
+from velatura.shader.material import identifier, title
 from velatura.shader.polynomials import Fit
 from velatura.shader.program import described
 from velatura.stack import Material
@@ -41,16 +41,12 @@ def write(request: Request) -> Export:
     chosen = recording.drawn_by(stack, request.model)
     material = Material.of(stack).solid()
     plain, conserving = (Fit(closures.tabulated(material, chosen, kept)) for kept in (False, True))
-    name = re.sub(r"\W+", "_", stack.name.lower(), flags=re.ASCII).strip("_") or "material"
-    lost = [
-        f"cosine {x.cosine:g}: {x.variation:.3f} of the light, albedo {x.albedo:.4f}"
-        for x in closures.losses(material, request.model, plain.above)
-    ]
+    name = identifier(stack)
     about = [
-        f"{' '.join(stack.name.split()) or 'A material'} as the model {described(request.model)} has it, by Velatura.",
+        f"{title(stack)} as the model {described(request.model)} has it, by Velatura.",
         "Its lobes are polynomials of the direction of view. What their closures are off the model, in light from",
         "above, as total variation and as the greatest difference of albedo:",
-        *(f"  {line}" for line in lost),
+        *(f"  {loss}" for loss in closures.losses(material, request.model, plain.above)),
         "Reflections of all targets but genosl are taken to let out again what facets block, as those of MaterialX do.",
     ]
     node = f"velatura_lobes_{name}"

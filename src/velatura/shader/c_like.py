@@ -170,9 +170,6 @@ class CLike(Printer):
 
     # Statements
 
-    def title(self, text: str) -> str:
-        return f"// {text}"
-
     def named(self, name: str, kind: Kind, text: str) -> str:
         return self.declared(kind, name, text)
 
@@ -221,12 +218,6 @@ class CLike(Printer):
 
     def loop(self, index: str, times: int, lines: Sequence[str]) -> list[str]:
         return _block(self.spelled(f"for (int {index} = 0; {index} < {times}; {index}++)"), lines)
-
-    def store(self, array: str, place: str, text: str) -> str:
-        return f"{array}[{place}] = {text};"
-
-    def put(self, place: str, text: str) -> str:
-        return f"{place} = {text};"
 
     def advance(self, name: str, following: str) -> str:
         return f"{name} = {following};"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -50,6 +51,16 @@ class Filled(NamedTuple):
     parameters: bool
 
 
+def title(stack: Stack) -> str:
+    """The name of a material on one line."""
+    return " ".join(stack.name.split()) or "A material"
+
+
+def identifier(stack: Stack) -> str:
+    """The name of a material in lower-case letters, digits and underscores."""
+    return re.sub(r"\W+", "_", stack.name.lower(), flags=re.ASCII).strip("_") or "material"
+
+
 def place(address: Address) -> str:
     """Where a value lies in the struct: `layer0.eta` for `layer0_eta`."""
     return address.key if address.layer is None else f"layer{address.layer}.{address.key}"
@@ -93,9 +104,14 @@ def _images(stack: Stack, read: Sequence[str]) -> dict[Texture, str]:
     return images
 
 
+def brushed(value: Brushing) -> Brushed:
+    """The angle of a way of brushing; concentric lines lie across the direction away from the centre."""
+    return Brushed(value.u, value.v, (90.0 if value.brushing == "concentric" else 0.0) + value.offset)
+
+
 def _value(address: Address, value: Any, images: Mapping[Texture, str]) -> Operand | Mapped | Brushed:
     if isinstance(value, Brushing):
-        return Brushed(value.u, value.v, (90.0 if value.brushing == "concentric" else 0.0) + value.offset)
+        return brushed(value)
     if not isinstance(value, Varying):
         return operand(constant(address, value))
     assert isinstance(value, Texture)

@@ -24,8 +24,8 @@ from velatura.shader import atlas, closures, films, recording
 from velatura.shader.bake import Group, together
 from velatura.shader.closures import Closure, Closures, Loss, Tabulated
 from velatura.shader.graph import Graph
+from velatura.shader.material import brushed, identifier, place, title
 from velatura.shader.material import constant as as_constant
-from velatura.shader.material import place
 from velatura.shader.printer import ATOM, Language
 from velatura.shader.program import described
 from velatura.shader.statements import statements
@@ -96,9 +96,6 @@ class Osl(Language):
         nodes = films.layouts([table])[0].nodes
         return f"vt_film(vt_{table}, {', '.join(map(str, nodes))}, {', '.join(args)})"
 
-    def title(self, text: str) -> str:
-        return f"// {text}"
-
     def named(self, name: str, kind: Kind, text: str) -> str:
         return f"{_TYPES[kind]} {name} = {text};"
 
@@ -122,12 +119,6 @@ class Osl(Language):
 
     def loop(self, index: str, times: int, lines: Sequence[str]) -> list[str]:
         return [f"for (int {index} = 0; {index} < {times}; {index}++) {{", *_indented(lines), "}"]
-
-    def store(self, array: str, place: str, text: str) -> str:
-        return f"{array}[{place}] = {text};"
-
-    def put(self, place: str, text: str) -> str:
-        return f"{place} = {text};"
 
     def advance(self, name: str, following: str) -> str:
         return f"for (int k = 0; k < arraylength({name}); k++) {name}[k] = {following}[k];"
@@ -242,21 +233,18 @@ class _Program:
 
     def _name(self) -> str:
         """An identifier."""
-        name = re.sub(r"\W+", "_", self.stack.name.lower(), flags=re.ASCII).strip("_") or "material"
+        name = identifier(self.stack)
         return f"vt_{name}" if name in OSL.words or not name[0].isalpha() else name
 
     def _header(self) -> str:
         """Comments that describe the material and what is lost."""
-        model = described(self.model)
-        name = " ".join(self.stack.name.split()) or "A material"
         over = "Lobes are tabulated over the direction of view. " if self.baked else ""
         varying = " where textures are half bright" if not recording.is_uniform(self.stack) else ""
-        lost = [f"    cosine {x.cosine:g}: {x.variation:.3f} of the light, albedo {x.albedo:.4f}" for x in self.losses]
         return _HEADER.format(
-            name=name,
-            model=model,
+            name=title(self.stack),
+            model=described(self.model),
             text="\n".join(f"// {line}" for line in wrap(_ABOUT.format(over=over, varying=varying), LINE)),
-            lost="\n".join(f"//{line}" for line in lost),
+            lost="\n".join(f"//    {loss}" for loss in self.losses),
         )
 
     def _arrays(self, symbols: Sequence[Symbol]) -> Iterator[str]:
@@ -304,9 +292,8 @@ def _varied(at: Address, value: Varying) -> str:
     """The declaration of a value at the texture coordinates."""
     literal = OSL.literal
     if isinstance(value, Brushing):
-        turned = literal((90.0 if value.brushing == "concentric" else 0.0) + value.offset)
-        away = f"UV[1] - {literal(value.v)}, UV[0] - {literal(value.u)}"
-        return f"float {at.name} = degrees(atan2({away})) + {turned};"
+        u, v, offset = map(literal, brushed(value))
+        return f"float {at.name} = degrees(atan2(UV[1] - {v}, UV[0] - {u})) + {offset};"
     assert isinstance(value, Texture)
     channel, file = value.channel or "r", f"{at.name}_map"
     texel = f"vt_colour({file}, UV)" if channel == "rgb" else f"vt_channel({file}, {'rgba'.index(channel)}, UV)"

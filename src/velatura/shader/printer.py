@@ -130,9 +130,9 @@ class Language(ABC):
 
     # Statements
 
-    @abstractmethod
     def title(self, text: str) -> str:
         """A comment over the statements that follow."""
+        return f"// {text}"
 
     @abstractmethod
     def named(self, name: str, kind: Kind, text: str) -> str:
@@ -174,13 +174,13 @@ class Language(ABC):
     def loop(self, index: str, times: int, lines: Sequence[str]) -> list[str]:
         """Statements, repeated for an index from 0 on."""
 
-    @abstractmethod
     def store(self, array: str, place: str, text: str) -> str:
         """A value is put into an array."""
+        return f"{array}[{place}] = {text};"
 
-    @abstractmethod
     def put(self, place: str, text: str) -> str:
         """A value is put into its place in a struct."""
+        return f"{place} = {text};"
 
     @abstractmethod
     def advance(self, name: str, following: str) -> str:

@@ -122,7 +122,7 @@ def shader(
         material.filled(stack, read, bool(shown)),
     )
     placed = films.layouts(recording.films)
-    name = "A material" if shown else " ".join(stack.name.split()) or "A material"
+    name = "A material" if shown else material.title(stack)
     costs = _costs(recording)
     parts = [
         printer.header(name, described(recording.model), not recording.read, costs),
