@@ -12,7 +12,7 @@ from xml.sax.saxutils import quoteattr
 
 from velatura import __version__
 from velatura.bakes import TARGETS, Bake, Carried, bake
-from velatura.exports.formats import Export, Request
+from velatura.exports.formats import Export, Request, xml_comment
 from velatura.stack import dumps
 from velatura.targets import embedded
 from velatura.targets.openpbr import TURNS
@@ -42,11 +42,6 @@ def _written(made: Bake) -> list[tuple[Parameter, float | RGB]]:
 
 def _comment(made: Bake) -> list[str]:
     return [f"Written by Velatura {__version__}.", *made.summary]
-
-
-def _xml_comment(lines: list[str], indent: str) -> list[str]:
-    """Comments of XML hold no two hyphens in a row."""
-    return [f"{indent}<!--", *(f"{indent}  {line.replace('--', '- -')}" for line in lines), f"{indent}-->"]
 
 
 def _text(value: float | RGB) -> str:
@@ -235,7 +230,7 @@ def _mitsuba(made: Bake, material: Any, files: dict[str, str]) -> str:
 
 def _xml(head: list[str], made: Bake, material: Any, body: list[str]) -> str:
     """A document with the loss in a comment, and the stack in another."""
-    above = "\n".join([*head, *_xml_comment(_comment(made), "  ")])
+    above = "\n".join([*head, *xml_comment(_comment(made))])
     return f"{above}\n  {embedded.in_xml(material, chr(10).join(body))}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from importlib import import_module
@@ -193,6 +193,11 @@ def check_writable(path: Path, to: str) -> None:
 def taking(option: str) -> list[str]:
     """The formats that take an option."""
     return [name for name, each in FORMATS.items() if option in each.options]
+
+
+def xml_comment(lines: Iterable[str]) -> list[str]:
+    """The lines of a comment, which holds no two hyphens in a row."""
+    return ["  <!--", *(f"    {line.replace('--', '- -')}" for line in lines), "  -->"]
 
 
 def headed(text: str) -> str:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import NamedTuple
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura.errors import InvalidInput
-from velatura.exports.formats import Export, Request
+from velatura.exports.formats import Export, Request, xml_comment
 from velatura.model.mixture import ALPHA_MIN
 from velatura.shader import closures, recording
 from velatura.shader.material import identifier, title
@@ -53,9 +53,7 @@ def write(request: Request) -> Export:
     lines = [
         '<?xml version="1.0"?>',
         '<materialx version="1.39" colorspace="lin_rec709">',
-        "  <!--",
-        *(f"    {escape(line).replace('--', '- -')}" for line in about),
-        "  -->",
+        *xml_comment(about),
         f'  <nodedef name="ND_{node}" node="{node}" nodegroup="pbr" doc={quoteattr(about[0])}>',
         '    <input name="normal" type="vector3" defaultgeomprop="Nworld" />',
         '    <input name="tangent" type="vector3" defaultgeomprop="Tworld" />',
