@@ -10,6 +10,7 @@ import numpy as np
 from velatura import kernel
 from velatura.model import Model, bsdf
 from velatura.model.context import at_a_point
+from velatura.optics.ggx import Direction
 from velatura.sampling import coated, directional_grid
 from velatura.shader import closures, recording
 from velatura.shader.closures import Closure
@@ -61,7 +62,11 @@ def of_table(baked: closures.Tabulated) -> Found:
     mi = kernel.mitsuba()
     flat = mi.Float(baked.rows[0].ravel().astype(np.float32))
     curves = directional_grid.interleaved(flat, baked.shape, mi.Float)
-    return lambda si: baked.at(tuple(si.wi), curves, mi.Color3f, baked.etas[0])
+
+    def read(w: Direction) -> closures.Columns:
+        return closures.Columns.of(curves(w), mi.Color3f)
+
+    return lambda si: baked.at(tuple(si.wi), read, baked.etas[0])
 
 
 def of_layers(stack: Stack, model: Model) -> Found:

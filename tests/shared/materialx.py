@@ -45,18 +45,34 @@ def document(text: str) -> Any:
     return made
 
 
-def generated(
-    made: Any,
-    target: str,
-    environment: Any = gen.HwSpecularEnvironmentMethod.SPECULAR_ENVIRONMENT_FIS,
-) -> str:
+_GLSL = {"float": "float", "integer": "int", "vector2": "vec2", "color3": "vec3"}
+
+
+FILTERED = gen.HwSpecularEnvironmentMethod.SPECULAR_ENVIRONMENT_FIS
+
+
+def generated(made: Any, target: str, environment: Any = FILTERED) -> str:
     """The code of the first material of a document."""
+    return str(_shader(made, target, made.getMaterialNodes()[0], environment).getSourceCode(gen.PIXEL_STAGE))
+
+
+def drawing(made: Any, node: str) -> str:
+    """Code in GLSL ES that draws a node of a document, with the document's values as constants."""
+    shader = _shader(made, "essl", made.getNode(node))
+    code = str(shader.getSourceCode(gen.PIXEL_STAGE))
+    for port in shader.getStage(gen.PIXEL_STAGE).getUniformBlock("PublicUniforms"):
+        kind, name = _GLSL.get(port.getType().getName()), port.getVariable()
+        code = code.replace(f"uniform {kind} {name};", f"{kind} {name} = {kind}({port.getValueString()});")
+    return code
+
+
+def _shader(made: Any, target: str, element: Any, environment: Any = FILTERED) -> Any:
     generator = GENERATORS[target].create()
     context = gen.GenContext(generator)
     context.registerSourceCodeSearchPath(mx.getDefaultDataSearchPath())
     generator.registerTypeDefs(made)
     context.getOptions().hwSpecularEnvironmentMethod = environment
-    return str(generator.generate("material", made.getMaterialNodes()[0], context).getSourceCode(gen.PIXEL_STAGE))
+    return generator.generate("drawn", element, context)
 
 
 # Values of graphs: of vectors and colours the parts (k, N), of numbers (N,)

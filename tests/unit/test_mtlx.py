@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,18 +16,50 @@ from velatura.shader.polynomials import Fit
 from velatura.stack import Material
 
 
-@pytest.mark.parametrize(("preset", "model"), [("frosted-metal", "weier2020"), ("coated-gold", "weier2020")])
+@pytest.mark.parametrize(("preset", "model"), [("frosted-metal", "weier2020"), ("tinted-plate", "weier2020")])
 def test_all_generators_make_code_of_the_graph(preset: str, model: str) -> None:
-    """A reflection for each lobe that has light; only the reflections of genosl have other weights."""
+    """Facets for each lobe that has light; only those of genosl have other weights."""
     text = vt.export(preset, "mtlx", model).text
     made = document(text)
     assert len(made.getMaterialNodes()) == 1
     for target in GENERATORS:
         assert "velatura_lobes" in generated(made, target), target
     osl = generated(made, "osl")
-    lobes = tabulated(Material.of(vt.preset(preset)), named(model)).kinds.count("reflection")
+    kinds = tabulated(Material.of(vt.preset(preset)), named(model)).kinds
     body = osl.split("NG_velatura_lobes", 1)[1].split("\n}\n")[0]
-    assert body.count("mx_generalized_schlick_bsdf(") == lobes
+    assert body.count("mx_generalized_schlick_bsdf(") == sum(kind not in ("diffuse", "translucent") for kind in kinds)
+    assert body.count("translucent_bsdf(") == kinds.count("translucent") == text.count("<translucent_bsdf")
+
+
+@pytest.fixture
+def image(tmp_path: Path) -> str:
+    (tmp_path / "map.png").touch()
+    return str(tmp_path / "map.png")
+
+
+@pytest.mark.parametrize(
+    ("preset", "key", "varies"),
+    [
+        ("coated-gold", "layer0_alpha", {"channel": "g", "scale": 0.5}),
+        ("tinted-plate", "layer1_sigma_a", {"channel": "rgb", "encoding": "srgb"}),
+        ("turned-brushing", "layer1_rotation", {"brushing": "concentric", "u": 0.25}),
+    ],
+)
+def test_all_generators_make_code_of_layers_with_textures(
+    preset: str, key: str, varies: dict[str, Any], image: str
+) -> None:
+    """Values of layers are inputs of the node; those that vary come from nodes of the document, whose image lies where
+    the stack has it."""
+    value = varies if "brushing" in varies else {"texture": image, **varies}
+    text = vt.export(vt.preset(preset).replace(**{key: value}), "mtlx", "weier2020").text
+    made = document(text)
+    for target in GENERATORS:
+        assert "velatura_lobes" in generated(made, target), target
+    (lobes,) = [node for node in made.getNodes() if node.getCategory().startswith("velatura_lobes")]
+    connected = [each for each in lobes.getInputs() if each.getName().startswith(key)]
+    assert all(each.getConnectedNode() for each in connected) and connected
+    images = made.getNodes("image")
+    assert [node.getInputValue("file") for node in images] == [] if "brushing" in varies else [image] * len(images)
 
 
 @pytest.mark.parametrize(("preset", "off"), [("frosted-metal", 0.01), ("turned-brushing", 0.1)])
@@ -41,10 +74,14 @@ def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float
         np.testing.assert_allclose(np.sort(a.roughness[:2], 0), np.sort(b.roughness[:2], 0), atol=off)
 
 
-def test_what_a_graph_cannot_hold_is_refused_in_a_line(tmp_path: Path) -> None:
-    (tmp_path / "rough.png").touch()
-    textured = vt.Stack([vt.Interface(conductor="Au", alpha={"texture": str(tmp_path / "rough.png")})])
-    with pytest.raises(vt.InvalidInput, match="mtlx: only for uniform materials"):
-        vt.export(textured, "mtlx")
-    with pytest.raises(vt.InvalidInput, match="mtlx: only for materials that no light passes"):
-        vt.export("frosted-glass", "mtlx")
+def test_what_a_graph_cannot_hold_is_refused_in_a_line(image: str) -> None:
+    rough = {"layer0_alpha": {"texture": image}}
+    with pytest.raises(vt.InvalidInput, match=r"mtlx: a graph has no tables, which velatura .* looks up"):
+        vt.export(vt.preset("coated-gold").replace(**rough), "mtlx")
+    with pytest.raises(vt.InvalidInput, match="mtlx: a graph has no tables, which weier2020 looks up"):
+        vt.export(vt.preset("glossy-plastic").replace(**rough), "mtlx", "weier2020")
+    curved = {"layer0_alpha": {"texture": image, "curve": [0, 0.5, 0.6]}}
+    with pytest.raises(vt.InvalidInput, match="mtlx: layer0_alpha_u: textures with a curve"):
+        vt.export(vt.preset("coated-gold").replace(**curved), "mtlx", "weier2020")
+    with pytest.raises(vt.InvalidInput, match=r"mtlx: the index below over that above must be 1, or 1\.223 at least"):
+        vt.export(vt.Stack([vt.Interface(eta=1.1, alpha=0.2)]), "mtlx", "weier2020")

@@ -156,3 +156,18 @@ def test_textures_are_read_by_parameters(tmp_path: Path) -> None:
     assert f"float layer0_alpha_u = {expected};" in made.text
     assert "float layer0_rotation = degrees(atan2(UV[1] - 0.5, UV[0] - 0.25)) + 90.0;" in made.text
     assert "float layer0_alpha_v = 0.2" in made.text
+
+
+def test_curves_of_textures_are_arrays(tmp_path: Path) -> None:
+    (tmp_path / "wood.png").touch()
+    curved = {"texture": str(tmp_path / "wood.png"), "curve": [0, 0.5, 0.6]}
+    made = osl(vt.Stack([vt.Interface(conductor="Au", alpha=curved)])).text
+    assert re.search(r"float vt_layer0_alpha_u_curve\[3\] = \{\s*0, 0\.5, 0\.6\s*\};", made)
+    texel = "vt_curve(vt_layer0_alpha_u_curve, vt_channel(layer0_alpha_u_map, 0, UV))"
+    assert f"float layer0_alpha_u = clamp({texel} * 1.0 + 0.0, 0.0, 1.0);" in made
+
+
+def test_a_pane_of_measured_glass_is_a_closure_that_goes_straight_on() -> None:
+    """Its index is one of three channels, and in closed form the same on both sides."""
+    made = osl("frosted-glass", "weier2020").text
+    assert "BSDF += (" in made and 'microfacet("ggx", view, x, ' in made

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 from xml.sax.saxutils import quoteattr
 
 from velatura import __version__
 from velatura.bakes import TARGETS, Bake, Carried, bake
-from velatura.exports.formats import Export, Request, xml_comment
+from velatura.exports.formats import Export, Request, relative, xml_comment
 from velatura.stack import dumps
 from velatura.targets import embedded
 from velatura.targets.openpbr import TURNS
@@ -24,14 +22,9 @@ def write(request: Request) -> Export:
     made = bake(request.stack, request.to, request.model)
     # Blender finds no files beside a script
     folder = None if request.to == "blender-principled" else request.folder
-    files = {name: _path(image.texture.texture, folder) for name, image in made.images.items()}
+    files = {name: relative(image.texture.texture, folder) for name, image in made.images.items()}
     text = _PRINTERS[request.to](made, json.loads(dumps(request.stack, "json", request.folder)), files)
     return Export(text, notes=tuple(made.summary))
-
-
-def _path(path: Path, folder: Path | None) -> str:
-    """A path as it stands in a file of a folder, if there is one."""
-    return path.resolve().as_posix() if folder is None else Path(os.path.relpath(path, folder.resolve())).as_posix()
 
 
 def _written(made: Bake) -> list[tuple[Parameter, float | RGB]]:

@@ -195,6 +195,11 @@ def taking(option: str) -> list[str]:
     return [name for name, each in FORMATS.items() if option in each.options]
 
 
+def relative(path: Path, folder: Path | None) -> str:
+    """A path as it stands in a file of a folder, if there is one."""
+    return path.resolve().as_posix() if folder is None else Path(os.path.relpath(path, folder.resolve())).as_posix()
+
+
 def xml_comment(lines: Iterable[str]) -> list[str]:
     """The lines of a comment, which holds no two hyphens in a row."""
     return ["  <!--", *(f"    {line.replace('--', '- -')}" for line in lines), "  -->"]

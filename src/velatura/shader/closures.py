@@ -7,10 +7,11 @@ facets, as renderers have it; lobes in their own media are drawn outside; all ot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from math import pi
-from typing import Literal, NamedTuple
+from functools import partial
+from math import isclose, pi
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model import Model, bsdf, variance_kind
 from velatura.model.bsdf import Asked
-from velatura.model.context import Context
+from velatura.model.context import Context, at_a_point
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes
 from velatura.model.mixture import ALPHA_MIN
 from velatura.model.roughness_maps import AS_IT_IS
@@ -30,7 +31,9 @@ from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid
 from velatura.sampling.directional_grid import Curves
 from velatura.sampling.low_discrepancy import fibonacci, square
-from velatura.stack import Material
+from velatura.shader import films, recording
+from velatura.stack import Address, Brushing, Material, Stack, Texture
+from velatura.stack import number as plain
 
 Array = NDArray[np.floating]
 
@@ -78,6 +81,31 @@ def of_body(body: bsdf.Lobed, wi: Direction, straight: bool) -> list[Closure]:
     return found
 
 
+def in_closed_form(
+    stack: Stack, model: Model, constant: Collection[str], wi: Direction
+) -> tuple[list[Closure], Closures]:
+    """The closures of a model in closed form: for a recorded wi, of inputs for all values that are not `constant`, and
+    in NumPy of `numbers`."""
+    known = numbers(stack)
+    body = bsdf.body(known, model)
+    straight = known.transmits and isclose(np.mean(body.eta), 1.0)
+    constants = {*constant, *films.beside(stack)}
+    recorded = films.recorded(recording.symbols(stack, constants), stack, general=False)
+    found = of_body(bsdf.body(recorded, model, recording.variance(stack), at_a_point()), wi, straight)
+    return found, partial(of_body, body, straight=straight)
+
+
+def numbers(stack: Stack) -> Material:
+    """A stack with numbers in place of what varies: those of texels of .5."""
+
+    def value(address: Address, described: Any) -> Value:
+        if isinstance(described, Texture):
+            return float(np.clip(0.5 * described.scale + described.offset, *address.declared.within))
+        return described.offset if isinstance(described, Brushing) else plain(address, described)
+
+    return Material.of(stack, value).solid()
+
+
 def _separable(w: Direction, roughness: Roughness) -> Value:
     """Albedo of a GGX reflection with separable masking over that with masking correlated by height: a fit within .006
     for cosines of .1 and more."""
@@ -113,6 +141,18 @@ def bounded(roughness: Roughness) -> Roughness:
 # Tabulated over direction
 
 
+class Columns(NamedTuple):
+    """Columns at a direction, by their place: one as a number, or the three from there on as a colour."""
+
+    number: Callable[[int], Value]
+    colour: Callable[[int], Value]
+
+    @classmethod
+    def of(cls, values: Sequence[Value], colour: Callable[..., Value]) -> Columns:
+        """Of all columns as numbers, and a function that makes a colour of three."""
+        return cls(values.__getitem__, lambda k: colour(*values[k : k + 3]))
+
+
 @dataclass(frozen=True)
 class Tabulated:
     """The closures of a uniform material over direction, from above and, where it transmits, from below: `rows` (sides,
@@ -125,18 +165,18 @@ class Tabulated:
     etas: Sequence[float]
     rows: Array
 
-    def at(
-        self, wi: Direction, read: Callable[[Direction], Sequence[Value]], colour: Callable[..., Value], eta: Value
-    ) -> list[Closure]:
+    def at(self, wi: Direction, read: Callable[[Direction], Columns], eta: Value) -> list[Closure]:
         """The closures for light from wi, of the columns that are read at an upright direction."""
-        columns, found = iter(read(bsdf.upright(wi, wi))), list[Closure]()
+        columns, k, found = read(bsdf.upright(wi, wi)), 0, list[Closure]()
         for kind in self.kinds:
-            weight = colour(*(next(columns) for _ in range(3)))
+            weight, k = columns.colour(k), k + 3
             if kind in _SMOOTH:
                 found.append(Closure(kind, weight))
                 continue
             variance = _variance(kind, self.variance)
-            u, v, rotation = variance(*(next(columns) for _ in variance.__dataclass_fields__)).roughness(AS_IT_IS)
+            count = len(variance.__dataclass_fields__)
+            u, v, rotation = variance(*map(columns.number, range(k, k + count))).roughness(AS_IT_IS)
+            k += count
             if variance is PerAxis:
                 rotation = ops.arctan2(wi[1], wi[0])
             found.append(Closure(kind, weight, Roughness(u, v, rotation), STRAIGHT if kind == "straight" else eta))
@@ -145,7 +185,7 @@ class Tabulated:
     def above(self, wi: Direction) -> list[Closure]:
         """In NumPy, for light from above."""
         curves = Curves(self.rows[0].reshape(*self.shape, -1), self.shape)
-        return self.at(wi, curves, lambda *channels: np.stack(channels), self.etas[0])
+        return self.at(wi, lambda w: Columns.of(curves(w), lambda *three: np.stack(three)), self.etas[0])
 
 
 _SMOOTH = ("diffuse", "translucent")
@@ -158,7 +198,7 @@ def _variance(kind: Kind, variance: type[Variance]) -> type[Variance]:
 
 def tabulated(material: Material, model: Model, conserving: bool = False) -> Tabulated:
     """The closures of a material with values in NumPy, as `velatura.lobes` reports its lobes; for renderers whose
-    reflections are `conserving`, all light that facets block leaves again."""
+    facets are `conserving`, all light that they block leaves again."""
     isotropic = variance_kind(material) is Isotropic
     shape, variance = (LINE, PerAxis) if isotropic else (PLANE, Covariance)
     x, y, z = (np.ravel(w) for w in directional_grid.directions(shape, None))
@@ -189,7 +229,7 @@ def _of_statistics(lobes: StackLobes, w: Direction, eta: float, conserving: bool
     if passed:
         u, v = passed.alpha
         closure = _through(passed.energy, Roughness(u, v, passed.rotation), w, eta, abs(eta - 1) < FAINT)
-        through = albedo(closure, w)
+        through = np.ones_like(w[2]) if conserving else albedo(closure, w)
         weight = passed.energy / np.maximum(through, LEAST)
         found += [closure._replace(weight=weight), Closure("translucent", passed.energy - weight * through)]
     return found

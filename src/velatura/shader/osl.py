@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
-from math import isclose
+from functools import cache
 from textwrap import wrap
 from typing import Any
 
@@ -14,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops, tables
-from velatura.model import DEFAULT, Model, bsdf, named
-from velatura.model.context import at_a_point
+from velatura.model import DEFAULT, Model, named
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid
 from velatura.shader import atlas, closures, films, recording
 from velatura.shader.bake import Group, together
-from velatura.shader.closures import Closure, Closures, Loss, Tabulated
+from velatura.shader.closures import Closure, Closures, Columns, Loss, Tabulated
 from velatura.shader.graph import Graph
 from velatura.shader.material import brushed, identifier, place, title
 from velatura.shader.material import constant as as_constant
@@ -30,8 +28,7 @@ from velatura.shader.printer import ATOM, Language
 from velatura.shader.program import described
 from velatura.shader.statements import statements
 from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
-from velatura.stack import Address, Brushing, Material, MaterialLike, Stack, Texture, Varying, load
-from velatura.stack import number as plain
+from velatura.stack import Address, Brushing, MaterialLike, Stack, Texture, Varying, load
 
 LINE = 116  # characters of comments
 ACROSS = 12  # numbers of an array on a line
@@ -152,34 +149,16 @@ def osl(
     stack, asked = load(stack), named(model, **switches)
     chosen = recording.drawn_by(stack, asked)
     recording.check_constant(stack, constant)
-    numbers, wi = _numbers(stack), recording.direction("wi")
+    numbers, wi = closures.numbers(stack), recording.direction("wi")
     baked: Tabulated | None = None
     known: Closures
-    if chosen.recursion.closed_form:
-        constants = {*constant, *films.beside(stack)}
-        recorded = films.recorded(recording.symbols(stack, constants), stack, general=False)
-        body, kind = bsdf.body(numbers, chosen), recording.variance(stack)
-        straight = numbers.transmits and isclose(float(body.eta), 1.0)
-        known = partial(closures.of_body, body, straight=straight)
-        with ops.readable():
-            found = closures.of_body(bsdf.body(recorded, chosen, kind, at_a_point()), wi, straight)
-    else:
-        baked = closures.tabulated(numbers, chosen)
-        known = baked.above
-        with ops.readable():
-            found = _read(baked, wi)
+    with ops.readable():
+        if chosen.recursion.closed_form:
+            found, known = closures.in_closed_form(stack, chosen, constant, wi)
+        else:
+            baked = closures.tabulated(numbers, chosen)
+            found, known = _read(baked, wi), baked.above
     return _Program(stack, chosen, found, baked, list(closures.losses(numbers, asked, known))).made()
-
-
-def _numbers(stack: Stack) -> Material:
-    """A stack with numbers in place of what varies: those of texels of .5."""
-
-    def value(address: Address, described: Any) -> Value:
-        if isinstance(described, Texture):
-            return float(np.clip(0.5 * described.scale + described.offset, *address.declared.within))
-        return described.offset if isinstance(described, Brushing) else plain(address, described)
-
-    return Material.of(stack, value).solid()
 
 
 def _read(baked: Tabulated, wi: Direction) -> list[Closure]:
@@ -189,12 +168,12 @@ def _read(baked: Tabulated, wi: Direction) -> list[Closure]:
     one = len(baked.etas) == 1
     side = 0.0 if one else ops.select(above, 0.0, 1.0)
 
-    def read(w: Direction) -> list[Symbol]:
+    def read(w: Direction) -> Columns:
         at = [operand(x) for x in (*directional_grid.places(w, len(baked.shape)), side)]
         texels = Symbol("baked", tuple(at), "texels", group)
-        return [Symbol("component", (texels,), "number", k) for k in range(group.texels)]
+        return Columns.of([Symbol("component", (texels,), "number", k) for k in range(group.texels)], together)
 
-    return baked.at(wi, read, together, baked.etas[0] if one else ops.select(above, *baked.etas))
+    return baked.at(wi, read, baked.etas[0] if one else ops.select(above, *baked.etas))
 
 
 @dataclass(frozen=True)
@@ -222,7 +201,7 @@ class _Program:
         parameters += [_file(name, image) for name, image in maps.items()]
         parameters += [*([_UV] if varying else []), *_PLACE]
         each = [texts[k : k + 5] for k in range(0, len(texts), 5)]
-        body = [*self._arrays(symbols), *(_varied(at, x) for at, x in varying), *_FRAME, *lines]
+        body = [*self._arrays(symbols, varying), *(_varied(at, x) for at, x in varying), *_FRAME, *lines]
         body += ["", *_sum([closure.kind for closure in self.closures], each)]
         name, lines = self._name(), _indented(body)
         shader = "\n".join([f"shader {name}(", ",\n".join(parameters), ")", "{", *lines, "}", ""])
@@ -247,12 +226,15 @@ class _Program:
             lost="\n".join(f"//    {loss}" for loss in self.losses),
         )
 
-    def _arrays(self, symbols: Sequence[Symbol]) -> Iterator[str]:
+    def _arrays(self, symbols: Sequence[Symbol], varying: Sequence[tuple[Address, Varying]]) -> Iterator[str]:
         """The numbers that are looked up."""
         for name in sorted({symbol.detail for symbol in symbols if symbol.op in ("texels", "value")}):
             yield from _of_table(name)
         for name, film in films.tables(self.stack, films.read_by(symbols), self.model).items():
             yield from _array(name, film)
+        for at, x in varying:
+            if isinstance(x, Texture) and x.curve:
+                yield from _array(f"{at.name}_curve", np.array(x.curve))
         if self.baked:
             yield from _array("columns", self.baked.rows)
 
@@ -298,6 +280,7 @@ def _varied(at: Address, value: Varying) -> str:
     channel, file = value.channel or "r", f"{at.name}_map"
     texel = f"vt_colour({file}, UV)" if channel == "rgb" else f"vt_channel({file}, {'rgba'.index(channel)}, UV)"
     texel = f"vt_linear({texel})" if value.encoding == "srgb" else texel
+    texel = f"vt_curve(vt_{at.name}_curve, {texel})" if value.curve else texel
     low, high = (literal(float(np.clip(x, -1e6, 1e6))) for x in at.declared.within)
     bounded = f"clamp({texel} * {literal(value.scale)} + {literal(value.offset)}, {low}, {high})"
     colour = f"color({bounded})" if channel != "rgb" else bounded
@@ -449,6 +432,20 @@ color vt_film(float table[], int nx, int ny, float x, float y)
 // Decoded from sRGB
 float vt_linear(float x) { return x <= 0.04045 ? x / 12.92 : pow((x + 0.055) / 1.055, 2.4); }
 color vt_linear(color x) { return color(vt_linear(x[0]), vt_linear(x[1]), vt_linear(x[2])); }
+""",
+    "vt_curve": """\
+// Values for texels from 0 to 1, in equal steps
+float vt_curve(float values[], float x)
+{
+    float position = clamp(x, 0.0, 1.0) * (arraylength(values) - 1);
+    int i = min(int(position), arraylength(values) - 2);
+    return mix(values[i], values[i + 1], position - i);
+}
+
+color vt_curve(float values[], color x)
+{
+    return color(vt_curve(values, x[0]), vt_curve(values, x[1]), vt_curve(values, x[2]));
+}
 """,
     "vt_channel": """\
 float vt_channel(string file, int channel, point uv)

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
+from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid
-from velatura.shader.closures import Closure, Tabulated, bounded
+from velatura.shader.closures import Closure, Columns, Tabulated, bounded
 
 DEGREE = 8
-MODES = 3  # of azimuth, the first a constant: cosines and sines of 2 and 4 times the angle
+MODES = 5  # of azimuth: a constant, cosines and sines of 2 and 4 times the angle
+NEGLIGIBLE = 3e-4  # of a weight or a roughness, over directions
+SINE2_MIN = 1e-6  # squared sine of a direction that has an azimuth
 
 Array = NDArray[np.floating]
 
@@ -23,28 +27,48 @@ class Fit:
 
     def __init__(self, baked: Tabulated) -> None:
         self.baked = baked
-        self.modes = 2 * MODES - 1 if len(baked.shape) > 1 else 1
+        self.modes = MODES if len(baked.shape) > 1 else 1
         x, y, z = (np.ravel(w) for w in directional_grid.directions(baked.shape, None))
-        basis = self._basis((x, y, z))
-        rows = baked.rows[0]
+        powers = np.sqrt(z) ** np.arange(DEGREE + 1)[:, None]
+        basis = (np.stack(np.broadcast_arrays(*_modes((x, y, z), self.modes)))[:, None] * powers).reshape(-1, len(z))
         weight = np.sqrt(z)  # as many nodes are at grazing directions, where little light is
-        fitted = np.linalg.lstsq((basis.reshape(-1, len(rows)) * weight).T, rows * weight[:, None], rcond=None)[0]
+        rows = baked.rows[0]
+        fitted = np.linalg.lstsq((basis * weight).T, rows * weight[:, None], rcond=None)[0]
         self.coefficients = fitted.reshape(self.modes, DEGREE + 1, -1)
 
-    def _basis(self, w: Direction) -> Array:
-        """(modes, degrees, N)."""
-        x, angle = np.sqrt(w[2]), 2 * np.arctan2(w[1], w[0])
-        trigonometry = [np.ones_like(x), *(f(k * angle) for k in range(1, MODES) for f in (np.cos, np.sin))]
-        return np.array([[mode * x**k for k in range(DEGREE + 1)] for mode in trigonometry[: self.modes]])
-
-    def read(self, w: Direction) -> list[Array]:
-        """The columns at directions, those that are negative by the errors of fits 0."""
-        return list(np.einsum("mdn,mdc->cn", self._basis(w), self.coefficients))
-
     def above(self, wi: Direction) -> list[Closure]:
-        """The closures for light from above."""
-        found = self.baked.at(wi, self.read, lambda *channels: np.stack(channels), self.baked.etas[0])
+        """The closures for light from above, in any dialect; weights that are negative by the errors of fits are 0."""
+        found = self.baked.at(wi, self._read, self.baked.etas[0])
         return [
-            closure._replace(weight=np.maximum(closure.weight, 0), roughness=bounded(closure.roughness))
+            closure._replace(weight=ops.maximum(closure.weight, 0.0), roughness=bounded(closure.roughness))
             for closure in found
         ]
+
+    def _read(self, w: Direction) -> Columns:
+        x, modes = ops.sqrt(w[2]), _modes(w, self.modes)
+
+        def polynomial(coefficients: Array) -> Value:
+            """By Horner's rule, of the modes that count."""
+            total: Value = 0.0
+            for k, (mode, each) in enumerate(zip(modes, coefficients)):
+                if k == 0 or np.abs(each).sum(axis=0).max() >= NEGLIGIBLE:
+                    found: Value = each[-1]
+                    for one in each[-2::-1]:
+                        found = found * x + one
+                    total = total + found * mode
+            return total
+
+        def colour(k: int) -> Value:
+            return polynomial(self.coefficients[..., k : k + 3, None])
+
+        return Columns(lambda k: polynomial(self.coefficients[..., k]), colour)
+
+
+def _modes(w: Direction, count: int) -> list[Value]:
+    """1, and cosine and sine of twice the azimuth, and of four times: as many as there are."""
+    if count == 1:
+        return [1.0]
+    u, v, _ = w
+    length = ops.maximum(u * u + v * v, SINE2_MIN)
+    c, s = (u * u - v * v) / length, 2 * u * v / length
+    return [1.0, c, s, c * c - s * s, 2 * c * s]
