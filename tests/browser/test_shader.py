@@ -1,12 +1,13 @@
 """The printed shader, run in headless Chromium, against NumPy.
 
-Rationale: only a compiler of shaders tells whether the text is GLSL, and only numbers tell whether it is the model. The
-same random stacks and directions go through both. `benchmarks/shader.py` does it for 10^4 of them and all patterns.
+The text is compiled, and its values are compared: the same random stacks and directions go through both.
+`benchmarks/shader.py` does it for 10^4 of them and all patterns.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import chromium
@@ -63,6 +64,18 @@ def test_the_shader_is_the_model(pattern: int, model: str, switches: dict[str, s
     assert found.value < 1e-3
     assert found.density < 1e-3
     assert found.drawn < 1e-4
+
+
+def test_facets_wider_across_the_tangent_are_not_turned(page: chromium.Browser) -> None:
+    """Drivers may take the angle of -0 and a negative number for 0, by which an interface without rotation among turned
+    ones lay across."""
+    case = random_case(PATTERNS[11], 60, np.random.default_rng(7))
+    values, keys = case.values, ("layer0_alpha_u", "layer0_alpha_v")
+    across = dict(zip(keys, np.sort([values[key] for key in keys], axis=0)), layer0_rotation=np.zeros(60))
+    case = replace(case, values={**values, **across})
+    recording = record(case.stack, "weier2020")
+    found, _, _ = in_browser(case, recording, shader(case.stack, "weier2020"), page)
+    assert differences(in_numpy(case, recording), found).value < 1e-3
 
 
 # One metal, two dielectrics over one, a pane, each of a model that looks films up in its own way; what is solved

@@ -135,10 +135,12 @@ class Covariance(Variance):
             mean, half = 0.5 * (self.xx + self.yy), 0.5 * (self.xx - self.yy)
             radius = ops.sqrt(half * half + self.xy * self.xy)
             turned = radius > 1e-9 * mean
-            rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
+            # -0, which drivers may take for another angle than 0, counts as 0
+            across = ops.select(ops.absolute(self.xy) > 1e-9 * mean, self.xy, 0.0)
+            rotation = 0.5 * ops.arctan2(across, ops.select(turned, half, 1.0))
             u = mean + radius
             v = ops.divide(ops.maximum(self.xx * self.yy - self.xy * self.xy, 0.0), u)  # mean - radius would cancel
-            ops.names(mean=mean, half=half, radius=radius, turned=turned, rotation=rotation, u=u, v=v)
+            ops.names(mean=mean, half=half, radius=radius, turned=turned, across=across, rotation=rotation, u=u, v=v)
         return Roughness(f.roughness(u, v), f.roughness(v, u), rotation)
 
     def matrix(self) -> tuple[Value, Value, Value]:
