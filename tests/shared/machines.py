@@ -180,7 +180,7 @@ class InHlsl(InVulkan):
 
     def code(self, text: str) -> bytes:
         return spirv(
-            f"#define VT_SAMPLE(map, uv) map.SampleLevel(vt_sampler, uv, 0.0)\n{text}", "-D", "-V", "-e", "main"
+            f"#define VT_SAMPLE(map, uv) map.SampleLevel(vt_sampler, uv, 0.0)\n{text}", "-Od", "-D", "-V", "-e", "main"
         )
 
 

@@ -1,7 +1,7 @@
 """Printed shaders in every language but GLSL ES, run on the CPU, against NumPy.
 
-Rationale: only a compiler tells whether a text is of its language, and only numbers tell whether it is the model. GLSL
-ES runs in Chromium (tests/browser/test_shader.py); `benchmarks/shader.py` runs 10^4 stacks of all patterns.
+A compiler of the language takes each text, and its values are compared. GLSL ES runs in Chromium
+(tests/browser/test_shader.py); `benchmarks/shader.py` runs 10^4 stacks of all patterns.
 """
 
 from __future__ import annotations
