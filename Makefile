@@ -40,6 +40,7 @@ mutants: .venv/ready-mutants ## change formulas, and list the changes that no te
 docs: .venv/ready-docs ## build the manual into site/
 	$(BIN)/sphinx-build -W --keep-going -q -j 2 -d build/doctrees docs site
 	$(BIN)/velatura edit --static site/try
+	$(BIN)/pytest -q tests/browser/test_site.py
 	@echo "The manual is $(CURDIR)/site/index.html"
 
 figures: .venv/ready ## compute the figures of the manual again that are missing, or whose sources have changed

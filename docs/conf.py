@@ -31,7 +31,6 @@ autodoc_member_order = "bysource"
 autodoc_default_options = {"exclude-members": "model_config, record"}
 autodoc_typehints_format = "short"
 autosummary_generate = ["reference/api.rst"]
-maximum_signature_line_length = 100
 nitpick_ignore_regex = [("py:(class|obj|data|exc|func|attr)", r".*")]
 nitpicky = True  # with -W, a reference to nothing ends the build
 exclude_patterns = ["_templates", "examples", "figures", "gallery/*.ipynb"]
@@ -65,14 +64,17 @@ html_theme = "pydata_sphinx_theme"
 html_theme_options = {
     "secondary_sidebar_items": ["page-toc", "sg_download_links"],
     "show_prev_next": False,
+    "navbar_persistent": ["search-button"],  # the wider one has a label that differs from what it shows
     "footer_start": ["copyright"],
     "footer_end": [],
 }
 html_show_sourcelink = False
+html_context = {"default_mode": "auto"}  # light or dark, as the system is
 
 # Formulas are typeset by a file of the site, whose glyphs are paths, so that neither a server nor fonts are needed.
 _mathjax = find_spec("sphinx-mathjax-offline")
 assert _mathjax and _mathjax.origin
 html_static_path = ["_static", str(Path(_mathjax.origin).with_name("static") / "mathjax" / "tex-svg.js")]
 html_css_files = ["manual.css"]
+html_js_files = ["manual.js"]
 mathjax_path = "tex-svg.js"

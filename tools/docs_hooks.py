@@ -1,7 +1,7 @@
 """A Sphinx extension: insert the program's own help and numbers into the manual, so that the two cannot disagree.
 
 `<!-- parameters -->` becomes the table of a material's parameters, `<!-- help VERB -->` the output of
-`velatura VERB --help`.
+`velatura VERB --help`, `<!-- presets -->` a card for each preset.
 
 `{{belcour2018-13: rmse/forward}}` becomes a number of `docs/figures/belcour2018-13.json`, which `make figures`
 computes. After the figure's name stand the keys that lead to the number; an item of a list has an index or its name. A
@@ -15,9 +15,11 @@ Records of a material's parameters (`Interface`, ...) are shown with the signatu
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from functools import cache
@@ -25,7 +27,9 @@ from math import floor, log10
 from pathlib import Path
 from typing import Any
 
-DOCS = Path(__file__).parents[1] / "docs"
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "velatura"
+DOCS = ROOT / "docs"
 FIGURES = DOCS / "figures"
 PLACES = 3  # after the point
 
@@ -64,6 +68,7 @@ class ExampleOrder:
 
 def setup(app: Any) -> dict[str, bool]:
     app.setup_extension("sphinx.ext.autodoc")
+    app.connect("builder-inited", _forget_old_examples, priority=100)  # before the gallery
     app.connect("source-read", _on_source_read)
     app.connect("autodoc-process-signature", _on_signature)
     app.connect("autodoc-process-docstring", _on_docstring)
@@ -72,7 +77,23 @@ def setup(app: Any) -> dict[str, bool]:
 
 def _on_source_read(app: Any, page: str, source: list[str]) -> None:
     if app.env.doc2path(page).suffix == ".md":
-        source[0] = replaced(source[0])
+        written = replaced(source[0])
+        if written != source[0]:
+            app.env.note_reread()  # what is inserted does not come from the page alone
+        source[0] = written
+
+
+def _forget_old_examples(app: Any) -> None:
+    """Remove the gallery where the package has changed, so that pictures are those of its sources."""
+    digest = hashlib.sha256()
+    for path in sorted(path for kind in ("py", "yaml", "npz") for path in PACKAGE.rglob(f"*.{kind}")):
+        digest.update(path.read_bytes())
+    gallery = DOCS / "gallery"
+    stamp = gallery / "sources.sha256"
+    if not stamp.exists() or stamp.read_text() != digest.hexdigest():
+        shutil.rmtree(gallery, ignore_errors=True)
+        gallery.mkdir()
+        stamp.write_text(digest.hexdigest())
 
 
 def _on_signature(app: Any, what: str, name: str, item: Any, *_: Any) -> tuple[str, str] | None:
@@ -106,6 +127,7 @@ def _described(parameter: Any) -> str:
 def replaced(markdown: str) -> str:
     """A page with its placeholders replaced."""
     markdown = re.sub(r"<!-- parameters -->", lambda _: _parameters(), markdown)
+    markdown = re.sub(r"<!-- presets -->", lambda _: _presets(), markdown)
     markdown = re.sub(r"\{\{(.*?)\}\}", lambda match: _number(match[1]), markdown)
     markdown = re.sub(r"\]\(((?:\.\./)*)examples/(\w+)\.py\)", r"](\1gallery/\2.rst)", markdown)
     return re.sub(r"<!-- help( \w+)? -->", lambda match: _help((match[1] or "").split()), markdown)
@@ -115,6 +137,47 @@ def _parameters() -> str:
     from velatura.stack import parameter_table
 
     return parameter_table()
+
+
+def _presets() -> str:
+    """A grid of cards: picture, file, lobes of light along the normal, and distance from the truth."""
+    import velatura as vt
+
+    distances = json.loads((DOCS / "reference" / "presets.json").read_text())
+    cards = (_card(name, vt.preset(name), distances[name]) for name in vt.presets())
+    return "\n".join(["::::{grid} 1 2 3 4", ":gutter: 3", "", *cards, "::::"])
+
+
+def _card(name: str, stack: Any, distance: dict[str, float]) -> str:
+    import velatura as vt
+
+    found = vt.lobes(stack, 1.0)
+    kinds = [kind for kind in stack.kinds if kind in ("dielectric", "conductor")]
+    lobes = [f"{kind}: {_energy(e)}, α {_alphas(a)}" for kind, e, a in zip(kinds, found.energy, found.alpha)]
+    if found.transmitted is not None:
+        lobes.append(f"passed: {_energy(found.transmitted.energy)}, α {_alphas(found.transmitted.alpha)}")
+    lobes.append(f"in no lobe: {_energy(found.remainder)}")
+    return f"""\
+:::{{grid-item-card}} {stack.name}
+:img-top: ../../src/velatura/editor/page/thumbnails/{name}.jpg
+:img-alt: The preset {name} on the material ball
+
+[`{name}`](../../src/velatura/stack/presets/{name}.yaml)
+
+{chr(10).join(f"- {lobe}" for lobe in lobes)}
+
+Total variation {_written(distance["total_variation"], 3)} (noise {_written(distance["noise"], 3)}), albedo within
+{_written(distance["albedo"], 3)}
+:::"""
+
+
+def _energy(energy: Any) -> str:
+    return f"{100 * energy.mean():.0f} %"
+
+
+def _alphas(alpha: Any) -> str:
+    """Roughness along both axes, once where they agree."""
+    return " by ".join(dict.fromkeys(_written(float(a), 2) for a in alpha[:, 0]))
 
 
 def _help(verb: list[str]) -> str:

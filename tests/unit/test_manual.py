@@ -95,7 +95,7 @@ def test_the_files_that_contributing_names_exist() -> None:
     `NAME` of a file stands in that file.
     """
     rows = [line for line in (ROOT / "CONTRIBUTING.md").read_text().splitlines() if line.startswith("| a")]
-    assert len(rows) == 15
+    assert len(rows) == 16
     package = ROOT / "src" / "velatura"
     for row in rows:
         paths = re.findall(r"`((?:[\w.-]+/)*[\w-]+\.(?:py|js|md|yaml))`", row)
@@ -117,3 +117,10 @@ def test_the_reference_has_every_public_name() -> None:
 
 def test_the_gallery_orders_every_example(hooks: ModuleType) -> None:
     assert sorted(hooks.EXAMPLES) == sorted(path.stem for path in (ROOT / "docs" / "examples").glob("*.py"))
+
+
+def test_every_preset_has_its_distance_and_its_picture() -> None:
+    distances = json.loads((ROOT / "docs" / "reference" / "presets.json").read_text())
+    pictures = ROOT / "src" / "velatura" / "editor" / "page" / "thumbnails"
+    assert tuple(distances) == velatura.presets()
+    assert {path.stem for path in pictures.glob("*.jpg")} == set(velatura.presets())
