@@ -152,7 +152,7 @@ def _card(name: str, stack: Any, distance: dict[str, float]) -> str:
     import velatura as vt
 
     found = vt.lobes(stack, 1.0)
-    kinds = [kind for kind in stack.kinds if kind in ("dielectric", "conductor")]
+    kinds = [kind for kind in stack.kinds if kind not in ("medium", "diffuse")]
     lobes = [f"{kind}: {_energy(e)}, α {_alphas(a)}" for kind, e, a in zip(kinds, found.energy, found.alpha)]
     if found.transmitted is not None:
         lobes.append(f"passed: {_energy(found.transmitted.energy)}, α {_alphas(found.transmitted.alpha)}")
