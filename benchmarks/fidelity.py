@@ -26,7 +26,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +36,8 @@ from walks import FOLDER, HALVES, Incidence, Kind, Walks, arguments, chosen, eve
 
 import velatura as vt
 from velatura import kernel
+from velatura.benchmark.candidates import evenly, probe_of
+from velatura.benchmark.entrants import with_bounces
 from velatura.checks.probe import Probe
 from velatura.comparison.evaluated_lobes import Light, distribution
 from velatura.errors import InvalidInput
@@ -99,10 +100,7 @@ class Record:
 
 def of_kind(kind: Kind, model: str, switches: dict[str, str]) -> Model:
     """The model, with the reflectance that the walks have if it averages over facets."""
-    plain = named(model, **switches)
-    if not plain.reflectance.startswith("fgd"):
-        return plain
-    return plain.with_switches(reflectance="fgd-multi" if kind.often else "fgd")
+    return with_bounces(named(model, **switches), kind.often)
 
 
 def textured(stack: Stack, model: Model) -> Any:
@@ -119,26 +117,13 @@ def textured(stack: Stack, model: Model) -> Any:
     return kernel.load_dict({"type": "layered", "material": dumps(stack, "json"), **switches, **maps})
 
 
-@cache
-def numbers(half: int) -> Array:
-    """Points (n, 3) that fill a cube evenly, other ones for either half."""
-    return qmc.Sobol(3, seed=half).random_base2(SAMPLES).clip(0, 1 - 2**-24)
-
-
-def probe_of(bsdf: Any) -> Probe:
-    """Asks a BSDF for energies: of what passes, not the radiance."""
-    probe = Probe(bsdf)
-    probe.context = probe.mi.BSDFContext(probe.mi.TransportMode.Importance)
-    return probe
-
-
 def seen(probe: Probe, incidence: Incidence) -> tuple[Array, Array]:
     """Energies (2, 2, 3, bins, bins) as `Walks.grids` has them, and the weights (n,) of all samples."""
     z = -incidence.cosine if incidence.inside else incidence.cosine
     wi = (np.sqrt(1 - z * z), 0.0, z)
     halves, weights = [], []
     for half in range(2):
-        u = numbers(half)
+        u = evenly(SAMPLES, half)
         drawn = probe.sample(np.broadcast_to(wi, u.shape), u)
         back = (drawn.wo[:, 2] > 0) != incidence.inside
         lights = [Light(drawn.wo[side, :2].T, drawn.weight[side].T / len(u)) for side in (back, ~back)]

@@ -15,7 +15,6 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,8 @@ from rich.progress import track
 
 import velatura as vt
 from velatura import files
-from velatura.stack import Diffuse, Interface, Layer, Material, Medium, Stack, as_described, dumps
+from velatura.benchmark.random_stacks import clear, cloudy, isotropic, milky, painted, tinted, turned
+from velatura.stack import Material, Stack, as_described, dumps
 
 Array = NDArray[np.floating]
 
@@ -33,107 +33,7 @@ DEEP = 0.6  # of the way from the critical angle to grazing
 HALVES = ("fit", "test")
 STACKS, PATHS, FOLDER = 12, 1_000_000, Path("walks")
 
-# Layers of every sort ------------------------------------------------------------------------------------------------
-
-
-def roughness(rng: np.random.Generator, low: float = 0.0) -> float:
-    """Smooth, evenly distributed, or evenly in its logarithm."""
-    u, even, power = rng.uniform(), rng.uniform(low, 0.55), 10 ** rng.uniform(-2.3, -0.26)
-    return 0.0 if u < 0.15 and not low else float(even if u < 0.7 else power)
-
-
-def surface(rng: np.random.Generator, turned: str | None = None, **index: Any) -> Interface:
-    """An interface; seven in ten of a brushed or turned stack have two roughnesses."""
-    if turned is None:
-        return Interface(alpha=roughness(rng), **index)
-    alpha: Any = (roughness(rng, 0.01), roughness(rng, 0.01))
-    rotation = float(rng.uniform(0, 180)) if turned == "turned" else float(rng.choice([0, 90]))
-    return Interface(alpha=alpha if rng.uniform() < 0.7 else alpha[0], rotation=rotation, **index)
-
-
-def coat(rng: np.random.Generator, turned: str | None = None) -> Interface:
-    """A dielectric."""
-    return surface(rng, turned, eta=float(rng.uniform(1.1, 2.2)))
-
-
-def base(rng: np.random.Generator, turned: str | None = None) -> Interface:
-    """A metal of any colour, more rarely a mirror or glass."""
-    u = rng.uniform()
-    if u < 0.7:
-        eta, k = (tuple(map(float, rng.uniform(*span, 3))) for span in ((0.2, 2.0), (1.5, 5.0)))
-        return surface(rng, turned, eta=eta, k=k)
-    return surface(rng, turned, conductor="mirror") if u < 0.85 else coat(rng, turned)
-
-
-def absorbing(rng: np.random.Generator) -> Medium:
-    """A coloured medium that scatters nothing."""
-    return Medium(sigma_a=tuple(map(float, rng.uniform(0, 1) * rng.uniform(0, 1, 3))))
-
-
-def scattering(rng: np.random.Generator) -> Medium:
-    """A medium of any asymmetry, depth and single-scattering albedo, every second one coloured."""
-    depth, g = float(10 ** rng.uniform(-1, np.log10(8))), float(rng.uniform(-0.3, 0.95))
-    albedo = rng.uniform(0.5, 1, 3) if rng.uniform() < 0.5 else np.full(3, rng.uniform(0.5, 1))
-    return Medium(depth=depth, sigma_s=tuple(map(float, albedo)), sigma_a=tuple(map(float, 1 - albedo)), g=g)
-
-
 # Stacks of every kind ------------------------------------------------------------------------------------------------
-
-
-def isotropic(rng: np.random.Generator, number: int) -> Stack:
-    """Up to three dielectrics over a base."""
-    return Stack([*(coat(rng) for _ in range(number % 4)), base(rng)])
-
-
-def turned(rng: np.random.Generator, number: int) -> Stack:
-    """The same, brushed along one of two axes or turned by any angle."""
-    way = ("brushed", "turned")[number % 2]
-    return Stack([*(coat(rng, way) for _ in range(number // 2 % 4)), base(rng, way)])
-
-
-def tinted(rng: np.random.Generator, number: int) -> Stack:
-    """One to three dielectrics over a base, above which there is a medium that absorbs, and others anywhere."""
-    layers: list[Layer] = []
-    for k in reversed(range(1 + number % 3)):
-        layers += [coat(rng), *([absorbing(rng)] if k == 0 or rng.uniform() < 0.5 else [])]
-    return Stack([*layers, base(rng)])
-
-
-def cloudy(rng: np.random.Generator, number: int) -> Stack:
-    """One or two dielectrics, a medium that scatters, and a base; three in ten of two have a second medium."""
-    layers: list[Layer] = [coat(rng)]
-    if number % 2:
-        layers += [*([scattering(rng)] if rng.uniform() < 0.3 else []), coat(rng)]
-    painted = rng.uniform() < 1 / 6
-    return Stack([*layers, scattering(rng), diffuse(rng) if painted else base(rng)])
-
-
-def diffuse(rng: np.random.Generator) -> Diffuse:
-    """A coloured base."""
-    return Diffuse(albedo=tuple(map(float, rng.uniform(0.1, 0.95, 3))))
-
-
-def painted(rng: np.random.Generator, number: int) -> Stack:
-    """One to three dielectrics over a diffuse base, a third of them with a medium that absorbs."""
-    medium = [absorbing(rng)] if rng.uniform() < 1 / 3 else []
-    return Stack([*(coat(rng) for _ in range(1 + number % 3)), *medium, diffuse(rng)])
-
-
-def clear(rng: np.random.Generator, number: int) -> Stack:
-    """Solids and panes in turn; a quarter of them turned, a fifth with a medium that absorbs."""
-    thin = bool(number % 2)
-    way = "turned" if number % 8 >= 6 else None
-    layers: list[Layer] = [coat(rng, way) for _ in range(max(1 + number // 2 % 4, 1 + thin))]
-    if rng.uniform() < 0.2 and len(layers) > 1:
-        layers.insert(1, absorbing(rng))
-    return Stack(layers, thin=thin)
-
-
-def milky(rng: np.random.Generator, number: int) -> Stack:
-    """Solids and panes in turn, of two or three interfaces with a medium that scatters between two of them."""
-    layers: list[Layer] = [coat(rng) for _ in range(2 + number // 2 % 2)]
-    layers.insert(int(rng.integers(1, len(layers))), scattering(rng))
-    return Stack(layers, thin=bool(number % 2))
 
 
 @dataclass(frozen=True)

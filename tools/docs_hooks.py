@@ -130,7 +130,7 @@ def replaced(markdown: str) -> str:
     markdown = re.sub(r"<!-- presets -->", lambda _: _presets(), markdown)
     markdown = re.sub(r"\{\{(.*?)\}\}", lambda match: _number(match[1]), markdown)
     markdown = re.sub(r"\]\(((?:\.\./)*)examples/(\w+)\.py\)", r"](\1gallery/\2.rst)", markdown)
-    return re.sub(r"<!-- help( \w+)? -->", lambda match: _help((match[1] or "").split()), markdown)
+    return re.sub(r"<!-- help((?: \w+)*) -->", lambda match: _help(match[1].split()), markdown)
 
 
 def _parameters() -> str:

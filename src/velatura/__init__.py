@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from velatura import bakes as bakes
+    from velatura import benchmark as benchmark
     from velatura import checks as checks
     from velatura import comparison as comparison
     from velatura import exports as exports
@@ -95,6 +96,7 @@ __all__ = [
 
 _PARTS = (
     "bakes",
+    "benchmark",
     "checks",
     "comparison",
     "exports",

@@ -43,6 +43,18 @@ def check_writable(path: str | os.PathLike[str], what: str, endings: Sequence[st
     return target
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, where they are missing.
+
+    Raises:
+        InvalidInput: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInput(f"{folder}: the folder cannot be made: {reason(error)}") from None
+
+
 def check_folder(folder: Path, subject: str) -> None:
     """Raise InvalidInput about `subject` unless a file can be made in the folder."""
     try:

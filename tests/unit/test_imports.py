@@ -36,6 +36,7 @@ MAY_IMPORT = {
     "checks": "kernel",
     "scenes": "kernel",
     "comparison": "stack optics model reference sampling checks scenes api kernel bakes",
+    "benchmark": "stack optics model reference sampling checks comparison api kernel bakes targets",
     "progress": "",
     "sweeps": "__init__ stack optics model inverse reference checks api kernel progress",
     "figures": "stack optics ops sampling model inverse reference checks scenes comparison api kernel",
@@ -43,9 +44,10 @@ MAY_IMPORT = {
 
 # The ends of the stream -> who may import them.
 IMPORTED_BY = {
+    "benchmark": "__init__ cli",
     "cli": "__main__",
     "editor": "__init__ cli",
-    "comparison": "__init__ figures cli",
+    "comparison": "__init__ figures cli benchmark",
     "exports": "__init__ cli editor",
     "imports": "__init__ cli",
     "figures": "cli editor",
@@ -55,7 +57,7 @@ IMPORTED_BY = {
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
 RENDERER = {
     "mitsuba": "kernel",
-    "drjit": "kernel ops sampling tables binding plugins reference checks scenes",
+    "drjit": "kernel ops sampling tables binding plugins reference checks scenes benchmark",
 }
 
 # Modules -> what importing them must not load.
@@ -74,6 +76,7 @@ LOADS_NO = {
     "velatura.plugins": "mitsuba drjit",
     "velatura.sweeps": "mitsuba drjit matplotlib xarray zarr dask distributed",
     "velatura.comparison": "mitsuba drjit matplotlib",
+    "velatura.benchmark": "mitsuba drjit matplotlib",
     "velatura.figures": "mitsuba drjit matplotlib",
     "velatura.editor.server": "mitsuba drjit scipy matplotlib",
 }

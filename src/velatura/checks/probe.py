@@ -120,7 +120,7 @@ class Probe:
         import drjit as dr
 
         mi, (u1, u2, u3) = self.mi, u.astype(np.float32).T
-        si, sample1, sample2 = self._interaction(wi), mi.Float(u1), mi.Point2f(u2, u3)
+        si, sample1, sample2 = self.interaction(wi), mi.Float(u1), mi.Point2f(u2, u3)
         bs, weight = self.bsdf.sample(self.context, si, sample1, sample2, True)
         weight, delta = mi.unpolarized_spectrum(weight), mi.has_flag(mi.UInt32(bs.sampled_type), mi.BSDFFlags.Delta)
         dr.eval(bs.wo, weight, bs.pdf, bs.eta, delta)
@@ -128,11 +128,11 @@ class Probe:
 
     @kernel.exclusive
     def _eval_pdf(self, wi: Array, wo: Array, offset: float) -> tuple[Array, ...]:
-        return self._values(*self.bsdf.eval_pdf(self.context, self._interaction(wi, offset), self._vector(wo), True))
+        return self._values(*self.bsdf.eval_pdf(self.context, self.interaction(wi, offset), self.vector(wo), True))
 
     @kernel.exclusive
     def _eval_and_pdf(self, wi: Array, wo: Array) -> tuple[Array, ...]:
-        si, direction = self._interaction(wi), self._vector(wo)
+        si, direction = self.interaction(wi), self.vector(wo)
         value = self.bsdf.eval(self.context, si, direction, True)
         return self._values(value, self.bsdf.pdf(self.context, si, direction, True))
 
@@ -143,19 +143,19 @@ class Probe:
         dr.eval(value, pdf)
         return _rows(value), _row(pdf)
 
-    def _interaction(self, wi: Array, offset: float = 0.0) -> Any:
+    def interaction(self, wi: Array, offset: float = 0.0) -> Any:
         import drjit as dr
 
         mi = self.mi
         si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
-        si.wi, si.uv, si.p = self._vector(wi), mi.Point2f(*self.uv), mi.Point3f(dr.opaque(mi.Float, offset), 0, 0)
+        si.wi, si.uv, si.p = self.vector(wi), mi.Point2f(*self.uv), mi.Point3f(dr.opaque(mi.Float, offset), 0, 0)
         si.n, si.sh_frame = mi.Normal3f(0, 0, 1), mi.Frame3f([1, 0, 0], [0, 1, 0], [0, 0, 1])
         si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
         if mi.is_spectral:
             si.wavelengths = type(si.wavelengths)(*_WAVELENGTHS)
         return si
 
-    def _vector(self, directions: Array) -> Any:
+    def vector(self, directions: Array) -> Any:
         return self.mi.Vector3f(np.ascontiguousarray(directions.T, dtype=np.float32))
 
 

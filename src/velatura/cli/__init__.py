@@ -21,6 +21,7 @@ import typer
 
 from velatura import __version__
 from velatura.cli import (
+    benchmark,
     check,
     cite,
     coat,
@@ -77,6 +78,7 @@ for verb in (
     doctor.doctor,
 ):
     app.command(verb.__name__.rstrip("_"))(verb)
+app.add_typer(benchmark.app, name="benchmark")
 
 
 def _print_version(wanted: bool) -> None:

@@ -141,7 +141,7 @@ def _lobe(wi: Array, wo: Array, weight: Array, paths: int, radial: bool, turned:
     energy_error = np.sqrt(np.maximum(second - energy**2, 0) / paths)
     # Moments on the disc
     grey = weight.mean(axis=0)
-    mean, mean_error, covariance, covariance_error = _moments(wo[:2], grey)
+    mean, mean_error, covariance, covariance_error = moments(wo[:2], grey)
     # Axes of the half-vectors, and the roughness along them
     x, y = roughness.slopes(wi, wo)
     rotation, rotation_error = (0.0, 0.0) if radial else _axes(x, y, grey, turned)
@@ -153,7 +153,7 @@ def _lobe(wi: Array, wo: Array, weight: Array, paths: int, radial: bool, turned:
     return value, WalkedLobe(energy_error, alpha_error, np.array(rotation_error), mean_error, covariance_error)
 
 
-def _moments(x: Array, weight: Array) -> tuple[Array, Array, Array, Array]:
+def moments(x: Array, weight: Array) -> tuple[Array, Array, Array, Array]:
     """Weighted mean (2,) and covariance (3,) of points (2, n), each followed by its standard error."""
     mean, mean_error = _average(x, weight)
     d = x - mean[:, None].astype(x.dtype)
@@ -176,7 +176,7 @@ def _axes(x: Array, y: Array, weight: Array, turned: bool) -> tuple[float, float
     """
     cosine = 1 / np.sqrt(1 + x * x + y * y)
     p = np.stack([x * cosine, y * cosine])
-    mean, _, (xx, xy, yy), _ = _moments(p, weight)
+    mean, _, (xx, xy, yy), _ = moments(p, weight)
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)
     # Carry the errors of the covariance over to the angle
     dx, dy = p - mean[:, None].astype(p.dtype)

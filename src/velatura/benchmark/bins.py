@@ -1,0 +1,92 @@
+"""Bins of outgoing directions, fine about the direction of a mirror, and nodes that integrate over each.
+
+A side of the surface is seen as the disc of x and y, with polar coordinates about the centre c where a smooth stack
+would send the light: phi, the azimuth from the plane of incidence, forwards, and t, the share of the way from c to the
+rim. Bins are those of `RADII` in t, and equal ones in phi. So they cover the disc, and are symmetric about the plane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.sampling.low_discrepancy import gauss
+
+Array = NDArray[np.floating]
+
+RADIAL, AZIMUTHAL = 16, 16
+FINEST = 0.01
+RADII = np.array([0.0, *np.geomspace(FINEST, 1, RADIAL)])
+FARTHEST = 0.97  # of the centre from the middle of the disc, where light is totally reflected
+NODES = 4  # along either side of a bin
+
+SIDES = ("reflected", "transmitted")
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Bins of one side for light from one direction.
+
+    forward: azimuth of the direction that the light goes on to; centre: distance of c from the middle of the disc;
+    up: whether the side is above the surface.
+    """
+
+    forward: float
+    centre: float
+    up: bool
+
+    @classmethod
+    def of(cls, wi: Array, side: str, eta: float) -> Bins:
+        """For light from wi (3,), with z < 0 from below, and the index eta below over that above."""
+        through, below = side == "transmitted", wi[2] < 0
+        index = (eta if below else 1 / eta) if through else 1.0
+        centre = min(float(np.hypot(wi[0], wi[1])) * index, FARTHEST if through else 1.0)
+        return cls(float(np.arctan2(-wi[1], -wi[0])), centre, bool(below == through))
+
+    def number(self, wo: Array) -> NDArray[np.intp]:
+        """The number (n,) of the bin of directions (3, n), which count over t, then phi; whichever side they are on."""
+        x, y = self._turned(wo[0], wo[1], -self.forward)
+        x = x - self.centre
+        phi = np.arctan2(y, x)
+        t = np.hypot(x, y) / self._rim(phi)
+        row = np.clip(np.searchsorted(RADII, t, side="right") - 1, 0, RADIAL - 1)
+        column = np.clip(((phi + pi) / (2 * pi) * AZIMUTHAL).astype(int), 0, AZIMUTHAL - 1)
+        return np.asarray(row * AZIMUTHAL + column)
+
+    def nodes(self, count: int = NODES) -> tuple[Array, Array]:
+        """Directions (3, n) and solid angles (n,): `count` squared nodes for each bin, bin by bin."""
+        x, w = gauss(count)
+        t = (RADII[:-1, None] + np.diff(RADII)[:, None] * x).ravel()
+        dt = (np.diff(RADII)[:, None] * w).ravel()
+        step = 2 * pi / AZIMUTHAL
+        phi = (step * (np.arange(AZIMUTHAL)[:, None] + x)).ravel() - pi
+        rim = self._rim(phi)
+        area = np.outer(t * dt, rim**2 * np.tile(step * w, AZIMUTHAL))
+        away = np.outer(t, rim)
+        px, py = self._turned(self.centre + away * np.cos(phi), away * np.sin(phi), self.forward)
+        cosine = np.sqrt(np.maximum(1 - px * px - py * py, 1e-12))
+        parts = px, py, cosine if self.up else -cosine, area / cosine
+        x, y, z, weight = (self._by_bin(part, count) for part in parts)
+        return np.stack([x, y, z]), weight
+
+    def _by_bin(self, values: Array, count: int) -> Array:
+        """Values over t and phi, with those of one bin together."""
+        return values.reshape(RADIAL, count, AZIMUTHAL, count).swapaxes(1, 2).reshape(-1)
+
+    def _rim(self, phi: Array) -> Array:
+        """Distance from the centre to the rim of the disc."""
+        across = self.centre * np.sin(phi)
+        return np.sqrt(np.maximum(1 - across**2, 0)) - self.centre * np.cos(phi)
+
+    @staticmethod
+    def _turned(x: Array, y: Array, angle: float) -> tuple[Array, Array]:
+        c, s = np.cos(angle), np.sin(angle)
+        return c * x - s * y, s * x + c * y
+
+
+def mirrored(grid: Array) -> Array:
+    """Values (RADIAL, AZIMUTHAL, ...) on the other side of the plane of incidence."""
+    return grid[:, ::-1]

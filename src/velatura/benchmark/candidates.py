@@ -1,0 +1,161 @@
+"""What is scored: functions of two directions, BSDFs of Mitsuba, and values from files, as light in bins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from velatura import kernel
+from velatura.benchmark.bins import AZIMUTHAL, NODES, RADIAL, SIDES, Bins
+from velatura.benchmark.stacks import Case
+from velatura.benchmark.walks import Binned, walked
+from velatura.checks.probe import Probe
+from velatura.errors import InvalidInput
+
+Array = NDArray[np.floating]
+
+#: f(wi, wo) |cos theta_o| (n, 3) of energies, for unit vectors (n, 3); NaN where a model does not say.
+Eval: TypeAlias = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The walk itself, by another seed."""
+
+    seed: int
+    paths: int
+
+
+#: What a factory makes for a case: an `Eval`, which may have a method `sample(wi, u)` for directions and numbers (n, 3)
+#: that gives weights (n, 3); a `mi.BSDF`, or the dict of one; a `Walk`; None where the model cannot express the stack.
+Candidate: TypeAlias = Any
+Factory: TypeAlias = Callable[[Case], Candidate]
+
+# Pairs of directions -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """All pairs of directions (n, 3) of a case, and their solid angles (n,); those of `keys` in turn, in equal parts.
+
+    keys: direction and side.
+    """
+
+    wi: Array
+    wo: Array
+    weight: Array
+    keys: tuple[tuple[int, str], ...]
+
+    @classmethod
+    def of(cls, case: Case, nodes: int = NODES) -> Pairs:
+        """With so many squared nodes for each bin."""
+        sides = SIDES[: 1 + case.stack.transmits]
+        keys = tuple((direction, side) for direction in range(len(case.incident)) for side in sides)
+        each = [Bins.of(case.incident[direction], side, case.eta).nodes(nodes) for direction, side in keys]
+        wi = np.repeat(case.incident[[direction for direction, _ in keys]], len(each[0][1]), axis=0)
+        wo, weight = (np.concatenate([pair[i] for pair in each], axis=-1) for i in (0, 1))
+        return cls(wi, wo.T, weight, keys)
+
+    def light(self, value: Array) -> dict[tuple[int, str], Binned]:
+        """The light of values (n, 3), of those keys that have no NaN."""
+        each = np.split(value * self.weight[:, None], len(self.keys))
+        return {key: _exact(light) for key, light in zip(self.keys, each) if np.isfinite(light).all()}
+
+
+def _exact(light: Array) -> Binned:
+    """Light of energies (n, 3) at nodes that stand bin by bin, without errors."""
+    energy = light.reshape(RADIAL, AZIMUTHAL, -1, 3).sum(axis=2)
+    return Binned(energy, np.zeros_like(energy), energy.sum(axis=(0, 1)), np.zeros(3))
+
+
+def seen(case: Case, candidate: Candidate, nodes: int = NODES) -> dict[tuple[int, str], Binned]:
+    """The light of a candidate, by direction and side, of those that it has values for.
+
+    Raises:
+        InvalidInput: values of another shape than (n, 3).
+    """
+    if isinstance(candidate, Walk):
+        return {
+            (direction, side): light
+            for direction in range(len(case.incident))
+            for side, light in walked(case, direction, candidate.paths, candidate.seed).items()
+        }
+    pairs = Pairs.of(case, nodes)
+    value = np.asarray(candidate(pairs.wi, pairs.wo), float)
+    if value.shape != pairs.wo.shape:
+        raise InvalidInput(f"{case.id}: values must have the shape {pairs.wo.shape}, got {value.shape}")
+    return pairs.light(value)
+
+
+# Mitsuba -------------------------------------------------------------------------------------------------------------
+
+
+def probe_of(bsdf: Any) -> Probe:
+    """Asks a BSDF for energies: of what passes, not the radiance."""
+    probe = Probe(bsdf)
+    probe.context = probe.mi.BSDFContext(probe.mi.TransportMode.Importance)
+    return probe
+
+
+class Plugin:
+    """A `mi.BSDF` as a candidate; NaN from below where it is one-sided, and on the other side where it is opaque."""
+
+    def __init__(self, bsdf: Any) -> None:
+        self.probe = probe_of(bsdf)
+
+    def __call__(self, wi: Array, wo: Array) -> Array:
+        value = self.probe.eval_pdf(wi, wo).value
+        passes = np.sign(wi[:, 2]) != np.sign(wo[:, 2])
+        unknown = (passes & (not self.probe.transmits)) | ((wi[:, 2] < 0) & (not self.probe.two_sided))
+        return np.where(unknown[:, None], np.nan, value)
+
+    def sample(self, wi: Array, u: Array) -> Array:
+        """Weights (n, 3)."""
+        return np.where((wi[:, 2:] < 0) & (not self.probe.two_sided), np.nan, self.probe.sample(wi, u).weight)
+
+
+def made(candidate: Candidate) -> Candidate:
+    """The candidate, with a BSDF or the dict of one as a function.
+
+    Raises:
+        InvalidInput: a dict that Mitsuba refuses, or what is none of the above.
+    """
+    if candidate is None or isinstance(candidate, Walk | Plugin):
+        return candidate
+    if isinstance(candidate, Mapping):
+        return Plugin(kernel.load_dict(dict(candidate)))
+    if hasattr(candidate, "eval_pdf"):
+        return Plugin(candidate)
+    if not callable(candidate):
+        raise InvalidInput(f"candidate: must be a function of wi and wo, or a BSDF, got {type(candidate).__name__}")
+    return candidate
+
+
+@cache
+def evenly(power: int, seed: int) -> Array:
+    """Points (2^power, 3) that fill a cube evenly; not to be written to."""
+    points: Array = qmc.Sobol(3, seed=seed).random_base2(power).clip(0, 1 - 2**-24)
+    points.flags.writeable = False
+    return points
+
+
+# Files ---------------------------------------------------------------------------------------------------------------
+
+
+def from_values(values: Array, cases: Sequence[Case]) -> Factory:
+    """A factory that reads values (P, 3) of all pairs of these cases, as `write_task` has them.
+
+    Raises:
+        InvalidInput: another shape.
+    """
+    ends = np.cumsum([len(Pairs.of(case).wi) for case in cases])
+    if values.shape != (ends[-1], 3):
+        raise InvalidInput(f"values: must have the shape ({ends[-1]}, 3), got {values.shape}")
+    parts = dict(zip([case.id for case in cases], np.split(values, ends[:-1])))
+    return lambda case: lambda wi, wo: parts[case.id]
