@@ -69,10 +69,15 @@ def test_every_placeholder_of_the_page_of_figures_resolves(hooks: ModuleType) ->
     assert "{{" not in hooks.replaced(page)
 
 
-def test_the_page_prints_numbers_of_figures_that_are_there() -> None:
+def test_the_page_shows_every_figure_beside_its_numbers() -> None:
+    """Expected: small pictures, each described; numbers of none but these."""
     page = (ROOT / "docs" / "reference" / "figures.md").read_text()
-    printed = set(re.findall(r"\{\{([a-z0-9-]+): ", page))
-    assert printed <= {path.stem for path in (ROOT / "docs" / "figures").glob("*.json")} <= set(FIGURES)
+    shown = re.findall(r"!\[(.+?)\]\(\.\./figures/([a-z0-9-]+)\.webp\)", page)
+    assert sorted(name for _, name in shown) == sorted(FIGURES) and len({words for words, _ in shown}) == len(FIGURES)
+    assert set(re.findall(r"\{\{([a-z0-9-]+): ", page)) <= set(FIGURES)
+    files = {path.name: path.stat().st_size for path in (ROOT / "docs" / "figures").iterdir()}
+    assert set(files) == {f"{name}.{ending}" for name in FIGURES for ending in ("json", "webp")}
+    assert max(size for name, size in files.items() if name.endswith(".webp")) < 120_000
 
 
 @pytest.mark.parametrize("part", ["tutorials", "how-to", "explanation", "reference"])

@@ -1,8 +1,8 @@
 """Belcour 2018, figure 14: gold under a scattering medium that grows deeper.
 
 g = 0.7, no absorption and a scattering coefficient of 1, as printed; the depths, the gold's alpha of 0.01 and the
-object, a hollow ball, are chosen here. Beside the medium as published stands the one that scatters many times, and
-beside the symmetric form, which the paper renders, the forward one.
+object, a carved urn for the paper's dragon, are chosen here. Beside the medium as published stands the one that
+scatters many times, and beside the symmetric form, which the paper renders, the forward one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def stack(depth: float) -> Stack:
 
 STACKS = {f"depth {depth:g}": stack(depth) for depth in DEPTHS}
 
-_FIGURE = cells.Cells(STACKS, COLUMNS, "ball")
+_FIGURE = cells.Cells(STACKS, COLUMNS, "urn")
 compute, draw = _FIGURE.compute, _FIGURE.draw
 
 

@@ -7,17 +7,14 @@ dome, and its light are chosen here. Through the second one light passes, into t
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura.figures import canvas, cells
-from velatura.stack import Interface, Medium, Stack, Texture
+from velatura.stack import Interface, Medium, Stack
 
-MATERIALS = ("two layers", "three layers")
 COLUMNS: cells.Columns = {
     form: ("belcour2018", {"reflectance": "fgd", "tir": "published", "form": form}) for form in ("symmetric", "forward")
 }
@@ -29,40 +26,17 @@ def rings(side: int = 256, count: float = 4.0) -> Any:
     return 0.5 - 0.5 * np.cos(2 * np.pi * count * np.hypot(*np.meshgrid(ticks, ticks)))
 
 
-def stacks(alpha: Texture) -> dict[str, Stack]:
-    """Both materials, with their textured roughness."""
+def stacks(folder: Path) -> dict[str, Stack]:
+    """Both materials, their texture in a folder."""
+    alpha = canvas.texture(folder / "rings.exr", rings())
     metal = Interface(eta=1.0, k=0.5, alpha=alpha)
     tint = Medium(depth=1.0, sigma_a=(1.0, 0.7, 0.2))
-    two = Stack([Interface(eta=2.0), metal])
     three = Stack([Interface(eta=1.8, alpha=alpha), tint, Interface(eta=1.0, alpha=alpha)])
-    return dict(zip(MATERIALS, (two, three)))
+    return {"two layers": Stack([Interface(eta=2.0), metal]), "three layers": three}
 
 
-def compute(
-    materials: Sequence[str] = MATERIALS,
-    size: int = canvas.SIZE,
-    spp: int = canvas.SAMPLES,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Any]:
-    """A cell for each material: see `cells.compute`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        textured = stacks(canvas.texture(Path(folder) / "rings.exr", rings()))
-        chosen = {name: textured[name] for name in materials}
-        return cells.compute(chosen, COLUMNS, cells.Quality(size, spp), seed, progress, "lid")
-
-
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each material: the truth, and beside it both forms and what they have too much or too little.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    cells.draw(numbers, path)
+_FIGURE = cells.Cells(stacks, COLUMNS, "lid")
+compute, draw = _FIGURE.compute, _FIGURE.draw
 
 
 if __name__ == "__main__":

@@ -73,11 +73,11 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     """
     rows = len({cell["coat"] for cell in numbers["cells"]})
     columns = len(numbers["cells"]) // rows
-    figure = canvas.canvas(4 * columns, 2.3 * rows)
+    figure = canvas.canvas(4 * columns, 2.5 * rows)
     pairs = figure.subplots(rows, 2 * columns, squeeze=False).reshape(-1, 2)
     for (left, right), cell, seen in zip(pairs, numbers["cells"], numbers["pictures"]):
-        canvas.show(left, seen["model"], cell["name"])
-        canvas.show(right, seen["reference"], f"reference, {canvas.error_label(cell, FORMS[0])}")
+        canvas.show(left, seen["model"], cell["name"].replace(", ", "\n"))
+        canvas.show(right, seen["reference"], f"reference\n{canvas.error_label(cell, FORMS[0])}")
     canvas.save(figure, path)
 
 

@@ -1,7 +1,7 @@
 """Belcour 2018, table 2: the cost of three scenes by the model and by the baseline of Weidlich and Wilkie 2007.
 
 Frosted metal (figure 13) and the white furnace (figure 12) with direct light only, and the dragon (figure 14) with
-all of it. Objects and sizes are chosen here: spheres, and a hollow ball for the dragon. So are the roughness of the
+all of it. Objects and sizes are chosen here: spheres, and a carved urn for the dragon. So are the roughness of the
 furnace's dielectrics, 0.1, since wholly smooth stacks are mirrors here and cost nothing, and the depth of the medium
 over the dragon's gold. Weidlich and Wilkie know no scattering: their medium only absorbs, as much as it should scatter.
 In parentheses the paper gives its times without interpolation in the tables of FGD and TIR; here the model does without
@@ -32,7 +32,7 @@ COLUMNS: dict[str, tuple[str, dict[str, str]]] = {
 SCENES: dict[str, tuple[str, str, str, int | None]] = {
     "frosted metal": ("frosted-metal", "sphere", "studio", 2),
     "white furnace": ("furnace-rough", "sphere", "furnace", 2),
-    "dragon": ("scattering-medium-over-gold", "ball", "studio", None),
+    "dragon": ("scattering-medium-over-gold", "urn", "studio", None),
 }
 
 #: The paper's times in units of that of Weidlich and Wilkie.
@@ -103,7 +103,8 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         InvalidInput: the file cannot be written.
     """
     figure = canvas.canvas(15, 9)
-    rows = figure.subplots(len(numbers["scenes"]), len(COLUMNS) + 1, width_ratios=(1,) * len(COLUMNS) + (1.4,))
+    widths = (1,) * len(COLUMNS) + (1.4,)
+    rows = figure.subplots(len(numbers["scenes"]), len(widths), squeeze=False, width_ratios=widths)
     for row, (name, found) in zip(rows, numbers["scenes"].items()):
         for plot, column in zip(row, COLUMNS):
             image = 0.5 * np.array(numbers["pictures"][name][column])

@@ -22,7 +22,8 @@ Item = TypeVar("Item")
 SIZE, SAMPLES = 128, 128  # of a picture: pixels along a side, and samples of each
 PASSES = 8  # of a picture, each of its own random numbers: the noise of an error is that between them
 DPI = 120  # of what is drawn
-WIDEST = 1200  # pixels of a .webp, which stands on a web page
+PAGE = (1200, 1250)  # pixels across and down, at most, of a .webp, which stands on a web page
+QUALITY = 60  # of a .webp
 PASS_SAMPLES = 16  # of a pixel in a pass, where there are so many: a pass has a cost of its own
 #: Of every model: light meets one facet of an interface at a time, as in the reference that it is compared with.
 CHOICES: dict[str, Any] = {"reflectance": "fgd"}
@@ -179,6 +180,8 @@ def show_difference(axes: Any, image: ArrayLike, truth: ArrayLike, bound: float,
 def save(figure: Any, path: str | Path) -> None:
     """Write a matplotlib figure whole or not at all. Raises InvalidInput where that cannot be done."""
     target = check_figure(path)
-    dpi = min(DPI, WIDEST / figure.get_figwidth()) if target.suffix.lower() == ".webp" else DPI
+    options: dict[str, Any] = {"dpi": DPI}
+    if target.suffix.lower() == ".webp":
+        options = {"dpi": min(DPI, *(PAGE / figure.get_size_inches())), "pil_kwargs": {"quality": QUALITY}}
     with files.whole(target) as unfinished:
-        figure.savefig(unfinished, dpi=dpi)
+        figure.savefig(unfinished, **options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,21 +30,28 @@ class Quality(NamedTuple):
     paths: int = PATHS
 
 
+QUALITY = Quality()
+
+
 @dataclass(frozen=True)
 class Cells:
-    """A figure of cells: its stacks by name, its columns, the object, and how bright its pictures are drawn."""
+    """A figure of cells: its stacks by name, its columns, the object, and how bright its pictures are drawn.
 
-    stacks: Mapping[str, Stack]
+    Stacks with textures are given as what makes them, and writes their images into a folder.
+    """
+
+    stacks: Mapping[str, Stack] | Callable[[Path], Mapping[str, Stack]]
     columns: Columns
     scene: str = "sphere"
     exposure: float = 1.0
+    quality: Quality = QUALITY
 
     def compute(
         self,
         names: Collection[str] | None = None,
-        size: int = canvas.SIZE,
-        spp: int = canvas.SAMPLES,
-        paths: int = PATHS,
+        size: int | None = None,
+        spp: int | None = None,
+        paths: int | None = None,
         seed: int = 0,
         progress: Callable[[int, int], None] | None = None,
     ) -> dict[str, Any]:
@@ -52,8 +60,12 @@ class Cells:
         Raises:
             InvalidInput, MissingTool: as `vt.render`.
         """
-        chosen = {name: stack for name, stack in self.stacks.items() if names is None or name in names}
-        return compute(chosen, self.columns, Quality(size, spp, paths), seed, progress, self.scene)
+        given = {"size": size, "spp": spp, "paths": paths}
+        quality = self.quality._replace(**{key: value for key, value in given.items() if value is not None})
+        with tempfile.TemporaryDirectory() as folder:
+            stacks = self.stacks(Path(folder)) if callable(self.stacks) else self.stacks
+            chosen = {name: stack for name, stack in stacks.items() if names is None or name in names}
+            return compute(chosen, self.columns, quality, seed, progress, self.scene)
 
     def draw(self, numbers: dict[str, Any], path: str | Path) -> None:
         """The truth, each model, and what that has too much or too little.
