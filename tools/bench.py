@@ -31,6 +31,7 @@ PACKAGES = ("velatura", "mitsuba", "drjit", "numpy", "scipy")
 
 #: Commands of a benchmark, where that is not the one without options.
 COMMANDS = {
+    "engines": ["", "--quad"],
     "fidelity": ["--half test"],
     "fit": ["--cases 16 --seed 41"],
     "inverse": ["", "--parts films --seed 1"],
