@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from velatura.benchmark import Factory, Scores
 
 app = typer.Typer(
-    help="Score models of layered materials against random walks, on stacks that come with the package.",
+    help="Score models of layered materials against random walks.",
     rich_markup_mode=None,
     no_args_is_help=True,
 )

@@ -29,7 +29,7 @@ def check(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Hold a material to the laws of energy, reciprocity and sampling."""
+    """Check the energy, reciprocity and sampling of a material."""
     stack, switches = options.read(material, settings)
     import velatura
 

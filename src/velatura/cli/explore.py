@@ -34,7 +34,7 @@ def explore(
     model: options.Model = None,
     settings: invert.Switches = None,
 ) -> None:
-    """List stacks that look alike head-on; how they differ at grazing.
+    """List stacks that look alike head-on, and not at grazing.
 
     Every line is a stack that gives the target's lobes, from the top: absorption above, index and roughness of each
     interface. The number before it is its reflectance minus that of the stack that `velatura invert` finds,

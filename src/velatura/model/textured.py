@@ -225,7 +225,8 @@ def _tabulated(
     material = material.solid()
     numbers = solution.plain(material)
     spans = [coated.Span(at, *ends) for of, *ends in _textures(ranges) for at in of]
-    step, waves_max = partial(_step, coated.highest(numbers, spans)), WAVES_OF_TWO if films > 1 else WAVES_MAX[together]
+    step = partial(_step, coated.highest(numbers, spans))
+    waves_max = WAVES_MAX[together] if films == 1 else WAVES_OF_TWO
     spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together, step(x[0][0]), waves_max) for x in ranges]
     start = axes.placed(numbers, spanned, [axis.middle for axis in spanned])
     solver = Solver.of(model, variance, context)

@@ -206,7 +206,7 @@ export const setVariant = titled('change the kind of a layer', (state, id, varia
 function become(variant, kind, keys, names, fresh) {
   if (variantOf({ kind, keys }) === variant) return {};
   if (variant === 'diffuse') return { kind: 'diffuse', keys: fresh.diffuse };
-  const { eta, k, conductor, films = [], ...surface } = kind === 'interface' ? keys : fresh.interface;
+  const { eta, k, conductor, ...surface } = kind === 'interface' ? keys : fresh.interface;
   const metal = conductor === undefined || conductor === 'mirror' ? 'Al' : conductor;
   const index = {
     dielectric: () => ({ eta: typeof eta === 'string' && names.conductors[eta] ? 1.5 : (eta ?? 1.5) }),
@@ -217,11 +217,8 @@ function become(variant, kind, keys, names, fresh) {
     }),
     mirror: () => ({ conductor: 'mirror' }),
   };
-  return { kind: 'interface', keys: { ...index[variant](), ...surface, ...filmsOn(variant, films) } };
+  return { kind: 'interface', keys: { ...index[variant](), ...surface } };
 }
-
-/** The films that an interface keeps: none on a mirror. */
-const filmsOn = (variant, films) => (variant === 'mirror' || !films.length ? {} : { films });
 
 const rounded = (colour) => colour.map((channel) => Number(channel.toPrecision(4)));
 
