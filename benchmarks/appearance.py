@@ -19,6 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from rows import row
 
 import velatura as vt
 from velatura.editor import appearance, class_maps
@@ -121,11 +122,11 @@ def report(title: str, every: dict[str, list[float]]) -> float:
     """Print how long calls took, by verb; the median of those while something is dragged."""
     for verb, seconds in every.items():
         if seconds:
-            typical, most = 1e3 * np.median(seconds), 1e3 * np.percentile(seconds, 95)
-            print(f"{title}, {verb}: {len(seconds)} calls, median {typical:.1f} ms, 95 % below {most:.1f} ms")
-    median = float(np.median([s for verb in HELD for s in every[verb]]))
-    print(f"{title}: median while dragged {1e3 * median:.1f} ms (bound {1e3 * BOUND:g})")
-    return median
+            most = 1e3 * np.percentile(seconds, 95)
+            row(title, verb, [1e3 * s for s in seconds], "ms", f"95 % below {most:.1f} ms")
+    held = [s for verb in HELD for s in every[verb]]
+    row(title, "while dragged", [1e3 * s for s in held], "ms", f"bound {1e3 * BOUND:g} ms")
+    return float(np.median(held))
 
 
 if __name__ == "__main__":

@@ -14,13 +14,13 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
 import editor
 import viewport
+from rows import row
 
 import velatura as vt
 from velatura.editor import messages
@@ -188,14 +188,13 @@ def times() -> None:
         page = opened.page
         page.evaluate("viewport.setBudget({ samples: 0 })")
         two = messages.document(vt.preset("coated-gold"))
-        print(f"first picture {page.evaluate(FIRST, two) / 1e3:.2f} s")
-        print(f"a sample at 640 x 360: {page.evaluate(SAMPLE) / 1e3:.2f} s")
+        row("editor", "first picture", page.evaluate(FIRST, two) / 1e3)
+        row("editor", "a sample at 640 x 360", page.evaluate(SAMPLE) / 1e3)
         found = page.evaluate(BESIDE, two)
         fine, quick, theirs = found["times"]
-        print(
-            f"a frame of a solved material: {fine:.0f} ms, {quick:.0f} ms in fewer pixels, as while dragging, and "
-            f"{theirs:.0f} ms of MeshPhysicalMaterial: {found['fine']:.2f} and {found['quick']:.2f} times that"
-        )
+        theirs_too = f"{theirs:.0f} ms of MeshPhysicalMaterial"
+        row("frame", "a solved material", fine, "ms", f"{found['fine']:.2f} times the {theirs_too}")
+        row("frame", "in fewer pixels, as while dragging", quick, "ms", f"{found['quick']:.2f} times the {theirs_too}")
 
 
 def dragging(chromium: Any) -> None:
@@ -209,8 +208,8 @@ def dragging(chromium: Any) -> None:
                 page.settled()
                 found[model].append(page.page.evaluate(DRAG, [layer, 3]))
             page.page.close()
-        rates = ", ".join(f"{median(each):.1f} of {model}" for model, each in found.items())
-        print(f"dragging a roughness of {preset}, layer {layer}: frames/s {rates}", flush=True)
+        for model, rates in found.items():
+            row("dragging", f"a roughness of {preset}, layer {layer}, {model}", rates, "frames/s")
 
 
 def adding(chromium: Any) -> None:
@@ -231,7 +230,7 @@ def adding(chromium: Any) -> None:
             print(f"{kind:10} {preset:30} {found[False][-1]:.2f} s at once, {found[True][-1]:.2f} s later", flush=True)
     for foreseen, times in found.items():
         when = f"{FORESEEN / 1000:.0f} s later" if foreseen else "at once"
-        print(f"adding a layer {when}: median {median(times):.2f} s, at most {max(times):.2f} s")
+        row("adding", f"a layer {when}", times, remark=f"at most {max(times):.2f} s")
 
 
 def main() -> None:

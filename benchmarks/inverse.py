@@ -19,6 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from rows import row
 
 from velatura.inverse import (
     Above,
@@ -387,9 +388,9 @@ def main() -> int:
     if "speed" in parts:
         print(f"load when times are taken: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
         seconds, rate, grid = configuration(), pairs(), reach()
-        print(f"one configuration of figure 17: {1e3 * seconds:.1f} ms (bound {1e3 * CONFIGURATION:g})")
-        print(f"rough coloured pairs: {rate:.3g} a second on two cores (bound {PAIRS:g})")
-        print(f"class of three channels, 256 x 256: {1e3 * grid:.0f} ms (goal {1e3 * REACH:g})")
+        row("speed", "one configuration of figure 17", 1e3 * seconds, "ms", f"bound {1e3 * CONFIGURATION:g} ms")
+        row("speed", "rough coloured pairs", rate, "a second", f"on two cores; bound {PAIRS:g}")
+        row("speed", "class of three channels, 256 x 256", 1e3 * grid, "ms", f"goal {1e3 * REACH:g} ms")
         failed |= seconds > CONFIGURATION or rate < PAIRS
     return int(failed)
 

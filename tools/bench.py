@@ -2,9 +2,9 @@
 
     python tools/bench.py [NAME...] [--smoke] [--again]
 
-Every number that the manual quotes is of one of these commands. Results are kept by benchmark and by commit, so that a
-run that was interrupted goes on, and runs of single benchmarks add to the same report. `--smoke` runs those that are
-quick at tiny sizes; their numbers mean nothing.
+Numbers of benchmarks in the manual are of these commands. Results are kept by benchmark and by commit, so that a run
+that was interrupted goes on where no file has changed, and runs of single benchmarks add to the same report. `--smoke`
+runs those that are quick at tiny sizes; their numbers mean nothing.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ from typing import Any
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "benchmarks"
 REPORT = ROOT / "site" / "bench"
+NOTES = "VELATURA_BENCH_ROWS"  # as benchmarks/rows.py reads it
+DIRTY = "+"
 PACKAGES = ("velatura", "mitsuba", "drjit", "numpy", "scipy")
 
 #: Commands of a benchmark, where that is not the one without options.
@@ -66,22 +68,26 @@ def run(name: str, options: str) -> dict[str, Any]:
     with tempfile.NamedTemporaryFile("r", suffix=".jsonl", encoding="utf-8") as rows:
         command = [sys.executable, str(FOLDER / f"{name}.py"), *shlex.split(options)]
         load, begin = os.getloadavg()[0], time.perf_counter()
-        done = subprocess.run(
-            command,
-            cwd=ROOT,
-            env={**os.environ, "VELATURA_BENCH_ROWS": rows.name},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
+        environment = {**os.environ, NOTES: rows.name}
+        lines = []
+        with subprocess.Popen(
+            command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        ) as process:
+            try:
+                for line in process.stdout or ():
+                    print(line, end="", flush=True)
+                    lines.append(line)
+            except KeyboardInterrupt:
+                process.terminate()
+                raise
         return {
             "command": f"benchmarks/{name}.py {options}".strip(),
-            "status": done.returncode,
+            "status": process.returncode,
             "seconds": round(time.perf_counter() - begin, 1),
             "load": [round(load, 1), round(os.getloadavg()[0], 1)],
             "date": datetime.now(timezone.utc).isoformat(timespec="seconds"),
             "rows": [json.loads(line) for line in rows],
-            "output": done.stdout,
+            "output": "".join(lines),
         }
 
 
@@ -100,12 +106,12 @@ def machine() -> dict[str, Any]:
 
 
 def commit() -> str:
-    """The commit, with a + where files differ from it."""
+    """The commit, marked where files differ from it."""
 
     def git(*arguments: str) -> str:
         return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True).stdout.strip()
 
-    return git("rev-parse", "--short=12", "HEAD") + ("+" if git("status", "--porcelain", "-uno") else "")
+    return git("rev-parse", "--short=12", "HEAD") + (DIRTY if git("status", "--porcelain", "-uno") else "")
 
 
 def markdown(report: dict[str, Any]) -> str:
@@ -144,6 +150,14 @@ def collect(folder: Path) -> None:
     (folder / "report.md").write_text(markdown(report), encoding="utf-8")
 
 
+def _is_done(path: Path, now: str) -> bool:
+    """Whether there is a result of this commit, all commands of which ended well."""
+    if now.endswith(DIRTY) or not path.is_file():
+        return False
+    part = json.loads(path.read_text(encoding="utf-8"))
+    return bool(part["commit"] == now and not any(each["status"] for each in part["runs"]))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(names())}; all without")
@@ -155,21 +169,24 @@ def main() -> None:
         parser.error(f"no such benchmark: {', '.join(sorted(unknown))}")
     options.folder.mkdir(parents=True, exist_ok=True)
     failed, now = [], commit()
+    interrupted = False
     try:
         for name in options.names or (SMOKE if options.smoke else names()):
             path = options.folder / f"{name}.json"
-            if not options.again and path.is_file() and json.loads(path.read_text(encoding="utf-8"))["commit"] == now:
+            if not options.again and _is_done(path, now):
                 continue
             print(f"== {name}", flush=True)
             commands = [SMOKE[name]] if options.smoke else COMMANDS.get(name, [""])
             runs = [run(name, each) for each in commands]
-            print(*(each["output"] for each in runs), sep="\n", flush=True)
             failed += [name] if any(each["status"] for each in runs) else []
             about = (FOLDER / f"{name}.py").read_text(encoding="utf-8").removeprefix('"""').split("\n", 1)[0]
             path.write_text(json.dumps({"commit": now, "about": about, "runs": runs}, indent=1), encoding="utf-8")
-    finally:
-        collect(options.folder)
-        print(f"The report is {options.folder / 'report.md'}")
+    except KeyboardInterrupt:
+        interrupted = True
+    collect(options.folder)
+    print(f"The report is {options.folder / 'report.md'}")
+    if interrupted:
+        sys.exit(130)
     if failed:
         sys.exit(f"bench: {', '.join(failed)} failed")
 

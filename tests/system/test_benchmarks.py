@@ -56,6 +56,7 @@ def test_the_report_has_what_ran_and_goes_on(
         return run(name, options)
 
     monkeypatch.setattr(bench, "run", noted)
+    monkeypatch.setattr(bench, "commit", lambda: "0123456789ab")
     for names in (["coat"], ["startup", "coat"]):
         monkeypatch.setattr(sys, "argv", [*command, *names])
         bench.main()
