@@ -13,6 +13,7 @@ import subprocess
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,9 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from velatura.shader.c_like import FILMS, MAPS, SAMPLER, TABLES, CLike
+from velatura.shader.c_like import FILMS, MAPS, SAMPLER, TABLES, VALUES, CLike
 from velatura.shader.glsl import Desktop, Vulkan
 from velatura.shader.hlsl import Hlsl, Slang
+from velatura.shader.printer import Struct
 from velatura.shader.wgsl import Wgsl
 
 THREADS = 64  # of a group
@@ -30,6 +32,53 @@ RESULTS, GIVEN = 0, 1  # bindings of the second group
 IN_OPENGL = 8  # textures of materials stay below
 SLOTS = {"vt_tables": TABLES, "vt_baked": TABLES, "vt_films": FILMS}
 INSTALLED = "apt-get install -y mesa-vulkan-drivers libvulkan1 glslang-tools, and pip install wgpu slangpy moderngl"
+
+
+@dataclass(frozen=True)
+class Changing:
+    """Values that change: numbers by their place in the material, whose `structs` are declared, and arrays (N,) or
+    (N, 3) by name, in the order of their declaration."""
+
+    structs: Sequence[Struct]
+    values: Mapping[str, Sequence[float]]
+    arrays: Mapping[str, np.ndarray]
+
+    def packed(self, least: int) -> bytes:
+        """The contents of a buffer, where structs and elements of arrays are aligned to `least` bytes or more: 16 in
+        uniform blocks (std140), 4 in storage."""
+        fields = {struct.name: struct.fields for struct in self.structs}
+        data, end = bytearray(), 0
+
+        def aligned(at: int, to: int) -> int:
+            return -(-at // to) * to
+
+        def put(at: int, numbers: Any) -> int:
+            own = np.asarray(numbers, "<f4").tobytes()
+            data.extend(bytes(max(0, at + len(own) - len(data))))
+            data[at : at + len(own)] = own
+            return at + len(own)
+
+        def alignment(kind: str) -> int:
+            if kind in fields:
+                return max(least, *(alignment(field.type) for field in fields[kind]))
+            return 16 if kind == "colour" else 4
+
+        def placed(kind: str, place: str, at: int) -> int:
+            at = aligned(at, alignment(kind))
+            if kind not in fields:
+                return put(at, self.values[place])
+            for name, own, _ in fields[kind]:
+                at = placed(own, f"{place}.{name}".lstrip("."), at)
+            return aligned(at, alignment(kind))
+
+        end = placed("VtMaterial", "", 0)
+        for array in self.arrays.values():
+            stride = 16 if array.ndim > 1 else max(4, least)
+            end = aligned(end, stride)
+            for numbers in array:
+                put(end, numbers)
+                end += stride
+        return bytes(data).ljust(aligned(end, 16), b"\0")
 
 
 class Machine(ABC):
@@ -55,22 +104,37 @@ class Machine(ABC):
 
     @abstractmethod
     def run(
-        self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray], bindings: Mapping[str, int] = SLOTS
+        self,
+        text: str,
+        count: int,
+        size: int,
+        textures: Mapping[str, np.ndarray],
+        bindings: Mapping[str, int] = SLOTS,
+        changing: Changing | None = None,
     ) -> np.ndarray:
         """What a program writes: `size` results for each of so many rows, (count, size, 4).
 
-        Textures are float arrays (height, width, 4) by name; among them `vt_given`, with a row for each.
+        Textures are float arrays (height, width, 4) by name; among them `vt_given`, with a row for each. `changing` is
+        what a program with uniforms reads.
         """
 
 
 class _OnVulkan(Machine):
+    storage = False  # whether values that change are in a storage buffer, not in a uniform block
+
     def missing(self) -> str:
         if find_spec("wgpu") is None:
             return f"wgpu is missing: {INSTALLED}"
         return "" if _device() else f"there is no Vulkan device: {INSTALLED}"
 
     def run(
-        self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray], bindings: Mapping[str, int] = SLOTS
+        self,
+        text: str,
+        count: int,
+        size: int,
+        textures: Mapping[str, np.ndarray],
+        bindings: Mapping[str, int] = SLOTS,
+        changing: Changing | None = None,
     ) -> np.ndarray:
         import wgpu
 
@@ -88,6 +152,17 @@ class _OnVulkan(Machine):
         if maps:
             filtering = device.create_sampler(mag_filter="linear", min_filter="linear")
             given[0].append({"binding": SAMPLER, "resource": filtering, "kind": "filtering"})
+        if changing:
+            packed = changing.packed(4 if self.storage else 16)
+            kind = "STORAGE" if self.storage else "UNIFORM"
+            block = device.create_buffer_with_data(data=packed, usage=getattr(wgpu.BufferUsage, kind))
+            resource = {"buffer": block, "offset": 0, "size": block.size}
+            entry = {
+                "binding": VALUES,
+                "resource": resource,
+                "kind": "read-only-storage" if self.storage else "uniform",
+            }
+            given[0].append(entry)
         usage = wgpu.BufferUsage.STORAGE | wgpu.BufferUsage.COPY_SRC
         results = device.create_buffer(size=16 * count * size, usage=usage)
         whole = {"buffer": results, "offset": 0, "size": results.size}
@@ -130,6 +205,7 @@ class _OnVulkan(Machine):
 
 class InWgsl(_OnVulkan):
     printer = Wgsl()
+    storage = True
 
     def declarations(self, count: int) -> str:
         return (
@@ -219,7 +295,13 @@ class InOpenGl(Machine):
         return "\n".join(["void main() {", "int row = int(gl_GlobalInvocationID.x);", *lines, "}"])
 
     def run(
-        self, text: str, count: int, size: int, textures: Mapping[str, np.ndarray], bindings: Mapping[str, int] = SLOTS
+        self,
+        text: str,
+        count: int,
+        size: int,
+        textures: Mapping[str, np.ndarray],
+        bindings: Mapping[str, int] = SLOTS,
+        changing: Changing | None = None,
     ) -> np.ndarray:
         context: Any = _context()
         program = context.compute_shader(f"#version 450\n{text}")
@@ -232,6 +314,11 @@ class InOpenGl(Machine):
             texture.filter = (context.LINEAR,) * 2 if name in maps else (context.NEAREST,) * 2
             texture.use(places[name])
             made.append(texture)
+        if changing:
+            members = {f"vt_parameters.{place}": np.array([numbers]) for place, numbers in changing.values.items()}
+            for name, array in {**members, **changing.arrays}.items():
+                if name in program:  # the compiler leaves out what has no effect, ends of arrays among it
+                    program[name].write(array[: program[name].array_length].astype("<f4").tobytes())
         results = context.buffer(reserve=16 * size * (-(-count // THREADS) * THREADS))
         results.bind_to_storage_buffer(RESULTS)
         program.run(-(-count // THREADS))
@@ -297,7 +384,7 @@ def _entry(binding: int, resource: Any, kind: str) -> dict[str, Any]:
     import wgpu
 
     described = {
-        "storage": {"buffer": {"type": "storage"}},
+        **{each: {"buffer": {"type": each}} for each in ("storage", "read-only-storage", "uniform")},
         "filtering": {"sampler": {"type": "filtering"}},
     }.get(kind, {"texture": {"sample_type": kind, "view_dimension": "2d"}})
     return {"binding": binding, "visibility": wgpu.ShaderStage.COMPUTE, **described}

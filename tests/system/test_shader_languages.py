@@ -15,6 +15,7 @@ import pytest
 from agreement import (
     PATTERNS,
     Case,
+    Program,
     compare,
     differences,
     in_numpy,
@@ -24,13 +25,15 @@ from agreement import (
     textures,
     together,
 )
-from machines import MACHINES, SLOTS
+from machines import MACHINES, SLOTS, Changing, Machine
 from spirv import counts
 
 import velatura as vt
 from velatura.shader import constant, record, shader
+from velatura.shader import material as parts
 from velatura.shader.glsl import Vulkan
 from velatura.shader.program import prefixed
+from velatura.shader.solved import Tabulated
 
 # Patterns that together have every kind of layer and every shape; merged lobes, films, brushed `velatura`, and the form
 # that looks at pairs of directions
@@ -156,6 +159,43 @@ def test_values_that_change_stand_in_a_block(name: str) -> None:
         machine.compile("\n".join([made.text, machine.declarations(1), machine.main(lines)]))
 
 
+@pytest.mark.parametrize("preset", ["coated-gold", "tinted-plate"])
+@pytest.mark.parametrize("name", ["glsl450", "vulkan", "wgsl"])
+def test_values_that_change_are_those_of_the_program(name: str, preset: str) -> None:
+    """Expected: a program that is given the values and the solution of another material has that one's values, as NumPy
+    has them. Densities differ on purpose: what is hidden may be shown, and is sampled faintly."""
+    machine = MACHINES[name]
+    if why := machine.missing():
+        pytest.skip(why)
+    stack = vt.preset(preset)
+    other = stack.replace(layer0_eta=1.4, layer0_alpha=0.25, layer1_sigma_a=0.3)
+    made, recording = shader(stack, values="uniforms", printer=machine.printer), record(stack, parameters=True)
+    assert isinstance(made.baked, Tabulated)
+    found = made.baked.solve(other)
+    changing = Changing(
+        parts.structs(stack, list(recording.read)),
+        {parts.place(at): np.broadcast_to(constant(at, x), 3 if at.colour else 1).tolist() for at, x in other.values()},
+        {
+            "vt_shown": np.ones(len(made.shown)),
+            "vt_remainder": np.array(found.remainder),
+            **({"vt_layout": np.array(found.layout)} if len(found.layout) else {}),
+        },
+    )
+    below = "dielectric" if other.transmits else "conductor"
+    case = Case(other, {}, random_case(((below,), "round"), 60, np.random.default_rng(3)).directions)
+    called = of_material(program(case, recording, replace(made, uniforms={}), machine.printer), machine, "wi.xy")
+    read = {**textures(made), "vt_baked": found.texels}
+    (answers,) = together([called], made.text, machine, read, changing=changing)
+    truth = in_numpy(case, record(other)).value
+    np.testing.assert_allclose(called.results(answers).value, truth, rtol=1e-3, atol=1e-5)
+
+
+def of_material(called: Program, machine: Machine, uv: str) -> Program:
+    """The calls of a program, of what `vt_material` gives at texture coordinates."""
+    *filled, last = [line for line in called.lines if "VtMaterial" not in line]
+    return replace(called, lines=[*filled, machine.printer.declared("VtMaterial", "m", f"vt_material({uv})"), last])
+
+
 @pytest.mark.parametrize("name", MACHINES)
 def test_textures_are_read_where_the_material_is(name: str, tmp_path: Path) -> None:
     """Expected: lobes, values and samples are those of the numbers that textures hold, and of the way of brushing."""
@@ -190,9 +230,7 @@ def test_textures_are_read_where_the_material_is(name: str, tmp_path: Path) -> N
     case = Case(stack, {}, {**directions, "at": np.array([*uv, uv[0]])})
     recording = record(stack, "weier2020")
     called = program(case, recording, replace(made, uniforms={}), machine.printer)
-    filled = [line for line in called.lines if "VtMaterial" not in line]
-    lines = [*filled[:-1], machine.printer.declared("VtMaterial", "m", "vt_material(at.xy)"), filled[-1]]
-    (found,) = together([replace(called, lines=lines)], made.text, machine, {**textures(made), **maps})
+    (found,) = together([of_material(called, machine, "at.xy")], made.text, machine, {**textures(made), **maps})
     apart = differences(truth, called.results(found))
     assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
     assert max(apart.value, apart.density) < 1e-3
