@@ -124,7 +124,8 @@ class Covariance(Variance):
         u, v = f.variance(roughness.alpha_u, roughness.alpha_v), f.variance(roughness.alpha_v, roughness.alpha_u)
         c, s = ops.cos(roughness.rotation), ops.sin(roughness.rotation)
         ops.names(u=u, v=v, cosine=c, sine=s)
-        return cls(u * c * c + v * s * s, (u - v) * c * s, u * s * s + v * c * c)
+        # (u - v) c s would be -0 without rotation, an angle that drivers take for another than that of 0
+        return cls(u * c * c + v * s * s, u * c * s - v * c * s, u * s * s + v * c * c)
 
     @classmethod
     def uniform(cls, s: Value) -> Covariance:
@@ -135,12 +136,10 @@ class Covariance(Variance):
             mean, half = 0.5 * (self.xx + self.yy), 0.5 * (self.xx - self.yy)
             radius = ops.sqrt(half * half + self.xy * self.xy)
             turned = radius > 1e-9 * mean
-            # -0, which drivers may take for another angle than 0, counts as 0
-            across = ops.select(ops.absolute(self.xy) > 1e-9 * mean, self.xy, 0.0)
-            rotation = 0.5 * ops.arctan2(across, ops.select(turned, half, 1.0))
+            rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
             u = mean + radius
             v = ops.divide(ops.maximum(self.xx * self.yy - self.xy * self.xy, 0.0), u)  # mean - radius would cancel
-            ops.names(mean=mean, half=half, radius=radius, turned=turned, across=across, rotation=rotation, u=u, v=v)
+            ops.names(mean=mean, half=half, radius=radius, turned=turned, rotation=rotation, u=u, v=v)
         return Roughness(f.roughness(u, v), f.roughness(v, u), rotation)
 
     def matrix(self) -> tuple[Value, Value, Value]:
