@@ -11,7 +11,7 @@ from materialx import GENERATORS, document, generated
 
 import velatura as vt
 from velatura.model import named
-from velatura.shader.closures import tabulated
+from velatura.shader.closures import losses, tabulated
 from velatura.shader.polynomials import Fit
 from velatura.stack import Material
 
@@ -72,6 +72,15 @@ def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float
     for a, b in zip(Fit(baked).above(wi), baked.above(wi)):
         np.testing.assert_allclose(a.weight, b.weight, atol=0.01)
         np.testing.assert_allclose(np.sort(a.roughness[:2], 0), np.sort(b.roughness[:2], 0), atol=off)
+
+
+@pytest.mark.parametrize("model", ["belcour2018", "weier2020"])
+def test_polynomials_of_models_in_closed_form_have_their_light(model: str) -> None:
+    """Expected: as the closures in closed form, within .01 of the light: facets of both lose what they block."""
+    material, chosen = Material.of(vt.preset("coated-gold")), named(model)
+    for loss in losses(material, chosen, Fit(tabulated(material, chosen)).above):
+        assert loss.variation < 0.01
+        assert loss.albedo < 0.002
 
 
 def test_what_a_graph_cannot_hold_is_refused_in_a_line(image: str) -> None:

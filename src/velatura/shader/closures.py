@@ -207,12 +207,18 @@ def tabulated(material: Material, model: Model, conserving: bool = False) -> Tab
     w = x * scale, y * scale, z
     sides = [material, material.reversed()] if material.transmits else [material]
     etas = [float(np.mean(side.below) / np.mean(side.exterior)) if material.transmits else 1.0 for side in sides]
-    each = [
-        _of_statistics(model.recursion.statistics(side, model, w), w, eta, conserving) for side, eta in zip(sides, etas)
-    ]
+    each = [_at_nodes(side, model, w, eta, conserving) for side, eta in zip(sides, etas)]
     kept = [k for k, closures in enumerate(zip(*each)) if max(np.max(c.weight) for c in closures) > FAINT]
     rows = np.array([np.concatenate([_columns(closures[k], variance) for k in kept]).T for closures in each])
     return Tabulated([each[0][k].kind for k in kept], variance, shape, etas, rows.astype(np.float32).astype(float))
+
+
+def _at_nodes(side: Material, model: Model, w: Direction, eta: float, conserving: bool) -> list[Closure]:
+    """Closures at directions (N,) on a side; models in closed form lose the light that facets block."""
+    if not model.recursion.closed_form:
+        return _of_statistics(model.recursion.statistics(side, model, w), w, eta, conserving)
+    found = of_body(bsdf.body(side, model), w, straight=side.transmits and abs(eta - 1) < FAINT)
+    return [c._replace(weight=c.weight * albedo(c, w)) if conserving and c.kind not in _SMOOTH else c for c in found]
 
 
 def _of_statistics(lobes: StackLobes, w: Direction, eta: float, conserving: bool) -> list[Closure]:
@@ -248,8 +254,8 @@ def _columns(closure: Closure, variance: type[Variance]) -> Array:
 def albedo(closure: Closure, wi: Direction) -> Array:
     """Share of light from upright directions wi (N,) that a closure of weight 1 keeps."""
     u1, u2 = fibonacci(SAMPLES)
-    roughness = Roughness(*(np.reshape(x, (-1, 1)) for x in closure.roughness))
-    one = closure._replace(weight=1.0, roughness=roughness)
+    *roughness, eta = (np.reshape(x, (-1, 1)) for x in (*closure.roughness, closure.eta))
+    one = closure._replace(weight=1.0, roughness=Roughness(*roughness), eta=eta)
     w = tuple(np.reshape(x, (-1, 1)) for x in wi)
     wo = sample(one, w, u1, u2)  # type: ignore[arg-type]
     value, density = eval_pdf(one, w, wo)  # type: ignore[arg-type]
