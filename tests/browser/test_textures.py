@@ -25,13 +25,21 @@ layers:
   - medium: {depth: 0.5, sigma_a: {texture: spots.png, scale: 3}}
   - interface: {conductor: Al, alpha: {texture: spots.png, curve: [0.1, 0.2, 0.5]}}
 """
+FILMED = """
+layers:
+  - interface: {eta: 1.5, alpha: 0.05}
+  - interface: {conductor: Ta, alpha: 0.2, films: [{eta: 2.4, thickness_nm: {texture: spots.png, scale: 300}}]}
+"""
 
 
-def test_images_lie_on_the_object_as_in_mitsuba(opened: Any, served: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Expected: within .01 of white, absorption and roughness from a picture that the page fetches from the folder."""
+@pytest.mark.parametrize("text", [TEXTURED, FILMED])
+def test_images_lie_on_the_object_as_in_mitsuba(
+    text: str, opened: Any, served: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: within .01 of white, values from a picture that the page fetches from the folder."""
     spots = np.random.default_rng(3).integers(0, 256, (4, 8, 3))
     imsave(served.folder / "spots.png", np.kron(spots, np.ones((4, 4, 1))).astype(np.uint8))
-    (served.folder / "spots.yaml").write_text(TEXTURED)
+    (served.folder / "spots.yaml").write_text(text)
     visit = Visit(opened.new_context(viewport={"width": 900, "height": 600}).new_page(), served.entrance)
     page = visit.page
     page.get_by_label("Object", exact=True).select_option("sphere")

@@ -16,6 +16,7 @@ from agreement import (
     PATTERNS,
     Case,
     Program,
+    Results,
     compare,
     differences,
     in_numpy,
@@ -225,15 +226,49 @@ def test_textures_are_read_where_the_material_is(name: str, tmp_path: Path) -> N
     directions = random_case(PATTERNS[15], 40, rng).directions
     truth = in_numpy(Case(plain, values, directions), record(plain, "weier2020"))
 
-    made = shader(stack, "weier2020", printer=machine.printer)
-    assert str(tmp_path) not in made.text
-    case = Case(stack, {}, {**directions, "at": np.array([*uv, uv[0]])})
-    recording = record(stack, "weier2020")
-    called = program(case, recording, replace(made, uniforms={}), machine.printer)
-    (found,) = together([of_material(called, machine, "at.xy")], made.text, machine, {**textures(made), **maps})
-    apart = differences(truth, called.results(found))
+    apart = differences(truth, on_texels(stack, machine, maps, uv, directions))
     assert max(apart.energy, apart.alpha, apart.drawn) < 1e-4
     assert max(apart.value, apart.density) < 1e-3
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_thicknesses_of_films_are_read_where_the_material_is(name: str, tmp_path: Path) -> None:
+    """Expected: lobes are those of the uniform material of each thickness, within what tables are interpolated by."""
+    machine = MACHINES[name]
+    if why := machine.missing():
+        pytest.skip(why)
+    (tmp_path / "oxide.png").touch()
+    thickness = {"texture": str(tmp_path / "oxide.png"), "scale": 400.0, "offset": 50.0}
+    films = [{"eta": 2.1, "thickness_nm": thickness}, {"eta": 1.4, "thickness_nm": 80}]
+    gilt = [{"eta": 0.4, "k": 2.6, "thickness_nm": {**thickness, "scale": 20.0, "offset": 5.0}}]
+    stack = vt.Stack([vt.Interface(eta=1.5, alpha=0.2, films=gilt), vt.Interface(eta=1, alpha=0.1, films=films)])
+    rng = np.random.default_rng(5)
+    texels = rng.integers(16, 240, (2, 2, 4)) / 256
+    x, y = np.repeat([[0, 1, 0, 1], [0, 0, 1, 1]], 8, axis=1)
+    directions = random_case(PATTERNS[18], 32, rng).directions
+    found = on_texels(
+        stack,
+        machine,
+        {f"vt_map_layer{k}_film0_thickness_nm": texels for k in (0, 1)},
+        np.array([0.25 + 0.5 * x, 0.25 + 0.5 * y]),
+        directions,
+    )
+    for k, texel in enumerate(texels[..., 0].ravel().tolist()):
+        uniform = stack.replace(layer0_film0_thickness_nm=5 + 20 * texel, layer1_film0_thickness_nm=50 + 400 * texel)
+        some = slice(8 * k, 8 * k + 8)
+        case = Case(uniform, {}, {key: w[:, some] for key, w in directions.items()})
+        truth = in_numpy(case, record(uniform, "weier2020"))
+        assert found.energy[..., some] == pytest.approx(truth.energy, abs=1e-3)
+
+
+def on_texels(stack: vt.Stack, machine: Machine, maps: dict[str, Any], uv: np.ndarray, directions: Any) -> Results:
+    """What a shader makes of a material with textures, at texture coordinates (2, N)."""
+    made = shader(stack, "weier2020", printer=machine.printer)
+    assert not any(str(image.texture) in made.text for image in made.maps.values())
+    case = Case(stack, {}, {**directions, "at": np.array([*uv, uv[0]])})
+    called = program(case, record(stack, "weier2020"), replace(made, uniforms={}), machine.printer)
+    (found,) = together([of_material(called, machine, "at.xy")], made.text, machine, {**textures(made), **maps})
+    return called.results(found)
 
 
 @pytest.mark.parametrize(

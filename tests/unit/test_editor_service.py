@@ -268,6 +268,17 @@ def test_tables_are_those_that_are_read(here: Path) -> None:
     np.testing.assert_array_equal(decoded(VERBS["tables"]({"key": textured["tables"]})["texture"]), texture)
 
 
+def test_a_thickness_from_a_texture_has_a_table(here: Path) -> None:
+    """Of the second of two films, whose image the code reads; tables are those that the code looks up."""
+    (here / "pixel.png").write_bytes(PIXEL)
+    films = [{"eta": 1.4, "thickness_nm": 50}, {"eta": 1.9, "thickness_nm": {"texture": "pixel.png", "scale": 300}}]
+    made = shader(changed(films=films))
+    (name,) = made["films"]
+    number, places = name.split("_by")
+    assert [each["sampler"] for each in made["maps"]] == [f"vt_map_layer{number[4:]}_film0_thickness_nm"]
+    assert decoded(made["films"][name]).shape == (int(places), 257, 3) and f"vec3 vt_{name}(" in made["text"]
+
+
 def test_the_names_of_all_tables_make_a_key() -> None:
     everything = ",".join(name for name, _ in tables.load().items())
     assert decoded(VERBS["tables"](admitted({"key": everything}))["texture"]).shape[1:] == (1024, 4)

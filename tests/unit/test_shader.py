@@ -391,6 +391,27 @@ def test_films_may_change(text: str, model: str, textured: bool, tmp_path: Path)
     assert max(np.abs(a - b).max() for a, b in zip(bare, evaluate([alone.lobes[x] for x in energies], given))) > 0.02
 
 
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"layer2_film0_eta": 1.5},
+            "layer2_film0_eta: is a texture, and in a shader films have textures of a thickness",
+        ),
+        ({"layer0_eta": 1.5}, "layer0_eta: is a texture, and in a shader films have textures of a thickness"),
+        (
+            {"layer2_film0_thickness_nm": 9.0, "layer2_film1_thickness_nm": 9.0},
+            "layer2_film1_thickness_nm: in a shader only one film of an interface may have a texture",
+        ),
+    ],
+)
+def test_other_textures_of_films_are_refused(values: dict[str, float], message: str, tmp_path: Path) -> None:
+    (tmp_path / "t.png").touch()
+    textured = {key: {"texture": str(tmp_path / "t.png"), "scale": scale} for key, scale in values.items()}
+    with pytest.raises(vt.InvalidInput, match=message):
+        shader(loads(UNDER_A_COAT).replace(**textured), "belcour2018")
+
+
 def without_films(stack: vt.Stack) -> vt.Stack:
     layers = [
         layer.model_copy(update={"films": ()}) if isinstance(layer, vt.Interface) else layer for layer in stack.layers

@@ -120,7 +120,9 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
             values[address.name] = address.declared.typical
     for k, coated in enumerate(films.coated_layers(stack)):
         if coated:
-            film = {**_FILM, "k": 0.1} if coated.absorbs else _FILM
+            film: dict[str, Any] = {**_FILM, "k": 0.1} if coated.absorbs else {**_FILM}
+            if coated.axis:
+                film["thickness_nm"] = stack.flat()[f"layer{k}_film{coated.axis.film}_thickness_nm"]
             values |= {f"layer{k}_film0_{key}": value for key, value in film.items()}
             values[f"layer{k}_eta"] = _LOWEST + k * _STEP
     return Stack.from_flat(stack.kinds, values)

@@ -592,7 +592,7 @@ def constant(material: Material, spans: Sequence[Span], number: Any) -> list[Coa
         changed = given.replaced(start, numbers)
         found = _of(changed, may_absorb)
         for k, axis in axes.items():
-            found[k] = _over_thickness(changed, k, axis, may_absorb)
+            found[k] = over_thickness(changed, k, axis, may_absorb)
         return found
 
     def arrays(numbers: list[float]) -> list[Array]:
@@ -605,7 +605,7 @@ def constant(material: Material, spans: Sequence[Span], number: Any) -> list[Coa
     return [points.get(k, films) for k, films in enumerate(found)]
 
 
-def _over_thickness(material: Material, k: int, axis: Axis, may_absorb: Collection[int]) -> Coated:
+def over_thickness(material: Material, k: int, axis: Axis, may_absorb: Collection[int]) -> Coated:
     """The films on the k-th layer, over thicknesses of one of them."""
     name = f"layer{k}_film{axis.film}_thickness_nm"
 

@@ -6,6 +6,9 @@ Code knows them by name: `film2` is the reflectance of the facets of layer 2 ove
 `sampling.coated.Absorbing`, and `film2_above_lost` and `film2_below_lost` the averages of what is absorbed. Where a
 user changes values, code knows which interfaces have films, and whether these absorb, and no more; the texture changes
 with the values.
+
+Where a thickness comes from a texture, the tables of facets are over as many thicknesses, too, `film2_by101` over 101:
+those that texels from 0 to 1 give, beyond which the nearest serves. There are no averages of such films.
 """
 
 from __future__ import annotations
@@ -19,15 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.errors import InvalidInput
 from velatura.model import Model
 from velatura.model.film_average import NODES as AVERAGED
 from velatura.model.film_average import film_average
 from velatura.ops import Value
 from velatura.sampling import coated
-from velatura.sampling.coated import NODES, Absorbing, Average, Coated
+from velatura.sampling.coated import NODES, Absorbing, Average, Axis, Coated
 from velatura.shader.atlas import Layout
 from velatura.shader.symbol import Symbol, operand
-from velatura.stack import Address, InterfaceValues, Material, Stack, Varying, number
+from velatura.stack import Address, Interface, InterfaceValues, Material, Stack, Texture, Varying, number
 from velatura.tables import coordinates
 
 Array = NDArray[np.floating]
@@ -35,7 +39,8 @@ Array = NDArray[np.floating]
 FILM = "film"  # an operation: a table of films, looked up at a cosine, or at coordinates of direction and roughness
 WIDTH = NODES  # texels of a line of the texture; each table begins a line
 SIDES = ("rarer", "denser", "passing")  # what tables of films that absorb are of, as `Absorbing` has them
-_NAME = re.compile(r"film(\d+)(?:_(rarer|denser|passing))?(?:_(above|below)(_lost)?)?")
+_NAME = re.compile(r"film(\d+)(?:_by(\d+))?(?:_(rarer|denser|passing))?(?:_(above|below)(_lost)?)?")
+STEP_NM = 6.0  # between thicknesses that are worked out: 15 nm of optical thickness for an index of 2.5
 
 
 class Read(Coated):
@@ -47,8 +52,16 @@ class Read(Coated):
     known = False  # code reads the texture
     n12: Value
 
-    def __init__(self, name: str, data: Array | None, n12: Value | None, absorbing: bool, turned: bool = False) -> None:
-        super().__init__(np.empty((0, 3)) if data is None else data, 1)
+    def __init__(
+        self,
+        name: str,
+        data: Array | None,
+        n12: Value | None,
+        absorbing: bool,
+        axis: Axis | None = None,
+        turned: bool = False,
+    ) -> None:
+        super().__init__(np.empty((0, 3)) if data is None else data, 1, axis=axis)
         self.name, self.n12, self.absorbing, self.turned = name, n12, absorbing, turned
 
     @property
@@ -57,8 +70,10 @@ class Read(Coated):
 
     def reversed(self) -> Read:
         """As seen from below."""
-        data = self.data if len(self.data) else None
-        return Read(self.name, data, 1 / self.n12, self.absorbing, not self.turned)
+        data, axis = self.data if len(self.data) else None, self.axis and self.axis.reversed()
+        found = Read(self.name, data, 1 / self.n12, self.absorbing, axis, not self.turned)
+        found.place = self.place
+        return found
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
         if not self.absorbing:
@@ -79,16 +94,21 @@ class Read(Coated):
 
     def _side(self, k: int, at: Value) -> Value:
         """What is reflected on either side, or passes."""
-        if len(self.data) and not isinstance(at, Symbol):
+        if len(self.data) and not isinstance(at, Symbol) and not self.place:
             return np.stack(ops.interpolate(self, float(at))[3 * k : 3 * k + 3])
-        return Symbol(FILM, (operand(at),), "colour", f"{self.name}_{SIDES[k]}")
+        return self._symbol(at, f"{self.name}_{SIDES[k]}")
 
     def at(self, cosine: Value, like: Value) -> Value:
-        if len(self.data) and not isinstance(cosine, Symbol):
+        if len(self.data) and not isinstance(cosine, Symbol) and not self.place:
             return np.stack(ops.interpolate(self, float(cosine)))
-        return Symbol(FILM, (operand(cosine),), "colour", self.name)
+        return self._symbol(cosine, self.name)
 
-    def averaged(self, often: bool) -> tuple[Average, Average]:
+    def _symbol(self, at: Value, name: str) -> Symbol:
+        return Symbol(FILM, tuple(map(operand, (*self.place, at))), "colour", name)
+
+    def averaged(self, often: bool) -> tuple[Average, Average] | None:
+        if self.axis:
+            return None
         name = f"{self.name}_{'below' if self.turned else 'above'}"
 
         def average(name: str, cos_theta: Value, alpha: Value) -> Value:
@@ -118,7 +138,8 @@ def recorded(material: Material, stack: Stack, general: bool) -> Material:
             if general and n12 is not None:
                 below = material.exterior if material.thin and layer is layers[-1] else layer.eta
                 n12 = ops.mean(below) / ops.mean(above)
-            read: Any = Read(f"film{n}", data, n12, known.absorbs)
+            name = f"film{n}_by{len(known.data)}" if known.axis else f"film{n}"
+            read: Any = Read(name, data, n12, known.absorbs, known.axis)
             material = material.with_layer(n, coating=read)
         elif layer.films:
             material = material.with_layer(n, films=())
@@ -130,16 +151,45 @@ def coated_layers(stack: Stack) -> list[Coated | None]:
     """The films on each layer; None of those without. Other values may come from textures.
 
     Raises:
-        InvalidInput: a value of a film that comes from one.
+        InvalidInput: an index of a film, or beside one, that comes from one; or several thicknesses of one interface.
     """
+    beside, axes = _beside(stack), dict[int, Axis]()
 
     def value(address: Address, described: Any) -> Value:
-        if isinstance(described, Varying) and address.film is None:
+        thickness = address.role == "film_thickness_nm"
+        if isinstance(described, Texture) and thickness and address.layer is not None:
+            if address.layer in axes:
+                raise InvalidInput(f"{address.name}: in a shader only one film of an interface may have a texture")
+            axes[address.layer] = axis = _axis(address, described)
+            return axis.high_nm
+        if isinstance(described, Varying) and address.film is None and address.name not in beside:
             return 0.0
-        address.plain(described, "films of shaders have one thickness")
+        address.plain(described, "in a shader films have textures of a thickness alone")
         return number(address, described)
 
-    return coated.of(Material.of(stack, value))
+    material = Material.of(stack, value)
+    return [
+        coated.over_thickness(material, n, axes[n], ()) if n in axes else films
+        for n, films in enumerate(coated.of(material))
+    ]
+
+
+def _axis(address: Address, texture: Texture) -> Axis:
+    """The thicknesses that texels from 0 to 1 give."""
+    assert address.film is not None
+    ends = np.array(texture.curve or (0.0, 1.0)) * texture.scale + texture.offset
+    low, high = np.clip((ends.min(), ends.max()), *address.declared.within).tolist()
+    return Axis.around(address.film, low, high, STEP_NM)
+
+
+def _beside(stack: Stack) -> set[str]:
+    """Flat names of the indices on either side of films, and of the extinction below them."""
+    found, above = set[str](), "exterior"
+    for n, layer in enumerate(stack.layers):
+        if isinstance(layer, Interface):
+            found |= {above, f"layer{n}_eta", f"layer{n}_k"} if layer.films else set()
+            above = f"layer{n}_eta"
+    return found
 
 
 def beside(stack: Stack) -> set[str]:
@@ -165,7 +215,7 @@ def tables(stack: Stack, names: Collection[str], model: Model, coarse: bool = Fa
     for name in sorted(names):
         parts = _NAME.fullmatch(name)
         assert parts
-        (number, of_facets, side, lost) = parts.groups()
+        (number, _, of_facets, side, lost) = parts.groups()
         own = films[int(number)]
         assert own
         if side:
@@ -183,7 +233,8 @@ def layouts(names: Iterable[str]) -> list[Layout]:
     for name in sorted(names):
         parts = _NAME.fullmatch(name)
         assert parts
-        nodes = AVERAGED if parts[3] else (2 * NODES - 1 if parts[2] else NODES,)
+        over = (int(parts[2]),) if parts[2] else ()
+        nodes = AVERAGED if parts[4] else (*over, 2 * NODES - 1 if parts[3] else NODES)
         found.append(Layout(name, start, nodes, 3))
         start = -(-found[-1].end // WIDTH) * WIDTH
     return found

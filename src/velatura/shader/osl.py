@@ -144,9 +144,13 @@ def osl(
         constant: flat names of values that are worked in.
 
     Raises:
-        InvalidInput: as `velatura.shader.record`.
+        InvalidInput: as `velatura.shader.record`; a thickness of a film that is a texture.
     """
     stack, asked = load(stack), named(model, **switches)
+    for address, value in stack.values():
+        if address.film is not None:
+            # A table over thickness, too, would be megabytes of code
+            address.plain(value, "in OSL films have no textures")
     chosen = recording.drawn_by(stack, asked)
     recording.check_constant(stack, constant)
     numbers, wi = closures.numbers(stack), recording.direction("wi")
