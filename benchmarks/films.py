@@ -2,10 +2,13 @@
 
 - smooth: random stacks of coherent films between thick media, absorbing or clear, s and p apart: the largest error.
 - rough: energies of a model minus those of walks, for random stacks with films and for the same ones without, by kind.
+- queries: albedos that are queried in a spectral variant minus those of samples, of a film of index 1.5 on a metal,
+  over roughness and thickness: the largest difference at one wavelength, and in the mean over all of them.
 - cost: CPU time of a render, and of `eval_pdf`, with films over that without, interleaved; and of an index of films
   from a texture over that of a thickness from one.
 
-    python benchmarks/films.py [--smooth 10000] [--stacks 12] [--paths 300000] [--rounds 7] [--seed 0] [--model NAME]
+    python benchmarks/films.py [--smooth 10000] [--stacks 12] [--paths 300000] [--queries 100000] [--rounds 7]
+        [--seed 0] [--model NAME]
 """
 
 from __future__ import annotations
@@ -17,15 +20,16 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
 from mixed_films import random_mixed
 from render import picture
+from rows import row
 
 import velatura as vt
 from velatura import kernel
@@ -33,6 +37,9 @@ from velatura.model import DEFAULT, named
 from velatura.stack import Film, Interface, Layer, Medium, Stack
 
 COSINES = (1.0, 0.7, 0.35)
+WAVELENGTHS, QUERIED = 96, (1.0, 0.8, 0.6, 0.35)  # and cosines of queries
+
+Array = NDArray[np.floating]
 
 
 def smooth(count: int, seed: int) -> float:
@@ -85,6 +92,11 @@ def gilt(rng: np.random.Generator) -> Interface:
     return glass(rng).model_copy(update={"films": both})
 
 
+def mirror(rng: np.random.Generator) -> Interface:
+    """As `gilt`, of which nothing passes."""
+    return Interface(conductor="mirror", alpha=alpha(rng), films=gilt(rng).films)
+
+
 def coated(rng: np.random.Generator) -> list[Layer]:
     medium = [Medium(sigma_a=tuple(map(float, rng.uniform(0, 0.5, 3))))] if rng.random() < 0.5 else []
     return [glass(rng), *medium, metal(rng)]
@@ -103,6 +115,7 @@ KINDS: dict[str, Callable[[np.random.Generator], list[Layer]]] = {
     "brushed metal": lambda rng: [metal(rng).model_copy(update={"alpha": (alpha(rng), alpha(rng))})],
     "glass": lambda rng: [glass(rng)],
     "glass, films absorb": lambda rng: [gilt(rng)],
+    "mirror, films absorb": lambda rng: [mirror(rng)],
     "coated metal": coated,
     "metal under films that absorb": lambda rng: [gilt(rng), metal(rng)],
     "pane": pane,
@@ -136,6 +149,38 @@ def rough(model: str, stacks: int, paths: int, seed: int) -> Iterator[tuple[str,
                 for column, each in zip(found, (stack, without(stack))):
                     column += errors(each, model, often, paths, seed + k)
             yield kind, often, found
+
+
+# Queries --------------------------------------------------------------------------------------------------------------
+
+
+def queries(model: str, count: int, seed: int) -> None:
+    """Over the cosines: what samples of a metal under a film weigh in the mean, `count` at a wavelength."""
+    import drjit as dr
+
+    mi = kernel.mitsuba("llvm_ad_spectral")
+    nm = np.linspace(380, 720, WAVELENGTHS).reshape(-1, 4)
+
+    def hit(cosine: float, at: Array, count: int) -> Any:
+        si = dr.zeros(mi.SurfaceInteraction3f, count)
+        si.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0, cosine)
+        si.wavelengths = mi.UnpolarizedSpectrum(*at.tolist())
+        return si
+
+    def off(bsdf: Any, cosine: float, at: Array) -> Array:
+        rng = mi.PCG32(count, initseq=seed)
+        u = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        _, weight = bsdf.sample(mi.BSDFContext(mi.TransportMode.Importance), hit(cosine, at, count), *u)
+        return np.ravel(bsdf.eval_diffuse_reflectance(hit(cosine, at, 1))) - np.mean(np.array(weight), axis=1)
+
+    for alpha in (0.005, 0.03, 0.1, 0.3):
+        for thickness_nm in (500.0, 1500.0, 5000.0):
+            film = Film(eta=1.5, thickness_nm=thickness_nm)
+            bsdf = vt.bsdf(Stack([Interface(eta=2.0, k=1.0, alpha=alpha, films=[film])]), model=model)
+            found = np.array([[off(bsdf, cosine, at) for at in nm] for cosine in QUERIED])
+            name = f"alpha {alpha:g}, {thickness_nm:g} nm"
+            row("queries", f"{name}: at a wavelength", float(np.abs(found).max()), "")
+            row("queries", f"{name}: in the mean", float(np.abs(found.mean(axis=(1, 2))).max()), "")
 
 
 # Cost ----------------------------------------------------------------------------------------------------------------
@@ -176,17 +221,17 @@ def evaluation(mi: Any, bsdf: Any, count: int) -> Callable[[int], None]:
     return job
 
 
-def ratio(jobs: list[Callable[[int], None]], rounds: int) -> float:
-    """Median over rounds of the CPU time of the first job over that of the second, interleaved."""
-    ratios = []
+def ratios(jobs: list[Callable[[int], None]], rounds: int) -> list[float]:
+    """The CPU time of the first job over that of the second, interleaved."""
+    found = []
     for number in range(rounds + 1):
         seconds = []
         for job in jobs:
             start = time.process_time()
             job(number)
             seconds.append(time.process_time() - start)
-        ratios.append(seconds[0] / seconds[1])
-    return median(ratios[1:])  # the first one compiles
+        found.append(seconds[0] / seconds[1])
+    return found[1:]  # the first one compiles
 
 
 def textured(mi: Any, folder: str) -> Iterator[tuple[str, list[Stack]]]:
@@ -210,9 +255,8 @@ def cost(model: str, rounds: int) -> None:
         found += [(name, both, 4) for name, both in textured(mi, folder)]
         made = [(name, [vt.bsdf(each, model=model) for each in both], spp) for name, both, spp in found]
     for name, bsdfs, spp in made:
-        render = ratio([picture(mi, bsdf, 256, spp) for bsdf in bsdfs], rounds)
-        evaluated = ratio([evaluation(mi, bsdf, spp << 16) for bsdf in bsdfs], rounds)
-        print(f"cost, {name:24s} render {render:.2f}  eval_pdf {evaluated:.2f}", flush=True)
+        row("cost", f"{name}: render", ratios([picture(mi, bsdf, 256, spp) for bsdf in bsdfs], rounds), "")
+        row("cost", f"{name}: eval_pdf", ratios([evaluation(mi, bsdf, spp << 16) for bsdf in bsdfs], rounds), "")
 
 
 def main() -> None:
@@ -220,6 +264,7 @@ def main() -> None:
     parser.add_argument("--smooth", type=int, default=10_000)
     parser.add_argument("--stacks", type=int, default=12)
     parser.add_argument("--paths", type=int, default=300_000)
+    parser.add_argument("--queries", type=int, default=100_000)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--model", default=DEFAULT)
@@ -228,11 +273,13 @@ def main() -> None:
     if options.smooth:
         print(f"smooth: {options.smooth} stacks, s and p: error {smooth(options.smooth, options.seed):.1e}", flush=True)
     if options.stacks:
-        print(f"{'rough, model minus walk':42s}{'with films':>24s}{'without':>24s}")
+        print(f"{'rough, model minus walk':42s}{'with films':>26s}{'without':>26s}")
         for kind, often, found in rough(options.model, options.stacks, options.paths, options.seed):
             cells = (f"mean {np.abs(x).mean():.4f} worst {np.abs(x).max():.4f}" for x in found)
             name = f"{kind}, facets met {'often' if often else 'once'}"
-            print(f"{name:42s}" + "".join(f"{cell:>24s}" for cell in cells), flush=True)
+            print(f"{name:42s}" + "".join(f"{cell:>26s}" for cell in cells), flush=True)
+    if options.queries:
+        queries(options.model, options.queries, options.seed)
     if options.rounds:
         cost(options.model, options.rounds)
 

@@ -148,6 +148,7 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     nodes = solved_spectra.NODES
     if binding.interferes and not binding.varies:
         nodes = solved_spectra.nodes_of(plain(binding.uniform_material()))
+        nodes += -nodes % len(mi.UnpolarizedSpectrum())  # as many as rays carry at a time
     nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, nodes).tolist()]
     places = np.array(spectral.places(nm))
     if not binding.varies and model.recursion.solves(binding.uniform_material()):
@@ -175,6 +176,6 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         si.wavelengths = wavelengths
         return prepared.lobed(si, True)
 
-    over = nodes + -nodes % len(mi.UnpolarizedSpectrum()) if binding.interferes else spectral.NODES
+    over = nodes if binding.interferes else spectral.NODES
     fixed = settled(bsdf.body(binding.uniform_material(), model, variance, context))
     return Prepared(binding, model, variance, settled(spectral.sample(mi, fixed, at_wavelengths, over)))
