@@ -6,8 +6,10 @@ The text is compiled, and its values are compared: the same random stacks and di
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import chromium
@@ -116,6 +118,40 @@ void main() {
     drawn = page.draw(f"#version 300 es\n{made.text}{main}", {"vt_tables": made.tables}, 1, 1)
     expected = vt.lobes(stack, cos_theta=0.8, model="belcour2018").energy[1][:, 0]
     np.testing.assert_allclose(drawn.pixels[0, 0, :3], expected, atol=1e-5)
+
+
+READ_TABLES = """
+async ({ text, bytes }) => {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  let asked, width, height;
+  const given = gl.texImage2D.bind(gl);
+  gl.texImage2D = (...all) => { [width, height] = all.slice(3, 5); given(...all); };
+  const fetched = async (name) => { asked = name; return new Response(Uint8Array.from(bytes)); };
+  const block = Object.getPrototypeOf(async () => {}).constructor('gl', 'fetch', text);
+  await block(gl, fetched);
+  gl.getExtension('EXT_color_buffer_float');
+  gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
+  gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
+  const texels = new Float32Array(4 * width * height);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, texels);
+  return { asked, width, height, error: gl.getError(), texels: [...texels] };
+}
+"""
+
+
+def test_tables_are_read_as_the_manual_has_it(page: chromium.Browser, tmp_path: Path) -> None:
+    """Expected: the texture holds the columns of the material of the page."""
+    text = (Path(__file__).parents[2] / "docs" / "how-to" / "shaders.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```js\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    vt.export("coated-gold", "glsl").save(tmp_path / "gold.glsl")
+    columns = shader(vt.preset("coated-gold"), "velatura").columns
+    assert columns is not None
+    found = page.page.evaluate(READ_TABLES, {"text": block, "bytes": [*(tmp_path / "gold.tables.bin").read_bytes()]})
+    assert (found["asked"], found["error"]) == ("gold.tables.bin", 0)
+    read = np.reshape(found["texels"], (found["height"], found["width"], 4))
+    np.testing.assert_array_equal(read, columns.astype(np.float32))
 
 
 STEEP = {"interface": {"eta": 1.5, "alpha": 0.15}}

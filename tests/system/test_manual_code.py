@@ -1,0 +1,310 @@
+"""All code of the manual and the README runs as it is printed.
+
+Rationale: what a page prints is copied. The Python of a page runs in its order and in one namespace, its commands in
+this process, both in a folder with the files that the page takes for granted. Pictures and samples are few here,
+regardless of what the page asks for. Expected: no error, and exit status 0. Commands within sentences, which have names
+in place of files, are not run: expected are a verb and options that the program has.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+import runpy
+import shlex
+import textwrap
+import warnings
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import typer
+import yaml
+
+import velatura as vt
+from velatura import api, comparison, figures, inverse, sweeps
+from velatura.bakes import fit
+from velatura.benchmark import scores, stacks
+from velatura.cli import app
+from velatura.comparison import evaluated_lobes, pictures, plugins
+from velatura.editor import server
+from velatura.errors import Incomplete
+from velatura.shader import closures
+from velatura.sweeps import run as sweeping
+
+Run = Callable[..., tuple[int, str, str]]
+ROOT = Path(__file__).parents[2]
+PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"^( *)```([\w{}-]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+COMMAND = re.compile(r"^(velatura|make|pip|python) ", re.MULTILINE)
+
+# A model that solves no energies, in place of the default one where that would take minutes
+QUICK = "bati2021"
+
+# Commands that are not run here, by their beginning, and why
+ELSEWHERE = {
+    "make demo": "it installs, as each run of these tests has done",
+    "make test": "it runs this test",
+    "pip install": "it installs",
+    "python benchmarks/fuzz.py": "it takes hours; tests/system/test_random_inputs.py runs a part",
+    "velatura benchmark truth": "it takes hours; tests/unit/test_benchmark.py walks through a part",
+    "velatura edit --static": "it takes minutes; tests/browser/test_offline.py writes a part",
+}
+# Languages that are not run here, and why
+OTHERS = {
+    "text": "it is output",
+    "glsl": "tests/system/test_engines.py runs it",
+    "js": "tests/browser/test_shader.py runs it",
+}
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """The fenced blocks of a page: language, text."""
+    found = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+    return [(language, textwrap.dedent(text)) for _, language, text in found if not language.startswith("{")]
+
+
+def commands(text: str) -> list[list[str]]:
+    """The words of each command of a block."""
+    lines = text.replace("\\\n", " ").splitlines()
+    return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+# Files that pages take for granted
+
+
+def written(page: str, language: str) -> list[str]:
+    """The texts of a language on a page."""
+    return [text for found, text in blocks(page) if found == language]
+
+
+def material(folder: Path, name: str = "coated-gold.yaml") -> None:
+    vt.save(vt.preset("coated-gold"), folder / name)
+
+
+def picture(folder: Path, name: str) -> None:
+    import mitsuba as mi
+
+    vt.kernel.mitsuba()
+    kind, value = (np.uint8, 128) if name.endswith(".png") else (np.float32, 0.5)
+    mi.Bitmap(np.full((4, 8, 3), value, kind)).write(str(folder / name))
+
+
+def table(folder: Path) -> None:
+    """Of one metal, in a few directions."""
+    stack = vt.Stack([vt.Interface(eta=1.5, k=3.0, alpha=0.2)])
+    rows = inverse.table_of(stack, inverse.Directions.about_lobes(False), vt.MODELS[0])
+    wi, wo = rows.directions.wi, rows.directions.wo
+    angles = [np.degrees(np.arccos(w[2])) for w in (wi, wo)]
+    phi = np.degrees(np.arctan2(wo[1], wo[0]) - np.arctan2(wi[1], wi[0]))
+    lines = [",".join(f"{x:.6f}" for x in row) for row in zip(*angles, phi, *rows.value)]
+    (folder / "table.csv").write_text("theta_i,theta_o,phi,r,g,b\n" + "\n".join(lines) + "\n")
+
+
+def files_of_benchmark(folder: Path) -> None:
+    script = next(text for text in written("docs/how-to/benchmark.md", "python") if "task/mine.npy" in text)
+    (folder / "mine.py").write_text(script)
+
+
+def files_of_readme(folder: Path) -> None:
+    material(folder, "my-material.yaml")
+    picture(folder, "sunset.hdr")
+    (folder / "target.yaml").write_text(written("docs/how-to/inverse.md", "yaml")[0])
+    (folder / "plan.yaml").write_text(written("docs/how-to/sweeps.md", "yaml")[0])
+    (folder / "varnished.mtlx").write_text(written("docs/how-to/imports.md", "xml")[0])
+
+
+def files_of_inverse(folder: Path) -> None:
+    names = "target.yaml", None, "metal.yaml", "blue-over-red.yaml"
+    for name, text in zip(names, written("docs/how-to/inverse.md", "yaml")):
+        if name:
+            (folder / name).write_text(text)
+    table(folder)
+
+
+def files_of_materials(folder: Path) -> None:
+    picture(folder, "scratches.png")
+    for part in ("eta", "k"):
+        (folder / f"my-alloy.{part}.spd").write_text("400 1.5\n700 2.5\n")
+
+
+def files_of_mitsuba(folder: Path) -> None:
+    material(folder)
+    picture(folder, "scratches.png")
+    parts = '<integrator type="path"/><shape type="sphere"/><sensor type="perspective"/>'
+    (folder / "scene.xml").write_text(f'<scene version="3.0.0">{parts}</scene>')
+
+
+def files_of_imports(folder: Path) -> None:
+    (folder / "varnished.mtlx").write_text(written("docs/how-to/imports.md", "xml")[0])
+
+
+def files_of_shaders(folder: Path) -> None:
+    vt.export("coated-gold", "mitsuba-xml").save(folder / "gold.xml")
+
+
+FILES: dict[str, Callable[[Path], None]] = {
+    "README.md": files_of_readme,
+    "docs/how-to/benchmark.md": files_of_benchmark,
+    "docs/how-to/imports.md": files_of_imports,
+    "docs/how-to/in-mitsuba.md": files_of_mitsuba,
+    "docs/how-to/inverse.md": files_of_inverse,
+    "docs/how-to/shaders.md": files_of_shaders,
+    "docs/reference/materials.md": files_of_materials,
+}
+
+
+# Fewer samples
+
+
+def with_less(function: Callable[..., Any], **fewer: Any) -> Callable[..., Any]:
+    """A function, called with other values of those parameters that it has; a function makes one of that given."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def called(*given: Any, **named: Any) -> Any:
+        bound = signature.bind(*given, **named)
+        for key in fewer.keys() & signature.parameters.keys():
+            value = fewer[key]
+            bound.arguments[key] = value(bound.arguments.get(key)) if callable(value) else value
+        return function(*bound.args, **bound.kwargs)
+
+    return called
+
+
+# Of what a page asks for: pixels, samples, walks, stacks; and of a model, one that solves no energies
+LESS = {"spp": 2, "size": (8, 8), "paths": 1000, "count": 2}
+FEWER: list[tuple[Any, str, dict[str, Any]]] = [
+    (api, "render", LESS),
+    (comparison, "compare", {**LESS, "cos_theta": (0.7,), "models": lambda given: given or [QUICK]}),
+    *((inverse, name, {**LESS, "model": QUICK}) for name in ("invert_stack", "alternatives", "fit_target", "simplify")),
+    (inverse, "coat", {"model": QUICK}),
+]
+# Of what no page asks for: samples, and directions of fits
+NUMBERS: list[tuple[Any, str, Any]] = [
+    *((module, "SAMPLES", 2**14) for module in (evaluated_lobes, plugins)),
+    (evaluated_lobes, "LIT_SAMPLES", 2**14),
+    (pictures, "SAMPLES", 4),
+    (scores, "SAMPLES", 6),
+    (closures, "PLANE", (16, 9)),
+    (fit, "NODES", 40),
+    (fit, "AZIMUTHS", (0.0,)),
+    (fit, "STEPS", 1),
+    (fit, "REPORTED", 2**10),
+    (fit, "COMPARED", 2**12),
+]
+
+
+@pytest.fixture
+def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small pictures, few walks, few points; no server stays."""
+    for module, name, fewer in FEWER:
+        monkeypatch.setattr(module, name, with_less(getattr(module, name), **fewer))
+    for module, name, value in NUMBERS:
+        monkeypatch.setattr(module, name, value)
+
+    def figure(name: str) -> Any:
+        found = real(name)
+        monkeypatch.setattr(found, "compute", with_less(found.compute, **{**LESS, "size": 8}))
+        return found
+
+    def sweep(plan: sweeps.Plan, store: Any, *_: Any, **named: Any) -> Any:
+        with ThreadPoolExecutor(1) as executor:
+            return all_of(plan.model_copy(update={"count": 4}), store, executor)
+
+    one = stacks.chosen(["diffuse base"])[:1]
+    monkeypatch.setattr(scores, "chosen", lambda kinds: one)
+    real, all_of = figures.figure, sweeping.carry_out
+    monkeypatch.setattr(figures, "figure", figure)
+    monkeypatch.setattr(sweeping, "carry_out", sweep)
+    monkeypatch.setattr(sweeps, "carry_out", sweep)
+    monkeypatch.setattr(server, "serve", lambda material, port, browser: vt.load(material))
+
+
+# The code
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
+def test_the_code_of_a_page_runs(
+    page: str, run: Run, cheap: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    FILES.get(page, lambda folder: None)(tmp_path)
+    names: dict[str, Any] = {}
+    for language, text in blocks(page):
+        if language == "python":
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", Incomplete)
+                exec(compile(text, page, "exec"), names)
+        elif language == "sh":
+            for command in commands(text):
+                if not any(" ".join(command).startswith(known) for known in ELSEWHERE):
+                    carry_out(command, page, run)
+        elif language == "yaml":
+            parse(text, tmp_path)
+        elif language == "xml" and text.startswith("<?xml"):
+            ElementTree.fromstring(text)  # a file that commands of the page read
+        elif language == "xml":
+            vt.register()
+            vt.kernel.mitsuba().load_string(f'<scene version="3.0.0">{text}</scene>')
+        else:
+            assert language in OTHERS, f"{page}: a language that no test runs: {language or text}"
+            assert language != "text" or not COMMAND.search(text), f"{page}: commands need a block of sh: {text}"
+
+
+def carry_out(command: list[str], page: str, run: Run) -> None:
+    """Run a command of Velatura, or a script in the current folder."""
+    program, *words = command
+    if program == "python" and Path(words[0]).exists():
+        runpy.run_path(words[0])
+        return
+    assert program == "velatura", f"{page}: neither run nor excepted: {' '.join(command)}"
+    status, _, err = run(*words)
+    assert status == 0, f"{page}: {' '.join(command)}: {err}"
+
+
+def parse(text: str, folder: Path) -> None:
+    """Read a block as the file that it is: a target, a plan, a material, or layers of one."""
+    path = folder / "block.yaml"
+    path.write_text(text if not text.startswith("-") else f"layers:\n{text}")
+    keys = yaml.safe_load(path.read_text()).keys()
+    if "lobes" in keys:
+        inverse.load_target(path)
+    elif "vary" in keys:
+        sweeps.load_plan(path)
+    else:
+        vt.load(path)
+
+
+def test_commands_in_sentences_exist() -> None:
+    said = [
+        (page, command)
+        for page in PAGES
+        for command in re.findall(r"`velatura ([^`]+)`", BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8")))
+    ]
+    assert len(said) > 20
+    for page, command in said:
+        words = shlex.split(command)
+        verb = typer.main.get_command(app)
+        while words and hasattr(verb, "commands"):
+            assert words[0] in verb.commands, f"{page}: no such verb: velatura {command}"
+            verb = verb.commands[words.pop(0)]
+        options = {name for parameter in verb.params for name in parameter.opts}
+        assert {word for word in words if word.startswith("-")} <= options, (
+            f"{page}: no such option: velatura {command}"
+        )
+
+
+def test_all_exceptions_are_needed() -> None:
+    """Expected: a command or a language that no page has any more is none here."""
+    said = [
+        " ".join(command) for page in PAGES for kind, text in blocks(page) if kind == "sh" for command in commands(text)
+    ]
+    assert [known for known in ELSEWHERE if not any(command.startswith(known) for command in said)] == []
+    assert set(OTHERS) <= {language for page in PAGES for language, _ in blocks(page)}
+    assert set(FILES) <= set(PAGES)
