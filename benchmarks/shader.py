@@ -5,7 +5,9 @@ holds a single one: then there is one stack to a pattern, and 10^4 directions. F
 difference in energy, alpha, value and density, where it was met, and what a shader costs: time to record and print, its
 lines, and time to compile and run it. At the end the tables of docs/how-to/shaders.md.
 
-    python benchmarks/shader.py [--language all] [--models belcour2018,velatura] [--count 10000] [--seed 0] [--textured]
+    python benchmarks/shader.py [--language all] [--models belcour2018,velatura] [--count 10000] [--seed 0]
+    python benchmarks/shader.py --uniforms [--language vulkan,wgsl] [--seed 0]
+    python benchmarks/shader.py --textured
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import sys
 import time
 from collections.abc import Iterable
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -24,7 +27,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
 import chromium
-from agreement import PATTERNS, Differences, differences, in_browser, in_numpy, on_machine, random_case
+from agreement import PATTERNS, Changeable, Differences, differences, in_browser, in_numpy, on_machine, random_case
 from machines import MACHINES
 
 import velatura
@@ -50,6 +53,8 @@ TEXTURED = (
 )
 COSINES = [1.0, 0.7, 0.35]
 SAMPLES = 4000
+
+CHANGES, DIRECTIONS = 6, 40  # stacks of a pattern that a program is given, and directions for each
 
 MODELS = "belcour2018,weier2020,yamaguchi2019,realtime,velatura"
 
@@ -134,12 +139,40 @@ def _apart(stack: Stack, model: Model, rng: np.random.Generator) -> list[tuple[f
     return found
 
 
+def uniforms(languages: list[str], seed: int) -> None:
+    """Programs whose values change, of `velatura`: one for each pattern, given the values of random stacks one after
+    the other. The largest differences from NumPy, and quantiles of values."""
+    each: dict[str, list[tuple[float, float]]] = {language: [] for language in languages}
+    values: dict[str, list[np.ndarray]] = {language: [] for language in languages}
+    for k, pattern in enumerate(PATTERNS):
+        if pattern[0] == ("diffuse",):
+            continue  # without interfaces nothing is solved
+        cases = [random_case(pattern, DIRECTIONS, np.random.default_rng((seed, k, j))) for j in range(CHANGES)]
+        programs = {language: Changeable.of(cases[0].stack, MACHINES[language]) for language in languages}
+        for case in cases:
+            truth = in_numpy(case, next(iter(programs.values())).recording)
+            rough = (truth.alpha.reshape(-1, DIRECTIONS) >= 0.05).all(axis=0)
+            for language, program in programs.items():
+                found = program.given(case)
+                apart = differences(truth, replace(found, alpha=truth.alpha))
+                each[language].append((apart.energy, apart.value))
+                relative = np.abs(found.value - truth.value) / np.maximum(truth.value, 1e-5)
+                values[language].append(relative[:, rough].ravel())
+    for language in languages:
+        energy, value = np.max(each[language], axis=0)
+        most = np.quantile(np.concatenate(values[language]), 0.999)
+        count = len(each[language])
+        print(f"{language:8} {count} stacks, {count * DIRECTIONS} directions: energy {energy:.1e}, value {value:.1e}")
+        print(f"{language:8} 999 of 1000 values within {most:.1e}", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--language", default="glsl", help=f"all, or some of {', '.join(LANGUAGES)}")
     parser.add_argument("--models", default=MODELS)
     parser.add_argument("--count", type=int, default=10_000, help="random stacks with directions, for each model")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--uniforms", action="store_true", help="programs whose values change, instead")
     parser.add_argument("--textured", action="store_true", help="textured materials against uniform ones, instead")
     arguments = parser.parse_args()
     if arguments.textured:
@@ -150,6 +183,9 @@ def main() -> None:
     for language, why in lacking.items():
         print(f"{language}: skipped, {why}" if why else f"{language}: runs", flush=True)
     languages = [language for language, why in lacking.items() if not why]
+    if arguments.uniforms:
+        uniforms([language for language in languages if language in MACHINES], arguments.seed)
+        return
     found: dict[str, dict[str, dict[str, float]]] = {}
     with chromium.browser() if "glsl" in languages else nullcontext() as page:
         for model in arguments.models.split(","):

@@ -10,15 +10,16 @@ from typing import Any, TypeAlias
 import numpy as np
 import viewport
 from chromium import Browser
-from machines import Machine
+from machines import Changing, Machine
 
 from velatura import tables
 from velatura.editor import messages
-from velatura.model import Model, bsdf, solution, turned
-from velatura.model.context import Context, at_a_point
+from velatura.model import bsdf, solution, turned
+from velatura.model.context import at_a_point
+from velatura.model.solution import Solver
 from velatura.optics import ggx
 from velatura.sampling import coated as interfaces
-from velatura.shader import Recording, Shader, constant, record, shader, variance
+from velatura.shader import Recording, Shader, constant, material, record, shader, variance
 from velatura.shader.bake import Bake
 from velatura.shader.c_like import CLike
 from velatura.shader.films import beside
@@ -118,11 +119,11 @@ def coated(case: Case) -> Case:
 
 
 def in_numpy(case: Case, recording: Recording) -> Results:
-    """What the model says; where it solves materials, of the first stack for all directions."""
+    """The values of the model; where it solves materials, those of the first stack for all directions."""
     stack = case.stack
     wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
     if isinstance(recording.baked, Tabulated):
-        return _solved(stack, recording.model, wi, wo, u)
+        return _solved(stack, recording.baked.solver, wi, wo, u)
     alone = Material.of(stack)
     material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(interfaces.of(alone))
     body = bsdf.body(material, recording.model, variance(stack), at_a_point())
@@ -140,10 +141,13 @@ def in_numpy(case: Case, recording: Recording) -> Results:
     )
 
 
-def _solved(stack: Stack, model: Model, wi: Any, wo: Any, u: Any) -> Results:
-    material = Material.of(stack)
+def _solved(stack: Stack, used: Solver, wi: Any, wo: Any, u: Any) -> Results:
+    """On the grid of a solver."""
+    material = solution.plain(Material.of(stack).solid())
     frame = turned.frame(material)
-    solved = solution.solve(frame.back(material), model, frame.kind(variance(stack)), Context())
+    upright, solver = frame.back(material), replace(used, variance=frame.kind(variance(stack)))
+    layouts = solver.layouts([upright])
+    solved = solver.body(upright, solver.solve(upright, layouts), layouts)
     seen, _ = solved.seen(ggx.rotate(wi, np.radians(frame.degrees(material))))
     body = frame.turned(solved, material)
     value, density = body.eval_pdf(wi, wo)
@@ -251,6 +255,44 @@ def together(
     parts = [text, machine.declarations(len(given) * size), programs[0].function, machine.main([*lines, "}"]), ""]
     found = machine.run("\n".join(parts), len(given), size, {"vt_given": given, **read}, **options)
     return np.split(found, ends[:-1], axis=1)
+
+
+def of_material(called: Program, machine: Machine, uv: str) -> Program:
+    """The calls of a program, of what `vt_material` gives at texture coordinates."""
+    *filled, last = [line for line in called.lines if "VtMaterial" not in line]
+    return replace(called, lines=[*filled, machine.printer.declared("VtMaterial", "m", f"vt_material({uv})"), last])
+
+
+@dataclass(frozen=True)
+class Changeable:
+    """A shader whose values change, of a kind of stack and a model that solves materials, on a machine."""
+
+    made: Shader
+    recording: Recording
+    machine: Machine
+
+    @classmethod
+    def of(cls, stack: Stack, machine: Machine) -> Changeable:
+        made = shader(stack, values="uniforms", printer=machine.printer)
+        return cls(made, record(stack, parameters=True), machine)
+
+    def given(self, case: Case) -> Results:
+        """The results where the program is given the values and the solution of a case's stack."""
+        assert isinstance(self.made.baked, Tabulated)
+        found = self.made.baked.solve(case.stack)
+        arrays = {"vt_shown": np.ones(len(self.made.shown)), "vt_remainder": np.array(found.remainder)}
+        if len(found.layout):
+            arrays["vt_layout"] = np.array(found.layout)
+        values = {
+            material.place(at): np.broadcast_to(constant(at, x), 3 if at.colour else 1).tolist()
+            for at, x in case.stack.values()
+        }
+        changing = Changing(material.structs(case.stack, list(self.recording.read)), values, arrays)
+        fixed = replace(self.made, uniforms={})
+        called = of_material(program(case, self.recording, fixed, self.machine.printer), self.machine, "wi.xy")
+        read = {**textures(self.made), "vt_baked": found.texels}
+        (answers,) = together([called], self.made.text, self.machine, read, changing=changing)
+        return called.results(answers)
 
 
 @dataclass(frozen=True)

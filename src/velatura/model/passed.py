@@ -89,7 +89,8 @@ def parts(
     of_bounced = own_medium.integral(lobe, i) if lobe else np.zeros_like(of_straight)
     weight_straight = np.minimum(ops.divide(straight, of_straight), MOST)
     bounces = np.maximum(bounces + straight - weight_straight * of_straight, 0)
-    weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MOST)
+    # A kind of stack may have a lobe that this one has not
+    weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MOST) * bool(lobe)
     energies = weight_straight * of_straight, weight_bounced * of_bounced
     rest = np.maximum(passed - energies[0] - energies[1], 0)
     weight_rest = rest / bounced.integral_rest(found, i)

@@ -227,7 +227,7 @@ class Solver:
         if self.model.form == "forward":
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
-        numbers, folded = self._numbers(material, found, layouts), Folded.of(self.grid, material)
+        numbers, folded = self.body(material, found, layouts), Folded.of(self.grid, material)
         factors, wanted = exchange.factors(numbers, folded.directions, folded.shares, folded.count, self.samples)
         spread = folded.everywhere
         return [
@@ -235,7 +235,7 @@ class Solver:
             for side, each, of in zip(found, factors, wanted)
         ]
 
-    def _numbers(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
+    def body(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
         """The BSDF in NumPy."""
         context, made = Context(colour=_stacked, tables=self.tables), []
         for seen, side, layout in zip(sides(material), found, layouts):

@@ -73,12 +73,16 @@ def constant(address: Address, value: Any) -> Any:
 
 
 def structs(stack: Stack, read: Sequence[str]) -> list[Struct]:
-    """`VtMaterial`, which holds the values that are read, by flat name, and a struct for each layer that has any."""
+    """`VtMaterial`, which holds the values that are read, by flat name, and a struct for each layer that has any.
+
+    Colours come first, so that a block of these structs has the same layout by the rules of HLSL as by std140.
+    """
     layers, members = [], [Field("exterior", "number")]
     for i, kind in enumerate(stack.kinds):
         own = [address for address, _ in stack.values() if address.layer == i and address.name in read]
         if own:
-            fields = [Field(address.key, "colour" if address.colour else "number") for address in own]
+            in_order = sorted(own, key=lambda address: not address.colour)
+            fields = [Field(address.key, "colour" if address.colour else "number") for address in in_order]
             layers.append(Struct(f"VtLayer{i}", fields, kind))
             members.append(Field(f"layer{i}", f"VtLayer{i}"))
     return [*layers, Struct("VtMaterial", members, "indices are absolute, rotations in degrees")]
