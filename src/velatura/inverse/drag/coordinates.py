@@ -45,9 +45,9 @@ SMOOTH = 1e-10  # variance below which an interface is smooth
 REFLECTANCE_MAX = 0.95  # of a dielectric
 DEEP = 50.0  # an optical depth that nothing passes
 CLEARED, OUTSIDE = 1e-7, 1e-4  # optical depths below 0: that are none, and that are read on the way
-SHIFT = 0.01  # share of an index by which it is changed,
-FLAT = 0.2  # and of that by which what films reflect follows; below, the tint follows, too:
-TURN = 3.0  # times as much at most
+SHIFT = 0.01  # change of an index, a reflectance or a tint, to see how what films reflect follows
+FLAT = 0.2  # slope of that over the reflectance of a conductor, as logarithms, below which its tint changes, too
+TURN = 3.0  # slope of the tint over that logarithm, at most
 
 
 @dataclass(frozen=True)
