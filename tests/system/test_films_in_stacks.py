@@ -172,6 +172,9 @@ ROUGH = {
     "glass from inside": vt.Stack(
         [vt.Interface(eta=1.0, alpha=0.5, films=[vt.Film(eta=2.0, thickness_nm=200)])], exterior=1.5
     ),
+    "a small step from inside": vt.Stack(
+        [vt.Interface(eta=1.2, alpha=0.4, films=[vt.Film(eta=1.8, thickness_nm=400)])], exterior=1.4
+    ),
     "gilt glass": vt.Stack([vt.Interface(eta=1.5, alpha=0.5, films=[vt.Film(eta=0.4, k=2.6, thickness_nm=15)])]),
     "gilt glass from inside": vt.Stack(
         [vt.Interface(eta=1.0, alpha=0.5, films=[vt.Film(eta=0.4, k=2.6, thickness_nm=15)])], exterior=1.5

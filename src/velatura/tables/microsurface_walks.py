@@ -143,13 +143,14 @@ def reflected_later(cos_theta: Array, alpha: Array, eta: Array, paths: int, rng:
 
 
 def shares_in_the_end(
-    facets: Sequence[Side], eta: float, cos_theta: Array, alpha: Array, paths: int
+    facets: Sequence[Side], eta: float, cos_theta: Array, alpha: Array, paths: int, straight: float = 0.0
 ) -> tuple[Array, Array]:
     """Shares (C, points) of light, of what meets facets again, that are reflected, and that pass, in the end.
 
     facets: from above and from below, the first alone for what is opaque. That takes its share already at the first
         meeting, so that the share is of light that meets facets again if they first reflect all.
     eta: relative index, of what is not opaque.
+    straight: share of refracted light that meets facets again and is not counted, since it passes these as well.
 
     Points draw the same numbers, and so they have nearly the same error.
     """
@@ -165,7 +166,9 @@ def shares_in_the_end(
             walks.scatter(i, h, np.full(count, eta), facets)
         leaving = walks.leave()
         if walks.meetings == 1:
-            again = _by_point(np.atleast_2d(walks.weight), walks, count)
+            passes = np.where(walks.outside, 0, straight * walks.weight)
+            again = _by_point(np.atleast_2d(walks.weight - passes), walks, count)
+            energies[1] = -_by_point(np.atleast_2d(passes), walks, count)
         if opaque:
             reflectance = facets[0].reflectance(np.clip(ggx.dot(i, h), 0, 1))
             leaving, walks.weight = leaving * reflectance, walks.weight * reflectance
@@ -175,9 +178,10 @@ def shares_in_the_end(
                 energy + _by_point(np.where(side, leaving, 0), walks, count) for energy, side in zip(energies, here)
             ]
         walks.end_faint()
+    reflected, passed = energies[0], np.maximum(energies[1], 0)
     # Of the few walks of an almost smooth interface those that are kept may weigh too much; more would be a gain
-    again = np.maximum(np.maximum(again, energies[0] + energies[1]), np.finfo(float).tiny)
-    return energies[0] / again, energies[1] / again
+    again = np.maximum(np.maximum(again, reflected + passed), np.finfo(float).tiny)
+    return reflected / again, passed / again
 
 
 def _by_point(weights: Array, walks: Walks, count: int) -> Array:

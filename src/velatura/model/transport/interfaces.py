@@ -85,6 +85,10 @@ class Facets:
             return 0.0
         return float(abs(np.log(ops.mean(self.below) / ops.mean(self.above))))
 
+    def straight(self, often: bool) -> float:
+        """Share of refracted light that meets further facets and still passes: a small step hardly turns it."""
+        return float(np.exp(-self.step / STRAIGHT[often]))
+
     def smooth(self, p: Array, transmitted: bool) -> Array:
         """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
         n = float(ops.mean(self.above))
@@ -168,8 +172,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
         else:
             both = ggx.masking(towards, *alpha)
         if through:
-            # Facets of a small step let light pass again and again, and hardly turn it
-            both = both + np.exp(-facets.step / STRAIGHT[ways[-1]]) * (1 - both)
+            both = both + facets.straight(ways[-1]) * (1 - both)
         return np.where(out, both, 0)
 
     def divided(w: tuple[Array, Array, Array], n: float, shares: Array, kept: Sequence[Array]) -> tuple[Light, Array]:
@@ -453,7 +456,7 @@ def shares_of_films(facets: Facets, made: dict[Hashable, Any], p: Array) -> tupl
         cosines = coordinates.to_cosine(places) if critical is None else coordinates.to_angle(places, critical)
         alpha = np.full(WALKED, mean)
         each = [Side(side.reflectance, side.passing) for side in sides]
-        made[key] = shares_in_the_end(each, eta, np.asarray(cosines), alpha, PATHS)
+        made[key] = shares_in_the_end(each, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
     at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
     reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in made[key])
