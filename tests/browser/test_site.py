@@ -21,6 +21,7 @@ PAGES = sorted(path for path in SITE.rglob("*.html") if path.relative_to(SITE).p
 KINDS = (
     "index.html",
     "explanation/model.html",
+    "explanation/primer.html",
     "gallery/films.html",
     "gallery/index.html",
     "how-to/in-mitsuba.html",

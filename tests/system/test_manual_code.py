@@ -40,7 +40,7 @@ from velatura.sweeps import run as sweeping
 Run = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[2]
 PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(r"^( *)```([\w{}-]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^( *)```([\w{}-]*)[^\n]*\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^(velatura|make|pip|python) ", re.MULTILINE)
 
 # A model that solves no energies, in place of the default one where that would take minutes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import operator
+import pydoc
 import re
 from pathlib import Path
 from types import ModuleType
@@ -118,6 +119,15 @@ def test_the_reference_has_every_public_name() -> None:
     assert {*velatura.__all__, "Editor"} <= set(listed)
     for name in listed:
         assert operator.attrgetter(name)(velatura) is not None
+
+
+def test_the_names_that_pages_give_exist() -> None:
+    """Expected: `velatura.x.y` is a module, or what one has."""
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    names = {name for page in pages for name in re.findall(r"`(velatura\.[\w.]+)(?:\(\))?`", page.read_text())}
+    assert len(names) > 10
+    for name in names:
+        assert pydoc.locate(name) is not None, name
 
 
 def test_the_gallery_orders_every_example(hooks: ModuleType) -> None:
