@@ -44,7 +44,7 @@ docs: .venv/ready-docs site/try/index.html ## build the manual into site/
 	@echo "The manual is $(CURDIR)/site/index.html"
 
 site/try/index.html: $(PAGE) $(SOURCES) | .venv/ready-docs
-	$(BIN)/velatura edit --static $(@D)
+	$(BIN)/velatura edit --static site/try
 	@touch $@
 
 figures: .venv/ready ## compute the figures of the manual again that are missing, or whose sources have changed

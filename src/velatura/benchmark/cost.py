@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import kernel
-from velatura.benchmark.candidates import Candidate, Plugin, evenly
+from velatura.benchmark.candidates import Candidate, Factory, Plugin, evenly, made
 from velatura.benchmark.stacks import Case
 from velatura.checks.probe import Probe
+from velatura.errors import InvalidInput
 
 Array = NDArray[np.floating]
 
@@ -18,10 +19,23 @@ POWER = 20  # of 2, pairs of a run
 TURNS = 15  # runs of either
 
 
-def cost_of(case: Case, candidate: Candidate) -> float | None:
-    """Ratio of the quickest runs of both compiled kernels on one thread; None for what is no plugin."""
-    if not isinstance(candidate, Plugin):
-        return None
+def median_cost(factory: Factory, cases: Iterable[Case]) -> float | None:
+    """That over kinds of stacks, of the first of each that a candidate expresses; None for what is no plugin."""
+    first: dict[str, tuple[Case, Candidate]] = {}
+    for case in cases:
+        if case.kind not in first:
+            try:
+                candidate = made(factory(case))
+            except InvalidInput:
+                continue
+            if candidate is not None:
+                first[case.kind] = case, candidate
+    found = [_cost(case, candidate) for case, candidate in first.values() if isinstance(candidate, Plugin)]
+    return float(np.median(found)) if found else None
+
+
+def _cost(case: Case, candidate: Plugin) -> float:
+    """Ratio of the quickest runs of both compiled kernels on one thread."""
     metal = Plugin(kernel.load_dict({"type": "roughconductor", "distribution": "ggx", "alpha": 0.2}))
     run, yardstick = (_kernel(plugin.probe, case) for plugin in (candidate, metal))
     with kernel.threads_restored():

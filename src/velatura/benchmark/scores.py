@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from velatura import files
 from velatura.benchmark import candidates
 from velatura.benchmark.bins import RADII
 from velatura.benchmark.candidates import Candidate, Factory
-from velatura.benchmark.cost import cost_of
+from velatura.benchmark.cost import median_cost
 from velatura.benchmark.stacks import FORMAT, KINDS, Case, chosen
 from velatura.benchmark.walks import Binned, truth
 from velatura.errors import InvalidInput
@@ -25,7 +25,6 @@ Array = NDArray[np.floating]
 
 FAINT = 0.02  # light of a side, or a colour, that is not scored
 SAMPLES = 16  # power of 2, of each direction
-TIMED = 1  # stacks of each kind
 
 
 @dataclass(frozen=True)
@@ -108,18 +107,16 @@ def score(
     factory: Factory,
     name: str = "candidate",
     kinds: Sequence[str] | None = None,
-    timed: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Scores:
     """Score a model on the stacks of the benchmark.
 
     Args:
         factory: makes of a `Case` (its `stack`, its `often`) a function of wi and wo (n, 3), unit vectors away from the
-            surface, that gives f |cos theta_o| of energies (n, 3), NaN where it has none; or a `mi.BSDF` or the dict of
-            one; or None where the model cannot express the stack. An `InvalidInput` counts as that, too. A function
-            with a method `sample(wi, u)`, which gives weights (n, 3), is asked for the noise of its samples.
+            surface, that gives `f * abs(cos(theta_o))` of energies (n, 3), NaN where it has none; or a `mi.BSDF` or the
+            dict of one; or None where the model cannot express the stack. An `InvalidInput` counts as that, too. A
+            function with a method `sample(wi, u)`, which gives weights (n, 3), is asked for the noise of its samples.
         kinds: of stacks; None for all.
-        timed: whether to measure the cost of evaluations.
         progress: called with (stacks done, all stacks).
 
     Raises:
@@ -130,7 +127,6 @@ def score(
     records: list[Record] = []
     asked: dict[str, int] = {kind.name: 0 for kind in KINDS if kind.name in {case.kind for case in cases}}
     refused: Counter[str] = Counter()
-    costs: dict[str, list[float]] = {kind: [] for kind in asked}
     for n, case in enumerate(cases):
         mine = {
             (direction, side): each
@@ -149,12 +145,9 @@ def score(
             spreads = _spreads(case, candidate)
             kept = [key for key in mine if key in found]
             records += [_record(case, key, found[key], mine[key], spreads.get(key[0])) for key in kept]
-            if timed and len(costs[case.kind]) < TIMED and (cost := cost_of(case, candidate)):
-                costs[case.kind].append(cost)
         if progress:
             progress(n + 1, len(cases))
-    measured = [cost for each in costs.values() for cost in each]
-    return Scores(name, tuple(records), asked, dict(refused), float(np.median(measured)) if measured else None)
+    return Scores(name, tuple(records), asked, dict(refused))
 
 
 def kept_score(
@@ -167,6 +160,8 @@ def kept_score(
 ) -> Scores:
     """As `score`, read from a JSON file if that is there, else kept there; not kept where it is None.
 
+    `timed` measures the cost of evaluations, unless the file has it.
+
     Raises:
         InvalidInput: as `score`; the file holds other kinds, or cannot be read or written.
     """
@@ -177,10 +172,14 @@ def kept_score(
             raise InvalidInput(f"{path}: holds no scores: {error}") from None
         if set(found.asked) != {case.kind for case in chosen(kinds)}:
             raise InvalidInput(f"{path}: holds scores of other kinds of stacks; give another folder")
-        return found
-    if path:
-        files.make_folder(path.parent)
-    found = score(factory, name, kinds, timed, progress)
+        if found.cost is not None or not timed:
+            return found
+    else:
+        if path:
+            files.make_folder(path.parent)
+        found = score(factory, name, kinds, progress)
+    if timed:
+        found = replace(found, cost=median_cost(factory, chosen(kinds)))
     if path:
         with files.whole(path) as unfinished:
             unfinished.write_text(json.dumps(found.to_dict(), allow_nan=False), encoding="utf-8")
