@@ -29,6 +29,8 @@ FIRST, STEPS = 3, 12  # of least squares: from every look, and from where the be
 Baked: TypeAlias = dict[str, float | RGB]
 
 NEAR = 2e-3
+SLACK, SLIGHT = 0.1, 1e-3  # of the cost, by which it may grow for values that the layers say
+OTHER = 0.2  # of the cost, by which a base of another kind, or no coat, has to be nearer
 STEP = 1e-4  # of finite differences, of a range
 
 
@@ -176,34 +178,53 @@ class _Space:
 
 
 def _fitted(target: Target, described: Described, sampled: Sampled) -> Baked:
-    """The closest values of descents from every look."""
+    """The closest values of descents from every look.
+
+    Parts stay those of the stack: coat, film, metal and clear base have the weights of a look, and a look without the
+    coat, or with a base of another kind, has to be much nearer. All but colours and roughness stay as a look has them
+    where that costs little.
+    """
+    groups = (
+        (True, target.base),
+        (described.mixed, {target.clear if described.below is not None else target.metal: UNIT}),
+        (described.coated, target.coat),
+        (described.tinted, target.tint),
+        (described.blurred, target.rough),
+        (described.blurred and bool(described.brushed), target.brushed),
+        (described.film, target.film),
+    )
+    ranges = {name: pair for has, group in groups if has for name, pair in group.items()}
     starts = [complete(target.parameters, target.start(look)) for look in described.looks]
-    ends = [_descended(target, described, sampled, start, start, FIRST) for start in starts]
-    nearest = int(np.argmin([cost for cost, _ in ends]))
-    _, found = _descended(target, described, sampled, starts[nearest], ends[nearest][1], STEPS)
-    return found
-
-
-def _descended(
-    target: Target, described: Described, sampled: Sampled, look: Baked, start: Baked, steps: int
-) -> tuple[float, Baked]:
-    """Cost and values at the end of a descent by least squares, near the values of a look where nothing else counts."""
-    from scipy.optimize import least_squares
-
-    film = any(look.film for look in described.looks)
-    ranges = {
-        **target.always,
-        **(target.brushed if described.brushed else {}),
-        **(target.clear if described.below is not None else {}),
-        **(target.film if film else {}),
+    kinds = [(look.metalness, look.coat_eta > 1) for look in described.looks]
+    other = [OTHER * (kind != kinds[0] and not described.mixed) for kind in kinds]
+    few = {
+        name: pair
+        for name, pair in ranges.items()
+        if isinstance(starts[0][name], tuple) or (name in target.rough and starts[0][name])
     }
-    space = _Space(start, ranges)
-    first = space.numbers(look)
 
-    def residuals(numbers: Array) -> Array:
-        light = target.value(space.values(numbers), sampled.pair, described.thin)
-        return np.concatenate([sampled.residuals(light), PRIOR * (numbers - first)])
+    def descended(ranges: dict[str, Range], look: Baked, start: Baked, steps: int) -> tuple[float, Baked]:
+        """Cost and values at the end of a descent by least squares, near the values of a look where nothing else
+        counts."""
+        from scipy.optimize import least_squares
 
-    inside = np.clip(space.numbers(start), 1e-3, 1 - 1e-3)
-    found = least_squares(residuals, inside, bounds=(0, 1), diff_step=STEP, max_nfev=steps, tr_solver="lsmr")
-    return float(found.cost), space.rounded(found.x)
+        space = _Space(start, ranges)
+        first = space.numbers(look)
+
+        def residuals(numbers: Array) -> Array:
+            light = target.value(space.values(numbers), sampled.pair, described.thin)
+            return np.concatenate([sampled.residuals(light), PRIOR * (numbers - first)])
+
+        inside = np.clip(space.numbers(start), 1e-3, 1 - 1e-3)
+        found = least_squares(residuals, inside, bounds=(0, 1), diff_step=STEP, max_nfev=steps, tr_solver="lsmr")
+        return float(found.cost), space.rounded(found.x)
+
+    def nearest(ends: list[tuple[float, Baked]]) -> int:
+        return int(np.argmin([cost + more for (cost, _), more in zip(ends, other)]))
+
+    ends = [descended(ranges, start, start, FIRST) for start in starts]
+    best = nearest(ends)
+    cost, found = descended(ranges, starts[best], ends[best][1], STEPS)
+    ends = [descended(few, start, start, STEPS) for start in starts]
+    plain_cost, plain = ends[nearest(ends)]
+    return plain if plain_cost < (1 + SLACK) * cost + SLIGHT else found

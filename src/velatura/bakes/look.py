@@ -19,6 +19,7 @@ from velatura.targets.parameters import RGB
 Array: TypeAlias = NDArray[np.floating]
 Pair: TypeAlias = tuple[float, float]
 
+SAME = 1e-6  # of roughnesses
 CLEAR: RGB = (1.0, 1.0, 1.0)
 
 
@@ -67,6 +68,34 @@ class Described:
         return cls(solid, brushed, below, tuple(_looks(solid, seen)))
 
     @property
+    def mixed(self) -> bool:
+        """Whether media scatter light, above a base or a clear one."""
+        return _scatters(self.material)
+
+    @property
+    def coated(self) -> bool:
+        """Whether a look has a coat."""
+        return any(look.coat_eta > 1 for look in self.looks)
+
+    @property
+    def film(self) -> bool:
+        """Whether a look has a film."""
+        return any(look.film for look in self.looks)
+
+    @property
+    def tinted(self) -> bool:
+        """Whether reflectances at the normal are not those of one index for all colours."""
+        return any(
+            each.kind != "dielectric" or bool(each.films) or np.ptp(np.broadcast_to(each.eta, (3, 1))) > 1e-6
+            for each in self.material.interfaces
+        )
+
+    @property
+    def blurred(self) -> bool:
+        """Whether anything but facets of one interface spreads what is reflected, or light passes."""
+        return self.below is not None or len(self.material.interfaces) > 1 or self.mixed
+
+    @property
     def thin(self) -> bool:
         """Whether what light passes into has the index that it came from."""
         return self.below is not None and abs(self.below - 1) < 1e-3
@@ -88,19 +117,22 @@ def _looks(material: Material, seen: StackLobes) -> Iterator[Look]:
         return
 
     under = energy[1:] if coated else energy
-    metal = under.sum(axis=0)
-    if len(under) and metal.mean() > 0:
-        strongest = int(np.argmax(under.mean(axis=1))) + coated
-        alpha, turn = _along(seen, strongest)
-    else:
-        alpha, turn = _along(seen, 0)
-    share = float(metal.mean() / max((metal + remainder).mean(), 1e-6))
-    through = (1 - fresnel.normal_incidence(eta_1)) ** 2
-    color = (metal + remainder) / through
+    of_facets = under.sum(axis=0)
+    strongest = int(np.argmax(under.mean(axis=1))) + coated if of_facets.mean() > 0 else 0
+    alpha, turn = _along(seen, strongest)
+    metallic = any(each.kind != "dielectric" for each in interfaces)
+    mixed = _scatters(material)
+    share = float(of_facets.mean() / max((of_facets + remainder).mean(), 1e-6)) if mixed else float(metallic)
+    entered = 1 - fresnel.normal_incidence(eta_1)
+    below = interfaces[1] if coated else first
+    eta = float(np.mean(below.eta / first.eta)) if coated and below.kind == "dielectric" else 1.0
+    color = (of_facets + remainder) / entered**2
+    if not (mixed or metallic):
+        color = remainder / (entered * (1 - fresnel.normal_incidence(eta)))
     plain = Look(_rgb(color), share, alpha, turn, max(eta_1, 1.0), film=film)
     if coated:
         coat_alpha, coat_turn = _along(seen, 0)
-        coat = replace(plain, eta=1.0, coat_eta=eta_1, coat_alpha=coat_alpha, coat_turn=coat_turn)
+        coat = replace(plain, eta=max(eta, 1.0), coat_eta=eta_1, coat_alpha=coat_alpha, coat_turn=coat_turn)
         yield coat
         if 0 < share < 1:
             yield replace(coat, metalness=1.0)
@@ -116,13 +148,14 @@ def _looks(material: Material, seen: StackLobes) -> Iterator[Look]:
 
 
 def _clear(seen: StackLobes, eta_1: float, film: Pair | None) -> Iterator[Look]:
-    """One interface that does all, one below a coat, and one that does not deflect light."""
+    """One interface that does all, one that does not deflect light, and one below a coat; of three only the last."""
     energy = np.array([each[:, 0] for each in seen.energy]).clip(0)
     tint = _rgb(seen.passed[:, 0] / np.maximum(1 - energy.sum(axis=0), 1e-3))
     alpha, turn = _along(seen, int(np.argmax(energy.mean(axis=1))))
     one = Look(tint, 0.0, alpha, turn, _index_of(float(energy.sum(axis=0).mean())), clear=1.0, tint=tint, film=film)
-    yield one
-    yield replace(one, eta=1.0)
+    if len(energy) < 3:
+        yield one
+        yield replace(one, eta=1.0)
     if len(energy) > 1 and seen.transmitted:
         u, v = (float(x) for x in seen.transmitted.alpha[:, 0])
         below = _index_of(float(energy[1:].sum(axis=0).mean()))
@@ -132,10 +165,14 @@ def _clear(seen: StackLobes, eta_1: float, film: Pair | None) -> Iterator[Look]:
         )
 
 
+def _scatters(material: Material) -> bool:
+    return any(isinstance(layer, MediumValues) and layer.spreads for layer in material.layers)
+
+
 def _along(seen: StackLobes, k: int) -> tuple[Pair, float]:
     """Roughness of a lobe with the greater one first, which other programs have along the tangent."""
     (u, v), turn = seen.alpha[k][:, 0], float(seen.rotation[k][0])
-    return ((float(u), float(v)), turn) if u >= v else ((float(v), float(u)), turn + np.pi / 2)
+    return ((float(u), float(v)), turn) if u > v * (1 - SAME) else ((float(v), float(u)), turn + np.pi / 2)
 
 
 def _rgb(colour: Array) -> RGB:

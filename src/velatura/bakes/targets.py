@@ -21,7 +21,9 @@ Range: TypeAlias = tuple[float, float]
 class Target:
     """A program's material: its formulas, the parameters of a look, and the ranges of those that are fitted.
 
-    always: fitted for every stack; others only where a stack has what they stand for; no film: the program has none.
+    base: fitted for every stack; others only where it has what they stand for.
+    metal, clear: shares of the base, fitted where media scatter light. rough, brushed: of a base that is seen through
+        others, or passes light. tint: where reflectances at the normal are not those of one index.
     coat_eta, coat_brushed, coat_colour, coat_depth: whether the coat has an index, a brushing, a colour, and one that
         deepens where light crosses it at an angle.
     turned, pane: whether brushing can be turned, and light pass without refraction.
@@ -34,9 +36,13 @@ class Target:
     parameters: tuple[Parameter, ...]
     value: Callable[[Values, Pair, bool], Array]
     start: Callable[[Look], dict[str, float | RGB]]
-    always: dict[str, Range]
+    metal: str
+    clear: str
+    base: dict[str, Range]
+    coat: dict[str, Range]
+    tint: dict[str, Range]
+    rough: dict[str, Range]
     brushed: dict[str, Range]
-    clear: dict[str, Range]
     film: dict[str, Range]
     coat_eta: bool = False
     coat_brushed: bool = False
@@ -44,7 +50,6 @@ class Target:
     coat_depth: bool = False
     turned: bool = False
     pane: bool = False
-    metal: str = ""
     colour: str = ""
     roughness: str = ""
     images: tuple[str, ...] = ()
@@ -115,7 +120,7 @@ def _gltf(look: Look) -> dict[str, float | RGB]:
         "roughnessFactor": _roughness(v),
         "anisotropyStrength": float(np.sqrt(np.clip((u - v) / max(1 - v, 1e-6), 0, 1))),
         "anisotropyRotation": look.turn,
-        "ior": look.eta,
+        "ior": look.eta if look.metalness < 1 else 1.5,
         "transmissionFactor": look.clear,
     }
     if look.coat_eta > 1:
@@ -185,33 +190,28 @@ TARGETS: dict[str, Target] = {
         (*openpbr.PARAMETERS, *openpbr.TURNS),
         openpbr.value,
         _openpbr,
-        always={
+        metal="base_metalness",
+        clear="transmission_weight",
+        base={
             "base_color": UNIT,
-            "base_metalness": UNIT,
-            "specular_weight": UNIT,
-            "specular_color": UNIT,
-            "specular_roughness": ROUGH,
+            "transmission_color": UNIT,
             "specular_ior": (1.001, 4.0),
-            "coat_weight": UNIT,
-            "coat_color": UNIT,
-            "coat_roughness": ROUGH,
-            "coat_ior": (1.001, 3.0),
-            "coat_darkening": UNIT,
             "base_diffuse_roughness": UNIT,
         },
+        coat={"coat_color": UNIT, "coat_ior": (1.001, 3.0), "coat_darkening": UNIT},
+        tint={"specular_color": UNIT},
+        rough={"specular_roughness": ROUGH},
         brushed={
             "specular_roughness_anisotropy": UNIT,
             "coat_roughness_anisotropy": UNIT,
             "geometry_tangent": (-180.0, 180.0),
         },
-        clear={"transmission_weight": UNIT, "transmission_color": UNIT},
-        film={"thin_film_weight": UNIT, "thin_film_ior": (1.001, 3.0), "thin_film_thickness": (0.01, 2.0)},
+        film={"thin_film_ior": (1.001, 3.0), "thin_film_thickness": (0.01, 2.0)},
         coat_eta=True,
         coat_brushed=True,
         coat_colour=True,
         turned=True,
         pane=True,
-        metal="base_metalness",
         colour="base_color",
         roughness="specular_roughness",
     ),
@@ -220,26 +220,19 @@ TARGETS: dict[str, Target] = {
         gltf.PARAMETERS,
         gltf.value,
         _gltf,
-        always={
-            "baseColorFactor": UNIT,
-            "metallicFactor": UNIT,
-            "roughnessFactor": ROUGH,
-            "clearcoatFactor": UNIT,
-            "clearcoatRoughnessFactor": ROUGH,
-            "ior": (1.001, 4.0),
-            "specularFactor": UNIT,
-            "specularColorFactor": UNIT,
-        },
+        metal="metallicFactor",
+        clear="transmissionFactor",
+        base={"baseColorFactor": UNIT, "ior": (1.001, 4.0)},
+        coat={},
+        tint={"specularColorFactor": UNIT},
+        rough={"roughnessFactor": ROUGH},
         brushed={"anisotropyStrength": UNIT, "anisotropyRotation": (-np.pi, np.pi)},
-        clear={"transmissionFactor": UNIT},
         film={
-            "iridescenceFactor": UNIT,
             "iridescenceIor": (1.001, 3.0),
             "iridescenceThicknessMaximum": (10.0, 2000.0),
         },
         turned=True,
         pane=True,
-        metal="metallicFactor",
         colour="baseColorFactor",
         images=(".png", ".jpg", ".jpeg"),
     ),
@@ -248,28 +241,23 @@ TARGETS: dict[str, Target] = {
         blender.PARAMETERS,
         blender.value,
         _blender,
-        always={
+        metal="Metallic",
+        clear="Transmission Weight",
+        base={
             "Base Color": UNIT,
-            "Metallic": UNIT,
-            "Roughness": ROUGH,
             "IOR": (1.001, 4.0),
             "Diffuse Roughness": UNIT,
-            "Specular IOR Level": UNIT,
-            "Specular Tint": UNIT,
-            "Coat Weight": UNIT,
-            "Coat Roughness": ROUGH,
-            "Coat IOR": (1.001, 4.0),
-            "Coat Tint": UNIT,
         },
+        coat={"Coat IOR": (1.001, 4.0), "Coat Tint": UNIT},
+        tint={"Specular Tint": UNIT},
+        rough={"Roughness": ROUGH},
         brushed={"Anisotropic": UNIT, "Anisotropic Rotation": (-1.0, 2.0)},
-        clear={"Transmission Weight": UNIT},
         film={"Thin Film IOR": (1.001, 3.0), "Thin Film Thickness": (10.0, 2000.0)},
         coat_eta=True,
         coat_colour=True,
         coat_depth=True,
         turned=True,
         pane=True,
-        metal="Metallic",
         colour="Base Color",
         roughness="Roughness",
     ),
@@ -278,18 +266,13 @@ TARGETS: dict[str, Target] = {
         principled.PARAMETERS,
         principled.value,
         _principled,
-        always={
-            "base_color": UNIT,
-            "metallic": UNIT,
-            "roughness": ROUGH,
-            "eta": (1.001, 4.0),
-            "spec_tint": UNIT,
-            "clearcoat": UNIT,
-            "clearcoat_gloss": UNIT,
-            "flatness": UNIT,
-        },
+        metal="metallic",
+        clear="spec_trans",
+        base={"base_color": UNIT, "eta": (1.001, 4.0), "flatness": UNIT},
+        coat={"clearcoat": UNIT, "clearcoat_gloss": UNIT},
+        tint={"spec_tint": UNIT},
+        rough={"roughness": ROUGH},
         brushed={"anisotropic": UNIT},
-        clear={"spec_trans": UNIT},
         film={},
     ),
 }
