@@ -224,7 +224,7 @@ def _code(node: str) -> tuple[str, dict[str, Any]]:
     ):
         code, count = re.subn(pattern, instead, code)
         assert count, pattern
-    inputs = made.getNodeDef(f"ND_{node}_surfaceshader").getInputs()
+    inputs = made.getNodeDef(f"ND_{node}_surfaceshader").getActiveInputs()
     defaults = {each.getName(): _numbers(each) for each in inputs}
     return code, defaults
 

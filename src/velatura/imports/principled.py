@@ -22,7 +22,7 @@ from velatura.targets.parameters import Parameter
 
 PARAMETERS = (*principled.PARAMETERS, Parameter("specular", 0.5))
 RATES = ("diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate")
-COAT = 1.5  # index of a clearcoat, of which a quarter is reflected (Burley 2012)
+COAT = 1.5  # index of a clearcoat, whose reflectance at the normal the plugin has
 
 
 def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) -> Imported:
@@ -61,7 +61,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
         albedo=albedo,
         tint=tint,
         by_sight=True,
-        coat=coated(notes, "clearcoat", 0.25 * given.number("clearcoat"), Coat(COAT, (blur, blur))),
+        coat=coated(notes, "clearcoat", given.number("clearcoat"), Coat(COAT, (blur, blur))),
     )
     given.leave("sheen", FIBRES)
     given.leave("flatness", LAMBERTIAN)
