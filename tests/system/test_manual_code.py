@@ -269,8 +269,10 @@ def carry_out(command: list[str], page: str, run: Run) -> None:
 
 
 def parse(text: str, folder: Path) -> None:
-    """Read a block as the file that it is: a target, a plan, a material, or layers of one."""
-    path = folder / "block.yaml"
+    """Read a block as the file that it is: a target, a plan, a material, or layers of one; and keep it under the name
+    that stands in its first line."""
+    named = re.match(r"# (\S+\.yaml)$", text, re.MULTILINE)
+    path = folder / (named[1] if named else "block.yaml")
     path.write_text(text if not text.startswith("-") else f"layers:\n{text}")
     keys = yaml.safe_load(path.read_text()).keys()
     if "lobes" in keys:
