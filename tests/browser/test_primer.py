@@ -48,7 +48,7 @@ def page(opened: Any) -> Any:
 
 
 def test_the_formulas_are_those_of_the_package(primer: ModuleType) -> None:
-    assert primer.DATA.read_text(encoding="utf-8") == primer.text()
+    assert primer.DATA.read_text(encoding="utf-8") == primer.text(), "run `python tools/primer.py`"
 
 
 @pytest.mark.parametrize("case", CASES)
