@@ -121,6 +121,23 @@ def test_no_light_is_gained_between_the_nodes_about_critical_angles() -> None:
         assert np.all(weight.mean(axis=-1) < 1.02 + 4 * weight.std(axis=-1) / np.sqrt(SAMPLES)), cosine
 
 
+@pytest.mark.parametrize(
+    ("etas", "alpha", "off"),
+    [([1.5], 0.01, 0.01), ([1.5], 0.03, 0.01), ([1.5], (0.02, 0.04), 0.01), ([1.9, 1.6], 0.02, 0.05)],
+)
+def test_glass_keeps_all_light_between_the_nodes_about_its_critical_angle(
+    etas: list[float], alpha: float | tuple[float, float], off: float
+) -> None:
+    """From inside, beside 4 standard errors (false alarms 1 in 1000)."""
+    _, found = body(Stack([Interface(eta=eta, alpha=alpha) for eta in etas]))
+    for i, sine in enumerate(np.linspace(0.95, 1.06, 12) / etas[-1]):
+        x, y, z = from_cosine(np.sqrt(1 - sine**2))
+        wi = x, y, -z
+        value, density = found.eval_pdf(wi, found.sample(wi, *uniform(i))[0], POWER)
+        weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0)[0]
+        assert abs(weight.mean() - 1) < off + 4 * weight.std() / np.sqrt(SAMPLES), sine
+
+
 @pytest.mark.parametrize("base", [Interface(eta=0.2, k=3.5, alpha=0.6), Interface(eta=1.2, alpha=0.6)])
 def test_densities_integrate_to_one_at_most(base: Interface) -> None:
     """Over uniform directions, within 4.5 standard errors; samples that leave below the horizon are lost."""

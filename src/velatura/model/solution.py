@@ -364,12 +364,8 @@ class Solver:
         light = np.sum([side.rows[k : k + self.colours] for k, _ in side.light], axis=0)
         rows = self.grid.spread(np.concatenate([side.rows, light, side.columns.chance[None]]), self.shape)
         rows, whole, left = np.split(rows, [-1 - self.colours, -1])
-        for shape, place, weight, roughness in zip(
-            side.edged, side.weights, side.columns.weights, side.columns.roughness
-        ):
-            if shape:
-                there = slice(place, place + self.colours)
-                rows[there] = self._between(shape, weight, roughness, rows[there])
+        if any(side.edged):
+            self._lobes_between(rows, side)
         self._scale_energies(rows, side, whole)
         if side.passage:
             self._pass_between(rows, side.passage, *side.light[-1])
@@ -414,18 +410,31 @@ class Solver:
             for each in group:
                 rows[each] *= share * rest if group in coloured else share
 
-    def _between(self, shape: Shape, weight: Array, roughness: Sequence[Array], spread: Array) -> Array:
-        """Weights (C, prod(shape)) of a lobe with the light that is interpolated, instead of weights that are `spread`;
-        none is larger than at the nodes."""
+    def _lobes_between(self, rows: Array, side: SolvedSide) -> None:
+        """With weights of lobes whose integrals have edges between directions, as near to the light that is
+        interpolated as those at the nodes beside allow. What one lobe has too much of, or lacks, is left to others."""
+        wi = directional_grid.directions(self.shape, None)
+        found = []
+        for shape, place, weight, roughness in zip(
+            side.edged, side.weights, side.columns.weights, side.columns.roughness
+        ):
+            if shape:
+                at_nodes = self._integral(shape, roughness, self.grid.directions)
+                z = self._integral(shape, [self.grid.spread(x[None], self.shape)[0] for x in roughness], wi)
+                light = self.grid.spread(weight * at_nodes, self.shape)
+                ends = self.grid.beside(weight, self.shape)
+                there = slice(place, place + self.colours)
+                rows[there] = np.clip(np.where(z > FAINT, light / np.maximum(z, FAINT), rows[there]), *ends)
+                found.append((there, z, light, ends))
+        lacks = sum(light - rows[there] * z for there, z, light, _ in found)
+        rooms = [np.where(lacks > 0, high - rows[there], rows[there] - low) for there, _, _, (low, high) in found]
+        share = np.clip(ops.divide(lacks, sum(z * room for (_, z, *_), room in zip(found, rooms))), -1, 1)
+        for (there, *_), room in zip(found, rooms):
+            rows[there] += share * room
 
-        def integral(numbers: Sequence[Array], wi: Direction) -> Array:
-            lobe = shape.lobe(1.0, self.kind(*numbers).roughness(ROOTS))
-            return own_medium.integrals(lobe, wi, BETWEEN[self.isotropic])[0]
-
-        light = self.grid.spread(weight * integral(roughness, self.grid.directions), self.shape)
-        there = [self.grid.spread(x[None], self.shape)[0] for x in roughness]
-        z = integral(there, directional_grid.directions(self.shape, None))
-        return np.where(z > FAINT, np.minimum(light / np.maximum(z, FAINT), weight.max(axis=-1, keepdims=True)), spread)
+    def _integral(self, shape: Shape, numbers: Sequence[Array], wi: Direction) -> Array:
+        lobe = shape.lobe(1.0, self.kind(*numbers).roughness(ROOTS))
+        return own_medium.integrals(lobe, wi, BETWEEN[self.isotropic])[0]
 
     def _colours(self, values: Array) -> Array:
         return np.broadcast_to(values, (self.colours, np.shape(values)[-1]))

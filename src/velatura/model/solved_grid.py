@@ -92,6 +92,14 @@ class Grid:
             values = np.maximum((waves @ np.exp(2j * order[:, None] * phi)).real, np.minimum(least, 0))
         return self.along(values.swapaxes(-1, -2), shape[0]).swapaxes(-1, -2).reshape(*rows.shape[:-1], -1)
 
+    def beside(self, rows: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
+        """The lesser and the greater of the values at the two cosines beside each place of `spread`, of its shape."""
+        values = self.spread(rows, (self.cosines, *shape[1:])).reshape(*rows.shape[:-1], self.cosines, -1)
+        cell = np.minimum(np.linspace(0, self.cosines - 1, shape[0]).astype(int), self.cosines - 2)
+        ends = values[..., cell, :], values[..., cell + 1, :]
+        low, high = (each(*ends).reshape(*rows.shape[:-1], -1) for each in (np.minimum, np.maximum))
+        return low, high
+
     def along(self, values: Array, count: int) -> Array:
         """Values at the cosines, (..., cosines), interpolated by splines at as many places."""
         with np.errstate(over="ignore"):  # of inverse slopes, where values are hardly above 0
