@@ -1,4 +1,4 @@
-"""All code of the manual and the README runs as it is printed.
+"""All code of the manual, its gallery and the README runs as it is printed.
 
 Rationale: what a page prints is copied. The Python of a page runs in its order and in one namespace, its commands in
 this process, both in a folder with the files that the page takes for granted. Pictures and samples are few here,
@@ -40,8 +40,10 @@ from velatura.sweeps import run as sweeping
 Run = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[2]
 PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
-BLOCK = re.compile(r"^( *)```([\w{}-]*)[^\n]*\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^( *)(?:```|~~~)([\w{}-]*)[^\n]*\n(.*?)^ *(?:```|~~~)$", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^(velatura|make|pip|python) ", re.MULTILINE)
+
+SCRIPTS = sorted((ROOT / "docs" / "examples").glob("*.py"))
 
 # A model that solves no energies, in place of the default one where that would take minutes
 QUICK = "bati2021"
@@ -60,6 +62,12 @@ OTHERS = {
     "text": "it is output",
     "glsl": "tests/system/test_engines.py runs it",
     "js": "tests/browser/test_shader.py runs it",
+}
+# Scripts of the gallery that are not run here, and the tests that run them
+RUN_ELSEWHERE = {
+    "coats.py": "tests/system/test_sweeps.py",
+    "recover.py": "tests/system/test_in_mitsuba.py",
+    "recover_texture.py": "tests/system/test_in_mitsuba.py",
 }
 
 
@@ -283,6 +291,20 @@ def parse(text: str, folder: Path) -> None:
         vt.load(path)
 
 
+@pytest.mark.parametrize(
+    "script", [path for path in SCRIPTS if path.name not in RUN_ELSEWHERE], ids=lambda path: path.stem
+)
+def test_a_script_of_the_gallery_runs(
+    script: Path, cheap: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In pictures of the size that it asks for, which it may put together."""
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(api, "render", with_less(inspect.unwrap(api.render), spp=2))
+    runpy.run_path(str(script), run_name="__main__")
+    pyplot.close("all")
+
+
 def test_commands_in_sentences_exist() -> None:
     said = [
         (page, command)
@@ -310,3 +332,5 @@ def test_all_exceptions_are_needed() -> None:
     assert [known for known in ELSEWHERE if not any(command.startswith(known) for command in said)] == []
     assert set(OTHERS) <= {language for page in PAGES for language, _ in blocks(page)}
     assert set(FILES) <= set(PAGES)
+    for script, test in RUN_ELSEWHERE.items():
+        assert f'"{script}"' in (ROOT / test).read_text(encoding="utf-8")
