@@ -20,6 +20,7 @@ AXE = ROOT / "tests" / "page" / "node_modules" / "axe-core" / "axe.min.js"
 PAGES = sorted(path for path in SITE.rglob("*.html") if path.relative_to(SITE).parts[0] not in ("try", "_static"))
 KINDS = (
     "index.html",
+    "explanation/films.html",
     "explanation/model.html",
     "explanation/primer.html",
     "gallery/films.html",
@@ -111,7 +112,8 @@ def test_the_first_page_is_light(opened: Any, address: str) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("name", KINDS)
 def test_a_page_is_accessible_and_asks_no_other_machine(opened: Any, address: str, name: str, scheme: str) -> None:
-    """Expected: axe-core finds nothing serious, the console has no errors, and all requests go to the site."""
+    """Expected: axe-core finds nothing serious, the console has no errors, all requests go to the site, and every
+    formula can be set."""
     context = opened.new_context(viewport={"width": 1300, "height": 900}, color_scheme=scheme)
     page = context.new_page()
     asked, said = set(), []
@@ -120,8 +122,9 @@ def test_a_page_is_accessible_and_asks_no_other_machine(opened: Any, address: st
     page.goto(address + name, wait_until="networkidle")
     page.add_script_tag(path=AXE)
     found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+    formulas = page.locator("[data-mml-node='merror']").all_text_contents()
     context.close()
     worst = [each for each in found["violations"] if each["impact"] in ("serious", "critical")]
     assert [f"{each['id']}: {node['html'][:200]}" for each in worst for node in each["nodes"]] == []
     assert [url for url in asked if not url.startswith((address, "data:", "blob:"))] == []
-    assert said == []
+    assert said == [] and formulas == []
