@@ -69,6 +69,7 @@ class ExampleOrder:
 def setup(app: Any) -> dict[str, bool]:
     app.setup_extension("sphinx.ext.autodoc")
     app.connect("builder-inited", _forget_old_examples, priority=100)  # before the gallery
+    app.connect("builder-inited", forget_old_pages, priority=100)  # before autosummary
     app.connect("source-read", _on_source_read)
     app.connect("autodoc-process-signature", _on_signature)
     app.connect("autodoc-process-docstring", _on_docstring)
@@ -94,6 +95,16 @@ def _forget_old_examples(app: Any) -> None:
         shutil.rmtree(gallery, ignore_errors=True)
         gallery.mkdir()
         stamp.write_text(digest.hexdigest())
+
+
+def forget_old_pages(app: Any) -> None:
+    """Remove generated pages of names that the reference no longer lists: one outside every table of contents ends a
+    strict build."""
+    reference = DOCS / "reference"
+    listed = re.findall(r"^   (velatura\.\S+)$", (reference / "api.rst").read_text(), re.MULTILINE)
+    for page in (reference / "api").glob("*.rst"):
+        if page.stem not in listed:
+            page.unlink()
 
 
 def _on_signature(app: Any, what: str, name: str, item: Any, *_: Any) -> tuple[str, str] | None:

@@ -65,6 +65,19 @@ def test_an_unknown_placeholder_ends_the_build(example: ModuleType, placeholder:
         example.replaced(f"{{{{{placeholder}}}}}")
 
 
+def test_generated_pages_of_names_that_are_gone_are_removed(
+    hooks: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages = tmp_path / "reference" / "api"
+    pages.mkdir(parents=True)
+    (pages.parent / "api.rst").write_text(".. autosummary::\n\n   velatura.lobes\n")
+    for name in ("velatura.lobes", "velatura.gone"):
+        (pages / f"{name}.rst").touch()
+    monkeypatch.setattr(hooks, "DOCS", tmp_path)
+    hooks.forget_old_pages(None)
+    assert [page.stem for page in pages.iterdir()] == ["velatura.lobes"]
+
+
 def test_every_placeholder_of_the_page_of_figures_resolves(hooks: ModuleType) -> None:
     page = (ROOT / "docs" / "reference" / "figures.md").read_text()
     assert "{{" not in hooks.replaced(page)
