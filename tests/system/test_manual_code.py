@@ -244,6 +244,7 @@ def test_the_code_of_a_page_runs(
     monkeypatch.chdir(tmp_path)
     FILES.get(page, lambda folder: None)(tmp_path)
     names: dict[str, Any] = {}
+    printed = ""
     for language, text in blocks(page):
         if language == "python":
             with warnings.catch_warnings():
@@ -252,7 +253,7 @@ def test_the_code_of_a_page_runs(
         elif language == "sh":
             for command in commands(text):
                 if not any(" ".join(command).startswith(known) for known in ELSEWHERE):
-                    carry_out(command, page, run)
+                    printed += carry_out(command, page, run)
         elif language == "yaml":
             parse(text, tmp_path)
         elif language == "xml" and text.startswith("<?xml"):
@@ -263,17 +264,20 @@ def test_the_code_of_a_page_runs(
         else:
             assert language in OTHERS, f"{page}: a language that no test runs: {language or text}"
             assert language != "text" or not COMMAND.search(text), f"{page}: commands need a block of sh: {text}"
+            if text.startswith("┃"):  # rows of a table that a command above has printed
+                assert [row for row in text.splitlines() if row not in printed] == []
 
 
-def carry_out(command: list[str], page: str, run: Run) -> None:
-    """Run a command of Velatura, or a script in the current folder."""
+def carry_out(command: list[str], page: str, run: Run) -> str:
+    """Run a command of Velatura, or a script in the current folder. Returns what the former prints."""
     program, *words = command
     if program == "python" and Path(words[0]).exists():
         runpy.run_path(words[0])
-        return
+        return ""
     assert program == "velatura", f"{page}: neither run nor excepted: {' '.join(command)}"
-    status, _, err = run(*words)
+    status, out, err = run(*words)
     assert status == 0, f"{page}: {' '.join(command)}: {err}"
+    return out
 
 
 def parse(text: str, folder: Path) -> None:
