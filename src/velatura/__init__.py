@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from velatura.editor.widget import Editor as Editor
     from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
     from velatura.exports import export
-    from velatura.imports import from_openpbr
+    from velatura.imports import from_gltf, from_openpbr, from_principled, from_standard_surface
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Film, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
     from velatura.sweeps import Axis, Space, sweep
@@ -41,7 +41,7 @@ _HOMES = {
     "velatura.editor.widget": ("Editor",),
     "velatura.errors": ("InvalidInput", "LawBroken", "MissingTool", "NoSolution", "VelaturaError"),
     "velatura.exports": ("export",),
-    "velatura.imports": ("from_openpbr",),
+    "velatura.imports": ("from_gltf", "from_openpbr", "from_principled", "from_standard_surface"),
     "velatura.model": ("MODELS", "Model"),
     "velatura.stack": (
         "Diffuse",
@@ -82,7 +82,10 @@ __all__ = [
     "check",
     "compare",
     "export",
+    "from_gltf",
     "from_openpbr",
+    "from_principled",
+    "from_standard_surface",
     "load",
     "lobes",
     "preset",

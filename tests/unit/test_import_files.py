@@ -224,7 +224,13 @@ def test_other_documents_are_refused_in_one_line(write: Write, kind: str) -> Non
     assert message in refusal(lambda: imports.read(path)) and str(path) in refusal(lambda: vt.load(path))
 
 
-def test_a_cycle_of_nodes_is_left_out(write: Write) -> None:
+def test_cycles_are_left_out(write: Write) -> None:
+    """Expected: of nodes, and of an image's file that is an input of its own graph."""
+    graph = """<nodegraph name="G"><input name="file" type="filename" interfacename="file"/>
+      <image name="i" type="color3"><input name="file" type="filename" interfacename="file"/></image>
+      <output name="o" type="color3" nodename="i"/></nodegraph>"""
+    found = imports.read(write("a.mtlx", document(graph + node(connected("base_color", "o", "color3")))))
+    assert "the node i (image) names no file" in str(found.left[0])
     found = imports.read(write("a.mtlx", document(LOOP + node(connected("coat_weight", "half_out")))))
     assert str(found.left[0]) == "coat_weight G: a cycle of nodes; its default stands for it"
 
@@ -317,11 +323,21 @@ def test_materials_of_gltf_are_read(write: Write, tmp_path: Path, ending: str) -
         ("a.gltf", '{"asset": {}}', "has no material that is read here"),
         ("a.gltf", '{"asset": {}, "materials": 3}', "materials: must be a list, got 3"),
         ("a.gltf", '{"asset": {}, "materials": [3]}', "material 0: must hold keys and values, got 3"),
-        ("a.gltf", '{"asset": {}, "materials": [{"extensions": 3}]}', "is no material of glTF"),
+        ("a.gltf", '{"asset": {}, "materials": [{"extensions": 3}]}', "extensions: must hold keys and values, got 3"),
+        (
+            "a.gltf",
+            '{"asset": {}, "materials": [{"extensions": {"KHR_materials_ior": 2}}]}',
+            "KHR_materials_ior: must hold keys and values, got 2",
+        ),
+        (
+            "a.gltf",
+            '{"asset": {}, "materials": [{"emissiveFactor": ["x"]}]}',
+            "emissiveFactor: must be a number or [r, g, b]",
+        ),
         (
             "a.gltf",
             '{"asset": {}, "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 4}}}]}',
-            "is no material of glTF",
+            "textures: has no image of index 4",
         ),
         (
             "a.gltf",

@@ -97,12 +97,14 @@ def from_gltf(material: Mapping[str, Any]) -> Imported:
     """
     from velatura.imports.gltf_file import of_material
 
+    if not isinstance(material, Mapping):
+        raise InvalidInput(f"a material of glTF must hold its keys and values, got {show(material)}")
     try:
         return of_material(material, str(material.get("name", "")), Notes(), lambda _: "without a file")
-    except InvalidInput:
-        raise
-    except (AttributeError, KeyError, IndexError, TypeError, ValueError):
-        raise InvalidInput(f"a material of glTF must hold its keys and values, got {show(material)}") from None
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
+        if isinstance(error, InvalidInput):
+            raise
+        raise InvalidInput(f"{show(material)} is no material of glTF: {error}") from None
 
 
 def from_principled(described: Mapping[str, Any]) -> Imported:

@@ -15,6 +15,7 @@ from velatura.errors import InvalidInput
 from velatura.imports import gltf
 from velatura.imports.file import content
 from velatura.imports.result import Imported, Notes, shown
+from velatura.imports.surface import INDICES
 from velatura.imports.values import changed
 from velatura.stack import Texture, loads
 from velatura.stack.schema import show
@@ -96,23 +97,26 @@ def of_material(
     if held is not None:
         notes.add("extras", embedded.KEY, embedded.READ)
         return Imported(loads(json.dumps(held), "the stack in extras.json", folder), tuple(notes.left))
-    extensions = dict(material.get("extensions", {}))
-    parts = {"pbrMetallicRoughness": material.get("pbrMetallicRoughness", {}), **extensions}
+    extensions = _holding(material.get("extensions", {}), "extensions")
+    core = "pbrMetallicRoughness"
+    parts = {name: _holding(part, name) for name, part in {core: material.get(core, {}), **extensions}.items()}
     values: dict[str, Any] = {}
 
     # Factors, by the parts that they stand in
     for factor in FACTORS:
         if factor.name in parts.get(factor.within, {}):
             given = parts[factor.within][factor.name]
-            values[factor.name] = given[:3] if factor.is_colour else given
+            values[factor.name] = given[:3] if factor.is_colour and isinstance(given, list | tuple) else given
     for part, factor_name in _OTHERS.items():
         if factor_name in parts.get(part, {}):
             values[factor_name] = parts[part][factor_name]
-    if values.get("ior") == 0:  # stands for an infinite one
-        values["ior"] = 1e3
+    if values.get("ior") == 0:
+        notes.add("ior", 0.0, f"an infinite index: {INDICES[1]:g} stands for it")
+        values["ior"] = INDICES[1]
     strength = parts.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
     if any(material.get("emissiveFactor", ())):
-        values["emissiveFactor"] = [strength * part for part in material["emissiveFactor"]]
+        emitted = material["emissiveFactor"]
+        values["emissiveFactor"] = [strength * part for part in emitted] if strength != 1 else emitted
 
     # Images, times their factors
     defaults = {each.name: each.default for each in gltf.PARAMETERS}
@@ -122,7 +126,7 @@ def of_material(
             continue
         factor = values.get(factor_name, defaults[factor_name])
         least = values.get("iridescenceThicknessMinimum", 100.0) if key == _THICKNESS[1] else 0.0
-        texture = _texture(reference, channel, key, notes, find)
+        texture = _texture(_holding(reference, key), channel, key, notes, find)
         if texture is not None:
             values[factor_name] = _scaled(texture, factor, float(least), factor_name, notes)
     for key in gltf.IGNORED:
@@ -139,6 +143,13 @@ def of_material(
     for part in sorted(set(extensions) - known):
         notes.add(part, "", "not read")
     return gltf.read(values, name, notes)
+
+
+def _holding(part: object, name: str) -> Mapping[str, Any]:
+    """A part of a material, or its extensions, if it holds keys and values."""
+    if not isinstance(part, Mapping):
+        raise InvalidInput(f"{name}: must hold keys and values, got {show(part)}")
+    return part
 
 
 def _texture(
@@ -168,10 +179,13 @@ def _scaled(texture: Texture, factor: Any, least: float, name: str, notes: Notes
 
 
 def _file(reference: Mapping[str, Any], path: Path, document: Mapping[str, Any]) -> Path | str:
-    texture = document["textures"][reference["index"]]
+    try:
+        texture = document["textures"][reference["index"]]
+        uri = document["images"][texture["source"]].get("uri") if "source" in texture else ""
+    except (AttributeError, KeyError, IndexError, TypeError):
+        raise InvalidInput(f"textures: has no image of index {show(reference.get('index'))}") from None
     if "source" not in texture:
         return "in a format of an extension"
-    uri = document["images"][texture["source"]].get("uri")
     if uri is None or uri.startswith("data:"):
         return "inside the file"
     return path.parent / unquote(uri)

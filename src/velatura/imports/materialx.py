@@ -276,9 +276,10 @@ def _channel(node: Element, value: Value, inputs: Mapping[str, Element], output:
 
 def _image(node: Element, inputs: Mapping[str, Element], parameter: str, notes: Notes) -> Texture:
     file = inputs.get("file")
-    while file is not None and file.get("interfacename"):
-        file = _graph(file).child("input", file.get("interfacename") or "")
-    if file is None or not file.get("value"):
+    for _ in range(DEEPEST):
+        if file is not None and file.get("interfacename"):
+            file = _graph(file).child("input", file.get("interfacename") or "")
+    if file is None or file.get("interfacename") or not file.get("value"):
         raise _Unread(f"the node {node.name} ({node.tag}) names no file")
     prefix = "".join(reversed([each.get("fileprefix") or "" for each in file.outwards()]))
     name = (prefix + (file.get("value") or "")).replace("\\", "/")

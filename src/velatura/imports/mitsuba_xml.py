@@ -54,6 +54,8 @@ def of_dict(described: Mapping[str, Any], notes: Notes) -> Imported:
     Raises:
         InvalidInput: a plugin of another type, an unknown parameter, or a value of another kind.
     """
+    if not isinstance(described, Mapping):
+        raise InvalidInput(f"principled: must be described by keys and values, got {show(described)}")
     if described.get("type", "principled") != "principled":
         raise InvalidInput(f"type: must be principled, got {show(described['type'])}")
     values: dict[str, Any] = {}

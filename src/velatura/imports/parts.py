@@ -28,7 +28,11 @@ UNDISPERSED = "all colours are refracted alike"
 
 def index(given: Given, name: str) -> float:
     """An index, within what stacks take."""
-    return float(np.clip(given.number(name), *INDICES))
+    value = given.number(name)
+    kept = float(np.clip(value, *INDICES))
+    if kept != value:
+        given.notes.add(name, value, f"outside {INDICES[0]:g} to {INDICES[1]:g}: the end stands for it")
+    return kept
 
 
 def alphas(roughness: Value, of: Callable[[Array], tuple[Array, Array]]) -> tuple[Value, Value]:
