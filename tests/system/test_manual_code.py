@@ -309,23 +309,39 @@ def test_a_script_of_the_gallery_runs(
     pyplot.close("all")
 
 
+def sentences(command: str) -> list[tuple[str, str, str]]:
+    """What stands outside blocks between backticks: the page, and both groups of a pattern."""
+    found = []
+    for page in PAGES:
+        text = BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8"))
+        found += [(page, *groups) for groups in re.findall(f"`{command}`", text.replace("\n", " "))]
+    return found
+
+
 def test_commands_in_sentences_exist() -> None:
-    said = [
-        (page, command)
-        for page in PAGES
-        for command in re.findall(r"`velatura ([^`]+)`", BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8")))
-    ]
+    said = sentences(r"(velatura) ([^`]+)")
     assert len(said) > 20
-    for page, command in said:
+    for page, _, command in said:
         words = shlex.split(command)
         verb = typer.main.get_command(app)
         while words and hasattr(verb, "commands"):
             assert words[0] in verb.commands, f"{page}: no such verb: velatura {command}"
             verb = verb.commands[words.pop(0)]
         options = {name for parameter in verb.params for name in parameter.opts}
-        assert {word for word in words if word.startswith("-")} <= options, (
-            f"{page}: no such option: velatura {command}"
-        )
+        unknown = {word for word in words if word.startswith("-")} - options
+        assert not unknown, f"{page}: no such option: velatura {command}"
+
+
+def test_programs_in_sentences_exist() -> None:
+    said = sentences(r"(?:python )?((?:benchmarks|tools)/\w+\.py)([^`]*)")
+    assert len(said) > 20
+    for page, program, words in said:
+        source = (ROOT / program).read_text(encoding="utf-8")
+        for option in re.findall(r"--[\w-]+", words):
+            assert f'"{option}"' in source, f"{page}: no such option: {program} {option}"
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    for page, target, _ in sentences(r"make ([a-z-]+)()"):
+        assert target in targets, f"{page}: make {target}"
 
 
 def test_all_exceptions_are_needed() -> None:
