@@ -96,6 +96,8 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
         InvalidInput: not a valid material, an unknown target, model or switch, an image that cannot be read.
         MissingTool: there are textures, and LLVM is missing or too old.
     """
+    from threadpoolctl import threadpool_limits
+
     if target not in TARGETS:
         raise InvalidInput(unknown("target", target, TARGETS))
     chosen, stack, kind = named(model, **switches), load(material), TARGETS[target]
@@ -104,7 +106,8 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
     azimuths = np.radians(AZIMUTHS if described.brushed else AZIMUTHS[:1])
     cosines, turns = (x.ravel() for x in np.meshgrid(FITTED, azimuths))
     sampled = Sampled.of(described, chosen, directions(cosines, turns), NODES)
-    values = _fitted(kind, described, sampled)
+    with threadpool_limits(1, "blas"):  # matrices are so small that threads wait for each other
+        values = _fitted(kind, described, sampled)
 
     varying = dict(carried(stack, found, kind, values))
     left = [f"{name}: {what}" for name, what in varying.items() if isinstance(what, str)]
