@@ -60,6 +60,14 @@ def test_a_dielectric_over_paint_is_held_by_all(baked: Bake) -> None:
         assert np.all((value >= each.low) & (value <= each.high)), each.name
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_base_without_an_interface_is_its_colour(target: str) -> None:
+    """Expected: the albedo, to .01 at the normal; `principled` has its own law of diffuse light."""
+    made = bake(vt.Stack([vt.Diffuse(albedo=(0.6, 0.2, 0.1))]), target)
+    assert made.baked_albedo[:, 0] == pytest.approx(np.array([0.6, 0.2, 0.1]), abs=0.01)
+    assert made.total_variation.max() < 0.03
+
+
 def test_bare_metal_is_what_a_target_that_compensates_has() -> None:
     """Expected: one lobe of the true roughness and colour, to a hundredth."""
     made = bake(vt.Stack([vt.Interface(conductor="Au", alpha=0.2)]), "openpbr")

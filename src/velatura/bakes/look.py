@@ -20,6 +20,7 @@ Array: TypeAlias = NDArray[np.floating]
 Pair: TypeAlias = tuple[float, float]
 
 SAME = 1e-6  # of roughnesses
+NO_FACETS = (0.25, 0.25)  # alpha where nothing reflects by it
 CLEAR: RGB = (1.0, 1.0, 1.0)
 
 
@@ -106,8 +107,11 @@ def _looks(material: Material, seen: StackLobes) -> Iterator[Look]:
     energy = np.array([each[:, 0] for each in seen.energy]).clip(0)  # (lobes, 3)
     remainder = seen.remainder[:, 0].clip(0)
     interfaces = list(material.interfaces)
-    first = interfaces[0]
+    if not interfaces:
+        yield Look(_rgb(remainder), 0.0, NO_FACETS, 0.0, 1.0)
+        return
 
+    first = interfaces[0]
     film = _film(interfaces)
     all_light = energy.sum(axis=0) + remainder
     eta_1 = float(np.mean(first.eta / material.exterior)) if first.kind == "dielectric" else 1.0

@@ -121,6 +121,7 @@ def _gltf(look: Look) -> dict[str, float | RGB]:
         "anisotropyStrength": float(np.sqrt(np.clip((u - v) / max(1 - v, 1e-6), 0, 1))),
         "anisotropyRotation": look.turn,
         "ior": look.eta if look.metalness < 1 else 1.5,
+        "specularFactor": 0.0 if look.eta == 1 and not (look.metalness or look.clear) else 1.0,
         "transmissionFactor": look.clear,
     }
     if look.coat_eta > 1:
