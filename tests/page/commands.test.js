@@ -303,13 +303,13 @@ test('films are added below the others, changed, moved and removed', () => {
   assert.deepEqual(documentOf(state), MATERIAL, 'no films are no key');
 });
 
-test('films stay on a dielectric, and none lies on a mirror', () => {
+test('films stay on an interface that becomes a dielectric, a metal of its own or a mirror', () => {
   const film = { eta: 2, k: 0.1, thickness_nm: 250 };
   const coated = commands.addFilm(opened(), 3, film);
   const become = (variant) => commands.setVariant(coated, 3, variant, NAMES, FRESH).layers[2].keys.films;
   assert.deepEqual(become('custom'), [film]);
   assert.deepEqual(become('dielectric'), [film]);
-  assert.equal(become('mirror'), undefined);
+  assert.deepEqual(become('mirror'), [film]);
 });
 
 test('code depends on whether there are films, and whether any absorbs, and on nothing else about them', () => {
