@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from materialx import document, generated
 
 import velatura as vt
 from velatura import kernel
@@ -190,6 +191,13 @@ def test_materialx_has_a_material_with_known_inputs(files) -> None:
     assert {each.get("name") for each in surface} <= known | {"geometry_thin_walled"}
     (shader,) = root.findall("surfacematerial/input")
     assert shader.get("nodename") == surface.get("name")
+
+
+def test_materialx_generates_code_of_images_and_turned_brushing(painted: vt.Stack) -> None:
+    """Expected: a valid document, whose code takes the turned tangent, or reads the images."""
+    brushed = vt.Stack([vt.Interface(conductor="Al", alpha=(0.1, 0.3), rotation=20)])
+    for stack, part in ((brushed, "mx_rotate_vector3("), (painted, "base_color_image")):
+        assert part in generated(document(vt.export(stack, "openpbr").text), "glsl")
 
 
 def test_blender_runs_the_script(files, monkeypatch) -> None:
