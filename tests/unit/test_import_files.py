@@ -159,6 +159,15 @@ def test_other_surfaces_of_materialx_are_read(write: Write, tag: str, inputs: st
     assert found.stack.layers == expected().stack.layers
 
 
+def test_the_gloss_of_materialx_is_roughness(write: Write) -> None:
+    """Expected: alpha is the square of 1 - gloss (`disney_principled.mtlx`); what Mitsuba's has not is listed."""
+    for gloss, alpha, left in ((0.8, 0.04, []), (0.5, 0.1, ["clearcoat_gloss"])):
+        inputs = number("clearcoat", 1) + number("clearcoatGloss", gloss)
+        found = imports.read(write("a.mtlx", document(node(inputs, tag="disney_principled"))))
+        assert found.stack.interfaces[0].alpha == pytest.approx(alpha, rel=1e-4)
+        assert [each.parameter for each in found.left] == left
+
+
 def test_turned_tangents_are_rotations(write: Write) -> None:
     """Expected: of what turns the tangent of the surface; other vectors are listed."""
     nodes = """<tangent name="t" type="vector3"/><bitangent name="b" type="vector3"/>

@@ -157,11 +157,12 @@ def _clear(seen: StackLobes, eta_1: float, film: Pair | None) -> Iterator[Look]:
     tint = _rgb(seen.passed[:, 0] / np.maximum(1 - energy.sum(axis=0), 1e-3))
     alpha, turn = _along(seen, int(np.argmax(energy.mean(axis=1))))
     one = Look(tint, 0.0, alpha, turn, _index_of(float(energy.sum(axis=0).mean())), clear=1.0, tint=tint, film=film)
-    if len(energy) < 3:
+    passed = seen.transmitted if len(energy) > 1 else None
+    if len(energy) < 3 or not passed:
         yield one
         yield replace(one, eta=1.0)
-    if len(energy) > 1 and seen.transmitted:
-        u, v = (float(x) for x in seen.transmitted.alpha[:, 0])
+    if passed:
+        u, v = (float(x) for x in passed.alpha[:, 0])
         below = _index_of(float(energy[1:].sum(axis=0).mean()))
         coat_alpha, coat_turn = _along(seen, 0)
         yield replace(

@@ -15,6 +15,7 @@ from velatura.imports.values import Value, changed, colour, linear
 from velatura.imports.xml import Element
 from velatura.stack import Texture
 from velatura.stack.schema import show
+from velatura.targets.principled import COAT_ALPHA
 
 SHADERS = {
     "open_pbr_surface": openpbr,
@@ -146,10 +147,18 @@ def _material(element: Element, path: Path, notes: Notes) -> Imported:
         values.pop("alpha", None)
     if "eta" in values and "specular" in values:  # the node has one for what passes, and one for what is reflected
         values.pop("specular" if values.get("spec_trans") else "eta")
+    if surface.tag == "disney_principled":
+        values["clearcoat_gloss"] = changed(values["clearcoat_gloss"], _gloss)
     try:
         return source.read(values, name, notes)
     except InvalidInput as error:
         raise InvalidInput(f"{path}: material {name}: {error}") from None
+
+
+def _gloss(gloss: Any) -> Any:
+    """The gloss of Mitsuba's clearcoat that is as rough as the node's, whose roughness is what its gloss lacks."""
+    rough, smooth = COAT_ALPHA
+    return (rough - (1 - gloss) ** 2) / (rough - smooth)
 
 
 # Connections ---------------------------------------------------------------------------------------------------------

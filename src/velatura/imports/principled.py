@@ -50,7 +50,8 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
         else:
             albedo = given["base_color"]
     anisotropic = given.number("anisotropic")
-    gloss = given.number("clearcoat_gloss")
+    weight = given.number("clearcoat")
+    gloss = given.number("clearcoat_gloss") if weight else 0.0
     rough, smooth = principled.COAT_ALPHA
     blur = rough + gloss * (smooth - rough)
     surface = Surface(
@@ -61,7 +62,7 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
         albedo=albedo,
         tint=tint,
         by_sight=True,
-        coat=coated(notes, "clearcoat", given.number("clearcoat"), Coat(COAT, (blur, blur))),
+        coat=coated(notes, "clearcoat", weight, Coat(COAT, (blur, blur))),
     )
     given.leave("sheen", FIBRES)
     given.leave("flatness", LAMBERTIAN)
