@@ -168,6 +168,13 @@ def test_colours_are_those_of_a_fine_integration(
     assert np.abs(found - finely(coating, cosines)).max() < 1e-3
 
 
+def test_a_harmonic_that_a_step_and_its_half_take_for_the_mean_is_seen() -> None:
+    """Of a film of a high index on a metal, whose fifth harmonic has a hundredth of the light."""
+    coating = Coating((ColouredFilm(white(2.5335), white(0.0), 3781.08),), white(1.0), white(0.94), white(3.484))
+    for cosine in (np.array([1.0]), np.array([0.9])):
+        assert np.abs(coating.reflectance(cosine, srgb_sensitivity) - finely(coating, cosine)).max() < 1e-3
+
+
 def test_colours_of_several_films_are_those_of_a_fine_integration() -> None:
     """From either side of them; resonances between films ask for many wavelengths."""
     rng = np.random.default_rng(3)

@@ -6,7 +6,7 @@ negative somewhere, so that the most saturated colours of films lie outside; the
 
 Over the wavenumber a film's reflectance is periodic, and sensitivities are smooth and vanish at both ends. There the
 trapezoidal rule has no error but aliasing, of the harmonics that its step does not resolve. So the step starts from the
-optical thickness, and is halved until the colour stays as it is: sharp resonances need more than thickness says.
+optical thickness, and is halved until the colour stays as it is twice: sharp resonances need more than thickness says.
 """
 
 from __future__ import annotations
@@ -135,11 +135,14 @@ def integrated(
     count = _intervals(thickness_nm, PER_PERIOD)
     step = (high - low) / count
     total, whole = _summed(share, cosines, low + step * np.arange(1, count), sensitivity)
+    settled = 0
     while True:
         more, more_whole = _summed(share, cosines, low + step * (np.arange(count) + 0.5), sensitivity)
         before, total, whole = total / whole, total + more, whole + more_whole
         count, step = 2 * count, 0.5 * step
-        if np.abs(total / whole - before).max() < CONVERGED or 2 * count > FINEST:
+        settled = settled + 1 if np.abs(total / whole - before).max() < CONVERGED else 0
+        # Twice, since harmonics that a step and its half both take for the mean change nothing
+        if settled == 2 or 2 * count > FINEST:
             return np.asarray(total / whole)
 
 
