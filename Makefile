@@ -44,6 +44,7 @@ docs: .venv/ready-docs site/try/index.html ## build the manual into site/
 	@echo "The manual is $(CURDIR)/site/index.html"
 
 site/try/index.html: $(PAGE) $(SOURCES) | .venv/ready-docs
+	@mkdir -p site
 	$(BIN)/velatura edit --static site/try
 	@touch $@
 
