@@ -106,7 +106,7 @@ class PythonPrinter(Printer):
     # Programs
 
     def header(self, name: str, model: str, fixed: bool, costs: Mapping[str, Cost]) -> str:
-        return f"# {name} as the model {model} has it\n"
+        return f"# {name}, by the model {model}\n"
 
     def structs(self, structs: Sequence[Struct]) -> str:
         def member(name: str, kind: str, length: int) -> str:

@@ -79,7 +79,7 @@ def test_code_says_where_it_comes_from(run: Run, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     status, out, err = run("export", "coated-gold", "--to", "slang", "--model", "belcour2018", "--set", "tir=off")
     first, second = out.split("\n")[:2]
-    assert first == "// Coated brushed gold as the model belcour2018 (tir=off) has it; Slang."
+    assert first == "// Coated brushed gold, by the model belcour2018 (tir=off); Slang."
     assert second == f"// Velatura {vt.__version__}, 2023-11-14; SPDX-License-Identifier: BSD-3-Clause"
     assert (status, err) == (0, "not written without -o: the tables that the code reads (.tables.bin)\n")
 
@@ -166,7 +166,7 @@ def test_films_are_exported(to: str, run: Run, tmp_path: Path) -> None:
         assert found["values"]["layer1_film0_eta"] == [1.4, 1.46, 1.5]
         assert found["values"]["layer0_film0_thickness_nm"] == 200
     elif to in ("osl", "blender", "mtlx"):
-        assert "as the model velatura has it" in path.read_text()
+        assert "by the model velatura" in path.read_text()
     elif to == "python":
         assert runpy.run_path(str(path))["stack"] == stack
     else:

@@ -129,7 +129,7 @@ def test_parameters_have_defaults_labels_and_ranges() -> None:
 def test_the_header_states_model_and_loss() -> None:
     made = osl(vt.Stack([vt.Interface(eta=1.5, alpha=0.2), vt.Diffuse(albedo=0.4)], name="2nd paint"), "belcour2018")
     assert made.name == "vt_2nd_paint" and not made.turns
-    assert made.text.startswith("// 2nd paint as the model belcour2018 has it; Open Shading Language")
+    assert made.text.startswith("// 2nd paint, by the model belcour2018; Open Shading Language")
     assert re.search(r"//    cosine 0\.7: 0\.\d{3} of the light, albedo 0\.\d{4}\n", made.text)
     assert "BSDF += " in made.text and "* diffuse(shading)" in made.text
 

@@ -17,7 +17,8 @@ from velatura.model.remainder import Remainder
 from velatura.model.transport.energies import INCIDENCES, energies
 from velatura.model.transport.nodes import Nodes
 from velatura.optics import fresnel
-from velatura.shader import symbol
+from velatura.shader import record, symbol
+from velatura.shader.solved import Tabulated
 from velatura.stack import Material
 
 Array = NDArray[np.floating]
@@ -205,3 +206,13 @@ def test_all_dialects_agree() -> None:
     jit = value([llvm.Array3f(*x.tolist()) for x in numbers], [llvm.Float(x) for x in values])
     np.testing.assert_allclose(evaluate([recorded], dict(zip(names, values)))[0], known, rtol=1e-9)
     np.testing.assert_allclose(np.array(jit), known, rtol=1e-4, atol=1e-6)
+
+
+def test_columns_of_rounding_are_not_scaled_up() -> None:
+    """Smooth facets are hardly met again: what brushed metals return so at the normal is rounding, as is its part along
+    each axis. Expected: no number of the remainder exceeds that light."""
+    for alpha in np.linspace(0.02, 0.05, 7).tolist():
+        metal = Stack([Interface(eta=(0.15, 2.14, 2.47), k=(3.8, 0.55, 1.35), alpha=(alpha, 0.3 * alpha))])
+        baked = record(metal).baked
+        assert isinstance(baked, Tabulated) and baked.solved
+        assert np.abs(baked.solved.remainder).max() < 1e-4

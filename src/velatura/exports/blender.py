@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from velatura.exports.formats import Export, Request
+from velatura.exports.formats import Export, Request, headed
 from velatura.shader.osl import osl
 
 
@@ -10,7 +10,7 @@ def write(request: Request) -> Export:
     """The script; the shader is in it, and in the file that is saved by Blender."""
     made = osl(request.stack, request.model)
     name = " ".join(request.stack.name.split()) or "Velatura"
-    return Export(_SCRIPT.format(name=name, turns=made.turns, shader=made.text.replace("\\", "\\\\")))
+    return Export(_SCRIPT.format(name=name, turns=made.turns, shader=headed(made.text).replace("\\", "\\\\")))
 
 
 _SCRIPT = """\

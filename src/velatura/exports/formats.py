@@ -205,12 +205,17 @@ def xml_comment(lines: Iterable[str]) -> list[str]:
     return ["  <!--", *(f"    {line.replace('--', '- -')}" for line in lines), "  -->"]
 
 
-def headed(text: str) -> str:
-    """Code that says below its first line by what it was written, when, and under which licence it may be used.
+def origin() -> str:
+    """The version that writes code, the date, and the licence under which the code may be used.
 
     The date is today, or that of the environment's SOURCE_DATE_EPOCH.
     """
     seconds = os.environ.get("SOURCE_DATE_EPOCH")
     day = datetime.fromtimestamp(int(seconds) if seconds else time.time(), timezone.utc)
+    return f"Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}"
+
+
+def headed(text: str) -> str:
+    """Code of a shader with its origin, in a comment below the first line."""
     first, _, rest = text.partition("\n")
-    return f"{first}\n// Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}\n{rest}"
+    return f"{first}\n// {origin()}\n{rest}"

@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from velatura.exports.formats import Export, Request, relative, xml_comment
+from velatura.exports.formats import Export, Request, origin, relative, xml_comment
 from velatura.shader import closures, mtlx, recording
 from velatura.shader.material import constant as as_constant
 from velatura.shader.material import identifier, title
@@ -62,16 +62,16 @@ def write(request: Request) -> Export:
 
 def _about(request: Request) -> list[str]:
     stack, varying = request.stack, not recording.is_uniform(request.stack)
-    over = "those of the layers, whose values are inputs" if varying else "polynomials of the direction of view"
+    over = "computed from the values of layers, which are inputs" if varying else "polynomials of the direction of view"
     text = (
-        f"Its lobes are {over}."
-        " Facets of all targets but genosl are taken to let out again what they block."
+        f"Weights and roughnesses of its lobes are {over}. All targets but genosl are taken to return the light that"
+        " facets block."
         f"{' It looks alike from both sides.' * stack.transmits}"
         f" Difference of its closures from the model{', where textures are half bright' * varying}, in light from"
         " above, as total variation and as the greatest difference of albedo:"
     )
-    name = f"{title(stack)} as the model {described(recording.drawn_by(stack, request.model))} has it, by Velatura."
-    return [name, *wrap(text, LINE)]
+    name = f"{title(stack)}, by the model {described(recording.drawn_by(stack, request.model))}; MaterialX."
+    return [name, origin(), *wrap(text, LINE)]
 
 
 def _input(stack: Stack, at: Address, value: Any) -> str:

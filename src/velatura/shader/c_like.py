@@ -81,7 +81,7 @@ class CLike(Printer):
     branches: ClassVar[bool] = True
     functions: ClassVar[Mapping[str, str]] = FUNCTIONS | {op: f"vt_{op}" for op in _OWN}
 
-    # What a dialect states
+    # Stated by each dialect
 
     def spelled(self, text: str) -> str:
         """Text in GLSL, in this language."""
@@ -349,7 +349,7 @@ def _film(layout: Layout) -> str:
 
 
 _HEADER = """\
-// {name} as the model {model} has it; {language}.
+// {name}, by the model {model}; {language}.
 //
 """
 
@@ -363,9 +363,9 @@ _USAGE = {
 _COSTS = """\
 //
 // Directions have length 1 and point away from the surface, in its frame: x along the tangent, z the normal.
-// `velatura export -o` writes the textures that are read beside this text, row by row.
+// `velatura export -o` writes the textures that the code reads beside it, row by row.
 //
-// What a call costs, colours being three numbers and elementary functions four operations:
+// The costs of a call; a colour counts as three numbers, an elementary function as four operations:
 {costs}
 """
 

@@ -46,7 +46,7 @@ class Glsl(CLike):
         return f"mix({b}, {a}, {conditions})"
 
     helping = {  # noqa: RUF012
-        "Without branches, of which compilers for processors make much": {
+        "Without branches, for which compilers for processors write long code": {
             (("select", "number"),): "float vt_choice(bool where, float a, float b) { return mix(b, a, where); }\n",
             (("select", "colour"),): "vec3 vt_choice(bool where, vec3 a, vec3 b) { return mix(b, a, bvec3(where)); }\n",
             (

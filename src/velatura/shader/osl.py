@@ -312,7 +312,7 @@ _CLOSURES: dict[closures.Kind, str] = {
 }
 
 _HEADER = """\
-// {name} as the model {model} has it; Open Shading Language.
+// {name}, by the model {model}; Open Shading Language.
 //
 {text}
 //
@@ -321,8 +321,8 @@ _HEADER = """\
 
 _ABOUT = (
     "The output BSDF is a sum of closures: GGX reflections of reflectance 1 by generalized_schlick_bsdf, refractions"
-    " without Fresnel by microfacet, diffuse light. {over}What it is off the model{varying}, in light from above, as"
-    " total variation and as the greatest difference of albedo:"
+    " without Fresnel by microfacet, diffuse light. {over}Its difference from the model{varying}, in light from above,"
+    " as total variation and as the greatest difference of albedo:"
 )
 
 _UV = '    point UV = point(u, v, 0)\n        [[ string label = "UV", string widget = "null" ]]'

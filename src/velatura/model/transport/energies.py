@@ -222,7 +222,7 @@ def _of_isotropic(
     found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, *numbers)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
     # Columns that cancel out are rounding
-    size = np.abs(found.remainder[:, 0]).sum(axis=1)
+    size = np.abs(found.remainder).sum(axis=2).max(axis=1)
     scale = (mean / np.maximum(np.maximum(found.rest, CANCELS * size), TINY))[:, None, None]
     return found.remainder * scale, found.around, found.again
 
