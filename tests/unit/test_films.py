@@ -14,6 +14,7 @@ from velatura.optics import films, fresnel
 from velatura.optics.coatings import Coating, ColouredFilm, quadrature
 from velatura.optics.films import Film
 from velatura.sampling import coated
+from velatura.shader import shader
 from velatura.stack import Material
 from velatura.stack.spectra import srgb_sensitivity, srgb_weights
 from velatura.tables.microsurface_walks import Side, shares_in_the_end
@@ -283,3 +284,10 @@ def test_a_fixed_quadrature_has_the_colours_of_a_fine_one(thickest_nm: float) ->
         a, b = (np.clip(w @ films.coherent(cosine, nm, 1.0, [film], *below).reflected, 0, 1) for nm, w in both)
         off.append(float(np.abs(a - b).max()))
     assert max(off) < 4e-3 and np.mean(off) < 4e-4
+
+
+@pytest.mark.parametrize("preset", [name for name in vt.presets() if not any(vt.preset(name).films)])
+def test_interfaces_without_films_have_no_tables(preset: str) -> None:
+    """Neither rows of reflectances, nor a texture beside a shader."""
+    assert not any(coated.of(Material.of(vt.preset(preset))))
+    assert shader(vt.preset(preset)).films is None
