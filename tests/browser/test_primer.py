@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from pathlib import Path
 from types import ModuleType
@@ -11,6 +10,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
+from benchmarks import tool
 
 import velatura as vt
 from velatura.model import Model, variance_kind
@@ -26,11 +26,7 @@ CASES = [(1.5, 0.1, 0.3, 0.15, 40), (1.05, 0.03, 0.0, 0.5, 0), (2.2, 0.5, 2.0, 0
 
 @pytest.fixture(scope="module")
 def primer() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("primer", DOCS.parent / "tools" / "primer.py")
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return tool("primer")
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
 import shlex
@@ -11,20 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks import benchmark
+from benchmarks import benchmark, tool
 
 ROOT = Path(__file__).parents[2]
 
 
-def driver() -> Any:
-    spec = importlib.util.spec_from_file_location("bench", ROOT / "tools" / "bench.py")
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-bench = driver()
+bench = tool("bench")
 
 
 @pytest.mark.parametrize("name", [name for name in bench.SMOKE if name not in ("coat", "startup")])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 from math import log
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
+import benchmarks
 import numpy as np
 import pytest
 from hypothesis import given
@@ -23,7 +22,6 @@ from velatura.tables.build import Built, belcour_grid, makers
 from velatura.tables.build.quadrature import average, ignore
 from velatura.tables.build.report import report
 
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "tables.py"
 DEFAULT = {
     *("dielectric_multi", "conductor_multi", "inside_multi", "absorbing_inside_multi"),
     *("tir_published", "tir_published_outside"),
@@ -35,17 +33,8 @@ MAKERS = makers()
 COSINES = np.linspace(0.02, 1, 500)
 
 
-def _benchmark() -> ModuleType:
-    """The benchmark makes the whole comparison, of 10^5 points; the tests make a part of the same."""
-    spec = importlib.util.spec_from_file_location("benchmark_tables", BENCHMARK)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-benchmark = _benchmark()
+# It makes the whole comparison, of 10^5 points; the tests make a part of the same
+benchmark = benchmarks.benchmark("tables")
 COMPARISONS = [(a, r) for a in benchmark.AVERAGES for r in a.regions]
 
 

@@ -31,7 +31,7 @@ Kinds = Annotated[
 def score(
     models: Annotated[
         str | None,
-        typer.Option("--model", metavar="NAME,NAME,...", help="Entrants; default: all, which takes an hour."),
+        typer.Option("--model", metavar="NAME,NAME,...", help="Entrants; default: all, which takes minutes."),
     ] = None,
     values: Annotated[
         Path | None,

@@ -32,11 +32,12 @@ def write(request: Request) -> Export:
     values = mtlx.values(stack, [*recorded.plain, *recorded.conserving])
     made, connected = mtlx.varying(values, lambda path: relative(path, request.folder))
     losses = closures.losses(closures.numbers(stack), request.model, recorded.known)
+    about = _about(request)
     lines = [
         '<?xml version="1.0"?>',
         '<materialx version="1.39" colorspace="lin_rec709">',
-        *xml_comment([*_about(request), *(f"  {loss}" for loss in losses)]),
-        f'  <nodedef name="ND_{node}" node="{node}" nodegroup="pbr" doc={quoteattr(_about(request)[0])}>',
+        *xml_comment([*about, *(f"  {loss}" for loss in losses)]),
+        f'  <nodedef name="ND_{node}" node="{node}" nodegroup="pbr" doc={quoteattr(about[0])}>',
         *(_input(stack, *each) for each in values),
         '    <input name="normal" type="vector3" defaultgeomprop="Nworld" />',
         '    <input name="tangent" type="vector3" defaultgeomprop="Tworld" />',
