@@ -55,6 +55,7 @@ SEQUENCES: tuple[tuple[Kind, ...], ...] = (
     (D, D, S, L),
     (D, D, D, C),
     (L,),
+    (S, L),
 )
 #: How the roughnesses of the interfaces lie: the same along both axes, along the frame's axes, turned.
 SHAPES = ("round", "straight", "turned")

@@ -79,7 +79,7 @@ class InOwnMedia(Recursion):
     def solves(self, material: Material) -> bool:
         from velatura.model import solution
 
-        return bool(material.interfaces) and any(layer.spreads for layer in solution.plain(material).layers)
+        return any(layer.spreads for layer in solution.plain(material).layers)
 
     def unsolved(self, model: Model) -> Model:
         from velatura.model import solution
@@ -98,7 +98,7 @@ class InOwnMedia(Recursion):
     def textured(self, material: Material, *values: Any) -> Textured | None:
         from velatura.model import textured
 
-        return textured.textured(material, *values) if material.interfaces else None
+        return textured.textured(material, *values)
 
     def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
         from velatura.model import solved_lobes  # loads SciPy

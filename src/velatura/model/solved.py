@@ -175,7 +175,7 @@ class Seen:
 
     @property
     def interfaces(self) -> int:
-        return 1 + max(shape.interface for shape in self.shapes)
+        return 1 + max((shape.interface for shape in self.shapes), default=-1)
 
     @property
     def numbers(self) -> list[int]:
@@ -308,12 +308,14 @@ class Solved:
         of, eta = self.seen(wi)
         i, drawn = of.turned(wi, wi), of.only(asked)
         begin = 1 - drawn.chances[-1]
-        within, lobe = u < begin, of.lobes[-1]
-        rest = ops.divide(u - begin, drawn.chances[-1])
-        for above, chance in zip(of.lobes[-2::-1], drawn.chances[-2:0:-1]):
-            begin = begin - chance
-            lobe = own_medium.either(u < begin, above, lobe)
-        wo = chosen_direction(within, of.out_of(lobe, i, u1, u2), of.samples.sample(i, rest, u1, u2))
+        within, rest = u < begin, ops.divide(u - begin, drawn.chances[-1])
+        wo = of.samples.sample(i, rest, u1, u2)
+        if of.lobes:
+            lobe = of.lobes[-1]
+            for above, chance in zip(of.lobes[-2::-1], drawn.chances[-2:0:-1]):
+                begin = begin - chance
+                lobe = own_medium.either(u < begin, above, lobe)
+            wo = chosen_direction(within, of.out_of(lobe, i, u1, u2), wo)
         if of.passage is None or drawn.passes is None:
             return wo, 1.0
         again = ops.clip(ops.divide(u, drawn.share), 0.0, passed.BELOW_ONE)

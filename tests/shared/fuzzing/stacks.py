@@ -17,6 +17,7 @@ METALS, GLASSES = names()
 def random_stack(rng: np.random.Generator, absurd: bool = False, most: int = 4, base: str | None = None) -> Stack:
     """A stack of up to `most` dielectrics, media between them and above the first, over a base (None: any).
 
+    Every other diffuse base lies under a medium and no interface: chalk, dust, matt paint.
     `absurd`: every value may lie anywhere in the range that is accepted, most often near its ends.
     """
     draw = _Absurd(rng) if absurd else _Tame(rng)
@@ -40,12 +41,15 @@ def random_stack(rng: np.random.Generator, absurd: bool = False, most: int = 4, 
         layers.append(draw.accepted(lambda: Interface(conductor=metal, **draw.surface(uneven, turned))))
     elif base == "diffuse":
         layers.append(Diffuse(albedo=draw.albedo()))
+        if rng.random() < 0.5:
+            layers = [draw.accepted(draw.medium), layers[-1]]
     return draw.accepted(lambda: Stack(layers, exterior=draw.exterior(), thin=base == "thin"))
 
 
 def in_range(rng: np.random.Generator, lossless: bool = False, brushed: bool = False) -> Stack:
-    """A stack of one to four interfaces: of an index in 1.05 to 2.5, over a metal, a mirror, glass or a pane, every
-    alpha in 0 to .8 and the axes of brushed ones at most 8 times apart, with media that absorb or scatter."""
+    """A stack of up to three interfaces: of an index in 1.05 to 2.5, over a metal, a mirror, glass, a pane or a diffuse
+    base, every alpha in 0 to .8 and the axes of brushed ones at most 8 times apart, with media that absorb or scatter
+    above any layer. Of diffuse bases every other one lies under no interface, unless some are to be `brushed`."""
     alpha = lambda: 0.0 if rng.random() < 0.15 else float(rng.uniform(0.01, 0.8))  # noqa: E731
 
     def surface(**index: Any) -> Interface:
@@ -64,12 +68,17 @@ def in_range(rng: np.random.Generator, lossless: bool = False, brushed: bool = F
             g=float(rng.uniform(-0.5, 0.9)),
         )
 
-    layers: list[Layer] = []
-    for _ in range(rng.integers(1, 4)):
-        layers += [surface(eta=float(rng.uniform(1.05, 2.5))), *([medium()] if rng.random() < 0.3 else [])]
-    kinds = ["mirror", "glass", "pane"] + ([] if lossless else ["metal"])
+    kinds = ["mirror", "glass", "pane", "diffuse"] + ([] if lossless else ["metal"])
     kind = str(rng.choice(kinds))
-    if kind == "metal":
+    matt = kind == "diffuse" and not brushed and rng.random() < 0.5
+    layers: list[Layer] = []
+    for _ in range(0 if matt else rng.integers(1, 4)):
+        layers += [*([medium()] if rng.random() < 0.3 else []), surface(eta=float(rng.uniform(1.05, 2.5)))]
+    if matt or rng.random() < 0.3:
+        layers.append(medium())
+    if kind == "diffuse":
+        layers.append(Diffuse(albedo=1.0 if lossless else float(rng.uniform(0, 1))))
+    elif kind == "metal":
         layers.append(surface(eta=float(rng.uniform(0.2, 2.0)), k=float(rng.uniform(1.5, 5.0))))
     else:
         layers.append(surface(conductor="mirror") if kind == "mirror" else surface(eta=float(rng.uniform(1.05, 2.5))))

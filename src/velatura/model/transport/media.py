@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,8 +16,9 @@ from velatura.sampling.low_discrepancy import fibonacci
 
 Array = NDArray[np.floating]
 
-DOUBLINGS = 12  # the first layer scatters once at most: errors go as its depth
+THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
 EVENTS = 600
+G_MAX = 0.999  # asymmetry of light that turns by less than nodes resolve
 COS_MIN = 0.01  # light that travels flatter is taken to travel so
 
 
@@ -38,16 +39,25 @@ class Slab:
 
 def medium(slab: Slab, setting: Setting) -> Layer:
     """A medium as a layer; it looks alike from both sides."""
+    slab = _resolved(slab)
     lost = slab.tau_a + (slab.tau_s if slab.straight is None else (1 - slab.straight) * slab.tau_s)
     if slab.straight is not None or not slab.tau_s.any():
         t = scaled(partial(_kept, slab, lost), setting)
         nothing = Operator.nothing(setting.basis.size, len(setting.p))
         return Layer(nothing, t, nothing, t)
-    r, t = _thin(slab, lost / 2**DOUBLINGS, setting)
-    for _ in range(DOUBLINGS):
-        between = (r @ r).repeated()
+    doublings = max(int(np.ceil(np.log2(lost.max() / THIN))), 0)
+    r, t = _thin(slab, lost / 2**doublings, setting)
+    for _ in range(doublings):
+        between = (r @ r).repeated(trapped=0.0)
         r, t = r + t @ r @ between @ t, t @ between @ t
     return Layer(r, t, r, t)
+
+
+def _resolved(slab: Slab) -> Slab:
+    """With light that turns by less than nodes resolve going straight on: (1 - g) tau_s stays (van de Hulst 1980,
+    similarity)."""
+    g = np.clip(slab.g, -G_MAX, G_MAX)
+    return replace(slab, tau_s=slab.tau_s * np.minimum((1 - slab.g) / (1 - g), 1), g=g)
 
 
 def _thin(slab: Slab, depth: Array, setting: Setting) -> tuple[Operator, Operator]:

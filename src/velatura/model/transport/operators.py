@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
-TRAPPED = 1e-9  # share that is lost at each bounce
+TRAPPED = 1e-9  # share that is lost at each reflection between layers
 ALONE = 2**18  # multiplications that OpenBLAS leaves to one thread
 
 
@@ -50,11 +50,11 @@ class Operator:
     def __rmul__(self, share: float) -> Operator:
         return Operator(share * self.nodes, share * self.columns, share * self.beams)
 
-    def repeated(self) -> Operator:
-        """The sum of all of its powers, (1 - A)^-1."""
-        # What smooth interfaces trap for ever no light reaches
-        inverse = np.linalg.inv((1 + TRAPPED) * np.eye(self.nodes.shape[-1]) - self.nodes)
-        beams = 1 / np.maximum(1 - self.beams, TRAPPED)
+    def repeated(self, trapped: float = TRAPPED) -> Operator:
+        """The sum of all of its powers, (1 - A)^-1, with a share lost each time."""
+        # No light reaches what smooth interfaces trap for ever
+        inverse = np.linalg.inv((1 + trapped) * np.eye(self.nodes.shape[-1]) - self.nodes)
+        beams = 1 / np.maximum(1 - self.beams, trapped)
         return Operator(inverse, _product(inverse, self.columns) * beams, beams)
 
 
