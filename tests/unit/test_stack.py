@@ -308,11 +308,10 @@ def stacks(draw: st.DrawFn, image: Path, table: Path) -> Stack:
     for _ in range(draw(st.integers(0, 3))):
         layers += [draw(medium)] * draw(st.booleans()) + [draw(dielectric)]
     layers += [draw(medium)] * draw(st.booleans()) + [draw(dielectric | conductor | named | diffuse)]
-    text = st.text(st.characters(exclude_categories=["Cs"]))
+    line = st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"], exclude_characters="\ufffe\uffff")
     transmits = layers[-1].kind == "dielectric"
-    return Stack(
-        layers, name=draw(text), source=draw(text), exterior=draw(indices), thin=transmits and draw(st.booleans())
-    )
+    name, source = draw(st.text(line)), draw(st.text(line | st.sampled_from("\n\t")))
+    return Stack(layers, name=name, source=source, exterior=draw(indices), thin=transmits and draw(st.booleans()))
 
 
 @settings(max_examples=60, suppress_health_check=list(HealthCheck))

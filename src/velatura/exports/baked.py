@@ -11,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 from velatura import __version__
 from velatura.bakes import TARGETS, Bake, Carried, bake
 from velatura.exports.formats import Export, Request, relative, xml_comment
+from velatura.shader.material import remark
 from velatura.stack import dumps
 from velatura.targets import embedded
 from velatura.targets.openpbr import TURNS
@@ -153,7 +154,7 @@ def _blender(made: Bake, material: Any, files: dict[str, str]) -> str:
     values = {name: (*value, 1.0) if isinstance(value, tuple) else value for name, value in made.values.items()}
     return "\n".join(
         [
-            *(f"# {line}" for line in _comment(made)),
+            *(f"# {remark(line)}" for line in _comment(made)),
             "",
             "import bpy",
             "",

@@ -9,8 +9,16 @@ from velatura.shader.osl import osl
 def write(request: Request) -> Export:
     """The script; the shader is in it, and in the file that is saved by Blender."""
     made = osl(request.stack, request.model)
-    name = " ".join(request.stack.name.split()) or "Velatura"
-    return Export(_SCRIPT.format(name=name, turns=made.turns, shader=headed(made.text).replace("\\", "\\\\")))
+    return Export(
+        _SCRIPT.format(
+            name=request.stack.name.strip() or "Velatura", turns=made.turns, shader=_literal(headed(made.text))
+        )
+    )
+
+
+def _literal(text: str) -> str:
+    """A text as Python's source, line by line."""
+    return "\n".join(["(", *(f"    {line!r}" for line in text.splitlines(keepends=True)), ")"])
 
 
 _SCRIPT = """\
@@ -23,8 +31,7 @@ import bpy
 
 NAME = {name!r}
 TURNS = {turns}  # with the tangent, which follows the UV map
-SHADER = '''
-{shader}'''
+SHADER = {shader}
 
 
 def make():
@@ -41,7 +48,7 @@ def make():
 
     # The shader compiles as it is put into the node
     text = bpy.data.texts.new(f"{{NAME}}.osl")
-    text.write(SHADER.lstrip())
+    text.write(SHADER)
     script = nodes.new("ShaderNodeScript")
     script.script = text
     if "BSDF" not in script.outputs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -46,6 +47,7 @@ _BAKES = {
     "mitsuba-principled": (".xml",),
 }
 LICENCE = "BSD-3-Clause"  # of code that is written
+LAST = 253402300799  # second of the year 9999
 _OF_SHADERS = frozenset({"constant", "prefix", "half", "tables", "baked"})
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
 
@@ -202,16 +204,23 @@ def relative(path: Path, folder: Path | None) -> str:
 
 def xml_comment(lines: Iterable[str]) -> list[str]:
     """The lines of a comment, which holds no two hyphens in a row."""
-    return ["  <!--", *(f"    {line.replace('--', '- -')}" for line in lines), "  -->"]
+    return ["  <!--", *(f"    {re.sub('-(?=-)', '- ', line)}" for line in lines), "  -->"]
 
 
 def origin() -> str:
     """The version that writes code, the date, and the licence under which the code may be used.
 
     The date is today, or that of the environment's SOURCE_DATE_EPOCH.
+
+    Raises:
+        InvalidInput: SOURCE_DATE_EPOCH is no date.
     """
-    seconds = os.environ.get("SOURCE_DATE_EPOCH")
-    day = datetime.fromtimestamp(int(seconds) if seconds else time.time(), timezone.utc)
+    from velatura.stack.schema import show
+
+    given = os.environ.get("SOURCE_DATE_EPOCH")
+    if given and not (re.fullmatch("[0-9]{1,12}", given) and int(given) <= LAST):
+        raise InvalidInput(f"SOURCE_DATE_EPOCH: must be whole seconds since 1970, 0 to {LAST}, got {show(given)}")
+    day = datetime.fromtimestamp(int(given) if given else time.time(), timezone.utc)
     return f"Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}"
 
 

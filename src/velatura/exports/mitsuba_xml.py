@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from xml.sax.saxutils import escape
+from xml.sax.saxutils import quoteattr
 
 from velatura.exports.formats import Export, Request
 from velatura.stack import dumps
@@ -13,12 +13,7 @@ def write(request: Request) -> Export:
     """The BSDF `material`; its textures are named relative to the scene's folder, where Mitsuba looks for them."""
     material = json.dumps(json.loads(dumps(request.stack, "json", request.folder)), ensure_ascii=False)
     strings = {"material": material, "model": request.model.name, **request.switches}
-    lines = [f'        <string name="{key}" value={_quoted(text)}/>' for key, text in strings.items()]
+    lines = [f'        <string name="{key}" value={quoteattr(text)}/>' for key, text in strings.items()]
     head = "<!-- Needs the plugins of Velatura: import velatura; velatura.register() -->"
     bsdf = ['    <bsdf type="layered" id="material">', *lines, "    </bsdf>"]
     return Export("\n".join(['<scene version="3.0.0">', f"    {head}", *bsdf, "</scene>", ""]))
-
-
-def _quoted(text: str) -> str:
-    """An attribute in single quotes, so that the double ones of JSON stay unchanged."""
-    return f"'{escape(text, {chr(39): '&apos;'})}'"

@@ -18,7 +18,7 @@ from velatura.model.stack_lobes import stack_lobes
 from velatura.optics import fresnel
 from velatura.stack import RGB, Diffuse, Film, Interface, Layer, Medium, Stack, Texture
 from velatura.stack.coatings import STEP_MIN
-from velatura.stack.values import THICKEST_NM
+from velatura.stack.values import THICKEST_NM, cleaned
 
 INDICES = (0.1, 10.0)  # of dielectrics
 BRIGHTEST = 0.95  # reflectance of a dielectric at the normal
@@ -89,7 +89,9 @@ def imported(surface: Surface, notes: Notes, name: str = "", source: str = "") -
         else:
             base.append(Diffuse(albedo=_diffuse(surface, surface.albedo, above, base)))
     thin = surface.pane and not surface.metal and surface.albedo is None
-    return Imported(Stack([*coat, *base], name=name, source=source, thin=thin), tuple(notes.left))
+    if (plain := cleaned(name)) != name:
+        notes.add("name", plain, "control characters are left out")
+    return Imported(Stack([*coat, *base], name=plain, source=source, thin=thin), tuple(notes.left))
 
 
 def weighed(eta: float, outside: float, weight: float) -> float:

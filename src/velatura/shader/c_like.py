@@ -20,7 +20,7 @@ from velatura.shader.atlas import WIDTH, Layout
 from velatura.shader.bake import Bake, Group
 from velatura.shader.cost import Cost
 from velatura.shader.films import WIDTH as LINE_OF_FILMS
-from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
+from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped, remark
 from velatura.shader.printer import FUNCTIONS, Field, Output, Printer, Struct
 from velatura.shader.statements import assignments, statements
 from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
@@ -242,8 +242,7 @@ class CLike(Printer):
 
     def material(self, filled: Filled) -> str:
         maps = [
-            f"// {image.texture.name}{', to be decoded from sRGB' * (image.encoding == 'srgb')}{_curve(image)}\n"
-            + self.texture(name, MAPS + k)
+            f"// {_described(image)}\n" + self.texture(name, MAPS + k)
             for k, (name, image) in enumerate(filled.samplers.items())
         ]
         begin = self.variable("VtMaterial", "m", self.input(PARAMETERS) if filled.parameters else "")
@@ -318,10 +317,10 @@ def _block(head: str, lines: Sequence[str]) -> list[str]:
     return [f"{head} {{", *(f"    {line}".rstrip() for line in lines), "}"]
 
 
-def _curve(image: Texture) -> str:
-    if image.curve is None:
-        return ""
-    return f", and taken through the curve {', '.join(f'{value:g}' for value in image.curve)}"
+def _described(image: Texture) -> str:
+    decoded = ", to be decoded from sRGB" if image.encoding == "srgb" else ""
+    curve = f", and taken through the curve {', '.join(f'{value:g}' for value in image.curve)}" if image.curve else ""
+    return remark(image.texture.name) + decoded + curve
 
 
 def _table(layout: Layout) -> str:

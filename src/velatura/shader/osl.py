@@ -22,7 +22,7 @@ from velatura.shader import atlas, closures, films, recording
 from velatura.shader.bake import Group, together
 from velatura.shader.closures import Closure, Closures, Columns, Loss, Tabulated
 from velatura.shader.graph import Graph
-from velatura.shader.material import brushed, identifier, place, title
+from velatura.shader.material import brushed, identifier, place, remark, title
 from velatura.shader.material import constant as as_constant
 from velatura.shader.printer import ATOM, Language
 from velatura.shader.program import described
@@ -224,7 +224,7 @@ class _Program:
         over = "Lobes are tabulated over the direction of view. " if self.baked else ""
         varying = " where textures are half bright" if not recording.is_uniform(self.stack) else ""
         return _HEADER.format(
-            name=title(self.stack),
+            name=remark(title(self.stack)),
             model=described(self.model),
             text="\n".join(f"// {line}" for line in wrap(_ABOUT.format(over=over, varying=varying), LINE)),
             lost="\n".join(f"//    {loss}" for loss in self.losses),
@@ -270,8 +270,13 @@ def _parameter(stack: Stack, at: Address, value: Any) -> str:
 
 def _file(name: str, image: Texture) -> str:
     """The declaration of the file of a texture."""
-    path = str(image.texture).replace("\\", "/").replace('"', '\\"')
-    return f'    string {name} = "{path}"\n        [[ string label = "{name}", string widget = "filename" ]]'
+    metadata = f'string label = "{name}", string widget = "filename"'
+    return f"    string {name} = {_string(image.texture.as_posix())}\n        [[ {metadata} ]]"
+
+
+def _string(text: str) -> str:
+    """A literal; what a string or a preprocessor reads otherwise stands in octal digits."""
+    return '"' + re.sub(r'["\\?]', lambda found: f"\\{ord(found[0]):03o}", text) + '"'
 
 
 def _varied(at: Address, value: Varying) -> str:

@@ -122,7 +122,7 @@ def shader(
         material.filled(stack, read, bool(shown)),
     )
     placed = films.layouts(recording.films)
-    name = "A material" if shown else material.title(stack)
+    name = "A material" if shown else material.remark(material.title(stack))
     costs = _costs(recording)
     parts = [
         printer.header(name, described(recording.model), not recording.read, costs),

@@ -27,7 +27,7 @@ class Stack(Record):
     """
 
     name: Annotated[str, Text("name of the material")] = ""
-    source: Annotated[str, Text("where the numbers come from")] = ""
+    source: Annotated[str, Text("where the numbers come from", lines=True)] = ""
     exterior: Annotated[float, EXTERIOR] = 1.0
     thin: Annotated[bool, Flag("a thin pane: light leaves it into the exterior index")] = False
     layers: tuple[Layer, ...]

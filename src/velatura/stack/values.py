@@ -24,14 +24,30 @@ LISTED = "`velatura schema` lists all"
 # Words, switches and files -------------------------------------------------------------------------------------------
 
 
+#: Characters that garble terminals, break lines of code, or that XML does not hold.
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
+
+
+def cleaned(text: str) -> str:
+    """Text of a foreign file without the characters that `Text` refuses."""
+    return _CONTROL.sub(" ", text).strip() if _CONTROL.search(text) else text
+
+
+@dataclass(frozen=True)
 class Text(Parameter):
-    """Free text."""
+    """Free text on one line, or on several `lines`."""
+
+    lines: bool = False
 
     what = "text (in quotes)"
 
     def check(self, value: Any) -> str:
         if not isinstance(value, str) or not _encodable(value):
             raise self.refuse(value)
+        if _CONTROL.search(re.sub(r"[\n\t]", "", value) if self.lines else value):
+            raise ValueError(
+                f"must be {'text' if self.lines else 'one line'} without control characters, got {show(value)}"
+            )
         return value
 
     def json_schema(self) -> dict[str, Any]:
@@ -83,6 +99,8 @@ class File(Parameter):
         path = Path(os.path.realpath(value))
         if not os.path.isfile(path):
             raise ValueError(f"file not found: {path}")
+        if _CONTROL.search(str(path)):
+            raise ValueError(f"must be a path without control characters, got {show(str(path))}")
         return path
 
     def json_schema(self) -> dict[str, Any]:
