@@ -1,7 +1,7 @@
 """Machines that run printed shaders on arrays of numbers: a compute shader for each language, on the CPU.
 
-WGSL runs as it is; Vulkan GLSL, HLSL and Slang are compiled to SPIR-V by glslangValidator and Slang's own compiler. All
-four run on the Vulkan device that `wgpu` finds. GLSL 4.50 runs in an OpenGL context without a window.
+WGSL runs as it is; Vulkan GLSL, HLSL and Slang are compiled to SPIR-V by glslangValidator and Slang's own compiler,
+HLSL by both. All four run on the Vulkan device that `wgpu` finds. GLSL 4.50 runs in an OpenGL context without a window.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from velatura.shader.wgsl import Wgsl
 THREADS = 64  # of a group
 RESULTS, GIVEN = 0, 1  # bindings of the second group
 IN_OPENGL = 8  # textures of materials stay below
+SLANG, HLSL = 1, 2  # languages by Slang's compiler
 SLOTS = {"vt_tables": TABLES, "vt_baked": TABLES, "vt_films": FILMS}
 INSTALLED = "apt-get install -y mesa-vulkan-drivers libvulkan1 glslang-tools, and pip install wgpu slangpy moderngl"
 
@@ -241,8 +242,14 @@ class InVulkan(_OnVulkan):
         return spirv(f"#version 450\n{text}", "-V")
 
 
+_UNFILTERED = "#define VT_SAMPLE(map, uv) map.SampleLevel(vt_sampler, uv, 0.0)\n"
+
+
 class InHlsl(InVulkan):
     printer = Hlsl()
+
+    def missing(self) -> str:
+        return super().missing() or ("" if find_spec("slangpy") else f"slangpy is missing: {INSTALLED}")
 
     def declarations(self, count: int) -> str:
         return (
@@ -255,22 +262,18 @@ class InHlsl(InVulkan):
         return "\n".join([head, "int row = int(id.x);", *lines, "}"])
 
     def code(self, text: str) -> bytes:
-        return spirv(
-            f"#define VT_SAMPLE(map, uv) map.SampleLevel(vt_sampler, uv, 0.0)\n{text}", "-Od", "-D", "-V", "-e", "main"
-        )
+        _slang(_UNFILTERED + text, HLSL)  # its front end knows scopes as Microsoft's compilers do
+        return spirv(_UNFILTERED + text, "-Od", "-D", "-V", "-e", "main")
 
 
 class InSlang(InHlsl):
     printer = Slang()
 
-    def missing(self) -> str:
-        return super().missing() or ("" if find_spec("slangpy") else f"slangpy is missing: {INSTALLED}")
-
     def main(self, lines: Sequence[str]) -> str:
         return f'[shader("compute")]\n{super().main(lines)}'
 
     def code(self, text: str) -> bytes:
-        return _slang(f"#define VT_SAMPLE(map, uv) map.SampleLevel(vt_sampler, uv, 0.0)\n{text}")
+        return _slang(_UNFILTERED + text)
 
 
 class InOpenGl(Machine):
@@ -431,10 +434,10 @@ def _compiler() -> tuple[Any, int]:
     return library, library.spCreateSession(None)
 
 
-def _slang(text: str) -> bytes:
-    """A compute shader in Slang, as SPIR-V."""
+def _slang(text: str, language: int = SLANG) -> bytes:
+    """A compute shader in Slang or HLSL, as SPIR-V."""
     slang, session = _compiler()
-    spirv_code, language, compute = 6, 1, 6  # SLANG_SPIRV, SLANG_SOURCE_LANGUAGE_SLANG, SLANG_STAGE_COMPUTE
+    spirv_code, compute = 6, 6  # SLANG_SPIRV, SLANG_STAGE_COMPUTE
     request = slang.spCreateCompileRequest(session)
     try:
         slang.spSetCodeGenTarget(request, spirv_code)

@@ -174,14 +174,14 @@ class CLike(Printer):
         return self.declared(kind, name, text)
 
     def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        return self._filled(name, count, f"vt_{table}(texel, {', '.join(args)})")
+        return self._filled(name, count, f"vt_{table}({self.counter(name)}, {', '.join(args)})")
 
     def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
-        first = f"{group.begin} + texel" if group.begin else "texel"
+        first = f"{group.begin} + {self.counter(name)}" if group.begin else self.counter(name)
         return self._filled(name, group.texels, f"vt_baked_texel({first}, {self.colour(place)})")
 
     def texels_where(self, where: str, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        return self._filled(name, count, f"vt_{table}(texel, {', '.join(args)})", where)
+        return self._filled(name, count, f"vt_{table}({self.counter(name)}, {', '.join(args)})", where)
 
     def all_of(self, conditions: Sequence[tuple[tuple[str, Kind], bool]]) -> str:
         def held(text: str, kind: Kind, holds: bool) -> str:
@@ -198,9 +198,14 @@ class CLike(Printer):
         """A value that may change gets a name."""
         return self.declared(kind, name, text)
 
+    def counter(self, array: str) -> str:
+        """The counter of a loop that fills an array of texels."""
+        return "texel"
+
     def _filled(self, name: str, count: int, text: str, where: str = "") -> list[str]:
         """In a loop, which compiles faster than reading texels one by one."""
-        head, own = self.spelled(f"for (int texel = 0; texel < {count}; texel++)"), f"{name}[texel]"
+        counter = self.counter(name)
+        head, own = self.spelled(f"for (int {counter} = 0; {counter} < {count}; {counter}++)"), f"{name}[{counter}]"
         if not where:
             return [self.array("vec4", name, count), f"{head} {{ {own} = {text}; }}"]
         zero = f"{self.type('vec4')}(0.0, 0.0, 0.0, 0.0)"

@@ -56,6 +56,10 @@ class Hlsl(CLike):
     def colour(self, channels: Sequence[str]) -> str:
         return f"(float3)({channels[0]})" if len(channels) == 1 else super().colour(channels)
 
+    def counter(self, array: str) -> str:
+        """Another one for each array, since a counter stays declared after its loop."""
+        return f"texel_of_{array}"
+
     def select(self, condition: str, a: str, b: str) -> tuple[str, int]:
         return f"{condition} ? {a} : {b}", _CHOICE
 
