@@ -10,9 +10,6 @@ with 64 degrees of freedom, regardless of its gradient. A test fails by chance i
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +17,8 @@ import numpy as np
 import pytest
 from in_mitsuba import of_layers, of_table, pictures
 from scipy.stats import t
+from with_cycles import NEEDED, ROOT, SCENE
+from with_cycles import pictures as by_cycles
 
 import velatura as vt
 from velatura import kernel
@@ -27,9 +26,8 @@ from velatura.model import named
 from velatura.shader import closures, recording
 from velatura.stack import Material, Stack
 
-PYTHON = Path(__file__).parents[2] / ".venv-blender/bin/python"
-OUTPUT = Path(__file__).parents[2] / "site/blender"  # where pictures of both are left
-pytestmark = pytest.mark.skipif(not PYTHON.exists(), reason="`make blender` installs the Blender that this runs")
+OUTPUT = ROOT / "site/blender"  # where pictures of both are left
+pytestmark = NEEDED
 
 CELL, ALARM = 8, 0.01
 COLOURS = 3
@@ -48,16 +46,7 @@ def _suns() -> list[list[float]]:
     return found
 
 
-JOB = {
-    "size": 48,
-    "spp": 64,
-    "seeds": [1, 2],
-    "lights": [None, *_suns()],
-    "camera": [0.0, -1.3, 0.9],
-    "fov": 50.0,
-    "half": 5.0,
-    "threads": int(os.environ.get("OMP_NUM_THREADS", 0)),
-}
+JOB = {**SCENE, "size": 48, "spp": 64, "seeds": [1, 2], "lights": [None, *_suns()]}
 
 
 @cache
@@ -106,15 +95,9 @@ def cycles(folder: Path) -> dict[str, np.ndarray]:
     """Pictures of all materials by Cycles, and of the first one with rougher interfaces."""
     stacks = {name: _stack(name, folder) for name in MATERIALS}
     stacks["control"] = _rougher(stacks["isotropic"][0]), stacks["isotropic"][1]
-    jobs = []
-    for name, (stack, model) in stacks.items():
-        vt.export(stack, "blender", model).save(folder / f"{name}.py")
-        jobs.append([str(folder / f"{name}.py"), str(folder / f"{name}.npy")])
-    (folder / "job.json").write_text(json.dumps({**JOB, "materials": jobs}))
-    script = Path(__file__).parents[1] / "shared/in_cycles.py"
-    run = subprocess.run([PYTHON, script, folder / "job.json"], capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stderr[-3000:]
-    return {name: np.load(folder / f"{name}.npy") for name in stacks}
+    made = {name: vt.export(stack, "blender", model) for name, (stack, model) in stacks.items()}
+    scripts = {name: each.save(folder / f"{name}.py")[0] for name, each in made.items()}
+    return by_cycles(folder, scripts, JOB)
 
 
 @cache

@@ -19,17 +19,24 @@ sys.path.append(bpy.utils.resource_path("LOCAL") + f"/python/lib/python3.{sys.ve
 
 
 def main(job: dict[str, Any]) -> None:
-    """Pictures (lights, seeds, height, width, 3) of each material, to the file named."""
+    """Pictures (lights, seeds, height, width, 3) of each material, to the file named.
+
+    Of a job with `cosines`, pictures (cosines, height, width, 3) along one direction each, under a white world.
+    """
     for script, output in job["materials"]:
         scene = _scene(job)
         _material(script)
-        pictures = [[_picture(scene, job, light, seed) for seed in job["seeds"]] for light in job["lights"]]
+        if "cosines" in job:
+            pictures: Any = [_along(scene, job, cosine) for cosine in job["cosines"]]
+        else:
+            pictures = [[_picture(scene, job, light, seed) for seed in job["seeds"]] for light in job["lights"]]
         np.save(output, np.array(pictures, np.float32))
 
 
 def _scene(job: dict[str, Any]) -> Any:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
     bpy.ops.mesh.primitive_plane_add(size=2 * job["half"])
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
@@ -54,14 +61,24 @@ def _scene(job: dict[str, Any]) -> Any:
 
 def _material(script: str) -> None:
     """Put the material that an exported script makes onto the plane."""
-    material = runpy.run_path(script)["make"]()
+    made = runpy.run_path(script)
+    material = made["make"]() if "make" in made else made["material"]
     bpy.data.objects["Plane"].data.materials.append(material)
     scene = bpy.context.scene
     scene.cycles.device, scene.cycles.pixel_filter_type = "CPU", "BOX"
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
     scene.cycles.max_bounces = scene.cycles.transmission_bounces = 2
-    compiled = next(node for node in material.node_tree.nodes if node.type == "SCRIPT")
-    assert bpy.app.build_options.cycles_osl and scene.cycles.shading_system and compiled.bytecode_hash
+    for node in material.node_tree.nodes:
+        if node.type == "SCRIPT":
+            assert bpy.app.build_options.cycles_osl and scene.cycles.shading_system and node.bytecode_hash
+
+
+def _along(scene: Any, job: dict[str, Any], cosine: float) -> np.ndarray:
+    """From one direction, in the plane of the tangent."""
+    away = Vector((math.sqrt(1 - cosine * cosine), 0, cosine))
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 0.1
+    scene.camera.location, scene.camera.rotation_euler = 3 * away, (-away).to_track_quat("-Z", "Y").to_euler()
+    return _picture(scene, job, None, job["seeds"][0])
 
 
 def _picture(scene: Any, job: dict[str, Any], light: list[float] | None, seed: int) -> np.ndarray:

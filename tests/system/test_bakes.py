@@ -121,6 +121,13 @@ def test_what_is_not_held_is_said() -> None:
     ]
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_pane_that_becomes_a_solid_is_said(target: str) -> None:
+    pane = Described.of(Material.of(vt.preset("frosted-glass")), named("belcour2018"))
+    said = "transmission: light is refracted as into a solid, and does not leave a pane"
+    assert (said in lost(pane, TARGETS[target])) == (target in ("blender-principled", "mitsuba-principled"))
+
+
 def test_unknown_targets_are_refused() -> None:
     with pytest.raises(vt.InvalidInput, match=r"unknown target 'unreal' \(known: openpbr, gltf,"):
         bake(SHEEN, "unreal")

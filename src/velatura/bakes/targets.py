@@ -258,7 +258,6 @@ TARGETS: dict[str, Target] = {
         coat_colour=True,
         coat_depth=True,
         turned=True,
-        pane=True,
         colour="Base Color",
         roughness="Roughness",
     ),

@@ -166,6 +166,7 @@ def _blender(made: Bake, material: Any, files: dict[str, str]) -> str:
             "}",
             "for name, value in inputs.items():",
             "    node.inputs[name].default_value = value",
+            *(_BLENDER_TANGENT if made.values["Anisotropic"] else []),
             *(_BLENDER_IMAGE if made.images else []),
             *(
                 f"multiplied({name!r}, {files[name]!r}, {_space(image)!r}, {_factor(image)})"
@@ -175,6 +176,13 @@ def _blender(made: Bake, material: Any, files: dict[str, str]) -> str:
         ]
     )
 
+
+# Without one the tangent runs around the middle of the object
+_BLENDER_TANGENT = """\
+tangent = material.node_tree.nodes.new("ShaderNodeTangent")
+tangent.direction_type = "UV_MAP"
+material.node_tree.links.new(tangent.outputs["Tangent"], node.inputs["Tangent"])
+""".splitlines()
 
 _BLENDER_IMAGE = """
 

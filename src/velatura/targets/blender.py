@@ -1,6 +1,9 @@
-"""Blender's Principled BSDF (https://docs.blender.org/manual, Shader Nodes, Principled BSDF, since version 4.5)."""
+"""Blender's Principled BSDF (https://docs.blender.org/manual, Shader Nodes, Principled BSDF), as Cycles 5.0 has it."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -30,10 +33,14 @@ PARAMETERS = (
 )
 
 
-def value(given: Values, pair: Pair, thin: bool = True) -> Array:
+ORDERS = 3  # of interference
+THINNEST_NM = 0.1  # a thinner film is none
+
+
+def value(given: Values, pair: Pair, thin: bool = False) -> Array:
     """f |cos theta_o| (3, N) of the node with multiple scattering: no subsurface, sheen or emission.
 
-    `thin`: transmission is not refracted.
+    `thin` changes nothing, since the node always refracts.
     """
     v = complete(PARAMETERS, given)
     base, tint, coat_tint = (np.reshape(v[name], (3, 1)) for name in ("Base Color", "Specular Tint", "Coat Tint"))
@@ -47,29 +54,25 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     eta = (1 + np.sqrt(f_0)) / (1 - np.sqrt(f_0))
     share = (fresnel.dielectric(pair.cos_d, eta) - f_0) / (1 - f_0)
     f_dielectric: Array = np.clip(f_0 * tint + (1 - f_0 * tint) * share, 0, 1)
-    f_metal = closures.tinted(pair.cos_d, base, np.minimum(tint, 1))
-    if v["Thin Film Thickness"] > 0:
-        n, nm = v["Thin Film IOR"], v["Thin Film Thickness"]
-        root = np.sqrt(np.clip(base, 0.01, 0.99))
-
-        def metal(cosine: Array) -> tuple[Array, Array]:
-            f = closures.tinted(cosine, base, np.minimum(tint, 1))
-            return f, f
-
-        f_dielectric = closures.film(pair.cos_d, n, nm, closures.dielectric_below(eta / n), np.full((3, 1), eta))
-        f_metal = closures.film(pair.cos_d, n, nm, metal, (1 + root) / (1 - root))
+    f_82 = np.minimum(tint, 1)
+    f_metal = closures.tinted(pair.cos_d, base, f_82)
+    filmed = v["Thin Film Thickness"] > THINNEST_NM
+    n, nm = v["Thin Film IOR"], v["Thin Film Thickness"]
+    if filmed:
+        f_dielectric = _coated(pair.cos_d, n, nm, eta, f_0, tint)
+        f_metal = closures.film(pair.cos_d, n, nm, _metal_below(base, f_82, n), ORDERS, closures.by_observer)
 
     # Dielectric over a diffuse base, glass, metal
     over = f_dielectric * closures.compensation(cos_i, mean, f_dielectric) * lobe
     once = closures.albedo(cos_i, mean, 1.0)
     share = (closures.dielectric_albedo(cos_i, mean, eta) - f_0 * once) / (1 - f_0)
-    whole = f_0 * tint * once + (1 - f_0 * tint) * share
-    kept = np.clip(1 - (whole * closures.compensation(cos_i, mean, f_0 * tint)).max(axis=0), 0, 1)
+    whole: Array = f_0 * tint * once + (1 - f_0 * tint) * share
+    whole = _coated(cos_i, n, nm, eta, f_0, tint) if filmed else whole * closures.compensation(cos_i, mean, f_0 * tint)
+    kept = np.clip(1 - whole.max(axis=0), 0, 1)
     clear = v["Transmission Weight"]
     diffuse = closures.oren_nayar(pair, base, v["Diffuse Roughness"], again=base)
-    through = np.sqrt(base) * closures.refracted(pair, 1.0 if thin else eta, au, av, turn)
-    dielectric = over + kept * ((1 - clear) * diffuse + clear * through)
-    metal_part = f_metal * closures.compensation(cos_i, mean, f_metal) * lobe
+    dielectric = (1 - clear) * (over + kept * diffuse) + (clear * _glass(pair, v, f_dielectric) if clear else 0)
+    metal_part = f_metal * closures.compensation(cos_i, mean, _often(base, f_82, mean)) * lobe
     substrate = (1 - v["Metallic"]) * dielectric + v["Metallic"] * metal_part
 
     # Coat: absorption along the view inside it, and its own reflection on top
@@ -85,3 +88,60 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
         cos_i, alpha, np.full(1, f_0)
     )
     return np.asarray(coat * top + kept * ((1 - coat) + coat * tinted) * substrate)
+
+
+def _coated(cosine: Array, film: float, thickness_nm: float, eta: float, f_0: float, tint: Array) -> Array:
+    """Reflectance (3, N) of a film over a dielectric, whose tint fades where more is reflected than at its normal."""
+
+    def below(inside: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        ratio = eta / film
+        (s, _), (p, _) = fresnel.dielectric_amplitudes(inside, fresnel.cos_transmitted(inside, ratio), ratio)
+        s, p = (np.broadcast_to(each, (3, len(inside))) for each in (s, p))
+        return (s**2, np.where(s < 0, np.pi, 0.0)), (p**2, np.where(p < 0, np.pi, 0.0))
+
+    found = closures.film(cosine, film, thickness_nm, below, ORDERS, closures.by_observer)
+    return found * (1 + (tint - 1) * np.clip((1 - found) / (1 - f_0), 0, 1))
+
+
+def _metal_below(f_0: Array, f_82: Array, film: float) -> closures.Below:
+    """A metal under a film: the index that has its colours in air (Gulbrandsen 2014), and its colours there."""
+    r = np.minimum(f_0, 0.999)
+    edge = closures.tinted(fresnel.EDGE, f_0, f_82)
+    root = np.sqrt(r)
+    eta = (1 - edge) * (1 + root) / (1 - root) + edge * (1 - r) / (1 + r)
+    kappa = np.sqrt(np.maximum((r * (eta + 1) ** 2 - (eta - 1) ** 2) / (1 - r), 0))
+    inside = fresnel.normal_incidence(eta / film, kappa / film)
+    tint = edge / closures.schlick(fresnel.EDGE, inside)
+
+    def below(cosine: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        reflected = closures.tinted(cosine, inside, tint)
+        s, p = (np.arctan2(im, re) for re, im in fresnel.conductor_amplitudes(cosine, eta / film, kappa / film))
+        return (reflected, s), (reflected, p)
+
+    return below
+
+
+def _often(f_0: Array, f_82: Array, alpha: float) -> Array:
+    """Reflectance of a metal for light that facets scatter many times."""
+    edge = fresnel.EDGE
+    lowered = closures.schlick(edge, f_0) * (1 - f_82) / (edge * (1 - edge) ** 6)
+    # The mean of Schlick's reflectance with its tint
+    return closures.often(f_0 + (1 - f_0) / 21 - lowered / 126, lambda cosine: closures.albedo(cosine, alpha, 1.0))
+
+
+def _glass(pair: Pair, v: Mapping[str, Any], f: Array) -> Array:
+    """Facets that reflect and refract, which are never brushed."""
+    eta, colour = v["IOR"], np.sqrt(np.reshape(v["Base Color"], (3, 1)))
+    # An index of 1 is no surface, regardless of its roughness
+    alpha = max(v["Roughness"] ** 2, closures.ALPHA_MIN) if eta > 1 else closures.ALPHA_MIN
+
+    def albedo(cosine: Array) -> Array:
+        return closures.dielectric_albedo(cosine, alpha, eta) + closures.dielectric_albedo(cosine, alpha, eta, True)
+
+    def passing(cosine: Array) -> Array:
+        return np.asarray(1 - fresnel.dielectric(cosine, eta)) if eta > 1 else np.ones_like(cosine)
+
+    once = albedo(pair.cos_i)
+    scale = 1 + closures.often(colour, albedo) * (1 - once) / once
+    reflected = f * pair.reflected * closures.microfacets(pair, alpha, alpha)
+    return np.asarray(scale * (reflected + colour * closures.refracted(pair, eta, alpha, alpha, passing=passing)))

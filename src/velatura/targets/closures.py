@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from velatura.optics import fresnel, ggx, refraction
 from velatura.sampling.low_discrepancy import square
+from velatura.stack import srgb_weights
 
 Array: TypeAlias = NDArray[np.floating]
 Number: TypeAlias = Any  # a float or an array
@@ -142,7 +143,7 @@ def schlick(cosine: Number, f_0: Number, f_90: Number = 1.0) -> Array:
     return np.asarray(f_0 + (f_90 - f_0) * (1 - np.clip(cosine, 0, 1)) ** 5)
 
 
-def tinted(cosine: Array, f_0: Array, f_82: Array) -> Array:
+def tinted(cosine: Number, f_0: Array, f_82: Array) -> Array:
     """Schlick's reflectance of a metal, times f_82 at about 82 degrees (Kutz et al. 2021)."""
     edge = fresnel.EDGE
     at_82 = schlick(edge, f_0) * (1 - f_82) / (edge * (1 - edge) ** 6)
@@ -159,8 +160,8 @@ def _indices() -> Array:
 
 @functools.cache
 def _albedos() -> Array:
-    """Albedos of microfacets (2 + NODES, cosines, alphas): for Schlick's Fresnel, the parts of F0 and of F90
-    (Karis 2013); for dielectrics of the indices.
+    """Albedos of microfacets (2 + 2 NODES, cosines, alphas): for Schlick's Fresnel, the parts of F0 and of F90
+    (Karis 2013); for dielectrics of the indices, what is reflected, and what is refracted.
 
     Cosines and alphas stand at the squares of i / (NODES - 1), since albedos change fastest near 0.
     """
@@ -169,12 +170,20 @@ def _albedos() -> Array:
     u, v = square(377)
     wi = (np.sqrt(1 - cosine**2), 0 * cosine, cosine)
     h = ggx.sample_visible(wi, alpha, alpha, u, v)
-    wo = ggx.reflect(wi, h)
-    visible_i, visible_o = ggx.masking(wi, alpha, alpha), ggx.masking(wo, alpha, alpha)
-    seen = np.where(wo[2] > 0, visible_o / np.maximum(visible_i + visible_o - visible_i * visible_o, 1e-12), 0)
     cos_d = np.clip(ggx.dot(wi, h), 0, 1)
-    grazing = (1 - cos_d) ** 5
-    parts = [seen * (1 - grazing), seen * grazing, *(seen * fresnel.dielectric(cos_d, eta) for eta in _indices())]
+    visible_i = ggx.masking(wi, alpha, alpha)
+
+    def seen(wo: ggx.Direction) -> Array:
+        visible_o = ggx.masking(wo, alpha, alpha)
+        both = np.maximum(visible_i + visible_o - visible_i * visible_o, 1e-12)
+        return np.where(wo[2] > 0, visible_o / both, 0)
+
+    mirrored, grazing = seen(ggx.reflect(wi, h)), (1 - cos_d) ** 5
+    reflected = [np.asarray(fresnel.dielectric(cos_d, eta)) for eta in _indices()]
+    parts = [mirrored * (1 - grazing), mirrored * grazing, *(mirrored * f for f in reflected)]
+    for f, eta in zip(reflected, _indices()):
+        x, y, z = refraction.refract(wi, h, eta)
+        parts.append((1 - f) * seen((x, y, -z)))
     return np.array([part.mean(axis=1).reshape(NODES, NODES) for part in parts])
 
 
@@ -192,12 +201,24 @@ def albedo(cosine: Array, alpha: float, f_0: Number, f_90: Number = 1.0) -> Arra
     return np.asarray(f_0 * of_0 + f_90 * of_90)
 
 
-def dielectric_albedo(cosine: Array, alpha: float, eta: float) -> Array:
-    """Directional albedo of a rough dielectric of relative index eta, or of its inverse."""
+def dielectric_albedo(cosine: Array, alpha: float, eta: float, passed: bool = False) -> Array:
+    """Directional albedo of a rough dielectric of relative index eta, or of its inverse; or the share that is
+    refracted."""
     z = np.sqrt((min(max(eta, 1 / eta), INDEX_MAX) - 1) / (INDEX_MAX - 1)) * (NODES - 1)
     k = int(min(z, NODES - 2))
-    below, above = _at(_albedos()[2 + k : 4 + k], cosine, alpha)
+    first = 2 + k + NODES * passed
+    below, above = _at(_albedos()[first : first + 2], cosine, alpha)
     return np.asarray(below + (z - k) * (above - below))
+
+
+def often(once: Number, albedo: Callable[[Array], Array]) -> Array:
+    """Reflectance for light that facets scatter many times, from that of facets and their albedo over the cosine.
+
+    (Kulla and Conty 2017)
+    """
+    cosine = (np.arange(64) + 0.5) / 64
+    mean = 2 * (albedo(cosine) * cosine).mean()
+    return np.asarray(once * mean / (1 - once * (1 - mean)))
 
 
 def compensation(cosine: Array, alpha: float, reflectance: Number) -> Array:
@@ -208,6 +229,8 @@ def compensation(cosine: Array, alpha: float, reflectance: Number) -> Array:
 
 # Thin films (Belcour & Barla 2017) ------------------------------------------------------------------------------------
 
+LONGEST_NM = 10_000.0  # of path differences that interfere in colours
+
 _TO_RGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.969266, 1.8760108, 0.041556], [0.0556434, -0.2040259, 1.0572252]]
 )
@@ -216,8 +239,12 @@ _TO_RGB_E = np.array(
 )
 
 
-def _sensitivity(path_nm: Array, shift: Array, to_rgb: Array) -> Array:
-    """Fourier transforms of the sensitivities of the eye, as Gaussians, in RGB (3, N)."""
+#: Interference of a path difference in nanometres and a phase, in RGB (3, N).
+Seen: TypeAlias = Callable[[Array, Array], Array]
+
+
+def _by_gaussians(path_nm: Array, shift: Array, to_rgb: Array = _TO_RGB_E) -> Array:
+    """By Fourier transforms of the sensitivities of the eye, as Gaussians."""
     phase = 2 * pi * path_nm * 1e-9
     val, pos, var = np.array(
         [[5.4856e-13, 4.4201e-13, 5.2481e-13], [1.681e6, 1.7953e6, 2.2084e6], [4.3278e9, 9.3046e9, 6.6121e9]]
@@ -228,14 +255,31 @@ def _sensitivity(path_nm: Array, shift: Array, to_rgb: Array) -> Array:
     return np.asarray(to_rgb @ xyz / 1.0685e-7)
 
 
-def _interference(r_12: Array, r_23: Array, path_nm: Array, phase: Array, to_rgb: Array, least: float) -> Array:
+@functools.cache
+def _transforms() -> tuple[Array, NDArray[np.complexfloating]]:
+    """Path differences (N,), and Fourier transforms (3, N) of the sensitivities of linear sRGB."""
+    wavelengths_nm, weights = srgb_weights(d65=False)
+    path_nm = np.linspace(0, LONGEST_NM, 1024)
+    return path_nm, weights @ np.exp(2j * pi * path_nm / wavelengths_nm[:, None])
+
+
+def by_observer(path_nm: Array, shift: Array) -> Array:
+    """By the CIE 1931 observer, in light of equal energy."""
+    at, transforms = _transforms()
+    found = np.stack([np.interp(path_nm, at, each, right=0.0) for each in transforms])
+    return np.asarray((found * np.exp(1j * shift)).real)
+
+
+def _interference(
+    r_12: Array, r_23: Array, path_nm: Array, phase: Array, seen: Seen, least: float, orders: int = 2
+) -> Array:
     """Light reflected by a film, of one polarisation (3, N)."""
     both = np.clip(r_12 * r_23, least, 0.9999)
     inside = (1 - r_12) ** 2 * r_23 / (1 - both)
     total, order = r_12 + inside, inside - (1 - r_12)
-    for m in (1, 2):
+    for m in range(1, orders + 1):
         order = order * np.sqrt(both)
-        total = total + order * 2 * _sensitivity(m * path_nm, m * phase, to_rgb)
+        total = total + order * 2 * seen(m * path_nm, m * phase)
     return np.asarray(total)
 
 
@@ -250,39 +294,44 @@ def film_by_schlick(cosine: Array, eta: float, thickness_nm: float, f_0: Array) 
     r_12 = np.broadcast_to(schlick(cosine, fresnel.normal_incidence(eta)), (3, *np.shape(cosine)))
     r_23 = schlick(cos_2, ((base - eta) / (base + eta)) ** 2)
     phase = pi + np.where(base < eta, pi, 0.0)
-    return np.maximum(_interference(r_12, r_23, 2 * eta * thickness_nm * cos_2, phase, _TO_RGB, 1e-5), 0)
+    in_srgb = functools.partial(_by_gaussians, to_rgb=_TO_RGB)
+    return np.maximum(_interference(r_12, r_23, 2 * eta * thickness_nm * cos_2, phase, in_srgb, 1e-5), 0)
+
+
+#: Reflectance (3, N) and phase, of s and of p, at the lower side of a film, by the cosine inside it.
+Below: TypeAlias = Callable[[Array], tuple[tuple[Array, Array], tuple[Array, Array]]]
 
 
 def film(
-    cosine: Array, eta: float, thickness_nm: float, below: Callable[[Array], tuple[Array, Array]], base: Array
+    cosine: Array, eta: float, thickness_nm: float, below: Below, orders: int = 2, seen: Seen = _by_gaussians
 ) -> Array:
-    """Reflectance (3, N) of a film: the mean of both polarisations.
-
-    `below` gives the reflectances of its lower side for s and p; `base` is the index below, by channel, which decides
-    on the phase.
-    """
+    """Reflectance (3, N) of a film: the mean of both polarisations, of so many orders of interference."""
     cos_2 = fresnel.cos_transmitted(cosine, eta)
     path = 2 * eta * thickness_nm * cos_2
-    first = _polarised(cosine, cos_2, eta)
-    phase_23 = np.where(base < eta, pi, 0.0)
-    tilted = np.where(cosine < np.cos(np.arctan(eta)), 0.0, pi)
-    total = [
-        _interference(np.broadcast_to(r_12, (3, len(r_12))), r_23, path, phase + phase_23, _TO_RGB_E, 0.0)
-        for r_12, r_23, phase in zip(first, below(cos_2), (pi, tilted))
-    ]
+    total = []
+    for (r_12, _), (r_23, phase) in zip(fresnel.dielectric_amplitudes(cosine, cos_2, eta), below(cos_2)):
+        again = phase + np.where(r_12 > 0, pi, 0.0)  # from inside, the amplitude has the other sign
+        reflected = np.broadcast_to(r_12**2, (3, len(r_12)))
+        total.append(_interference(reflected, r_23, path, again, seen, 0.0, orders))
     return np.clip(0.5 * (total[0] + total[1]), 0, 1)
 
 
+def below_film(reflectances: Callable[[Array], tuple[Array, Array]], base: Array, eta: float) -> Below:
+    """Reflectances of s and p, in phase but for the indices, of the base by channel and of the film."""
+    flipped = np.where(base < eta, pi, 0.0)
+
+    def found(cosine: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        s, p = reflectances(cosine)
+        return (s, flipped + pi), (p, flipped)
+
+    return found
+
+
 def dielectric_below(eta: Number) -> Callable[[Array], tuple[Array, Array]]:
-    """The lower side of a film over a dielectric of index eta over the film's."""
+    """Reflectances of the lower side of a film over a dielectric of index eta over the film's."""
 
     def reflectances(cosine: Array) -> tuple[Array, Array]:
-        s, p = _polarised(cosine, fresnel.cos_transmitted(cosine, eta), eta)
-        return np.broadcast_to(s, (3, len(cosine))), np.broadcast_to(p, (3, len(cosine)))
+        (s, _), (p, _) = fresnel.dielectric_amplitudes(cosine, fresnel.cos_transmitted(cosine, eta), eta)
+        return np.broadcast_to(s**2, (3, len(cosine))), np.broadcast_to(p**2, (3, len(cosine)))
 
     return reflectances
-
-
-def _polarised(cosine: Array, cos_t: Array, eta: Number) -> tuple[Array, Array]:
-    (s, _), (p, _) = fresnel.dielectric_amplitudes(cosine, cos_t, eta)
-    return s**2, p**2

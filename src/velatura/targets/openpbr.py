@@ -97,8 +97,11 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
             return f, f
 
         films = [
-            closures.film(pair.cos_d, n, nm, metal, (1 + root) / (1 - root)),
-            closures.film(pair.cos_d, n, nm, closures.dielectric_below(eta / n), np.full((3, 1), eta)),
+            closures.film(pair.cos_d, n, nm, closures.below_film(reflectances, index, n))
+            for reflectances, index in (
+                (metal, (1 + root) / (1 - root)),
+                (closures.dielectric_below(eta / n), np.full((3, 1), eta)),
+            )
         ]
         f_metal, f_dielectric = ((1 - share) * f + share * g for f, g in zip((f_metal, f_dielectric), films))
     metal_part = v["specular_weight"] * f_metal * closures.compensation(cos_i, mean, f_metal) * lobe
