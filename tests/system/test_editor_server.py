@@ -11,6 +11,7 @@ import base64
 import http.client
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -249,6 +250,26 @@ def test_hostile_requests_are_answered(here: Path, capfd: pytest.CaptureFixture[
     assert "Traceback" not in capfd.readouterr().err
 
 
+def test_files_hold_the_digits_that_a_picture_shows(here: Path, port: int) -> None:
+    """Expected: eight, as single precision has, of a file that is saved, and of one that is downloaded."""
+    layers = [
+        {"interface": {"eta": 1.0797032977443721, "alpha": 0.1}},
+        {"medium": {"sigma_s": 1, "g": 0.1234567890123}},
+    ]
+    material = {"layers": [*layers, {"interface": {"eta": [1.5, 1.6, 1.7], "k": 3.00000000001}}]}
+    text = call(port, "write", {"material": material})[1]["text"]
+    assert call(port, "save", {"file": "a.yaml", "material": material, "version": None})[0] == 200
+    assert (here / "a.yaml").read_text() == text
+    assert [n for n in re.findall(r"[\d.]+", text) if len(n) > 3] == ["1.0797033", "0.12345679"]
+
+
+def test_a_name_that_is_too_long_for_the_disk_is_refused_without_the_folder(here: Path, port: int) -> None:
+    for verb, body in (("open", {}), ("save", {"material": COAT, "version": None})):
+        status, answer = call(port, verb, {"file": "\u6f06" * 200 + ".yaml", **body})
+        assert status == 422 and "name too long" in answer["error"].lower()
+        assert str(here) not in answer["error"]
+
+
 def test_of_two_tabs_that_save_the_second_is_told(here: Path, port: int) -> None:
     body = {"file": "coat.yaml", "material": COAT, "version": None}
     assert call(port, "save", body)[0] == 200
@@ -343,6 +364,22 @@ def test_an_answer_that_takes_too_long_is_given_up(here: Path, monkeypatch: pyte
     monkeypatch.setitem(service.VERBS, "invert", lambda body: {"waited": threading.Event().wait(1)})
     with served() as port:
         assert call(port, "invert", {}) == (503, {"error": "invert: has no answer after 0.2 seconds"})
+
+
+def test_answers_that_are_given_up_stop_no_others(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: after as many endless answers as a kind of verb has at once, the next one is answered."""
+    release = threading.Event()
+    monkeypatch.setattr(server, "ANSWER_TIME", 1)
+    monkeypatch.setitem(service.VERBS, "values", lambda body: {"waited": release.wait(30)})
+    assert server.LANE_OF["values"] == server.LANE_OF["shader"]
+    at_once, _ = server.LANES[server.LANE_OF["shader"]]
+    with served() as port, ThreadPoolExecutor(at_once) as clients:
+        try:
+            asked = [clients.submit(call, port, "values", {}) for _ in range(at_once)]
+            assert [each.result()[0] for each in asked] == [503] * at_once
+            assert call(port, "shader", {"material": {}})[0] == 422
+        finally:
+            release.set()
 
 
 # Strangers

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, material_of
+from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, document, field, to_write
 from velatura.errors import InvalidInput
 from velatura.files import whole
 from velatura.stack import dumps, load
@@ -71,7 +71,7 @@ class Folder:
         """Write a material; Conflict unless the file has the version given, None for a file that is not there."""
         name = field(body, "file", str)
         path = self.place(name, MATERIALS)
-        text = dumps(material_of(body), "json" if path.suffix.lower() == ".json" else "yaml", self.path)
+        text = dumps(to_write(body), "json" if path.suffix.lower() == ".json" else "yaml", self.path)
         with self.writing:
             self._check_version(path, body.get("version"))
             _write(path, text.encode())
@@ -100,23 +100,25 @@ class Folder:
             InvalidInput: anything but the plain name of a file of this folder with one of the endings.
         """
         if not name.isprintable() or {"/", "\\"} & set(name) or name.startswith(".") or not name.strip():
-            raise InvalidInput(f"{name!r}: must be the plain name of a file in {self.path}")
+            raise InvalidInput(f"{name!r}: must be the plain name of a file of the folder")
         path = self.path / name
         if path.suffix.lower() not in endings:
             raise InvalidInput(f"{name}: must end in {', '.join(endings)}")
         try:
             inside = path.resolve().parent == self.path and (path.is_file() or not path.exists())
-        except (OSError, RuntimeError, ValueError):
+        except OSError as error:  # a name that is too long for the disk
+            raise InvalidInput(f"{name}: cannot be the name of a file ({error.strerror})") from None
+        except (RuntimeError, ValueError):
             inside = False
         if not inside:
-            raise InvalidInput(f"{name}: must be a file in {self.path}, and no link out of it")
+            raise InvalidInput(f"{name}: must be a file of the folder, and no link out of it")
         return path
 
     def existing(self, name: str, endings: Sequence[str]) -> Path:
         """The path of an existing file. Raises InvalidInput as `place`, and where it is missing or too large."""
         path = self.place(name, endings)
         if not path.is_file():
-            raise InvalidInput(f"{name}: there is no such file in {self.path}")
+            raise InvalidInput(f"{name}: there is no such file in the folder")
         if path.stat().st_size > LARGEST:
             raise InvalidInput(f"{name}: is larger than {LARGEST >> 20} MiB")
         return path
@@ -147,7 +149,7 @@ def _version(path: Path) -> str | None:
 
 def _write(path: Path, data: bytes, check: Callable[[Path], None] = lambda path: None) -> None:
     """Write a file that passes a check, whole or not at all."""
-    with whole(path) as unfinished:
+    with whole(Path(os.path.relpath(path))) as unfinished:
         unfinished.write_bytes(data)
         check(unfinished)
 

@@ -39,6 +39,7 @@ _TYPES: dict[Any, str] = {
 LAYERS, LOBES = 48, 16  # of a material, and of a target
 DEEPEST = 16  # lists and objects in one another
 BIGGEST = 1e30  # number, which single precision holds
+DIGITS = 8  # of values in files, all that single precision has
 TEXT = 2**18  # characters of a material file
 
 
@@ -245,6 +246,23 @@ def document(stack: Stack) -> Answer:
     """A stack as a body holds it."""
     fields: Answer = json.loads(dumps(stack, "json", "."))
     return fields
+
+
+def to_write(body: Body) -> Stack:
+    """The stack of a body with DIGITS digits of every value, where these make a stack: files are read by people."""
+    stack = material_of(body)
+    try:
+        return Stack.from_dict(_rounded(stack.to_dict()))
+    except InvalidInput:  # of a value beside the excluded end of its range
+        return stack
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(_rounded(entry) for entry in value)
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def array(values: ArrayLike, dtype: str = "float32") -> Answer:

@@ -41,11 +41,12 @@ SMALL = 2**20  # bytes of a message, and of every request but that of a texture
 IN_MEMORY = 2**16  # bytes of a request; a larger one is kept in a file until all of it is there
 BODY_TIME, ANSWER_TIME = 60, 60  # seconds for the body of a request, and for its answer
 
-#: Threads that answer, and calls that may wait for one: none waits for those of another kind.
+#: Calls that are answered at once, and those that may wait: none waits for those of another kind.
 LANES = {"quick": (4, 512), "picture": (2, 64), "slow": (4, 32)}
+THREADS = sum(at_once for at_once, _ in LANES.values()) + 8  # the others for answers that were given up
 LANE_OF = {
     **dict.fromkeys(("shader", "values", "appearance"), "picture"),
-    **dict.fromkeys(("invert", "class", "member", "coat", "targets", "truth", "validation"), "slow"),
+    **dict.fromkeys(("invert", "class", "member", "coat", "targets", "truth", "validation", "film", "export"), "slow"),
 }
 
 
@@ -167,14 +168,16 @@ class Desk:
     async def answer(self, name: str, body: Callable[[], Body]) -> tuple[int, str]:
         """Status and answer, in JSON, of a call of a verb with a body, which its thread makes."""
         lane = LANE_OF.get(name, "quick")
-        threads, waiting = LANES[lane]
-        limiter = self.limiters.setdefault(lane, anyio.CapacityLimiter(threads))
-        if self.calls[lane] >= threads + waiting:
+        at_once, waiting = LANES[lane]
+        free = self.limiters.setdefault(lane, anyio.CapacityLimiter(at_once))
+        threads = self.limiters.setdefault("threads", anyio.CapacityLimiter(THREADS))
+        if self.calls[lane] >= at_once + waiting:
             return 503, _error(BUSY)
         self.calls[lane] += 1
         try:
             with anyio.fail_after(ANSWER_TIME):
-                return await run_sync(_answer, self.verbs[name], body, abandon_on_cancel=True, limiter=limiter)
+                async with free:  # for others, too, where this answer is given up
+                    return await run_sync(_answer, self.verbs[name], body, abandon_on_cancel=True, limiter=threads)
         except TimeoutError:
             return 503, _error(f"{name}: has no answer after {ANSWER_TIME} seconds")
         finally:

@@ -17,7 +17,18 @@ from pydantic.fields import FieldInfo
 
 from velatura import __version__, exports, kernel
 from velatura.editor import appearance, class_maps, films, truth, validations
-from velatura.editor.messages import Answer, Body, Verb, admitting, array, document, field, material_of, model_of
+from velatura.editor.messages import (
+    Answer,
+    Body,
+    Verb,
+    admitting,
+    array,
+    document,
+    field,
+    material_of,
+    model_of,
+    to_write,
+)
 from velatura.editor.shading import contents, shading
 from velatura.editor.shading import tables as kept_tables
 from velatura.errors import InvalidInput
@@ -201,7 +212,7 @@ def read(body: Body) -> Answer:
 
 def write(body: Body) -> Answer:
     """A material as YAML, its textures relative to the working directory."""
-    return {"text": dumps(material_of(body), "yaml", ".")}
+    return {"text": dumps(to_write(body), "yaml", ".")}
 
 
 def object_(body: Body) -> Answer:
