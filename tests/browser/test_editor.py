@@ -423,6 +423,31 @@ def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
     assert page.page.evaluate(PREVIEWS) == known
 
 
+def test_the_page_goes_on_while_thirty_interfaces_are_compiled(visit: Open) -> None:
+    """Expected: a word for what the picture waits for, and no pause of the page as long as half of the compiling."""
+    page = visit(viewport={"width": 480, "height": 400})
+    page.page.evaluate(
+        """() => {
+          const watched = (window.watched = {}), place = document.querySelector('.samples');
+          let last = performance.now();
+          setInterval(() => {
+            const now = performance.now(), found = (watched[place.textContent] ??= { whole: 0, pause: 0 });
+            found.whole += now - last;
+            found.pause = Math.max(found.pause, now - last);
+            last = now;
+          }, 20);
+        }"""
+    )
+    for _ in range(28):
+        page.page.get_by_role("button", name="Interface", exact=True).click()
+    page.settled()
+    assert len(page.page.evaluate("velatura.shader().lobes")) == 30
+    watched = page.page.evaluate("watched")
+    compiling = watched["compiling the shader \u2026"]
+    assert max(each["pause"] for each in watched.values()) < compiling["whole"] / 2
+    assert watched["solving the layers \u2026"]["whole"] > 0
+
+
 def test_a_material_is_not_stained_by_the_one_before(visit: Open) -> None:
     """Expected: after paths have told where gold shadows itself, another material is previewed as in a new tab, of the
     same kinds of layers or of others; what is kept for other values of one material has no hue."""

@@ -291,8 +291,8 @@ async function showDifference(element, viewport) {
 const STAGES = { solving: 'solving the layers \u2026', compiling: 'compiling the shader \u2026' };
 
 /** The count of samples, which changes too often to draw the page for it, or what the picture waits for. */
-function showSamples(element, { samples, truth, lost }, stage) {
-  const waits = lost ? 'no graphics device' : STAGES[stage];
+function showSamples(element, { samples, truth, lost, warming, previewed }, stage) {
+  const waits = lost ? 'no graphics device' : STAGES[warming && !previewed ? 'compiling' : stage];
   if (waits) {
     element.querySelector('.samples').textContent = waits;
     return;

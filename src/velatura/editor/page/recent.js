@@ -13,6 +13,10 @@ export class Recent {
     return this.#entries.size;
   }
 
+  keys() {
+    return this.#entries.keys();
+  }
+
   get(key) {
     if (!this.#entries.has(key)) return undefined;
     const value = this.#entries.get(key);

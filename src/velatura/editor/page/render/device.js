@@ -1,6 +1,9 @@
 // WebGL 2 in few words: textures, targets, programs that compile beside the page's work, and waiting.
 
+import { Recent } from '../recent.js';
 import { throughCurve } from './curve.js';
+
+const MOST = 64; // programs that are kept; those in use stay whether they are or not
 
 const VERTEX = `#version 300 es
 void main() {
@@ -13,6 +16,8 @@ export class Device {
   parallel; // the extension by which programs compile beside other work, if any
   empty; // array of vertices
   programs; // promises of them, by their text
+  warming = 0; // how many draw for the first time, or are about to
+  shown = Promise.resolve(); // when the canvas is on the page as it was drawn last
 
   /** Throws Error if the browser lacks a required feature. */
   constructor(canvas) {
@@ -33,7 +38,7 @@ export class Device {
     this.soft = gl.getExtension('OES_texture_float_linear') ? 'RGBA32F' : 'RGBA16F';
     this.parallel = gl.getExtension('KHR_parallel_shader_compile');
     this.empty = gl.createVertexArray();
-    this.programs = new Map();
+    this.programs = new Recent(MOST);
   }
 
   // Pictures
@@ -167,9 +172,7 @@ export class Device {
 
   /** A program, compiled once; the page's work goes on meanwhile. Raises Error with the compiler's words. */
   program(fragment, vertex = VERTEX) {
-    const key = vertex + fragment;
-    if (!this.programs.has(key)) this.programs.set(key, this.compile(fragment, vertex));
-    return this.programs.get(key);
+    return this.programs.once(vertex + fragment, () => this.compile(fragment, vertex));
   }
 
   async compile(fragment, vertex) {
@@ -197,6 +200,24 @@ export class Device {
     }
     shaders.forEach((shader) => gl.deleteShader(shader));
     return { handle, places: new Map() };
+  }
+
+  /**
+   * Draws a pixel of a format by a program, once, and waits until it is drawn: some devices compile only then, and the
+   * page would stop for as long wherever it shows the canvas or asks the device for anything.
+   */
+  warm(program, uniforms, format) {
+    return (program.warm ??= this.#drawFirst(program, uniforms, format));
+  }
+
+  async #drawFirst(program, uniforms, format) {
+    this.warming++;
+    await this.shown;
+    const pixel = this.target(1, 1, [format]);
+    this.draw(program, uniforms, pixel);
+    this.free(pixel);
+    await this.done();
+    this.warming--;
   }
 
   /** Takes a program and its uniforms: numbers, arrays, textures; names that it does not have are ignored. */

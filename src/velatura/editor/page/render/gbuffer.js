@@ -116,15 +116,9 @@ export class GBuffer {
     return draw(this.#spreading, { coarse_light: light.textures[0], seen_every: block, ...named(this.#seen) }, target);
   }
 
-  /** Draws a pixel by a program that is to draw the object, once: some devices compile only then, beside other work. */
+  /** Waits for the first pixel by a program that is to draw the object. */
   warm(program, uniforms) {
-    const device = this.#device;
-    if (program.warm) return;
-    program.warm = true;
-    const pixel = device.target(1, 1, ['RGBA16F']);
-    device.draw(program, { ...uniforms, ...named(this.#seen), seen_every: 1 }, pixel);
-    device.free(pixel);
-    device.gl.flush();
+    return this.#device.warm(program, { ...uniforms, ...named(this.#seen), seen_every: 1 }, 'RGBA16F');
   }
 
   #setBlock(block) {

@@ -61,7 +61,9 @@ export class Slices {
   /** Waits for the programs, and for the data of most plots; a disc is drawn on demand. */
   async ready() {
     const texts = [lobesProgram(this.shader, this.parts), valuesProgram(this.shader)];
-    [this.#lobesProgram, this.#valuesProgram] = await Promise.all(texts.map((text) => this.#device.program(text)));
+    const programs = await Promise.all(texts.map((text) => this.#device.program(text)));
+    for (const program of programs) await this.#device.warm(program, this.#known, 'RGBA32F');
+    [this.#lobesProgram, this.#valuesProgram] = programs;
     [this.#table, this.polar] = await Promise.all([this.drawnTable(), this.drawnPolar()]);
     return this;
   }
@@ -173,6 +175,10 @@ export class Slices {
     });
   }
 
+  get #known() {
+    return { ...this.#uniforms, vt_directions: this.directions().texture };
+  }
+
   /** As many bands of rows as there are uniforms. */
   async drawn(program, width, height, bands) {
     const target = this.target(program, width, height, bands);
@@ -182,10 +188,9 @@ export class Slices {
   }
 
   target(program, width, height, bands) {
-    const known = { ...this.#uniforms, vt_directions: this.directions().texture };
     const target = this.#device.target(width, height, ['RGBA32F']), rows = height / bands.length;
     bands.forEach((uniforms, k) =>
-      this.#device.draw(program, { ...known, ...uniforms }, target, { rows: [k * rows, (k + 1) * rows] }),
+      this.#device.draw(program, { ...this.#known, ...uniforms }, target, { rows: [k * rows, (k + 1) * rows] }),
     );
     return target;
   }

@@ -168,13 +168,17 @@ export class Slot {
     const shade = this.shades[0].textures[0];
     if (!this.#surrounded) gbuffer.drawSurroundings({ ...uniforms, shade }, this.preview);
     this.#surrounded = true;
-    if (this.#outdated) this.warm(gbuffer, { ...uniforms, shade });
     gbuffer.drawObject(this.#lighting, { ...this.uniforms(coarse), ...uniforms, shade }, this.preview, block);
   }
 
-  /** Draws a pixel of the object, where this was never done by the same program. */
+  /** Waits for the first pixel of the object, where none was drawn by the same program. */
   warm(gbuffer, uniforms) {
-    gbuffer.warm(this.#lighting, { ...this.#textures, ...uniforms });
+    return gbuffer.warm(this.#lighting, { ...this.#textures, ...uniforms });
+  }
+
+  /** The same of paths. */
+  warmPaths(uniforms) {
+    return this.device.warm(this.#tracing, { ...this.#textures, ...uniforms }, 'RGBA32F');
   }
 
   forget() {

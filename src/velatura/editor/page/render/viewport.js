@@ -14,6 +14,7 @@ import { Thumbnails, radianceOf } from './stills.js';
 import { tileCorner, tileSize } from './tiles.js';
 
 const REFRESH = 100; // milliseconds between two pictures while paths are added up
+const WARMING = 10; // milliseconds until the next look while a program draws for the first time
 const RETRY = 1000; // milliseconds until the next look after an error, and while something is missing
 const MOST_PIXELS = 1_000_000;
 const PAIR = ['a', 'b']; // the slots that are compared over the whole canvas
@@ -97,7 +98,7 @@ export class Viewport {
   async prepare(shader) {
     const slot = (this.coming ??= new Slot(this.device, this.loader));
     await slot.setMaterial(shader, shader);
-    slot.warm(this.gbuffer, this.uniforms());
+    await slot.warm(this.gbuffer, this.uniforms());
   }
 
   /** Shadows that were learnt from paths of one material hold for no other. */
@@ -200,14 +201,19 @@ export class Viewport {
     return this.schedule.previewed;
   }
 
-  /** Whether there is nothing to do but to trace paths. */
-  get idle() {
-    return this.schedule.idle;
+  /** Whether the device is busy with programs that draw for the first time, and any question to it would wait. */
+  get warming() {
+    return this.device.warming > 0;
   }
 
-  /** Whether the preview has been there, as it is, for so many milliseconds. */
+  /** Whether there is nothing to do but to trace paths. */
+  get idle() {
+    return this.schedule.idle && !this.warming;
+  }
+
+  /** Whether the preview has been there, as it is, for so many milliseconds, and the device can be asked for more. */
   rested(milliseconds) {
-    return this.schedule.rested(milliseconds, performance.now());
+    return this.schedule.rested(milliseconds, performance.now()) && !this.warming;
   }
 
   /** Mean light of slot "a", or another: {width, height, data: RGBA, linear, from the upper left}. */
@@ -217,8 +223,9 @@ export class Viewport {
 
   /** The mean absolute difference in luminance, exposed, of what is compared; null where nothing is, yet. */
   async difference() {
-    if (this.settings.mode !== 'difference' || !this.screen.ready || this.lost) return null;
-    return this.screen.difference(this.#seen(), this.settings);
+    const seen = this.#seen(), isPair = this.truth || seen.length > 1;
+    if (this.settings.mode !== 'difference' || !isPair || !this.screen.ready || this.lost) return null;
+    return this.screen.difference(seen, this.settings);
   }
 
   /** A small square picture of another material on the same object, from here; an ImageData. */
@@ -309,11 +316,11 @@ export class Viewport {
     return mode === 'tiles' ? ['a', ...tiles] : ['a'];
   }
 
-  /** The slots that are drawn; of those side by side, the first and all that have a material. */
+  /** The slots that are drawn: the first, and of those beside it all that have a material. */
   #seen() {
-    const { a, b } = this.slots, { mode } = this.settings;
-    if (mode === 'tiles') return this.#names().map((name) => this.slots[name]).filter((slot) => slot === a || slot.shader);
-    return mode === 'single' || this.truth ? [a] : [a, b];
+    const { a } = this.slots, { mode } = this.settings;
+    const names = mode === 'tiles' || mode === 'single' || this.truth ? this.#names() : PAIR;
+    return names.map((name) => this.slots[name]).filter((slot) => slot === a || slot.shader);
   }
 
   // Over time
@@ -351,6 +358,7 @@ export class Viewport {
     const { hasObject, hasLight } = this.stage;
     if (!hasObject || !hasLight || this.#seen().some((slot) => !slot.shader)) return this.#sleep(RETRY);
     const { act, milliseconds } = this.schedule.next(performance.now(), this.samples);
+    if (this.warming) return this.#sleep(WARMING);
     if (act === 'preview') return this.#drawPreview();
     if (act === 'wait') return this.#sleep(milliseconds);
     return this.#seen().some((slot) => slot.contents.coarse) ? this.#sleep(RETRY) : this.#trace();
@@ -368,15 +376,19 @@ export class Viewport {
   }
 
   async #drawPreview() {
+    if (!this.held) await this.device.shown; // the page would wait for the canvas until all pixels are drawn
+    await Promise.all(this.#seen().map((slot) => slot.warm(this.gbuffer, this.uniforms())));
     const uniforms = this.uniforms(), drawing = this.schedule.beginPreview(performance.now());
     this.gbuffer.update(uniforms.camera_projection);
     for (const slot of this.#seen()) slot.drawPreview(this.gbuffer, uniforms, drawing.block);
+    const done = await this.device.done();
     this.#show();
-    this.schedule.endPreview(drawing, await this.device.done());
+    this.schedule.endPreview(drawing, done);
   }
 
   /** A slice of paths, in all slots that are seen. The device works on it while we wait for the one before. */
   async #trace() {
+    await Promise.all(this.#seen().map((slot) => slot.warmPaths(this.uniforms())));
     const uniforms = this.uniforms(), { height } = this.frame, before = this.#slice;
     let rows = 0;
     for (let band; this.samples < this.budget.samples && (band = this.#bands.next(height, rows)); ) {
@@ -399,10 +411,13 @@ export class Viewport {
   #show() {
     if (this.#asked) return;
     this.#asked = true;
-    requestAnimationFrame(() => {
-      this.#asked = false;
-      this.#painted = performance.now();
-      this.paint();
+    this.device.shown = new Promise((resolve) => {
+      requestAnimationFrame(() => {
+        this.#asked = false;
+        this.#painted = performance.now();
+        this.paint();
+        setTimeout(resolve); // after the frame
+      });
     });
   }
 
