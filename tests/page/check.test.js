@@ -44,6 +44,7 @@ for (const [material, why] of [
   [of({ medium: { sigma_a: 'red' } }), /sigma_a: must be a number/],
   [of({ interface: { alpha: { texture: 'a.png' } } }), /alpha: textures and spectra need Python/],
   [of({ interface: { eta: 'glass' } }), /eta: glass is not a known name/],
+  [of({ interface: { eta: 'constructor' } }), /eta: constructor is not a known name/],
   [of({ interface: { conductor: 'Fe' } }), /conductor: must be one of mirror, Au/],
   [of({ interface: { films: 3 } }), /films: must be a list of films/],
   [of({ interface: { films: [{}, {}, {}] } }), /films: must be at most 2 films/],

@@ -10,7 +10,7 @@ import { fragmentOf, isShared, readFragment } from '../../src/velatura/editor/pa
 
 const SESSION = {
   default_model: 'velatura',
-  models: [{ name: 'velatura' }, { name: 'belcour2018' }],
+  models: ['velatura', 'belcour2018'].map((name) => ({ name, switches: { tir: ['on', 'off'] } })),
   objects: ['ball', 'sphere'],
   environments: [{ name: 'studio' }, { name: 'city' }],
 };
@@ -34,6 +34,22 @@ test('an address that was cut off is refused in words', async () => {
   const fragment = await fragmentOf(shown(), MATERIAL);
   for (const text of [fragment.slice(0, 20), '#m=', '#m=%%%'])
     await assert.rejects(readFragment(text, SESSION), /cut off, or changed/);
+});
+
+const fragmentFor = (found) => fragmentOf({ ...shown(), ...found }, found.material);
+
+test('an address that holds anything else is refused in words, or without what is not known', async () => {
+  const stranger = { constructor: 'off' };
+  await assert.rejects(readFragment(await fragmentFor({ switches: stranger }), SESSION), /a switch that .* constructor/);
+  await assert.rejects(readFragment(await fragmentFor({ switches: { tir: '<b>' } }), SESSION), /a switch/);
+  await assert.rejects(readFragment(await fragmentFor({ model: { toString: 1 } }), SESSION), /a model that is not known/);
+  for (const switches of [null, 3, []]) {
+    const found = await readFragment(await fragmentFor({ switches, camera: 'none' }), SESSION);
+    assert.deepEqual([found.switches, found.camera], [{}, null]);
+  }
+  const bomb = await fragmentFor({ material: { name: 'x'.repeat(3e6) } });
+  assert.ok(bomb.length < 6000);
+  await assert.rejects(readFragment(bomb, SESSION), /cut off, or changed/);
 });
 
 test('an unknown model is named, and an unknown view left out', async () => {

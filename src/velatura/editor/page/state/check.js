@@ -46,7 +46,7 @@ function refusal(value, spec, names) {
   if (kind === 'choice') return options.includes(value) ? '' : `must be one of ${options.join(', ')}`;
   if (value !== null && typeof value === 'object' && !Array.isArray(value)) return 'textures and spectra need Python';
   if (kind === 'index' && typeof value === 'string')
-    return value in names.dielectrics || value in names.conductors ? '' : `${value} is not a known name`;
+    return [names.dielectrics, names.conductors].some((known) => Object.hasOwn(known, value)) ? '' : `${value} is not a known name`;
   if (Array.isArray(value) && value.length !== SEVERAL[kind]) return `must not be ${value.length} numbers`;
   return [value].flat().map((number) => objection(number, spec)).find(Boolean) ?? '';
 }

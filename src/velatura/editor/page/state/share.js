@@ -1,6 +1,7 @@
 // A material in an address: after #m= its JSON, deflated, in base64url.
 
 const MARK = '#m=';
+const MOST = 2 ** 18; // bytes of the JSON, as many as Python takes of a material's text
 const VIEW = { object: 'objects', environment: 'environments', rotation: null, exposure: null }; // what is shared of it
 
 /** What follows the address of the page to open it with what is shown now; files that were dropped are left out. */
@@ -25,16 +26,23 @@ export async function readFragment(fragment, session) {
   try {
     const letters = atob(fragment.slice(MARK.length).replace(/-/g, '+').replace(/_/g, '/'));
     const bytes = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
-    found = JSON.parse(new TextDecoder().decode(await through(new DecompressionStream('deflate-raw'), bytes)));
+    found = JSON.parse(new TextDecoder().decode(await through(new DecompressionStream('deflate-raw'), bytes, MOST)));
   } catch {
     throw new Error('The address holds no material that can be read: it has been cut off, or changed.');
   }
-  const { material, model, switches = {}, view = {}, camera = null } = found ?? {};
-  if (!session.models.some(({ name }) => name === model)) {
-    throw new Error(`The address names a model that is not known here: ${model}.`);
-  }
-  return { material, model, switches, view: known(view, session), camera: isCamera(camera) ? camera : null };
+  const { material, model, switches, view, camera = null } = Object(found);
+  const named = session.models.find(({ name }) => name === model);
+  if (!named) throw new Error(`The address names a model that is not known here: ${show(model)}.`);
+  const chosen = Object.entries(Object(switches));
+  const wrong = chosen.find(([key, value]) => !Object.hasOwn(named.switches, key) || !named.switches[key].includes(value));
+  if (wrong) throw new Error(`The address has a switch that ${model} does not take: ${show(wrong[0])}.`);
+  return {
+    ...{ material, model, switches: Object.fromEntries(chosen), view: known(Object(view), session) },
+    camera: isCamera(camera) ? camera : null,
+  };
 }
+
+const show = (value) => String(typeof value === 'string' ? value : JSON.stringify(value)).slice(0, 40);
 
 /** Of a view that which is possible here. */
 function known(view, session) {
@@ -48,7 +56,16 @@ function known(view, session) {
 const isPoint = (point) => Array.isArray(point) && point.length === 3 && point.every(Number.isFinite);
 const isCamera = (camera) => isPoint(camera?.origin) && isPoint(camera.target) && Number.isFinite(camera.fov);
 
-/** Bytes after a stream that transforms them. */
-export async function through(stream, bytes) {
-  return new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(stream)).arrayBuffer());
+/** Bytes after a stream that transforms them; RangeError where these are more than `most`. */
+export async function through(stream, bytes, most = Infinity) {
+  let left = most;
+  const counted = new TransformStream({
+    transform(chunk, out) {
+      left -= chunk.length;
+      if (left < 0) throw new RangeError(`more than ${most} bytes`);
+      out.enqueue(chunk);
+    },
+  });
+  const transformed = new Blob([bytes]).stream().pipeThrough(stream).pipeThrough(counted);
+  return new Uint8Array(await new Response(transformed).arrayBuffer());
 }
