@@ -7,6 +7,7 @@ import * as commands from './state/commands.js';
 import { documentOf, enabled } from './state/material.js';
 import { fragmentOf, readFragment } from './state/share.js';
 
+const LETTERS = 60; // of a file name
 const DROPPED = 'file:'; // before the names of environments and objects that were dropped on the page
 
 /**
@@ -79,10 +80,10 @@ export function createFiles({ store, session, call, storage, messages, address, 
         await toClipboard(text);
         messages.say('The text is on the clipboard.');
       }),
-    /** The file name of the open material. */
+    /** The file name of the open material: letters and digits of any language, no more than disks take. */
     nameOf(ending) {
-      const name = store.get().name.toLowerCase();
-      return `${name.replace(/[^\p{L}\p{N}]+/gu, '-').replace(/^-|-$/g, '') || 'material'}.${ending}`;
+      const letters = [...store.get().name.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, '-')];
+      return `${letters.slice(0, LETTERS).join('').replace(/^-|-$/g, '') || 'material'}.${ending}`;
     },
     /** Copies an address of the present state to the clipboard. */
     share: () =>

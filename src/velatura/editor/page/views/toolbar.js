@@ -53,7 +53,7 @@ function toolbar(bar) {
       ${step('Redo', 'redo', store.redo, store.canRedo, store.redoes)}
       <span class="gap"></span>
       <span class="document" title=${changed ? 'There are changes that are not saved' : ''}>
-        ${file ?? 'Not saved'}${file && changed ? ' · unsaved changes' : nothing}
+        ${file ?? (changed ? 'Not saved' : nothing)}${file && changed ? ' · unsaved changes' : nothing}
       </span>
       <span class="rest"></span>
       <button type="button" @click=${bar.exports.show} title="For other programs">Export</button>
@@ -147,14 +147,7 @@ function savePanel(bar) {
     close();
     bar.files.save(name, name === place.file ? place.version : null);
   };
-  const suggested =
-    file ??
-    `${
-      bar.store
-        .get()
-        .name.toLowerCase()
-        .replace(/[^a-z0-9]+/g, '-') || 'material'
-    }.yaml`;
+  const suggested = file ?? bar.files.nameOf('yaml');
   return html`<dialog class="save" aria-label="Save as" ${ref(bar.dialogs.save)}>
     <form @submit=${submit}>
       <h2>Save as</h2>

@@ -13,19 +13,23 @@ export function oneAtATime(act, rest) {
 
   async function work() {
     busy = true;
-    while (waiting) {
-      const next = waiting;
-      waiting = null;
-      await act(next);
+    try {
+      while (waiting) {
+        const next = waiting;
+        waiting = null;
+        await act(next);
+      }
+    } finally {
+      busy = false;
+      if (waiting) work();
+      else rest();
     }
-    busy = false;
-    rest();
   }
 
   return {
     want(next) {
       waiting = next;
-      if (!busy) work();
+      return busy ? null : work();
     },
     get busy() {
       return busy;
