@@ -1,12 +1,13 @@
 """Random inputs of every kind, and what must hold of each: stacks, laws, files, command lines.
 
-    python benchmarks/fuzz.py [lobes|plugin|check|files|commands ...] [--count N] [--seed 0] [--processes 2]
+    python benchmarks/fuzz.py [lobes|plugin|check|files|imports|commands ...] [--count N] [--seed 0] [--processes 2]
                               [--failures FOLDER] [--index I]
 
 lobes      stacks through `vt.lobes`, all models and switches, cosines to 1e-6: finite, no energy gained, no jumps
 plugin     stacks through `vt.bsdf`, all models, either side, down to the horizon: its functions agree, see laws
 check      `vt.check` on tame stacks: no law is broken that its model does not declare
 files      mutated material files: refused in one line that names the file, or equal once written and read again
+imports    likewise files of other programs, tables, spectra and textures; in bounded time and memory
 commands   mutated command lines and input files: no traceback, a known status, nothing written or lost on refusal
 
 Without a name all run. FOLDER gets the smallest input of each kind of failure as YAML; `--index` repeats one input in
@@ -31,7 +32,7 @@ from rich.progress import Progress
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
-from fuzzing import Failure, Trial, checking, commands, files, lobes, plugin
+from fuzzing import Failure, Trial, checking, commands, files, imports, lobes, plugin
 
 # The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
 PROGRAMS: dict[str, tuple[Trial, int, int]] = {
@@ -39,6 +40,7 @@ PROGRAMS: dict[str, tuple[Trial, int, int]] = {
     "plugin": (plugin.trial, 2_000, 100),
     "check": (checking.trial, 500, 100),
     "files": (files.trial, 15_000, 1_500),
+    "imports": (imports.trial, 15_000, 1_000),
     "commands": (commands.trial, 500, 100),
 }
 

@@ -83,7 +83,8 @@ def files(folder: Path, checked: bool) -> None:
 
 def rows(path: Path, counts: dict[str, int], checked: bool) -> list[tuple[str, str, str, str]]:
     try:
-        readers: Mapping[str, Callable[..., Any]] = import_module(imports.FORMATS[path.suffix.lower()]).materials(path)
+        readers: Mapping[str, Callable[..., Any]]
+        readers, _ = import_module(imports.FORMATS[path.suffix.lower()]).materials(path)
     except vt.InvalidInput as error:
         counts["refused"] += 1
         return [("", f"refused: {error}", "", "")]

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from velatura import kernel
 from velatura.errors import InvalidInput
 from velatura.sampling import coated
 from velatura.stack import (
@@ -555,14 +556,12 @@ class Binding:
 
 def texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
     """Linear texels of an image, shape (height, width, 3), or 1 for numbers and grey."""
+    read = kernel.bitmap(image.texture, f"{name}: the texture {image.texture}")
     try:
-        read = mi.Bitmap(str(image.texture))
         read.set_srgb_gamma(image.encoding == "srgb")
         texels = np.array(read.convert(component_format=mi.Struct.Type.Float32, srgb_gamma=False))
     except (RuntimeError, MemoryError):
         raise InvalidInput(f"{name}: the texture {image.texture} is no image that Mitsuba can read") from None
-    if not texels.size:
-        raise InvalidInput(f"{name}: the texture {image.texture} has no texels")
     if not np.isfinite(texels).all():
         raise InvalidInput(f"{name}: the texture {image.texture} has texels that are not finite")
     # Separate colours from opacity, which comes last

@@ -9,12 +9,21 @@ import contextlib
 import sys
 from collections.abc import Iterator
 
+MOST = 1000  # characters of a line
+
+
+def short(text: str, most: int = MOST) -> str:
+    """A text of at most so many characters, without its middle where it is longer."""
+    end = most // 3
+    return text if len(text) <= most else f"{text[: most - end - 3]}...{text[-end:]}"
+
 
 def one_line(text: str) -> str:
-    """A text with line breaks and control characters, which would end or garble its line, as Python escapes.
+    """A text without its middle if it is long, and with Python's escapes for line breaks and control characters.
 
-    Surrogates for bytes of a file's name that are not UTF-8 stay unchanged.
+    Those would end or garble its line. Surrogates for bytes of a file's name that are not UTF-8 stay unchanged.
     """
+    text = short(text)
     kept = (c if c.isprintable() or "\udc80" <= c <= "\udcff" else c.encode("unicode_escape").decode() for c in text)
     return "".join(kept)
 

@@ -1,19 +1,139 @@
-"""Files that are written whole or not at all."""
+"""Files that are read within a budget, and written whole or not at all."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import stat
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
+from contextvars import ContextVar
 from errno import EACCES, EINVAL
 from pathlib import Path
 
 from velatura.errors import InvalidInput
 
 _TRIAL = bytes(4096)  # written and thrown away, so that a full disk shows itself
+
+#: What may be read at once, by all files and graphs that belong together: elements of XML, values of other texts, nodes
+#: of graphs, pixels of images.
+LIMITS = {
+    "files": 256,
+    "bytes": 2**28,
+    "elements": 200_000,
+    "values": 2_000_000,
+    "nodes": 10_000,
+    "pixels": 2**28,
+}
+SECONDS = 30.0  # of the processor, in which they are read
+
+# Reading -------------------------------------------------------------------------------------------------------------
+
+
+class Budget:
+    """What is left of `LIMITS` and `SECONDS`."""
+
+    def __init__(self) -> None:
+        self._left = dict(LIMITS)
+        self._end = time.thread_time() + SECONDS
+
+    def spend(self, where: object, what: str, count: int = 1) -> None:
+        """Take some of the budget, for the file that is being read.
+
+        Raises:
+            InvalidInput: there is not so much left, or no time; one line that begins with `where`.
+        """
+        self._left[what] -= count
+        if self._left[what] < 0:
+            raise InvalidInput(f"{where}: holds more than {LIMITS[what]} {what}, with all that it is read with")
+        if time.thread_time() > self._end:
+            raise InvalidInput(f"{where}: takes longer than {SECONDS:g} s to read, with all that it is read with")
+
+
+_current: ContextVar[Budget | None] = ContextVar("budget", default=None)
+
+
+@contextlib.contextmanager
+def budget() -> Iterator[Budget]:
+    """The budget of what is read in the block, or in a function that this decorates: that around it, or a new one."""
+    left = _current.get() or Budget()
+    token = _current.set(left)
+    try:
+        yield left
+    finally:
+        _current.reset(token)
+
+
+def content(path: Path, largest: int = LIMITS["bytes"]) -> bytes:
+    """The content of a file.
+
+    Raises:
+        InvalidInput: it cannot be read, is no regular file, larger than `largest` bytes, or beyond the budget; one line
+            that begins with the path.
+    """
+    with budget() as left:
+        left.spend(path, "files")
+        try:
+            check_regular(path)  # since opening a pipe or a device may wait, or do something
+            with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+                data = file.read(largest + 1) or b""
+        except (OSError, ValueError) as error:
+            if isinstance(error, InvalidInput):
+                raise
+            raise InvalidInput(f"{path}: cannot be read: {reason(error)}") from None
+        if len(data) > largest:
+            raise InvalidInput(f"{path}: is larger than {_size(largest)}")
+        left.spend(path, "bytes", len(data))
+    return data
+
+
+def text_of(path: Path, largest: int = LIMITS["bytes"]) -> str:
+    """The content of a file of UTF-8, with or without a mark of its order of bytes.
+
+    Raises:
+        InvalidInput: as `content`, or it is none.
+    """
+    return decoded(content(path, largest), path)
+
+
+def decoded(data: bytes, where: object) -> str:
+    """UTF-8 as text. Raises InvalidInput, in one line that begins with `where`, if it is none."""
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InvalidInput(f"{where}: is not UTF-8 text (byte {error.start})") from None
+
+
+def check_regular(path: Path) -> None:
+    """Raise InvalidInput unless there is a file of that name, and no folder, pipe or device."""
+    try:
+        mode = os.stat(path).st_mode
+    except FileNotFoundError:
+        raise InvalidInput(f"{path}: file not found") from None
+    except (OSError, ValueError) as error:
+        raise InvalidInput(f"{path}: cannot be read: {reason(error)}") from None
+    if not stat.S_ISREG(mode):
+        raise InvalidInput(f"{path}: cannot be read: is {'a directory' if stat.S_ISDIR(mode) else 'no regular file'}")
+
+
+def number(text: str) -> float:
+    """A decimal number as all programs write it: in ASCII, without underscores. Raises ValueError."""
+    if not _NUMBER.fullmatch(text.strip()):
+        raise ValueError(f"{text!r} is no number")
+    return float(text)
+
+
+_NUMBER = re.compile(r"[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|inf|nan)", re.IGNORECASE)
+
+
+def _size(count: int) -> str:
+    return f"{count >> 20} MiB" if count >= 2**20 else f"{count >> 10} KiB"
+
+
+# Writing -------------------------------------------------------------------------------------------------------------
 
 
 def check_writable(path: str | os.PathLike[str], what: str, endings: Sequence[str]) -> Path:

@@ -26,6 +26,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from velatura import pictures
 from velatura.errors import InvalidInput, MissingTool, VelaturaError
 
 Factory = Callable[[ModuleType], type]
@@ -126,16 +127,21 @@ def mitsuba(variant: str | None = None) -> ModuleType:
     return mi
 
 
-def is_picture(path: Path) -> bool:
-    """Whether Mitsuba can read a file as a picture. Sets no variant. Raises MissingTool if Mitsuba is not installed."""
+def bitmap(path: Path, subject: str = "") -> Any:
+    """The `mi.Bitmap` of a file. Sets no variant.
+
+    Raises:
+        InvalidInput: the file cannot be read, or is none; one line that begins with the subject, or the path.
+        MissingTool: Mitsuba is not installed.
+    """
     _drjit()
     import mitsuba as mi
 
+    pictures.check(path, subject)
     try:
-        mi.Bitmap(str(path))
+        return mi.Bitmap(str(path))
     except (RuntimeError, MemoryError):
-        return False
-    return True
+        raise InvalidInput(f"{subject or f'{path}:'} is no image that Mitsuba can read") from None
 
 
 # LLVM

@@ -228,7 +228,7 @@ def test_the_error_of_a_picture_is_a_root_mean_square() -> None:
         (["--models", "blendbsdf"], "blendbsdf holds other BSDFs"),
         (["--models", "measured"], 'models: measured: Property "filename" cannot be found!'),
         (["--models", "sphere"], "sphere is no BSDF"),
-        (["--models", "none.xml"], "none.xml: cannot be read"),
+        (["--models", "none.xml"], "none.xml: file not found"),
         (["--models", "principled", "--set", "tir=off"], "tir: for named models only"),
         (["--cos", "0"], "cos"),
         (["--cos", "1,x"], "--cos"),

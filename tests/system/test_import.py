@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import struct
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,7 @@ import chromium
 import numpy as np
 import pytest
 from benchmarks import benchmark
+from fuzzing import pictures
 
 import velatura as vt
 from velatura import kernel
@@ -117,6 +119,38 @@ def test_a_stack_comes_back_from_its_gltf(run: Run, tmp_path: Path) -> None:
     written["asset"]["generator"] = "another program"
     path.write_text(json.dumps(written))
     assert vt.imports.read(path).stack.source == "imported from glTF"
+
+
+def test_images_inside_a_glb_go_where_its_material_goes(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Expected: the image beside what `import` and `export` write, named there; none without -o or on failure."""
+    data = pictures.png()
+    document = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": len(data)}],
+        "bufferViews": [{"buffer": 0, "byteLength": len(data)}],
+        "images": [{"bufferView": 0, "mimeType": "image/png", "name": "wood"}],
+        "textures": [{"source": 0}],
+        "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0}}}],
+    }
+    text, chunk = json.dumps(document).encode(), data + bytes(-len(data) % 4)
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(chunk), len(text), b"JSON")
+    monkeypatch.chdir(tmp_path)
+    Path("red.glb").write_bytes(head + text + struct.pack("<I4s", len(chunk), b"BIN\0") + chunk)
+    assert run("import", "red.glb")[0] == 0 and [path.name for path in tmp_path.iterdir()] == ["red.glb"]
+    assert run("import", "red.glb")[2].startswith("not written without -o: images inside the file (")
+    assert run("import", "red.glb", "-o", "red.yaml")[:2] == (0, "red.yaml\n")
+    (image,) = tmp_path.glob("*.png")
+    assert image.read_bytes() == data and f"texture: {image.name}" in Path("red.yaml").read_text()
+    assert str(vt.bsdf("red.yaml")) == str(vt.bsdf("red.glb"))
+    image.unlink()
+    assert run("export", "red.glb", "--to", "mitsuba-xml", "-o", "red.xml")[0] == 0
+    assert image.read_bytes() == data and f'"{image.name}"' in Path("red.xml").read_text()
+    image.unlink()
+    Path("red.osl").mkdir()
+    assert run("export", "red.glb", "--to", "osl", "-o", "red.osl")[0] == 2 and not image.exists()
 
 
 def test_images_are_rendered_by_their_curves(tmp_path: Path) -> None:

@@ -1,14 +1,19 @@
-"""Slices of `benchmarks/fuzz.py`: mutated material files, and mutated command lines over mutated files."""
+"""Slices of `benchmarks/fuzz.py`: mutated files of materials, tables and textures, and command lines."""
 
 from __future__ import annotations
 
 import numpy as np
-from fuzzing import commands, files
+from fuzzing import commands, files, imports
 
 
 def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
     rng = np.random.default_rng(5)
     assert not [failure for _ in range(300) for failure in files.trial(rng)]
+
+
+def test_any_file_of_other_programs_is_refused_in_one_line_or_read_back_equal() -> None:
+    rng = np.random.default_rng(8)
+    assert not [failure for _ in range(400) for failure in imports.trial(rng)]
 
 
 def test_any_command_line_ends_in_one_line_and_loses_nothing() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import os
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +15,7 @@ import numpy as np
 import pytest
 
 import velatura as vt
-from velatura import imports
+from velatura import imports, kernel
 
 Write = Callable[..., Path]
 
@@ -196,6 +199,95 @@ def test_one_of_several_materials_is_named(write: Write, tmp_path: Path) -> None
     assert imports.read(bare).stack.name == "bare"
 
 
+def test_a_look_names_the_material(write: Write) -> None:
+    """Expected: the only one that looks assign needs no name; of two, or of an unknown one, the name is asked for."""
+    two, assigned = node(number("base_metalness", 1), "A") + node("", "B"), '<materialassign name="{}" material="{}"/>'
+
+    def looks(*materials: str) -> Path:
+        inside = "".join(assigned.format(k, each) for k, each in enumerate(materials))
+        return write("a.mtlx", document(f'{two}<look name="L">{inside}</look>'))
+
+    assert imports.read(looks("M_A", "M_A")).stack.kinds == ("conductor",)
+    assert imports.read(looks("M_A"), "M_B").stack.name == "M_B"
+    for path in (looks("M_A", "M_B"), looks("M_C"), looks()):
+        assert "has 2 materials; name one" in refusal(lambda path=path: imports.read(path))  # type: ignore[misc]
+
+
+def test_inputs_of_newer_versions_are_left_out(write: Write) -> None:
+    """Expected: those of OpenPBR 1.2 where they differ from its defaults; what is unknown with what looks alike."""
+    defaults = number("specular_haze", 0.0) + number("specular_haze_spread", 0.3)
+    assert imports.read(write("a.mtlx", document(node(defaults)))).left == ()
+    inputs = number("specular_haze", 0.4) + number("specular_haze_spread", 0.5) + number("sparkle", 2)
+    inputs += number("specular_retroreflectivity", 1) + number("coat_weigth", 1) + number("base_metalness", 1)
+    found = imports.read(write("a.mtlx", document(node(inputs))))
+    assert found.stack.kinds == ("conductor",)
+    assert {each.parameter: each.value for each in found.left} == {
+        **{"specular_haze": "0.4", "specular_haze_spread": "0.5", "specular_retroreflectivity": "1"},
+        **{"coat_weigth": "1", "sparkle": "2"},
+    }
+    why = {each.parameter: each.why for each in found.left}
+    assert why["coat_weigth"] == "unknown input 'coat_weigth' (did you mean coat_weight?): left out"
+    assert why["sparkle"] == "unknown input 'sparkle': left out"
+
+
+XI = 'xmlns:xi="http://www.w3.org/2001/XInclude"'
+
+
+def test_included_documents_are_read_once_and_share_their_nodes(write: Write) -> None:
+    """Expected: of 60 documents that include the next twice, the last is read once; it keeps what its root says."""
+    for k in range(60):
+        twice = f'<xi:include href="d{k + 1}.mtlx"/>' * 2
+        write(f"d{k}.mtlx", document(twice + (node("", f"S{k}") if k == 0 else ""), XI))
+    base = '<input name="base_color" type="color3" value="0.5, 0.5, 0.5"/>' + number("specular_weight", 0)
+    write("d60.mtlx", document(node(base, "deep") + GRAPH, 'colorspace="srgb_texture"'))
+    stack = imports.read(write("d0.mtlx", (write("d0.mtlx", b"").parent / "d1.mtlx").read_bytes())).stack
+    assert stack.base is not None
+    np.testing.assert_allclose(stack.base.albedo, 0.21404, atol=1e-4)
+    # A document uses the graph that another includes
+    write("graph.mtlx", document(GRAPH))
+    write("surface.mtlx", document(node(connected("specular_roughness", "half_out"))))
+    both = write("a.mtlx", document('<xi:include href="surface.mtlx"/><xi:include href="graph.mtlx"/>', XI))
+    assert imports.read(both).stack.interfaces[0].alpha == 0.25
+
+
+def test_one_budget_holds_for_all_that_is_included(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    for k in range(3):
+        write(f"b{k}.mtlx", document("<a/>" * 90_000))
+    includes = "".join(f'<xi:include href="b{k}.mtlx"/>' for k in range(3))
+    path = write("a.mtlx", document(includes, XI))
+    assert "b2.mtlx: line 3: holds more than 200000 elements" in refusal(lambda: imports.read(path))
+    for k in range(300):
+        write(f"c{k}.mtlx", document(f'<xi:include href="c{k + 1}.mtlx"/>', XI))
+    assert "c256.mtlx: holds more than 256 files" in refusal(lambda: imports.read(path.with_name("c0.mtlx")))
+    monkeypatch.setattr("velatura.files.SECONDS", -1.0)
+    assert "a.mtlx: takes longer than -1 s to read" in refusal(lambda: imports.read(path))
+
+
+def chain(length: int, each: str) -> str:
+    nodes = "".join(each.format(name=f"n{k}", below=f"n{k + 1}") for k in range(length))
+    last = f'<constant name="n{length}" type="float"><input name="value" type="float" value="0.5"/></constant>'
+    return nodes + last
+
+
+TWICE = """<add name="{name}" type="float"><input name="in1" type="float" nodename="{below}"/>
+  <input name="in2" type="float" nodename="{below}"/></add>"""
+ONCE = '<dot name="{name}" type="float"><input name="in" type="float" nodename="{below}"/></dot>'
+
+
+def test_graphs_are_worked_out_node_by_node(write: Write) -> None:
+    """Expected: 2^60 / 2 = 2^59 of a graph in which 60 nodes use the next twice; a long chain is not called a cycle."""
+    rough = '<input name="specular_roughness" type="float" nodename="n0"/>'
+    found = imports.read(write("a.mtlx", document(chain(60, TWICE) + node(rough))))
+    assert found.left[0].value == f"{2.0**59:.4g}" and found.stack.interfaces[0].alpha == 1.0
+    found = imports.read(write("a.mtlx", document(chain(5000, ONCE) + node(rough))))
+    assert "more than 64 nodes in a row" in str(found.left[0])
+    wide = "".join(chain(40, TWICE).replace('"n', f'"{k}n') for k in range(400))
+    names = [f'<input name="specular_roughness" type="float" nodename="{k}n0"/>' for k in range(400)]
+    assert "holds more than 10000 nodes" in refusal(
+        lambda: imports.read(write("a.mtlx", document(wide + node("".join(names)))))
+    )
+
+
 LAUGHS = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><materialx>&b;</materialx>'
 LOOP = """<nodegraph name="G">
   <dot name="d" type="float"><input name="in" nodename="d"/></dot><output name="half_out" nodename="d"/>
@@ -217,7 +309,6 @@ HOSTILE = {
         "material M: there is no node S",
     ),
     "other surface": (document(node("", tag="UsdPreviewSurface")), "its surface UsdPreviewSurface is none of"),
-    "unknown input": (document(node(number("coat", 1))), "material M_S: unknown parameter 'coat'"),
     "no image": (
         document(GRAPH.replace("wood.png", "oak.png") + node(connected("base_color", "wood_out", "color3"))),
         "oak.png",
@@ -294,9 +385,12 @@ GLTF: dict[str, Any] = {
 }
 
 
-def binary(document: bytes) -> bytes:
+def binary(document: bytes, chunk: bytes = b"") -> bytes:
     padded = document + b" " * (-len(document) % 4)
-    return struct.pack("<4sIII4s", b"glTF", 2, 20 + len(padded), len(padded), b"JSON") + padded
+    chunk += b"\0" * (-len(chunk) % 4)
+    rest = struct.pack("<I4s", len(chunk), b"BIN\0") + chunk if chunk else b""
+    head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(padded) + len(rest), len(padded), b"JSON")
+    return head + padded + rest
 
 
 @pytest.mark.parametrize("ending", [".gltf", ".glb"])
@@ -312,7 +406,7 @@ def test_materials_of_gltf_are_read(write: Write, tmp_path: Path, ending: str) -
     assert (base.alpha.texture, base.alpha.channel) == (tmp_path / "wood.png", "g")
     assert base.alpha.curve and base.alpha.curve[-1] == 0.25
     left = {each.parameter: each.why for each in found.left}
-    assert left.pop("baseColorTexture") == "inside the file: left out"
+    assert left.pop("baseColorTexture") == "inside the file, neither PNG nor JPEG: left out"
     assert set(left) == {"normalTexture", "emissiveFactor", "alpha", "KHR_materials_unlit"}
     (film,) = imports.read(path, "material 1").stack.interfaces[0].films
     assert film.eta == 1.8 and isinstance(film.thickness_nm, vt.Texture)
@@ -353,6 +447,26 @@ def test_materials_of_gltf_are_read(write: Write, tmp_path: Path, ending: str) -
             '{"asset": {}, "materials": [{"pbrMetallicRoughness": {"roughnessFactor": "x"}}]}',
             "roughnessFactor: must be a number, got 'x'",
         ),
+        (
+            "a.gltf",
+            '{"asset": {}, "materials": [{"pbrMetallicRoughness": {"roughnessFactor": %s}}]}' % ("9" * 400),
+            "roughnessFactor: must be a number, got inf",
+        ),
+        (
+            "a.gltf",
+            '{"asset": {}, "materials": [{"pbrMetallicRoughness": {"roughnessFactor": true}}]}',
+            "roughnessFactor: must be a number, got True",
+        ),
+        (
+            "a.gltf",  # a text times a number would fill the memory
+            '{"asset": {}, "materials": [{"emissiveFactor": [4000000000, 1, 1], "extensions": '
+            '{"KHR_materials_emissive_strength": {"emissiveStrength": "text"}}}]}',
+            "emissiveStrength: must be a number, got 'text'",
+        ),
+        ("a.gltf", '{"asset": {}, "asset": {}}', "key 'asset' appears twice"),
+        ("a.glb", struct.pack("<4sIII4s", b"glTF", 1, 22, 2, b"JSON") + b"{}", "is glTF in version 1, and 2 is read"),
+        ("a.glb", struct.pack("<4sIII4s", b"glTF", 2, 99, 2, b"JSON") + b"{}", "its head says 99 bytes, and it has 22"),
+        ("a.glb", struct.pack("<4sIII4s", b"glTF", 2, 22, 9, b"JSON") + b"{}", "is not whole"),
         ("a.glb", b"glTF", "its first chunk is not JSON"),
         ("a.glb", b"glTF" + b"\xff" * 40, "its first chunk is not JSON"),
     ],
@@ -360,6 +474,99 @@ def test_materials_of_gltf_are_read(write: Write, tmp_path: Path, ending: str) -
 def test_other_gltf_is_refused_in_one_line(write: Write, name: str, text: str | bytes, message: str) -> None:
     path = write(name, text)
     assert message in refusal(lambda: imports.read(path))
+
+
+def picture(tmp_path: Path, ending: str) -> bytes:
+    """A red picture of 2 x 2 pixels, half bright, by Mitsuba."""
+    mi = kernel.mitsuba()
+    texels = np.full((2, 2, 3), [128, 64, 0], np.uint8)
+    mi.Bitmap(texels).write(str(tmp_path / f"made{ending}"))
+    return (tmp_path / f"made{ending}").read_bytes()
+
+
+def with_image(data: bytes, inside: str, name: str = "wood") -> tuple[dict[str, Any], bytes]:
+    """A document whose base colour is an image, in its own text, in a buffer there, or in the chunk beside it."""
+    uri = f"data:application/octet-stream;base64,{base64.b64encode(data).decode()}"
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0"},
+        "images": [{"uri": uri, "name": name} if inside == "text" else {"bufferView": 0, "name": name}],
+        "textures": [{"source": 0}],
+        "materials": [
+            {"pbrMetallicRoughness": {"metallicFactor": 0, "baseColorTexture": {"index": 0}}, "name": "Red"},
+        ],
+    }
+    if inside != "text":
+        document["bufferViews"] = [{"buffer": 0, "byteOffset": 4, "byteLength": len(data)}]
+        padded = b"\0\0\0\0" + data
+        buffer = f"data:application/octet-stream;base64,{base64.b64encode(padded).decode()}"
+        document["buffers"] = [{"byteLength": len(padded)} | ({"uri": buffer} if inside == "buffer" else {})]
+    return document, b"\0\0\0\0" + data if inside == "chunk" else b""
+
+
+def written_with_image(write: Write, data: bytes, inside: str, **options: str) -> Path:
+    document, chunk = with_image(data, inside, **options)
+    text = json.dumps(document).encode()
+    return write("red.glb", binary(text, chunk)) if inside == "chunk" else write("red.gltf", text)
+
+
+@pytest.mark.parametrize(("inside", "ending"), [("text", ".png"), ("buffer", ".jpg"), ("chunk", ".png")])
+def test_images_inside_gltf_are_read_and_written(write: Write, tmp_path: Path, inside: str, ending: str) -> None:
+    """Expected: the bytes of the picture, in memory and beside the material that is written, under a plain name."""
+    data = picture(tmp_path, ending)
+    stack = vt.load(written_with_image(write, data, inside, name="../../wood \n"))
+    assert stack.base is not None and isinstance(stack.base.albedo, vt.Texture)
+    assert stack.base.albedo.texture.read_bytes() == data and stack.base.albedo.encoding == "srgb"
+    folder = tmp_path / "out"
+    folder.mkdir()
+    vt.save(stack, folder / "red.yaml")
+    image, material = sorted(folder.iterdir(), key=lambda path: path.suffix == ".yaml")
+    assert image.read_bytes() == data and re.fullmatch(rf"wood-[0-9a-f]{{12}}\{ending}", image.name)
+    again = vt.load(material)
+    assert again == stack.replace(layer1_albedo=stack.base.albedo.model_copy(update={"texture": image}))
+    vt.save(stack, folder / "other.yaml")  # the same image serves both
+    assert len(list(folder.iterdir())) == 3
+
+
+def test_an_image_replaces_no_file_and_goes_with_its_material(write: Write, tmp_path: Path) -> None:
+    stack = vt.load(written_with_image(write, picture(tmp_path, ".png"), "chunk"))
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "red.yaml").mkdir()  # cannot be written
+    refusal(lambda: vt.save(stack, folder / "red.yaml"))
+    assert [path.name for path in folder.iterdir()] == ["red.yaml"]
+    vt.save(stack, folder / "a.yaml")
+    (image,) = folder.glob("*.png")
+    image.write_text("mine")
+    assert "is another file than the image" in refusal(lambda: vt.save(stack, folder / "b.yaml"))
+    assert image.read_text() == "mine" and not (folder / "b.yaml").exists()
+
+
+def test_images_inside_gltf_are_refused_in_one_line(write: Write, tmp_path: Path) -> None:
+    """Expected: pictures of too many pixels, which the head of the file says, and data that is not there."""
+    data = picture(tmp_path, ".png")
+    bomb = data[:16] + struct.pack(">II", 60000, 60000) + data[24:]
+    path = written_with_image(write, bomb, "chunk")
+    assert refusal(lambda: imports.read(path)) == f"{path}: Red: image 0: holds 3.6e+09 pixels, more than 1.3e+08"
+
+    def changed(change: Callable[[dict[str, Any]], object]) -> str:
+        document, chunk = with_image(data, "chunk")
+        change(document)
+        path = write("red.glb", binary(json.dumps(document).encode(), chunk))
+        return refusal(lambda: imports.read(path)).removeprefix(f"{path}: Red: ")
+
+    view = f"image 0: bufferView 0: lies outside its buffer of {4 + len(data)} bytes"
+    assert changed(lambda it: it["bufferViews"][0].update(byteLength=10**9)) == view
+    assert changed(lambda it: it["bufferViews"][0].update(byteOffset=2**40)) == view
+    assert changed(lambda it: it["bufferViews"][0].update(byteOffset=-4)).startswith(
+        "image 0: bufferView 0: byteOffset:"
+    )
+    assert changed(lambda it: it["bufferViews"][0].update(buffer=1)) == "buffers: has no entry of index 1"
+    assert changed(lambda it: it["images"][0].update(bufferView="0")) == "bufferViews: has no entry of index '0'"
+    assert changed(lambda it: it["images"][0].update(uri="data:image/png,AAAA")).endswith(
+        "must be in base64, got 'data:image/png'"
+    )
+    assert changed(lambda it: it["images"][0].update(uri="data:;base64,A")) == "image 0: is not in base64"
+    assert changed(lambda it: it["textures"][0].update(source=True)) == "images: has no entry of index True"
 
 
 # Mitsuba -------------------------------------------------------------------------------------------------------------
@@ -431,6 +638,23 @@ def test_principled_is_read_from_dictionaries(write: Write, tmp_path: Path) -> N
 def test_other_scenes_are_refused_in_one_line(write: Write, text: str, message: str) -> None:
     path = write("a.xml", text)
     assert message in refusal(lambda: imports.read(path))
+
+
+@pytest.mark.parametrize("ending", [".mtlx", ".gltf", ".glb", ".xml", ".yaml", ".json"])
+def test_what_is_no_regular_file_is_not_opened(tmp_path: Path, ending: str) -> None:
+    """Expected: one line for a pipe, which would wait, a device without an end, and links that loop."""
+    pipe, link, loop = (tmp_path / f"{name}{ending}" for name in ("pipe", "link", "loop"))
+    os.mkfifo(pipe)
+    link.symlink_to("/dev/zero")
+    loop.symlink_to(loop)
+    assert refusal(lambda: vt.load(pipe)) == f"{pipe}: cannot be read: is no regular file"
+    assert refusal(lambda: vt.load(link)) == f"{link}: cannot be read: is no regular file"
+    assert refusal(lambda: vt.load(loop)) == f"{loop}: cannot be read: too many levels of symbolic links"
+    if ending == ".mtlx":
+        path = tmp_path / "a.mtlx"
+        for other in (pipe, loop):
+            path.write_text(document(f'<xi:include href="{other.name}"/>', XI))
+            assert f"{other.name}: cannot be read: " in refusal(lambda: vt.load(path))
 
 
 def test_files_that_cannot_be_read_are_refused(tmp_path: Path) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from benchmarks import benchmark
+from fuzzing.imports import tensors
 
 from velatura.errors import InvalidInput
 from velatura.inverse import Directions, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
@@ -294,7 +294,7 @@ def _polar(theta: Any, phi: Any) -> np.ndarray:
 def test_an_rgl_file(tmp_path: Path) -> None:
     """As Dupuy & Jakob 2018 have them: with a constant NDF D and projected area s, f cos is rgb D / (4 s)."""
     path, single = tmp_path / "paint_rgb.bsdf", np.float32
-    fields = {
+    fields: dict[str, Any] = {
         "description": np.frombuffer(b"constant", np.uint8),
         "jacobian": np.array([1], np.uint8),
         "theta_i": np.array([0, 0.8, 1.5], single),
@@ -305,34 +305,35 @@ def test_an_rgl_file(tmp_path: Path) -> None:
         "luminance": np.ones((1, 3, 4, 4), single),
         "rgb": np.tile(np.array([0.2, 0.4, 0.6], single)[:, None, None], (1, 3, 1, 4, 4)),
     }
-    path.write_bytes(_tensors(fields))
+    path.write_bytes(tensors(fields))
     table = load_table(path)
     assert not table.directions.brushed
     cosine = table.value * table.directions.wo[2]
     assert np.allclose(cosine, np.array([[0.1], [0.2], [0.3]]), rtol=1e-4)
 
+    # Mitsuba would read beyond the end of the file, or divide by the width of a grid
+    def broken(**changed: np.ndarray) -> None:
+        path.write_bytes(tensors({**fields, **changed}))
+        with pytest.raises(
+            InvalidInput, match=r"paint_rgb\.bsdf: holds values that are no finite numbers, or no grids"
+        ):
+            load_table(path)
+
+    broken(ndf=np.full((4, 1), 0.5, single))
+    broken(vndf=np.full((1, 3, 4, 4), np.nan, single))
+    broken(theta_i=np.array([0, 1.5, 0.8], single))
+    path.write_bytes(tensors(fields)[:-8])
+    with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: is no RGB file of the RGL database: its head is broken"):
+        load_table(path)
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: is no RGB file of the RGL database"):
         load_table(path)
-    with pytest.raises(InvalidInput, match=r"none\.bsdf: cannot be read: no such file"):
+    with pytest.raises(InvalidInput, match=r"none\.bsdf: file not found"):
         load_table(tmp_path / "none.bsdf")
 
 
-def _tensors(fields: dict[str, np.ndarray]) -> bytes:
-    """Arrays in the format of tensor files: a head with names, types, places and shapes, then the numbers."""
-    types = {np.dtype(np.uint8): 1, np.dtype(np.float32): 10}
-    head, body = b"tensor_file\0" + bytes([1, 0]) + struct.pack("<I", len(fields)), b""
-    begin = len(head) + sum(2 + len(name) + 2 + 1 + 8 + 8 * field.ndim for name, field in fields.items())
-    for name, field in fields.items():
-        kind, place = types[field.dtype], begin + len(body)
-        head += struct.pack("<H", len(name)) + name.encode() + struct.pack("<HBQ", field.ndim, kind, place)
-        head += struct.pack(f"<{field.ndim}Q", *field.shape)
-        body += field.tobytes()
-    return head + body
-
-
 def test_no_such_table(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match=r"none\.csv: cannot be read: no such file"):
+    with pytest.raises(InvalidInput, match=r"none\.csv: file not found"):
         load_table(tmp_path / "none.csv")
 
 

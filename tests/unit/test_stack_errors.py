@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from velatura.errors import InvalidInput, LawBroken, MissingTool, NoSolution, VelaturaError
 from velatura.stack import Diffuse, Interface, Medium, Named, Stack, Texture, load, loads, preset, save
@@ -168,6 +169,12 @@ VALUES = {
     "name: &a [*a]\n" + COAT: "holds more than 100000 values once its aliases are written out",
     "a0: &a0 [1]\n" + doubled(12) + COAT: "holds more than 100000 values once its aliases are written out",
     "[" * 600: "is nested too deeply",
+    # Numbers of any length, of which some would take quadratic time
+    one_layer("eta: " + "9" * 5000): "layer 0 (interface): eta: must be finite, got inf",
+    one_layer("eta: " + "9" * 5000 + ".5"): "layer 0 (interface): eta: must be finite, got inf",
+    one_layer("eta: 0x" + "f" * 5000): "layer 0 (interface): eta: must be finite, got inf",
+    one_layer("eta: " + "1:" * 500_000 + "1"): "layer 0 (interface): eta: must be finite, got inf",
+    one_layer("eta: " + "1:" * 500_000 + "1.5"): "layer 0 (interface): eta: must be finite, got inf",
 }
 
 
@@ -196,6 +203,15 @@ def test_a_layer_further_down_is_named_by_its_number() -> None:
         ('{"layers": [{"interface": {"eta": NaN}}]}', "layer 0 (interface): eta: must be finite, got nan"),
         ('{"name": "\\ud800", "layers": [{"diffuse": {}}]}', "name: must be text (in quotes), got '\\ud800'"),
         ("[" * 100_000, "is nested too deeply"),
+        (
+            '{"layers": [{"interface": {"eta": %s}}]}' % ("9" * 5000),
+            "layer 0 (interface): eta: must be finite, got inf",
+        ),
+        (
+            '{"layers": [{"interface": {"eta": -%s}}]}' % ("9" * 400),
+            "layer 0 (interface): eta: must be finite, got -inf",
+        ),
+        ("[" + "1, " * 2_000_001 + "1]", "holds more than 2000000 values, with all that it is read with"),
     ],
 )
 def test_a_wrong_json_file_gets_one_line(text: str, message: str) -> None:
@@ -358,3 +374,35 @@ def test_errors_carry_their_exit_status() -> None:
     statuses = {VelaturaError: 1, InvalidInput: 2, NoSolution: 3, LawBroken: 1, MissingTool: 1}
     assert {error: error.exit_status for error in statuses} == statuses
     assert issubclass(InvalidInput, ValueError)
+
+
+def test_values_are_counted_while_they_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: a refusal although the text goes on, and is no YAML there."""
+    monkeypatch.setattr("velatura.stack.io._MOST", 10)
+    with pytest.raises(InvalidInput, match=r"^material\.yaml: holds more than 10 values$"):
+        loads("[" + "1, " * 20 + "{{{")
+
+
+def test_messages_have_an_end(tmp_path: Path) -> None:
+    """Expected: the beginning, which names the file and the key, and the end of a name of 5,000 letters."""
+    path = tmp_path / "a.yaml"
+    path.write_text(one_layer(f"eta: 1.5, alpha: {{texture: {'n' * 5000}.png}}"))
+    with pytest.raises(InvalidInput) as caught:
+        load(path)
+    message = str(caught.value)
+    assert len(message) == 1000 and "nnn...nnn" in message and message.endswith("nnn.png")
+    assert message.startswith(f"{path}: layer 0 (interface): alpha: texture: ")
+
+
+def test_what_a_file_would_hold_is_a_material(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: the stack of the file; paths are relative to the current folder."""
+    monkeypatch.chdir(tmp_path)
+    Path("wood.png").touch()
+    text = one_layer("eta: 1.5, alpha: {texture: wood.png}")
+    assert load(json.loads(json.dumps(yaml.safe_load(text)))) == loads(text)
+    with pytest.raises(InvalidInput, match=r"^layer 0 \(interface\): alpha: must lie in 0 to 1, got 2$"):
+        load({"layers": [{"interface": {"eta": 1.5, "alpha": 2}}]})
+    endless: dict[str, Any] = {"layers": []}
+    endless["layers"].append(endless)
+    with pytest.raises(InvalidInput, match=r"^layer 0: unknown layer 'layers'"):
+        load(endless)

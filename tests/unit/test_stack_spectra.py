@@ -189,8 +189,8 @@ def test_a_table_stays_with_its_material(tmp_path: Path, monkeypatch: pytest.Mon
         ("500 1.5", "must hold values at two wavelengths or more, in nanometres, of visible light"),
         ("0.4 1.5\n0.7 1.5", "must hold values at two wavelengths or more, in nanometres, of visible light"),
         ("400 1.5\n700 -1", "must lie in 0.001 to 1e4, got -1.0"),
-        (b"\xff\xfe\x00", "is no text that can be read"),
-        ("#" * 2**20 + "#", "is larger than a table of a spectrum"),
+        (b"\xff\xfe\x00", "is not UTF-8 text (byte 0)"),
+        ("#" * 2**20 + "#", "is larger than 1 MiB"),
     ],
 )
 def test_what_is_no_table_is_refused_in_a_line(text: str | bytes, reason: str, tmp_path: Path) -> None:

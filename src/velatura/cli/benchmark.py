@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from velatura import files
 from velatura.cli import options, progress
 from velatura.errors import InvalidInput
 
@@ -112,6 +113,7 @@ def _from_file(path: Path) -> Factory:
 
     from velatura import benchmark
 
+    files.check_regular(path)
     try:
         found = np.load(path, mmap_mode="r")
     except (OSError, ValueError) as error:

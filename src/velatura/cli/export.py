@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from enum import Enum
 from pathlib import Path
@@ -74,7 +75,11 @@ def export(
             raise InvalidInput(f"--{name}: only for --to {', '.join(taking(name))}, not for {to.value}")
     stack, switches = options.read(material, settings)
     folder = output.parent if output else None
-    made = exported(stack, to.value, options.model_name(model), folder=folder, **chosen, **switches)
+    from velatura.stack.paths import beside
+
+    with beside(stack, folder) if folder else contextlib.nullcontext(stack) as placed:
+        made = exported(placed, to.value, options.model_name(model), folder=folder, **chosen, **switches)
+        written = made.save(output) if output else []
     for note in made.notes:
         print(note, file=sys.stderr)
     if output is None:
@@ -82,5 +87,5 @@ def export(
         if unwritten := [*made.beside, *map(str, made.apart)]:
             print(f"not written without -o: the tables that the code reads ({', '.join(unwritten)})", file=sys.stderr)
         return
-    path, *beside = made.save(output)
-    print(path if not beside else f"{path}, and its tables {', '.join(map(str, beside))}")
+    path, *others = written
+    print(path if not others else f"{path}, and its tables {', '.join(map(str, others))}")

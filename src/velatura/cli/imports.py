@@ -31,9 +31,12 @@ def import_(
     Prints it, or writes it to F, and lists on standard error what a stack cannot carry.
     """
     from velatura import imports, stack
+    from velatura.stack.paths import held
 
     fit.check(output)
     found = imports.read(file, material)
+    if images := [] if output else held(found.stack):
+        print(f"not written without -o: images inside the file ({', '.join(images)})", file=sys.stderr)
     if output:
         stack.save(found.stack, output)
     if as_json:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura import api, kernel
+from velatura import api, files, kernel
 from velatura.bakes import TARGETS
 from velatura.checks.probe import Probe
 from velatura.comparison.evaluated_lobes import Light, distribution
@@ -69,9 +69,9 @@ def made(plugin: Plugin, stack: Stack, microsurface: bool) -> Any:
 def _from_file(mi: Any, path: Any) -> Any:
     """The content of an XML file, refused before Mitsuba reads it unless it is a BSDF."""
     try:
-        root = ElementTree.parse(path).getroot()
-    except (OSError, ElementTree.ParseError) as error:
-        raise InvalidInput(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        root = ElementTree.fromstring(files.content(Path(path)))
+    except (LookupError, ElementTree.ParseError) as error:
+        raise InvalidInput(f"{path}: cannot be read: {error}") from None
     if root.tag != "bsdf":
         raise InvalidInput(f"{path}: must hold a <bsdf>, got a <{root.tag}>")
     api.register()

@@ -15,6 +15,7 @@ from velatura.editor.messages import TEXT, Answer, Body, Verb, admitting, docume
 from velatura.errors import InvalidInput
 from velatura.files import whole
 from velatura.stack import dumps, load
+from velatura.stack.paths import beside
 
 #: Bytes of the largest file that is read, and of the largest request.
 LARGEST = 32 * 2**20
@@ -71,10 +72,11 @@ class Folder:
         """Write a material; Conflict unless the file has the version given, None for a file that is not there."""
         name = field(body, "file", str)
         path = self.place(name, MATERIALS)
-        text = dumps(to_write(body), "json" if path.suffix.lower() == ".json" else "yaml", self.path)
+        format, material = "json" if path.suffix.lower() == ".json" else "yaml", to_write(body)
         with self.writing:
             self._check_version(path, body.get("version"))
-            _write(path, text.encode())
+            with beside(material, self.path) as placed:
+                _write(path, dumps(placed, format, self.path).encode())
             return {"file": name, "version": _version(path)}
 
     def texture(self, body: Body) -> Answer:
@@ -158,8 +160,10 @@ def _check_picture(path: Path, name: str) -> None:
     """Raise InvalidInput, which gives the name of the picture, unless the renderer can read a file as one."""
     from velatura import kernel
 
-    if not kernel.is_picture(path):
-        raise InvalidInput(f"{name}: is no picture that can be read")
+    try:
+        kernel.bitmap(path)
+    except InvalidInput:
+        raise InvalidInput(f"{name}: is no picture that can be read") from None
 
 
 def _free(path: Path, data: bytes) -> Path:

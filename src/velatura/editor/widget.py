@@ -42,8 +42,6 @@ class Read(traitlets.TraitType):
 
 
 def _stack(value: Any) -> Stack:
-    if isinstance(value, Mapping):
-        return Stack.from_dict(value)
     if isinstance(value, MaterialLike):
         return load(value)
     raise InvalidInput(f"stack: must be a Stack, its fields, a file or the name of a preset, got {show(value)}")

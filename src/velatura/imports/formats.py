@@ -1,4 +1,7 @@
-"""Files of other programs, by their endings; each format is a module with `materials(path)`, its materials by name."""
+"""Files of other programs, by their endings.
+
+Each format is a module with `materials(path)`: its materials by name, and the name of the one that the file chooses.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from velatura.errors import Incomplete, InvalidInput
+from velatura import files
+from velatura.errors import Incomplete, InvalidInput, short
 from velatura.imports.result import Imported, Left, Notes
 from velatura.stack import Stack, loads
 from velatura.stack.io import foreign
@@ -23,14 +27,17 @@ FORMATS = {
     ".xml": "velatura.imports.mitsuba_xml",
 }
 
+LONGEST = 5000  # characters of a warning
 BAKED = (".mtlx", ".xml")  # files whose bakes hold their stack in a comment
 
 
+@files.budget()
 def read(path: str | Path, material: str | None = None) -> Imported:
     """A material of a file of another program: MaterialX (.mtlx), glTF (.gltf, .glb), or a scene of Mitsuba (.xml).
 
     Args:
-        material: its name, where the file has several; `FILE#NAME` names both.
+        material: its name, where the file has several, and no look of MaterialX assigns one alone; `FILE#NAME` names
+            both.
 
     Raises:
         InvalidInput: the file cannot be read, has no such material, or several and none is named.
@@ -40,9 +47,11 @@ def read(path: str | Path, material: str | None = None) -> Imported:
     ending = Path(file).suffix.lower()
     if ending not in FORMATS:
         raise InvalidInput(f"{file}: a file to import ends in {', '.join(FORMATS)}")
-    found: Mapping[str, Any] = import_module(FORMATS[ending]).materials(Path(file))
+    found: Mapping[str, Any]
+    found, chosen = import_module(FORMATS[ending]).materials(Path(file))
     if not found:
         raise InvalidInput(f"{file}: has no material that is read here")
+    material = chosen if material is None and chosen in found else material
     if material is None and len(found) > 1:
         names = ", ".join(list(found)[:12]) + (", ..." if len(found) > 12 else "")
         raise InvalidInput(f"{file}: has {len(found)} materials; name one, as in {Path(file).name}#NAME: {names}")
@@ -56,7 +65,7 @@ def read(path: str | Path, material: str | None = None) -> Imported:
 
 def _held(path: Path) -> Imported | None:
     """The stack that the only material of a file was baked from; None of any other file."""
-    held = embedded.of_xml(path.read_text(encoding="utf-8", errors="replace"))
+    held = embedded.of_xml(files.content(path).decode("utf-8", "replace"))
     if held is None:
         return None
     stack = loads(json.dumps(held), f"{path}: the stack in it.json", path.parent)
@@ -71,7 +80,7 @@ def load(path: str) -> Stack:
     """
     found = read(path)
     if found.left:
-        warnings.warn(f"{path}: {'; '.join(map(str, found.left))}", Incomplete, stacklevel=2)
+        warnings.warn(short(f"{path}: {'; '.join(map(str, found.left))}", LONGEST), Incomplete, stacklevel=2)
     return found.stack
 
 

@@ -89,9 +89,11 @@ class Given:
                 value if value.channel else value.model_copy(update={"channel": "rgb" if declared.is_colour else "r"})
             )
         value = value.tolist() if hasattr(value, "tolist") else value
+        if declared.is_flag and type(value) is bool:
+            value = float(value)
         wanted = "a number or [r, g, b]" if declared.is_colour else "a number"
         entries = value if isinstance(value, list | tuple) else (value,)
-        if len(entries) not in ((1, 3) if declared.is_colour else (1,)) or not all(map(_is_number, entries)):
+        if len(entries) not in ((1, 3) if declared.is_colour else (1,)) or not all(map(is_number, entries)):
             raise InvalidInput(f"{declared.name}: must be {wanted}, got {show(value)}")
         kept = [min(max(float(entry), declared.low), declared.high) for entry in entries]
         if any(abs(float(entry) - end) > ROUNDING for entry, end in zip(entries, kept)):
@@ -99,8 +101,12 @@ class Given:
         return colour(kept if len(kept) == 3 else kept[0]) if declared.is_colour else kept[0]  # type: ignore[arg-type]
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, numbers.Real) and math.isfinite(value)
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number, and not true or false."""
+    try:
+        return not isinstance(value, bool) and isinstance(value, numbers.Real) and math.isfinite(value)
+    except OverflowError:  # an integer that no float holds
+        return False
 
 
 def _mean(texture: Texture, is_colour: bool) -> float | RGB:

@@ -1,4 +1,4 @@
-"""Files of glTF, .gltf and .glb: their materials, with images that lie beside them."""
+"""Files of glTF, .gltf and .glb: their materials, with images that lie beside or inside them."""
 
 from __future__ import annotations
 
@@ -7,23 +7,25 @@ import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
+from velatura import files
 from velatura.errors import InvalidInput
 from velatura.imports import gltf
-from velatura.imports.file import content
+from velatura.imports.given import is_number
+from velatura.imports.gltf_images import Images
 from velatura.imports.result import Imported, Notes, shown
 from velatura.imports.surface import INDICES
 from velatura.imports.values import changed
 from velatura.stack import Texture, loads
+from velatura.stack.io import parsed
 from velatura.stack.schema import show
 from velatura.targets import embedded
 from velatura.targets.gltf import PARAMETERS as FACTORS
 
-LARGEST = 2**28  # bytes of a file
-_MAGIC, _JSON = b"glTF", b"JSON"
+LARGEST = 2**26  # characters of JSON
+_MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
 
 #: Images of a factor: where they stand, the factor, their channel, and whether they hold colours.
 _TEXTURES = (
@@ -46,13 +48,16 @@ _OTHERS = {
 }
 
 
-def materials(path: Path) -> dict[str, Callable[[Notes], Imported]]:
-    """The materials of a file by name, those without one by their number, each as a function that reads it.
+def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]:
+    """The materials of a file by name, those without one by their number, each as a function that reads it; the
+    file chooses none.
 
     Raises:
         InvalidInput: it cannot be read, or is no glTF.
     """
-    document = _json(path, content(path, LARGEST))
+    text, chunk = _parts(path, files.content(path))
+    document = _document(path, text)
+    images = Images(path, document, chunk)
     found: dict[str, Callable[[Notes], Imported]] = {}
     entries = document.get("materials", [])
     if not isinstance(entries, list):
@@ -62,21 +67,21 @@ def materials(path: Path) -> dict[str, Callable[[Notes], Imported]]:
             raise InvalidInput(f"{path}: material {number}: must hold keys and values, got {show(entry)}")
         name = str(entry.get("name") or f"material {number}")
         name = name if name not in found else f"{name} ({number})"
-        found[name] = _reader(entry, name, path, document)
-    return found
+        found[name] = _reader(entry, name, path, document, images)
+    return found, None
 
 
 def _reader(
-    entry: Mapping[str, Any], name: str, path: Path, document: Mapping[str, Any]
+    entry: Mapping[str, Any], name: str, path: Path, document: Mapping[str, Any], images: Images
 ) -> Callable[[Notes], Imported]:
     def read(notes: Notes) -> Imported:
         try:
             ours = str(document["asset"].get("generator", "")).startswith("Velatura ")
             held = entry if ours else {key: value for key, value in entry.items() if key != "extras"}
-            return of_material(held, name, notes, lambda reference: _file(reference, path, document), path.parent)
+            return of_material(held, name, notes, images, path.parent)
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {name}: {error}") from None
-        except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
+        except (AttributeError, KeyError, IndexError, RecursionError, TypeError, ValueError) as error:
             raise InvalidInput(f"{path}: {name}: is no material of glTF: {error}") from None
 
     return read
@@ -113,10 +118,10 @@ def of_material(
     if values.get("ior") == 0:
         notes.add("ior", 0.0, f"an infinite index: {INDICES[1]:g} stands for it")
         values["ior"] = INDICES[1]
-    strength = parts.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
+    strength = _number(parts.get("KHR_materials_emissive_strength", {}), "emissiveStrength", 1.0)
     if any(material.get("emissiveFactor", ())):
         emitted = material["emissiveFactor"]
-        values["emissiveFactor"] = [strength * part for part in emitted] if strength != 1 else emitted
+        values["emissiveFactor"] = [strength * part if is_number(part) else part for part in emitted]
 
     # Images, times their factors
     defaults = {each.name: each.default for each in gltf.PARAMETERS}
@@ -125,10 +130,10 @@ def of_material(
         if reference is None:
             continue
         factor = values.get(factor_name, defaults[factor_name])
-        least = values.get("iridescenceThicknessMinimum", 100.0) if key == _THICKNESS[1] else 0.0
+        least = _number(values, "iridescenceThicknessMinimum", 100.0) if key == _THICKNESS[1] else 0.0
         texture = _texture(_holding(reference, key), channel, key, notes, find)
         if texture is not None:
-            values[factor_name] = _scaled(texture, factor, float(least), factor_name, notes)
+            values[factor_name] = _scaled(texture, factor, least, factor_name, notes)
     for key in gltf.IGNORED:
         if key in material or key in parts.get("KHR_materials_clearcoat", {}):
             values[key] = "an image"
@@ -150,6 +155,13 @@ def _holding(part: object, name: str) -> Mapping[str, Any]:
     if not isinstance(part, Mapping):
         raise InvalidInput(f"{name}: must hold keys and values, got {show(part)}")
     return part
+
+
+def _number(part: Mapping[str, Any], name: str, default: float) -> float:
+    value = part.get(name, default)
+    if not is_number(value):
+        raise InvalidInput(f"{name}: must be a number, got {show(value)}")
+    return float(value)
 
 
 def _texture(
@@ -178,33 +190,30 @@ def _scaled(texture: Texture, factor: Any, least: float, name: str, notes: Notes
     return changed(texture, lambda x: least + (most - least) * x)
 
 
-def _file(reference: Mapping[str, Any], path: Path, document: Mapping[str, Any]) -> Path | str:
-    try:
-        texture = document["textures"][reference["index"]]
-        uri = document["images"][texture["source"]].get("uri") if "source" in texture else ""
-    except (AttributeError, KeyError, IndexError, TypeError):
-        raise InvalidInput(f"textures: has no image of index {show(reference.get('index'))}") from None
-    if "source" not in texture:
-        return "in a format of an extension"
-    if uri is None or uri.startswith("data:"):
-        return "inside the file"
-    return path.parent / unquote(uri)
+def _parts(path: Path, data: bytes) -> tuple[str, bytes | None]:
+    """The JSON of a file, and its binary chunk if it is a .glb that has one."""
+    if data[:4] != _MAGIC:
+        return files.decoded(data, path), None
+    if len(data) < 20 or data[16:20] != _JSON:
+        raise InvalidInput(f"{path}: is no glTF: its first chunk is not JSON")
+    version, whole, length = struct.unpack("<III", data[4:16])
+    if version != 2:
+        raise InvalidInput(f"{path}: is glTF in version {version}, and 2 is read")
+    if whole != len(data) or 20 + length > whole:
+        raise InvalidInput(f"{path}: is not whole: its head says {whole} bytes, and it has {len(data)}")
+    chunk = data[20 + length :]
+    if len(chunk) < 8 or chunk[4:8] != _BINARY:
+        return files.decoded(data[20 : 20 + length], path), None
+    (size,) = struct.unpack("<I", chunk[:4])
+    if 8 + size > len(chunk):
+        raise InvalidInput(f"{path}: is not whole: its binary chunk says {size} bytes, and it has {len(chunk) - 8}")
+    return files.decoded(data[20 : 20 + length], path), chunk[8 : 8 + size]
 
 
-def _json(path: Path, data: bytes) -> Mapping[str, Any]:
-    if data[:4] == _MAGIC:
-        if len(data) < 20 or data[16:20] != _JSON:
-            raise InvalidInput(f"{path}: is no glTF: its first chunk is not JSON")
-        (length,) = struct.unpack("<I", data[12:16])
-        data = data[20 : 20 + length]
-    try:
-        document = json.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
-    except json.JSONDecodeError as error:
-        raise InvalidInput(f"{path}: line {error.lineno}: is not valid JSON: {error.msg}") from None
-    except (RecursionError, ValueError) as error:
-        raise InvalidInput(f"{path}: cannot be read: {error}") from None
+def _document(path: Path, text: str) -> Mapping[str, Any]:
+    if len(text) > LARGEST:
+        raise InvalidInput(f"{path}: holds more than {LARGEST >> 20} MiB of JSON")
+    document = parsed(text, "json", path)
     if not isinstance(document, Mapping) or "asset" not in document:
         raise InvalidInput(f"{path}: is no glTF: has no asset")
     return document

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.imports import principled, xml
 from velatura.imports.result import Imported, Notes
-from velatura.imports.values import linear
+from velatura.imports.values import linear, listed
 from velatura.imports.xml import Element
 from velatura.stack import Texture
 from velatura.stack.schema import show
@@ -19,8 +20,9 @@ from velatura.stack.schema import show
 _AROUND = ("twosided",)  # BSDFs that change nothing of what they hold
 
 
-def materials(path: Path) -> dict[str, Callable[[Notes], Imported]]:
-    """The `principled` BSDFs of a scene by their ids, or their numbers, each as a function that reads it.
+def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]:
+    """The `principled` BSDFs of a scene by their ids, or their numbers, each as a function that reads it; the
+    file chooses none.
 
     Raises:
         InvalidInput: it cannot be read, or is no scene.
@@ -45,7 +47,7 @@ def materials(path: Path) -> dict[str, Callable[[Notes], Imported]]:
             around = [each for each in element.outwards() if each.tag == "bsdf" and each.get("type") in _AROUND]
             name = next(filter(None, (each.get("id") for each in (element, *around))), f"bsdf {len(found)}")
             found[name] = reader(element, name)
-    return found
+    return found, None
 
 
 def of_dict(described: Mapping[str, Any], notes: Notes) -> Imported:
@@ -92,15 +94,9 @@ def _values(element: Element, folder: Path, default: Mapping[str, str], notes: N
 
 def _numbers(text: str) -> Any:
     """A number or a colour; None for other texts."""
-    if text.startswith("#") and len(text) == 7:
-        try:
-            return linear(np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])).tolist()
-        except ValueError:
-            return None
-    try:
-        numbers = [float(part) for part in text.replace(",", " ").split()]
-    except ValueError:
-        return None
+    if re.fullmatch("#[0-9a-fA-F]{6}", text):
+        return linear(np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])).tolist()
+    numbers = listed(" ".join(text.replace(",", " ").split()), " ")
     return numbers[0] if len(numbers) == 1 else numbers if len(numbers) == 3 else None
 
 

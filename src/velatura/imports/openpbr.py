@@ -39,7 +39,11 @@ PARAMETERS = (
     Parameter("emission_luminance", 0.0, high=GREATEST),
     Parameter("emission_color", WHITE),
     Parameter("geometry_opacity", 1.0),
-    Parameter("geometry_thin_walled", 0.0),
+    Parameter("geometry_thin_walled", False),
+    # Of version 1.2
+    Parameter("specular_haze", 0.0),
+    Parameter("specular_haze_spread", 0.3),
+    Parameter("specular_retroreflectivity", 0.0),
 )
 IGNORED = {
     "geometry_normal": FLAT,
@@ -94,6 +98,10 @@ def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) 
             ),
         ),
     )
+    given.leave("specular_haze", "an interface has one lobe: left out")
+    if given.number("specular_haze"):
+        given.leave("specular_haze_spread", "left out with the haze")
+    given.leave("specular_retroreflectivity", "facets send no light back: left out")
     given.leave("fuzz_weight", FIBRES)
     given.leave("emission_luminance", LIGHT)
     given.leave("geometry_opacity", COVERS)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from velatura.errors import one_line, short
 from velatura.stack import Stack, Texture
+
+MOST = 100  # characters of a name, and of a value
 
 
 @dataclass(frozen=True)
@@ -27,16 +30,21 @@ class Imported:
     left: tuple[Left, ...] = ()
 
 
-@dataclass
 class Notes:
     """A list of what is left, while a material is being read."""
 
-    left: list[Left] = field(default_factory=list)
+    def __init__(self) -> None:
+        self._left: dict[str, Left] = {}
+
+    @property
+    def left(self) -> tuple[Left, ...]:
+        """All notes, in their order."""
+        return tuple(self._left.values())
 
     def add(self, parameter: str, value: object, why: str) -> None:
         """Note one parameter; a second note of the same one is dropped."""
-        if all(parameter != each.parameter for each in self.left):
-            self.left.append(Left(parameter, shown(value), why))
+        name, text = (short(one_line(each), MOST) for each in (parameter, shown(value)))
+        self._left.setdefault(name, Left(name, text, one_line(why)))
 
 
 def shown(value: object) -> str:

@@ -71,7 +71,7 @@ PARAMETERS = (
     Parameter("emission", 0.0, high=GREATEST),
     Parameter("emission_color", WHITE),
     Parameter("opacity", WHITE),
-    Parameter("thin_walled", 0.0),
+    Parameter("thin_walled", False),
 )
 IGNORED = {"normal": FLAT, "coat_normal": FLAT, "tangent": TANGENT}
 LEAST_ASPECT = 0.02

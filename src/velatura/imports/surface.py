@@ -91,7 +91,7 @@ def imported(surface: Surface, notes: Notes, name: str = "", source: str = "") -
     thin = surface.pane and not surface.metal and surface.albedo is None
     if (plain := cleaned(name)) != name:
         notes.add("name", plain, "control characters are left out")
-    return Imported(Stack([*coat, *base], name=plain, source=source, thin=thin), tuple(notes.left))
+    return Imported(Stack([*coat, *base], name=plain, source=source, thin=thin), notes.left)
 
 
 def weighed(eta: float, outside: float, weight: float) -> float:

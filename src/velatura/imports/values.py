@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import files
 from velatura.stack import RGB, Texture
 
 Array: TypeAlias = NDArray[np.float64]
@@ -16,10 +17,23 @@ Value: TypeAlias = float | RGB | Texture
 _NODES = 65  # of curves
 
 
+def listed(text: str, between: str = ",") -> list[float]:
+    """The numbers in a text; none where something else is among them."""
+    try:
+        return [files.number(part) for part in text.split(between)]
+    except ValueError:
+        return []
+
+
 def changed(value: Value, function: Callable[[Array], Any]) -> Value:
-    """The value that a function of single numbers gives; of an image, one with a curve, or a number if it is level."""
+    """The value that a function of single numbers gives; of an image, one with a curve, or a number if it is level.
+
+    Raises:
+        InvalidInput: the numbers of the curve are beyond what textures take.
+    """
     if isinstance(value, Texture):
-        return _with_curve(value, np.broadcast_to(np.asarray(function(_at_nodes(value)), float), _NODES))
+        with np.errstate(all="ignore"):  # numbers that are not finite are refused
+            return _with_curve(value, np.broadcast_to(np.asarray(function(_at_nodes(value)), float), _NODES))
     found = np.broadcast_to(np.asarray(function(np.asarray(value, float)), float), np.shape(value))
     return tuple(map(rounded, found.tolist())) if found.ndim else rounded(float(found))  # type: ignore[return-value]
 
@@ -61,4 +75,4 @@ def _with_curve(texture: Texture, values: Array) -> Value:
         line: dict[str, Any] = {"scale": float(last - first), "offset": float(first), "curve": None}
     else:
         line = {"scale": 1.0, "offset": 0.0, "curve": tuple(map(rounded, values.tolist()))}
-    return texture.model_copy(update=line)
+    return Texture(**{**dict(texture), **line})

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
+from velatura import files
 from velatura.errors import InvalidInput
-from velatura.imports.file import content
 
 LARGEST = 2**24  # bytes of a file
-MOST, DEEPEST = 200_000, 100  # elements in all, and within each other
+DEEPEST = 100  # elements within each other
 
 
 @dataclass
@@ -36,9 +37,17 @@ class Element:
         """The elements in it of some tags."""
         return (child for child in self.children if child.tag in tags)
 
+    @functools.cached_property
+    def named(self) -> dict[str, list[Element]]:
+        """The elements in it by their names, once all are there."""
+        found: dict[str, list[Element]] = {}
+        for child in self.children:
+            found.setdefault(child.name, []).append(child)
+        return found
+
     def child(self, tag: str, name: str) -> Element | None:
-        """The element in it of a tag and a name."""
-        return next((child for child in self.of(tag) if child.name == name), None)
+        """The first element in it of a tag and a name."""
+        return next((child for child in self.named.get(name, ()) if child.tag == tag), None)
 
     def all(self) -> Iterator[Element]:
         """The element, and all in it, in their order."""
@@ -60,30 +69,29 @@ def read(path: Path) -> Element:
     """The root of a file.
 
     Raises:
-        InvalidInput: it cannot be read, is no XML, too large, or has a document type; one line that names the file.
+        InvalidInput: it cannot be read, is no XML, beyond the budget, or has a document type; one line that names it.
     """
-    root, count = Element("", {}), 0
+    root, parser = Element("", {}), expat.ParserCreate()
     at = [root]
-    parser = expat.ParserCreate()
 
-    def refuse(what: str) -> InvalidInput:
-        return InvalidInput(f"{path}: line {parser.CurrentLineNumber}: {what}")
+    def where() -> str:
+        return f"{path}: line {parser.CurrentLineNumber}"
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal count
-        count += 1
-        if count > MOST or len(at) > DEEPEST:
-            raise refuse(f"holds more than {MOST} elements, or {DEEPEST} within each other")
+        left.spend(where(), "elements")
+        if len(at) > DEEPEST:
+            raise InvalidInput(f"{where()}: holds more than {DEEPEST} elements within each other")
         at.append(Element(tag, attributes, at[-1]))
         at[-2].children.append(at[-1])
 
     def doctype(*_: object) -> None:
-        raise refuse("has a document type, which is not read")
+        raise InvalidInput(f"{where()}: has a document type, which is not read")
 
     parser.StartElementHandler, parser.StartDoctypeDeclHandler = begin, doctype
     parser.EndElementHandler = lambda _: at.pop()
     try:
-        parser.Parse(content(path, LARGEST), True)
+        with files.budget() as left:
+            parser.Parse(files.content(path, LARGEST), True)
     except expat.ExpatError as error:
         raise InvalidInput(f"{path}: line {error.lineno}: is not valid XML: {expat.ErrorString(error.code)}") from None
     except (LookupError, ValueError) as error:  # an encoding that there is not

@@ -7,6 +7,8 @@ adaptive grids, which Mitsuba reads.
 from __future__ import annotations
 
 import csv
+import io
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from math import prod
 from pathlib import Path
@@ -17,12 +19,15 @@ from velatura import files, kernel
 from velatura.errors import InvalidInput
 from velatura.inverse.angles import AZIMUTHS, Directions, ReflectanceTable
 from velatura.inverse.partial_stack import Array
+from velatura.stack.schema import show
 
 IN_PLANE = ("theta_i", "theta_o", "phi", "r", "g", "b")
 ALL_AZIMUTHS = ("theta_i", "phi_i", "theta_o", "phi_o", "r", "g", "b")
 GRAZING, BRIGHTEST = 90.0, 1e9  # degrees: directions must be above the surface; 1/sr: more than any lobe has
 MERL_SCALES = np.array([1.0, 1.15, 1.66]) / 1500  # of red, green and blue
 TAKEN = (24, 9, 8)  # of MERL's half-vector tilts, differences and azimuths: enough for a stack's few values
+LARGEST = 2**27  # bytes of a measurement
+TENSORS = dict(enumerate(("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8"), start=1))
 ROUND = 1e-3  # share of the brightest value by which a measurement may depend on its azimuth, and be isotropic
 
 
@@ -47,13 +52,13 @@ def load_table(path: str | Path) -> ReflectanceTable:
 
 
 def _csv(path: Path) -> ReflectanceTable:
+    text = files.text_of(path)
+    with files.budget() as left:
+        left.spend(path, "values", text.count(","))
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file))
-    except UnicodeDecodeError as error:
-        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
-    except (OSError, ValueError, csv.Error) as error:
-        raise InvalidInput(f"{path}: cannot be read: {files.reason(error)}") from None
+        lines = list(csv.reader(io.StringIO(text, newline="")))
+    except csv.Error as error:
+        raise InvalidInput(f"{path}: cannot be read: {error}") from None
     columns = tuple(cell.strip() for cell in lines[0]) if lines else ()
     if columns not in (IN_PLANE, ALL_AZIMUTHS):
         raise InvalidInput(f"{path}: line 1: must be {','.join(IN_PLANE)} or {','.join(ALL_AZIMUTHS)}")
@@ -84,11 +89,11 @@ def _row(where: str, line: Sequence[str], columns: Sequence[str]) -> list[float]
 
 def _number(where: str, text: str) -> float:
     try:
-        found = float(text)
+        found = files.number(text)
     except ValueError:
         found = float("nan")
     if not np.isfinite(found):
-        raise InvalidInput(f"{where}: must be a finite number, got {text.strip()!r}")
+        raise InvalidInput(f"{where}: must be a finite number, got {show(text.strip())}")
     return found
 
 
@@ -97,10 +102,7 @@ def _number(where: str, text: str) -> float:
 
 def _merl(path: Path) -> ReflectanceTable:
     """A file of three numbers of steps, then all of red, of green and of blue, the azimuth running first."""
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InvalidInput(f"{path}: cannot be read: {files.reason(error)}") from None
+    content = files.content(path, LARGEST)
     counts = [int(n) for n in np.frombuffer(content[: len(content) // 4 * 4][:12], "<i4")]
     if len(counts) < 3 or min(counts) < 1 or len(content) != 12 + 24 * prod(counts):
         raise InvalidInput(f"{path}: is no MERL file, three counts and then as many numbers for each colour")
@@ -125,8 +127,7 @@ def _rgl(path: Path) -> ReflectanceTable:
     mi = kernel.mitsuba()
     if not mi.is_rgb or mi.variant().startswith("scalar"):
         raise InvalidInput(f"{path}: is read in a vectorised RGB variant, llvm_ad_rgb for one, not in {mi.variant()}")
-    if not path.is_file():
-        raise InvalidInput(f"{path}: cannot be read: no such file")
+    _check_tensors(path, files.content(path, LARGEST))
 
     def at(directions: Directions) -> Array:
         si = mi.SurfaceInteraction3f()
@@ -144,6 +145,36 @@ def _rgl(path: Path) -> ReflectanceTable:
         raise InvalidInput(f"{path}: holds values that are no finite numbers")
     brushed = np.ptp(each, axis=0).max() > ROUND * np.max(each)
     return ReflectanceTable(all_round, found) if brushed else ReflectanceTable(plain, each[0])
+
+
+def _check_tensors(path: Path, content: bytes) -> None:
+    """Refuse a file of tensors that Mitsuba would read beyond its end, or whose nodes are none.
+
+    Raises:
+        InvalidInput: a head that ends early, numbers outside the file or not finite, grids without an inside.
+    """
+    arrays: dict[bytes, Array] = {}
+    try:
+        (count,), at = struct.unpack_from("<I", content, 14), 18
+        for _ in range(count):
+            (length,) = struct.unpack_from("<H", content, at)
+            name, at = content[at + 2 : at + 2 + length], at + 2 + length
+            dimensions, kind, begin = struct.unpack_from("<HBQ", content, at)
+            shape = struct.unpack_from(f"<{dimensions}Q", content, at + 11)
+            at += 11 + 8 * dimensions
+            arrays[name] = np.frombuffer(content, TENSORS[kind], prod(shape), begin).reshape(shape)
+        usable = all(
+            each.size and (each.dtype.kind != "f" or bool(np.isfinite(each).all())) and (each.ndim < 2 or _inside(each))
+            for each in arrays.values()
+        ) and all((np.diff(arrays[name]) > 0).all() for name in (b"theta_i", b"phi_i"))
+    except (struct.error, KeyError, OverflowError, ValueError) as error:
+        raise InvalidInput(f"{path}: is no RGB file of the RGL database: its head is broken ({error})") from None
+    if not usable:
+        raise InvalidInput(f"{path}: holds values that are no finite numbers, or no grids of them")
+
+
+def _inside(grid: Array) -> bool:
+    return min(grid.shape[-2:]) > 1
 
 
 #: By the end of the name; all other files are CSV.

@@ -76,8 +76,6 @@ def _read(mi: Any, path: Path) -> Any:
     if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such environment file")
     texels = _rgb(mi, path)
-    if not texels.size:
-        raise InvalidInput(f"{path}: has no texels")
     if not np.all((texels >= 0) & (texels <= BRIGHTEST)):
         raise InvalidInput(f"{path}: has texels that are negative, not finite, or above {BRIGHTEST:g}")
     return mi.Bitmap(texels)
@@ -85,8 +83,8 @@ def _read(mi: Any, path: Path) -> Any:
 
 def _rgb(mi: Any, path: Path) -> NDArray[np.float32]:
     """The texels of a file, linear RGB."""
+    picture = kernel.bitmap(path)
     try:
-        picture = mi.Bitmap(str(path))
         if picture.channel_count() > 4:
             raise InvalidInput(f"{path}: has {picture.channel_count()} channels; a light has one or three, and opacity")
         return np.array(picture.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, srgb_gamma=False))

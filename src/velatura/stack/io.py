@@ -7,7 +7,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module, resources
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -15,28 +15,33 @@ from typing import Any, TypeAlias
 import yaml
 
 from velatura.errors import InvalidInput
-from velatura.files import reason, whole
+from velatura.files import budget, text_of, whole
+from velatura.stack.paths import beside, rewritten
 from velatura.stack.schema import show, unknown
 from velatura.stack.stack import Stack
 
 _PRESETS = resources.files("velatura.stack") / "presets"
 _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
-_LARGEST = 100_000  # values in a file
-_PATHS = ("texture", "spectrum")  # keys
+LARGEST = 2**22  # bytes of a file
+_MOST = 100_000  # values in a file
+_DIGITS = 300  # of a number that may be an integer
 FOREIGN = (".mtlx", ".gltf", ".glb", ".xml")  # of other programs, which `velatura.imports` reads
 ENDINGS = (*_FORMATS, *FOREIGN)  # of all files that hold a material
 
-#: What names a material wherever one is asked for: a stack, a file, or the name of a preset.
-MaterialLike: TypeAlias = Stack | str | Path
+#: What names a material wherever one is asked for: a stack, a file, the name of a preset, or what a file would hold.
+#: The mapping is without its types, so that `isinstance` takes it.
+MaterialLike: TypeAlias = Stack | str | Path | Mapping
 
 
 # In ------------------------------------------------------------------------------------------------------------------
 
 
+@budget()
 def load(material: MaterialLike) -> Stack:
     """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack unchanged.
 
-    A bare word without an extension is a preset. Paths in it are relative to the file. A file of another program
+    A bare word without an extension is a preset. Paths in a file are relative to it; keys and values in place of a file
+    have them relative to the current folder. A file of another program
     (.mtlx, .gltf, .glb, or a scene of Mitsuba, .xml; FILE#NAME for one of its materials) is imported, with a warning
     that lists what a stack cannot carry.
 
@@ -45,8 +50,14 @@ def load(material: MaterialLike) -> Stack:
     """
     if isinstance(material, Stack):
         return material
+    if isinstance(material, Mapping):
+        try:
+            return Stack.from_dict(material)
+        except RecursionError:
+            raise InvalidInput("the material: is nested too deeply") from None
     if not isinstance(material, str | Path):
-        raise InvalidInput(f"a material must be a stack, a file or the name of a preset, got {show(material)}")
+        shown = show(material)  # type: ignore[unreachable]
+        raise InvalidInput(f"a material must be a stack, a file or the name of a preset, got {shown}")
     path = Path(material)
     if str(material) in presets() or (not path.suffix and path.parent == Path() and not os.path.isdir(path)):
         return preset(str(material))
@@ -56,7 +67,7 @@ def load(material: MaterialLike) -> Stack:
         imported: Stack = import_module("velatura.imports").load(str(material))  # by name, as it stands below
         return imported
     _format(path, "a material file", ENDINGS)
-    return loads(_text(path), name=str(path), folder=path.parent)
+    return loads(text_of(path, LARGEST), name=str(path), folder=path.parent)
 
 
 def foreign(material: str) -> str:
@@ -83,9 +94,9 @@ def loads(
         InvalidInput: the text is not a material; one line that begins with `name`.
     """
     find = find or (lambda path: str(Path(folder, path)))
+    fields = parsed(text, _FORMATS.get(Path(name).suffix.lower(), "yaml"), name)
     try:
-        fields = _parse(text, _FORMATS.get(Path(name).suffix.lower(), "yaml"))
-        return Stack.from_dict(_with_paths(fields, find))
+        return Stack.from_dict(rewritten(fields, find))
     except InvalidInput as error:
         raise InvalidInput(f"{name}: {error}") from None
     except RecursionError:
@@ -100,24 +111,7 @@ def read(path: str | Path, what: str) -> Any:
     """
     path = Path(path)
     format = _format(path, what)
-    text = _text(path)
-    try:
-        return _parse(text, format)
-    except InvalidInput as error:
-        raise InvalidInput(f"{path}: {error}") from None
-    except RecursionError:
-        raise InvalidInput(f"{path}: is nested too deeply") from None
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InvalidInput(f"{path}: is not UTF-8 text (byte {error.start})") from None
-    except FileNotFoundError:
-        raise InvalidInput(f"{path}: file not found") from None
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: cannot be read: {reason(error)}") from None
+    return parsed(text_of(path, LARGEST), format, path)
 
 
 def preset(name: str) -> Stack:
@@ -143,15 +137,17 @@ def presets() -> tuple[str, ...]:
 def save(stack: Stack, path: str | Path) -> None:
     """Write a material file, whole or not at all; paths in it are written relative to it.
 
+    Images that no file of the user's holds, such as those inside a .glb, are written beside it.
+
     Raises:
-        InvalidInput: the extension is none of .yaml, .yml and .json, or the file cannot be written.
+        InvalidInput: the extension is none of .yaml, .yml and .json, or a file cannot be written.
     """
     path = Path(path)
-    data = dumps(stack, _format(path), path.parent).encode("utf-8")
+    format = _format(path)
     if not os.path.isdir(path.parent):
         raise InvalidInput(f"{path}: there is no folder {path.parent}")
-    with whole(path) as unfinished:
-        unfinished.write_bytes(data)
+    with beside(stack, path.parent) as stack, whole(path) as unfinished:
+        unfinished.write_bytes(dumps(stack, format, path.parent).encode("utf-8"))
 
 
 def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) -> str:
@@ -165,7 +161,7 @@ def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) 
     fields = stack.to_dict()
     if folder is not None:
         start = Path(folder).resolve()
-        fields = _with_paths(fields, lambda path: Path(os.path.relpath(path, start)).as_posix())
+        fields = rewritten(fields, lambda path: Path(os.path.relpath(path, start)).as_posix())
     if format == "json":
         return json.dumps(fields, indent=2, ensure_ascii=False) + "\n"
     if format == "yaml":
@@ -177,24 +173,36 @@ def dumps(stack: Stack, format: str = "yaml", folder: str | Path | None = None) 
 # Text to values and back ---------------------------------------------------------------------------------------------
 
 
-def _parse(text: str, format: str) -> Any:
+def parsed(text: str, format: str, where: object) -> Any:
+    """The values in a text of "yaml" or "json".
+
+    Raises:
+        InvalidInput: it is none, or beyond the budget; one line that begins with `where`.
+    """
+    with budget() as left:
+        left.spend(where, "values", sum(map(text.count, ",[{")) if format == "json" else 0)
     try:
         if format == "json":
-            return json.loads(text, object_pairs_hook=_unique)
+            return json.loads(text, object_pairs_hook=_unique, parse_int=_integer)
         return yaml.load(text, Loader=_Loader)
-    except InvalidInput:
-        raise
+    except InvalidInput as error:
+        raise InvalidInput(f"{where}: {error}") from None
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
-        where = f"line {mark.line + 1}: " if mark else ""
+        line = f"line {mark.line + 1}: " if mark else ""
         reason = getattr(error, "problem", None) or getattr(error, "reason", None) or "it cannot be read"
-        raise InvalidInput(f"{where}is not valid YAML: {reason}") from None
+        raise InvalidInput(f"{where}: {line}is not valid YAML: {reason}") from None
     except json.JSONDecodeError as error:
-        raise InvalidInput(f"line {error.lineno}: is not valid JSON: {error.msg}") from None
+        raise InvalidInput(f"{where}: line {error.lineno}: is not valid JSON: {error.msg}") from None
     except RecursionError:
-        raise
-    except Exception as error:  # a number of too many digits, a date that is none: PyYAML lets all sorts pass
-        raise InvalidInput(f"cannot be read: {error}") from None
+        raise InvalidInput(f"{where}: is nested too deeply") from None
+    except Exception as error:  # a date that is none: PyYAML lets all sorts pass
+        raise InvalidInput(f"{where}: cannot be read: {error}") from None
+
+
+def _integer(text: str) -> int | float:
+    """A number without a point: infinite if it is long, so that it is refused where it stands."""
+    return int(text) if len(text) <= _DIGITS else math.copysign(math.inf, -1 if text[0] == "-" else 1)
 
 
 def _unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
@@ -209,8 +217,13 @@ def _unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 class _Loader(yaml.SafeLoader):
     """YAML that refuses tags, duplicate keys and endless aliases, and reads 1e-3 as a number, as YAML 1.2 does."""
 
+    _values = 0
+
     def get_event(self) -> yaml.Event:
         event = super().get_event()
+        self._values += isinstance(event, yaml.NodeEvent)
+        if self._values > _MOST:
+            raise InvalidInput(f"holds more than {_MOST} values")
         tag = getattr(event, "tag", None)
         if tag is not None:
             raise InvalidInput(f"line {event.start_mark.line + 1}: a value must have no tag, got {show(tag)}")
@@ -218,8 +231,8 @@ class _Loader(yaml.SafeLoader):
 
     def get_single_node(self) -> yaml.Node | None:
         node = super().get_single_node()
-        if node is not None and _size(node, {}) > _LARGEST:
-            raise InvalidInput(f"holds more than {_LARGEST} values once its aliases are written out")
+        if node is not None and _size(node, {}) > _MOST:
+            raise InvalidInput(f"holds more than {_MOST} values once its aliases are written out")
         return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
@@ -230,6 +243,16 @@ class _Loader(yaml.SafeLoader):
                     raise InvalidInput(f"line {key.start_mark.line + 1}: key {key.value!r} appears twice")
                 seen.add(key.value)
         return super().construct_mapping(node, deep)
+
+    def construct_number(self, node: yaml.ScalarNode) -> Any:
+        """A number; one of many digits in linear time, so without the base 60 of YAML 1.1."""
+        plain = self.construct_yaml_int if node.tag.endswith(":int") else self.construct_yaml_float
+        if len(node.value) <= _DIGITS:
+            return plain(node)
+        try:
+            return float(node.value)
+        except ValueError:
+            return math.inf
 
 
 def _size(node: yaml.Node, known: dict[int, float]) -> float:
@@ -256,6 +279,8 @@ class _Line(dict[str, Any]):
 _EXPONENT = re.compile(r"[-+]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)[eE][-+]?\d+$")
 for _dialect in (_Loader, _Dumper):
     _dialect.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+.0123456789"))
+for _kind in ("int", "float"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_number)
 # PyYAML would write U+0085 as a line break, and read back a space
 _Dumper.add_representer(
     str,
@@ -264,16 +289,6 @@ _Dumper.add_representer(
 _Dumper.add_representer(
     _Line, lambda dumper, data: dumper.represent_mapping("tag:yaml.org,2002:map", data, flow_style=True)
 )
-
-
-def _with_paths(node: Any, rewrite: Callable[[str], str]) -> Any:
-    """A copy of parsed values in which the path of every texture and table is rewritten."""
-    if isinstance(node, dict):
-        return {
-            key: rewrite(value) if key in _PATHS and isinstance(value, str) else _with_paths(value, rewrite)
-            for key, value in node.items()
-        }
-    return [_with_paths(entry, rewrite) for entry in node] if isinstance(node, list) else node
 
 
 def _format(path: Path, what: str = "a material file", endings: Iterable[str] = _FORMATS) -> str:

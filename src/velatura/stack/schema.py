@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import functools
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +25,9 @@ RecordType = TypeVar("RecordType", bound="Record")
 
 def unknown(what: str, name: object, known: Iterable[str], listed: str = "") -> str:
     """One line about an unknown name: the known one that looks alike; else all, or where so many are `listed`."""
-    lower_case = {option.lower(): option for option in known}
-    near = difflib.get_close_matches(str(name).lower(), lower_case, n=1, cutoff=0.65)
+    # Of a file's own names, which may be many and long, a part is compared
+    lower_case = {option.lower(): option for option in itertools.islice(known, 1000) if len(option) <= 100}
+    near = difflib.get_close_matches(str(name)[:100].lower(), lower_case, n=1, cutoff=0.65)
     if near:
         return f"unknown {what} {show(name)} (did you mean {lower_case[near[0]]}?)"
     if len(lower_case) <= 16:
@@ -37,7 +39,10 @@ def show(value: object) -> str:
     """`value` as quoted in an error message: one line, of limited length."""
     if value is None:
         return "nothing"
-    text = repr(value)
+    try:
+        text = repr(value)
+    except ValueError:  # of an integer of more digits than Python writes
+        return f"a value of type {type(value).__name__}"
     return text if len(text) <= 60 else text[:57] + "..."
 
 

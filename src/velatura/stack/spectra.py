@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from velatura.errors import InvalidInput, MissingTool
+from velatura.files import number, text_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +32,7 @@ _CRYSTALS = ("CsI", "MgO", "SiC", "ThF4", "TiO2", "TiO2-e", "d-C")
 # Files of the wheel with holes: eta is 0 below 440 nm (AlAs), nothing above 590 nm (AlSb), k is 0 throughout (SnTe).
 _BROKEN = ("AlAs", "AlSb", "SnTe")
 
-_LARGEST = 2**20  # characters of a table
+_LARGEST = 2**20  # bytes of a table
 VISIBLE_NM = (360.0, 830.0)  # that Mitsuba renders
 LUMINANCE = (0.212671, 0.715160, 0.072169)  # of linear sRGB (ITU-R BT.709), as in Mitsuba
 
@@ -184,25 +185,18 @@ def read(path: Path) -> Table:
         ValueError: it is none; one line that names the file, without its content.
     """
     rows: list[tuple[float, float]] = []
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            lines = file.read(_LARGEST + 1)
-    except (OSError, UnicodeDecodeError):
-        raise ValueError(f"{path}: is no text that can be read") from None
-    if len(lines) > _LARGEST:
-        raise ValueError(f"{path}: is larger than a table of a spectrum")
-    for number, line in enumerate(lines.splitlines(), start=1):
+    for at, line in enumerate(text_of(path, _LARGEST).splitlines(), start=1):
         cells = line.partition("#")[0].replace(",", " ").split()
         if not cells:
             continue
         try:
-            wavelength_nm, value = map(float, cells)
+            wavelength_nm, value = map(number, cells)
         except ValueError:
-            raise ValueError(f"{path}: line {number}: must be a wavelength in nanometres and a value") from None
+            raise ValueError(f"{path}: line {at}: must be a wavelength in nanometres and a value") from None
         if not (math.isfinite(wavelength_nm) and math.isfinite(value)):
-            raise ValueError(f"{path}: line {number}: must be finite")
+            raise ValueError(f"{path}: line {at}: must be finite")
         if rows and wavelength_nm <= rows[-1][0]:
-            raise ValueError(f"{path}: line {number}: wavelengths must ascend")
+            raise ValueError(f"{path}: line {at}: wavelengths must ascend")
         rows.append((wavelength_nm, value))
     if len(rows) < 2 or rows[-1][0] < VISIBLE_NM[0] or rows[0][0] > VISIBLE_NM[1]:
         raise ValueError(f"{path}: must hold values at two wavelengths or more, in nanometres, of visible light")

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 from collections.abc import Mapping
 from typing import Any
 
 KEY = "velatura"
 READ = "holds the stack that the parameters were fitted to, which is read"
-_COMMENT = re.compile(rf"<!-- {KEY} (\{{.*\}}) -->\n(.*)", re.DOTALL)
 
 
 def in_xml(material: Any, body: str) -> str:
@@ -22,12 +20,12 @@ def in_xml(material: Any, body: str) -> str:
 
 def of_xml(text: str) -> Any | None:
     """The material in a text of `in_xml`; None without one, or where what follows it was changed."""
-    found = _COMMENT.search(text)
+    comment, _, body = text.partition(f"<!-- {KEY} ")[2].partition(" -->\n")
     try:
-        held = json.loads(found[1]) if found else {}
-    except ValueError:
+        held = json.loads(comment) if comment.startswith("{") else {}
+    except (ValueError, RecursionError):
         return None
-    return held.get("material") if found and held.get("digest") == _digest(found[2]) else None
+    return held.get("material") if held.get("digest") == _digest(body) else None
 
 
 def in_gltf(material: Any, entry: Mapping[str, Any]) -> dict[str, Any]:

@@ -29,6 +29,10 @@ class Parameter:
     def is_colour(self) -> bool:
         return isinstance(self.default, tuple)
 
+    @property
+    def is_flag(self) -> bool:
+        return self.default is False
+
 
 def complete(parameters: tuple[Parameter, ...], given: Values) -> dict[str, Any]:
     """All values, the defaults where none is given."""

@@ -49,7 +49,7 @@ def trial(rng: np.random.Generator) -> list[Failure]:
     encoding = str(rng.choice(ENCODINGS)) if rng.random() < 0.2 else "utf-8"
     data = text.encode(encoding, "surrogatepass" if encoding.startswith("utf-") and encoding != "utf-7" else "replace")
     if rng.random() < 0.2:
-        data = _bytes_changed(data, rng)
+        data = bytes_changed(data, rng)
     like = ".json" if text.lstrip().startswith("{") else ".yaml"
     return tried(data, like if rng.random() < 0.9 else str(rng.choice(ENDINGS)))
 
@@ -178,7 +178,8 @@ def _many_times(text: str, rng: np.random.Generator) -> str:
     return text * int(rng.integers(2, 4))
 
 
-def _bytes_changed(data: bytes, rng: np.random.Generator) -> bytes:
+def bytes_changed(data: bytes, rng: np.random.Generator) -> bytes:
+    """Data with a few bytes changed, or more."""
     changed = bytearray(data)
     for _ in range(rng.integers(1, 5)):
         at = int(rng.integers(len(changed) + 1))
