@@ -24,8 +24,8 @@ THICK = 1e9  # nm, of a medium, whose extinction then changes no reflectance
 def light_of(wavelength_nm: float) -> Iterator[None]:
     """Colours of films are those of light of one wavelength in this block."""
 
-    def at(share: Any, cosines: np.ndarray, *_: Any) -> np.ndarray:
-        return np.repeat(share(np.array([wavelength_nm]), cosines).T, 3, axis=0)
+    def at(shares: Any, cosines: np.ndarray, *_: Any) -> np.ndarray:
+        return np.repeat(shares(np.array([wavelength_nm]), cosines).swapaxes(1, 2), 3, axis=1)
 
     def forget() -> None:
         coated._coated.cache_clear()

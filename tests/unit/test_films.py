@@ -17,7 +17,7 @@ from velatura.sampling import coated
 from velatura.shader import shader
 from velatura.stack import Material
 from velatura.stack.spectra import srgb_sensitivity, srgb_weights
-from velatura.tables.microsurface_walks import Side, shares_in_the_end
+from velatura.tables.microsurface_walks import shares_in_the_end
 
 COSINES = np.linspace(0.01, 1, 34)
 
@@ -251,6 +251,47 @@ def test_what_is_sampled_is_a_fine_integration_at_any_angle(kind: str) -> None:
             assert beyond == pytest.approx(np.ones((3, 9)), abs=1e-6)
 
 
+# Thick films
+
+
+def test_colours_of_thick_films_are_means_over_a_fine_spectrum() -> None:
+    """Of optical thicknesses from 20 micrometres to 5 centimetres, alone, with a thin film and with another thick one;
+    wavenumbers at random have no step that waves could follow."""
+    rng = np.random.default_rng(8)
+    wavenumber = rng.uniform(1 / 830, 1 / 360, 300_000)
+    weights = srgb_sensitivity(1 / wavenumber) / wavenumber**2
+    for index, thickness_nm, others, k in (
+        (4.5, 5000.0, (), 0.0),
+        (6.0, 4321.0, (), 1e-3),
+        (9.0, 4990.0, (ColouredFilm(white(1.4), white(0.0), 120.0),), 0.0),
+        (30.0, 4000.0, (), 0.0),
+        (1000.0, 5000.0, (ColouredFilm(white(2.2), white(0.0), 300.0),), 0.0),
+        (1e4, 5000.0, (), 0.0),
+        (5.0, 5000.0, (ColouredFilm(white(8.0), white(0.0), 4700.0),), 0.0),
+    ):
+        coating = Coating((ColouredFilm(white(index), white(k), thickness_nm), *others), white(1.0), white(1.5))
+        (found,) = coating.shares(["reflected"], np.array([0.7]), srgb_sensitivity)
+        each = [Film(film.eta[0], film.k[0], film.thickness_nm) for film in coating.films]
+        exact = weights @ films.coherent(0.7, 1 / wavenumber, 1.0, each, 1.5).reflected / weights.sum(axis=1)
+        # Resonances between faces that reflect nearly all are sharper than the wavelengths that they are given
+        assert np.abs(found[:, 0] - exact).max() < (4e-3 if index < 10 else 7e-3)
+
+
+def test_the_number_of_wavelengths_is_bounded() -> None:
+    """Of the thickest films of the highest index, eight of them, from the least cosines to the greatest."""
+    most = ColouredFilm(white(1e4), white(0.0), 5000.0)
+    met = 0
+
+    def sensitivity(wavelengths_nm: np.ndarray) -> np.ndarray:
+        nonlocal met
+        met += len(wavelengths_nm)
+        return srgb_sensitivity(wavelengths_nm)
+
+    Coating((most,) * 8, white(1.0), white(1.5)).reflectance(COSINES[:3], sensitivity)
+    assert met < 5000
+    assert len(quadrature(8 * 1e4 * 5000, srgb_sensitivity)[0]) < 5000
+
+
 # Between facets
 
 
@@ -258,10 +299,10 @@ def test_of_light_between_facets_a_mirror_reflects_all_and_a_black_film_nothing(
     """A channel may be clipped to 0 at some angles."""
     cosines, alphas = np.array([0.2, 0.6, 1.0]), np.full(3, 0.4)
 
-    def metal(cosine: np.ndarray) -> np.ndarray:
-        return np.stack([0 * cosine, cosine > 0.5, 0 * cosine + 1])
+    def metal(cosine: np.ndarray, _: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.stack([0 * cosine, cosine > 0.5, 0 * cosine + 1]), 0 * cosine
 
-    (black, half, mirror), _ = shares_in_the_end([Side(metal, np.zeros_like)], 1.0, cosines, alphas, 512)
+    (black, half, mirror), _ = shares_in_the_end(metal, None, cosines, alphas, 512)
     assert black == pytest.approx(np.zeros(3))
     assert np.all((half > 0.05) & (half < 0.95))
     assert mirror == pytest.approx(np.ones(3), abs=0.02)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from velatura.ops import Value
-from velatura.optics.coatings import PER_PERIOD, RANGE_NM
+from velatura.optics.coatings import FINEST, PER_PERIOD, RANGE_NM
 from velatura.optics.films import Film as FilmOfChannel
 from velatura.optics.films import coherent
 from velatura.sampling.coated import Coated
@@ -100,13 +100,14 @@ class AtNormal(Coated):
         cosines = np.broadcast_to(cosines, (shape[1], cosines.shape[1]))
         eta_1, eta_2, k_2 = (np.broadcast_to(x, shape) for x in each)
         grey = shape[0] == 1 and all(np.ptp(x) == 0 for film in self.films for x in (film.eta, film.k))
-        thickness_nm = max(sum(float(np.max(film.eta)) * film.thickness_nm for film in self.films), 1.0)
+        slower = [FilmOfChannel(x.eta, x.k, x.thickness_nm).in_colours() for x in self.films]
+        thickness_nm = max(sum(float(np.max(film.optical_nm)) for film in slower), 1.0)
         wavelengths_nm, weights = _spectrum(thickness_nm)
         size = max(BLOCK // (cosines.shape[1] * len(wavelengths_nm)), 1)
         found = np.empty((3, *cosines.shape))
         for c in range(1 if grey else 3):
             own = slice(None) if grey else slice(c, c + 1)
-            films = [FilmOfChannel(film.eta[c, 0], film.k[c, 0], film.thickness_nm) for film in self.films]
+            films = [FilmOfChannel(x.eta[c, 0], x.k[c, 0], x.thickness_nm).in_colours() for x in self.films]
             for n in range(0, shape[1], size):
                 one, two, k = (x[c % shape[0], n : n + size, None, None] for x in (eta_1, eta_2, k_2))
                 r = coherent(cosines[n : n + size, :, None], wavelengths_nm, one, films, two, k)
@@ -118,7 +119,7 @@ class AtNormal(Coated):
 def _spectrum(thickness_nm: float) -> tuple[Array, Array]:
     """Wavelengths (W,), and the weights of the channels, (3, W)."""
     low, high = 1 / RANGE_NM[1], 1 / RANGE_NM[0]
-    count = max(COARSEST, int(np.ceil(PER_PERIOD * 2 * thickness_nm * (high - low))))
+    count = min(max(COARSEST, int(np.ceil(2 * PER_PERIOD * 2 * thickness_nm * (high - low)))), FINEST)
     wavelengths_nm = 1 / (low + (high - low) * (np.arange(count) + 0.5) / count)
     weights = srgb_sensitivity(wavelengths_nm) * wavelengths_nm**2
     return wavelengths_nm, weights / weights.sum(axis=1, keepdims=True)

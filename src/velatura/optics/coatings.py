@@ -12,7 +12,7 @@ optical thickness, and is halved until the colour stays as it is twice: sharp re
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -29,11 +29,14 @@ Sensitivity: TypeAlias = Callable[[Array], Array]
 
 RANGE_NM = (360.0, 830.0)  # beyond it, sensitivities are 0
 COARSEST = 48  # wavenumbers at first,
-PER_PERIOD = 2.5  # or as many in a period of the thickest film's reflectance;
-PER_PERIOD_FIXED = 10.0  # where no colour is looked at
+PER_PERIOD = 1.309  # or as many in a period of all films' reflectance; four times as many are far from any integer,
+PER_PERIOD_FIXED = 10.0  # whose harmonic they would take for the mean; where no colour is looked at
 CONVERGED = 1e-3  # change of a colour by half the step
-FINEST = 1 << 14  # wavenumbers at most
-BLOCK = 1 << 16  # cosines times wavenumbers at a time
+COMMON = (0.1, 10.0)  # moduli of indices of materials; of eight such films, single precision holds the fields
+FINEST, FINEST_ELSE = 1 << 12, 1 << 9  # wavenumbers at most, of films and media of common indices, and of others
+TOGETHER = 32  # neighbouring cosines that settle together
+DOUBLE_NM = 1000.0  # optical thickness from which single precision, three times as quick, serves
+BLOCK = 1 << 14  # cosines times wavenumbers at a time, which a processor's cache holds
 
 
 @dataclass(frozen=True)
@@ -61,24 +64,29 @@ class Coating:
 
     def reflectance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
         """Reflectance (C, N) of unpolarised light at cosines (N,) above, in [0, 1]."""
-        return np.clip(self.share("reflected", cos_theta, sensitivity), 0.0, 1.0)
+        return np.clip(self.shares(["reflected"], cos_theta, sensitivity)[0], 0.0, 1.0)
 
-    def at(self, name: str, wavelengths_nm: Array, cos_theta: Array) -> Array:
-        """As `share`, of channels of one wavelength each (C,)."""
+    def at(self, names: Sequence[str], cos_theta: Array, wavelengths_nm: Array) -> Array:
+        """As `shares`, of channels of one wavelength each (C,)."""
         eta_1, eta_2, k_2 = (np.reshape(x, (-1, 1)) for x in (self.eta_1, self.eta_2, self.k_2))
         films = [Film(np.reshape(x.eta, (-1, 1)), np.reshape(x.k, (-1, 1)), x.thickness_nm) for x in self.films]
-        return np.asarray(getattr(coherent(cos_theta, wavelengths_nm[:, None], eta_1, films, eta_2, k_2), name))
+        found = coherent(cos_theta, wavelengths_nm[:, None], eta_1, films, eta_2, k_2)
+        return np.stack([getattr(found, name) for name in names])
 
     def reversed(self) -> Coating:
         """As seen from below, between media that do not absorb."""
         return replace(self, films=self.films[::-1], eta_1=self.eta_2, eta_2=self.eta_1)
 
-    def share(self, name: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
-        """A property of `optics.films.Response`, by its name, as `reflectance`, with colours outside sRGB; cosines may
-        differ from channel to channel, (C, N)."""
-        if np.ndim(cos_theta) == 1:
-            return self._integrated(name, cos_theta, sensitivity)
-        return np.stack([self._integrated(name, each, sensitivity)[c] for c, each in enumerate(cos_theta)])
+    def shares(self, names: Sequence[str], cos_theta: Array, sensitivity: Sensitivity) -> Array:
+        """Properties of `optics.films.Response`, by their names, as `reflectance`, with colours outside sRGB: (names,
+        C, N); cosines may differ from channel to channel, (C, N)."""
+        channels = [self._channel(c) for c in range(len(self.eta_1))]
+        cosines = np.broadcast_to(cos_theta, (len(channels), np.shape(cos_theta)[-1]))
+        if len({*channels}) == 1 and (cosines == cosines[0]).all():
+            return channels[0].integrated(names, cosines[0], sensitivity)
+        own = (functools.partial(_only, sensitivity, c) for c in range(len(channels)))
+        each = (channel.integrated(names, *seen) for channel, *seen in zip(channels, cosines, own))
+        return np.concatenate([*each], axis=1)
 
     def below(self, cos_theta: Array) -> Array:
         """Cosines (C, N) of refracted light, of cosines (N,) above; the medium below is not of lower index."""
@@ -92,15 +100,8 @@ class Coating:
     def _ratio2(self) -> Array:
         return np.asarray((np.array(self.eta_1) / np.array(self.eta_2))[:, None] ** 2)
 
-    def _integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
-        channels = [self._channel(c) for c in range(len(self.eta_1))]
-        if len({*channels}) == 1:
-            return channels[0].integrated(share, cos_theta, sensitivity)
-        each = (functools.partial(_only, sensitivity, c) for c in range(3))
-        return np.concatenate([channel.integrated(share, cos_theta, own) for channel, own in zip(channels, each)])
-
     def _channel(self, c: int) -> _Channel:
-        stack = tuple(Film(film.eta[c], film.k[c], film.thickness_nm) for film in self.films)
+        stack = tuple(Film(film.eta[c], film.k[c], film.thickness_nm).in_colours() for film in self.films)
         return _Channel(self.eta_1[c], stack, self.eta_2[c], self.k_2[c])
 
 
@@ -113,36 +114,51 @@ class _Channel:
     eta_2: float
     k_2: float
 
-    def integrated(self, share: str, cos_theta: Array, sensitivity: Sensitivity) -> Array:
-        """A share of light as colours (channels, N)."""
+    def integrated(self, names: Sequence[str], cosines: Array, sensitivity: Sensitivity) -> Array:
+        """Shares of light as colours (names, channels, N)."""
+
+        thickness_nm = sum(film.optical_nm for film in self.films)
+        indices = *((film.eta, film.k) for film in self.films), (self.eta_1, 0.0), (self.eta_2, self.k_2)
+        common = all(COMMON[0] < np.hypot(*index) < COMMON[1] for index in indices)
+        number = np.float32 if common and thickness_nm > DOUBLE_NM else np.float64
+        most = FINEST if common else FINEST_ELSE
 
         def over(wavelengths_nm: Array, cosines: Array) -> Array:
             found = coherent(cosines[:, None], wavelengths_nm, self.eta_1, self.films, self.eta_2, self.k_2)
-            return np.asarray(getattr(found, share))
+            shape = len(cosines), len(wavelengths_nm)
+            return np.stack([np.broadcast_to(getattr(found, name), shape) for name in names])
 
-        thickness_nm = sum(film.eta * film.thickness_nm for film in self.films)
-        return integrated(over, cos_theta, thickness_nm, sensitivity)
+        blocks = [cosines[k : k + TOGETHER] for k in range(0, len(cosines), TOGETHER)]
+        return np.concatenate(
+            [integrated(over, block.astype(number), thickness_nm, sensitivity, most) for block in blocks], axis=-1
+        )
 
 
 def integrated(
-    share: Callable[[Array, Array], Array], cosines: Array, thickness_nm: float, sensitivity: Sensitivity
+    shares: Callable[[Array, Array], Array],
+    cosines: Array,
+    thickness_nm: float,
+    sensitivity: Sensitivity,
+    most: int = FINEST,
 ) -> Array:
-    """Colours (channels, N) of a share of light (N, W) over wavelengths (W,), at cosines (N,).
+    """Colours (S, channels, N) of shares of light (S, N, W) over wavelengths (W,), at cosines (N,), whose precision is
+    that of the shares.
 
     thickness_nm: optical thickness of all films.
+    most: wavelengths.
     """
     low, high = 1 / RANGE_NM[1], 1 / RANGE_NM[0]
-    count = _intervals(thickness_nm, PER_PERIOD)
+    count = min(_intervals(thickness_nm, PER_PERIOD), most // 4)
     step = (high - low) / count
-    total, whole = _summed(share, cosines, low + step * np.arange(1, count), sensitivity)
+    total, whole = _summed(shares, cosines, low + step * np.arange(1, count), sensitivity)
     settled = 0
     while True:
-        more, more_whole = _summed(share, cosines, low + step * (np.arange(count) + 0.5), sensitivity)
+        more, more_whole = _summed(shares, cosines, low + step * (np.arange(count) + 0.5), sensitivity)
         before, total, whole = total / whole, total + more, whole + more_whole
         count, step = 2 * count, 0.5 * step
         settled = settled + 1 if np.abs(total / whole - before).max() < CONVERGED else 0
         # Twice, since harmonics that a step and its half both take for the mean change nothing
-        if settled == 2 or 2 * count > FINEST:
+        if settled == 2 or 2 * count > most:
             return np.asarray(total / whole)
 
 
@@ -152,7 +168,8 @@ def quadrature(thickness_nm: float, sensitivity: Sensitivity) -> tuple[Array, Ar
     One fixed step for all films of an optical thickness, so that colours err by .004 at most, .0001 in the mean.
     """
     low, high = 1 / RANGE_NM[1], 1 / RANGE_NM[0]
-    wavelengths_nm = 1 / np.linspace(low, high, _intervals(thickness_nm, PER_PERIOD_FIXED) + 1)[1:-1]
+    count = min(_intervals(thickness_nm, PER_PERIOD_FIXED), FINEST // 2)
+    wavelengths_nm = 1 / np.linspace(low, high, count + 1)[1:-1]
     weights = sensitivity(wavelengths_nm) * wavelengths_nm**2
     return wavelengths_nm, weights / weights.sum(axis=1, keepdims=True)
 
@@ -164,15 +181,15 @@ def _intervals(thickness_nm: float, per_period: float) -> int:
 
 
 def _summed(
-    share: Callable[[Array, Array], Array], cosines: Array, wavenumbers: Array, sensitivity: Sensitivity
+    shares: Callable[[Array, Array], Array], cosines: Array, wavenumbers: Array, sensitivity: Sensitivity
 ) -> tuple[Array, Array]:
-    """Sums over wavenumbers of weighted shares (channels, N), and of weights (channels, 1)."""
+    """Sums over wavenumbers of weighted shares (S, channels, N), and of weights (channels, 1)."""
     wavelengths_nm = 1 / wavenumbers
     weights = sensitivity(wavelengths_nm) * wavelengths_nm**2
     size = max(BLOCK // len(wavelengths_nm), 1)
     blocks = [cosines[k : k + size] for k in range(0, len(cosines), size)]
-    total = [weights @ np.broadcast_to(share(wavelengths_nm, x), (len(x), len(wavelengths_nm))).T for x in blocks]
-    return np.concatenate(total, axis=1), weights.sum(axis=1, keepdims=True)
+    total = [weights @ shares(wavelengths_nm.astype(x.dtype), x).swapaxes(1, 2) for x in blocks]
+    return np.concatenate(total, axis=-1), weights.sum(axis=1, keepdims=True)
 
 
 def _only(sensitivity: Sensitivity, channel: int, wavelengths_nm: Array) -> Array:

@@ -17,16 +17,37 @@ from math import pi
 from velatura import ops
 from velatura.ops import Value
 
+COHERENT_NM = 20_000.0  # optical thickness up to which colours may show that light keeps its phase across a film
 _GRAZING = 1e-12  # least square of q: what light grazes has a field that is linear over its depth, not constant
 
 
 @dataclass(frozen=True)
 class Film:
-    """A film of index eta + i k and a thickness in nanometres; a thickness of 0 is no film."""
+    """A film of index eta + i k and a thickness in nanometres; a thickness of 0 is no film.
+
+    `phase_nm` is the thickness that the phase of light sees, that of the film unless it is given.
+    """
 
     eta: Value
     k: Value
     thickness_nm: Value
+    phase_nm: Value | None = None
+
+    def in_colours(self) -> Film:
+        """The film as its colours see it: a thick one has the phase of a thinner one.
+
+        Beyond `COHERENT_NM` the reflectance over the wavenumber has waves so close together that a colour is its mean
+        over the phase. Waves that are further apart have the same mean, and ask for fewer wavelengths. Absorption is
+        that of the whole thickness.
+        """
+        waves = self.eta * self.thickness_nm / COHERENT_NM
+        slower = (1 + ops.log(ops.maximum(waves, 1.0))) / ops.maximum(waves, 1.0)
+        return Film(self.eta, self.k, self.thickness_nm, self.thickness_nm * slower)
+
+    @property
+    def optical_nm(self) -> Value:
+        """The optical thickness of the phase."""
+        return self.eta * (self.thickness_nm if self.phase_nm is None else self.phase_nm)
 
 
 @dataclass(frozen=True)
@@ -143,7 +164,9 @@ def coherent(
     for film in reversed(films):
         square = _square(film.eta, film.k)
         q = _normal(square, sin2)
-        cosine, sine, decay = _circular(q.times(2 * pi * film.thickness_nm / wavelength_nm))
+        phase_nm = film.thickness_nm if film.phase_nm is None else film.phase_nm
+        depth = _Complex(q.re * phase_nm, q.im * film.thickness_nm)
+        cosine, sine, decay = _circular(depth.times(2 * pi / wavelength_nm))
         over_q, times_q = _over_i(sine / q), _over_i(sine * q)
         s = _through(cosine, over_q, times_q, s)
         p = _through(cosine, over_q * square, times_q / square, p)

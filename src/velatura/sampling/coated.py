@@ -19,7 +19,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.coatings import Coating, ColouredFilm, quadrature
-from velatura.optics.films import Film, Response, coherent
+from velatura.optics.films import COHERENT_NM, Film, Response, coherent
 from velatura.sampling.differences import differentiable
 from velatura.sampling.packets import Packets, aligned, packets
 from velatura.sampling.variables import Variables, plain
@@ -30,11 +30,12 @@ Array = NDArray[np.floating]
 #: A look-up over the cosine and the roughness.
 Average: TypeAlias = Callable[[Value, Value], Value]
 
-#: A property of `optics.films.Response` of a coating, by its name, at cosines.
-Share: TypeAlias = Callable[[Coating, str, Array], Array]
+#: Properties of `optics.films.Response` of a coating, by their names, at cosines.
+Shares: TypeAlias = Callable[[Coating, Sequence[str], Array], Array]
 
 NODES = 257  # even over the cosine; between them no reflectance bends by more than 3e-4
 STEP_NM = 15.0  # optical, between thicknesses that are worked out, or by a step of an index
+MOST = ceil(COHERENT_NM / STEP_NM)  # steps between the ends of a texture: beyond, colours wave no more
 THIN_NM = 150.0  # of which steps of an index are .1: the least thickness that they are chosen for
 
 #: What textures of films and of indices span that cannot be looked at, by role.
@@ -186,17 +187,16 @@ class Absorbing(Coated):
     """
 
     @classmethod
-    def of_coating(cls, coating: Coating, rarer: int, n12: float, share: Share) -> Absorbing:
+    def of_coating(cls, coating: Coating, rarer: int, n12: float, shares: Shares) -> Absorbing:
         """Of a coating from the rarer side, by a function of its properties."""
         cosines, back = np.linspace(0, 1, NODES), coating.reversed()
         beyond = np.sin(np.linspace(0, 0.5 * pi, NODES))[:-1]
-        above, passing = (share(coating, name, cosines) for name in ("reflected", "transmitted"))
-        below, total = (
-            share(back, "reflected", x) for x in (coating.below(cosines), coating.totally_reflected(beyond))
-        )
+        above, passing = shares(coating, ["reflected", "transmitted"], cosines)
+        within = coating.totally_reflected(beyond), coating.below(cosines)
+        (denser,) = shares(back, ["reflected"], np.concatenate(within, axis=1))
         nowhere = np.repeat(above[:, :1], NODES - 1, axis=1)
-        each = [nowhere, above], [total, below], [0 * nowhere, passing]
-        found = np.concatenate([np.concatenate(x, axis=1) for x in each])
+        each = np.concatenate([nowhere, above], axis=1), denser, np.concatenate([0 * nowhere, passing], axis=1)
+        found = np.concatenate(each)
         return cls(found.T.copy(), rarer, n12, coating)
 
     @staticmethod
@@ -250,6 +250,7 @@ class Axis:
 
     @classmethod
     def around(cls, film: int, low_nm: float, high_nm: float, step_nm: float) -> Axis:
+        step_nm = max(step_nm, (high_nm - low_nm) / MOST)
         # One node more at either end, so that slopes are those of splines
         begin, end = max(floor(low_nm / step_nm) - 1, 0), ceil(high_nm / step_nm) + 1
         return cls(film, begin * step_nm, end * step_nm, end - begin + 1)
@@ -336,9 +337,13 @@ class AtWavelengths:
         return self._colour(self._response(cosine).reflected)
 
     def _response(self, cosine: Value) -> Response:
-        films = [Film(x.eta, x.k, x.thickness_nm) for x in self.films]
+        films = list(map(self._film, self.films))
         k_2 = 0.0 if self.k_2 is None else self.k_2
         return coherent(cosine, self.wavelengths_nm, self.eta_1, films, self.eta_2, k_2)
+
+    @staticmethod
+    def _film(values: FilmValues) -> Film:
+        return Film(values.eta, values.k, values.thickness_nm)
 
     def _cosine(self, cos_1: Value, cos_2: Value) -> Value:
         """That above, by colour: all are totally reflected from the same angle on."""
@@ -355,6 +360,15 @@ class AtWavelengths:
 
 
 At = TypeVar("At", bound=AtWavelengths)
+
+
+@dataclass(frozen=True)
+class InColours(AtWavelengths):
+    """As `AtWavelengths`, for sums over the wavelengths of colours."""
+
+    @staticmethod
+    def _film(values: FilmValues) -> Film:
+        return AtWavelengths._film(values).in_colours()
 
 
 @dataclass(frozen=True)
@@ -388,7 +402,7 @@ class AtAPoint(AtWavelengths):
 
     def _at(self, nm: Value) -> AtWavelengths:
         """At a wavelength, a colour of it."""
-        return AtWavelengths(nm, self.eta_1, self.films, self.eta_2, self.k_2)
+        return InColours(nm, self.eta_1, self.films, self.eta_2, self.k_2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -518,6 +532,8 @@ def _joined(like: Value, channels: list[Value]) -> Value:
         kind: Any = type(like)
         return channels[0] if len(channels) == 1 else _colour(kind)(channels)
     colour = np.stack(channels)
+    if colour.ndim > np.ndim(like) > 1:  # of coordinates by colour, each channel has its own
+        colour = np.stack([np.broadcast_to(x, (len(colour), *x.shape[1:]))[c] for c, x in enumerate(channels)])
     return colour if colour.ndim > 1 else colour[:, None]
 
 
@@ -641,7 +657,7 @@ def optical_nm(material: Material) -> float:
 
 
 def _thick_nm(layer: InterfaceValues) -> float:
-    return sum(float(np.max(x.eta)) * x.thickness_nm for x in layer.films)
+    return sum(Film(float(np.max(x.eta)), 0.0, x.thickness_nm).in_colours().optical_nm for x in layer.films)
 
 
 def _worked_out(layer: InterfaceValues, above: Value, light: Any, may_absorb: bool) -> OfInterface:
@@ -675,11 +691,12 @@ def _coated(coating: Coating, opaque: bool, absorbs: bool, light: str | tuple[fl
     if rarer == 2:
         coating = coating.reversed()
 
-    def share(of: Coating, name: str, cosines: Array) -> Array:
+    def shares(of: Coating, names: Sequence[str], cosines: Array) -> Array:
         if isinstance(light, str):
-            return of.share(name, cosines, _SENSITIVITIES[light])
-        return of.at(name, np.array(light), cosines)
+            return of.shares(names, cosines, _SENSITIVITIES[light])
+        return of.at(names, cosines, np.array(light))
 
     if n12 and absorbs:
-        return Absorbing.of_coating(coating, rarer, n12, share)
-    return Coated(share(coating, "reflected", np.linspace(0, 1, NODES)).T.copy(), rarer, n12, coating)
+        return Absorbing.of_coating(coating, rarer, n12, shares)
+    (reflected,) = shares(coating, ["reflected"], np.linspace(0, 1, NODES))
+    return Coated(reflected.T.copy(), rarer, n12, coating)

@@ -56,12 +56,12 @@ def polarised_films(coating: Coating, opaque: bool, sensitivity: Sensitivity) ->
 
     def matrix(of: Coating, name: str, cos: Array, most: Array | float = 1.0) -> list[Array]:
         """Its numbers, of shares up to `most` in the mean of s and p."""
-        s, p = (of.share(f"{name}_{x}", cos, sensitivity) for x in "sp")
+        names = [f"{name}_{part}" for part in ("s", "p", "real", "imaginary")]
+        s, p, real, imaginary = of.shares(names, cos, sensitivity)
         # Colours outside sRGB are clipped as those of unpolarised light are
         both = 2 * np.clip(0.5 * (s + p), 0, most)
         s = np.clip(s, np.maximum(both - 1, 0), np.minimum(both, 1))
         p = both - s
-        real, imaginary = (of.share(f"{name}_{part}", cos, sensitivity) for part in ("real", "imaginary"))
         # Sensitivities that are negative leave no matrix that light cannot have
         bound = np.minimum(np.sqrt(s * p) / np.maximum(np.hypot(real, imaginary), 1e-9), 1)
         return [s, p, bound * real, bound * imaginary]

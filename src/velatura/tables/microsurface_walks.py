@@ -7,8 +7,7 @@ walks give a directional albedo to a thousandth.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 
@@ -22,14 +21,9 @@ FAINT = 0.05  # weight below which walks are ended at random, and the others tak
 MOST_MEETINGS = 1000
 
 Array = np.ndarray
-Share = Callable[[Array], Array]  # of light that meets facets, (C, walks) by their cosines
 
-
-class Side(NamedTuple):
-    """What facets reflect, and let pass, of light from one side."""
-
-    reflectance: Share
-    passing: Share
+#: Shares (C, walks) of light that facets reflect, and let pass, by its cosines and whether it comes from above.
+Facets = Callable[[Array, Array], tuple[Array, Array]]
 
 
 class Walks:
@@ -92,9 +86,9 @@ class Walks:
     def reflect(self, i: Direction, h: Direction) -> None:
         self.w = ggx.reflect(i, h)
 
-    def scatter(self, i: Direction, h: Direction, eta: Array, facets: Sequence[Side] | None = None) -> None:
-        """Reflect and refract: two walks out of each one; `eta` by point, as seen from above, and the facets from above
-        and from below, which reflect as Fresnel's without."""
+    def scatter(self, i: Direction, h: Direction, eta: Array, facets: Facets | None = None) -> None:
+        """Reflect and refract: two walks out of each one; `eta` by point, as seen from above. Facets reflect as
+        Fresnel's unless they are given."""
         eta_here = eta.astype(np.float32)[self.point]
         eta_here = np.where(self.outside, eta_here, 1 / eta_here)
         cosine = np.clip(ggx.dot(i, h), 0, 1)
@@ -102,8 +96,7 @@ class Walks:
             reflectance = fresnel.dielectric(cosine, eta_here)
             passing = 1 - reflectance
         else:
-            reflectance = np.where(self.outside, *(side.reflectance(cosine) for side in facets))
-            passing = np.where(self.outside, *(side.passing(cosine) for side in facets))
+            reflectance, passing = facets(cosine, self.outside)
         refracted = reverse(refraction.refract(i, h, eta_here))
         self._take(np.tile(np.arange(len(self)), 2))
         x, y, z = map(np.concatenate, zip(ggx.reflect(i, h), refracted))
@@ -143,24 +136,23 @@ def reflected_later(cos_theta: Array, alpha: Array, eta: Array, paths: int, rng:
 
 
 def shares_in_the_end(
-    facets: Sequence[Side], eta: float, cos_theta: Array, alpha: Array, paths: int, straight: float = 0.0
+    facets: Facets, eta: float | None, cos_theta: Array, alpha: Array, paths: int, straight: float = 0.0
 ) -> tuple[Array, Array]:
     """Shares (C, points) of light, of what meets facets again, that are reflected, and that pass, in the end.
 
-    facets: from above and from below, the first alone for what is opaque. That takes its share already at the first
-        meeting, so that the share is of light that meets facets again if they first reflect all.
-    eta: relative index, of what is not opaque.
+    facets: what is opaque takes its share already at the first meeting, so that the share is of light that meets
+        facets again if they first reflect all.
+    eta: relative index; None for what is opaque.
     straight: share of refracted light that meets facets again and is not counted, since it passes these as well.
 
     Points draw the same numbers, and so they have nearly the same error.
     """
-    opaque = len(facets) == 1
     walks, count = Walks(cos_theta, alpha, paths, np.random.default_rng(0), alike=True), len(alpha)
     again: Array = np.zeros(1)
     energies: list[Array] = [np.zeros(1), np.zeros(1)]
     while len(walks) and walks.meetings < MOST_MEETINGS:
         i, h = walks.meet()
-        if opaque:
+        if eta is None:
             walks.reflect(i, h)
         else:
             walks.scatter(i, h, np.full(count, eta), facets)
@@ -169,8 +161,8 @@ def shares_in_the_end(
             passes = np.where(walks.outside, 0, straight * walks.weight)
             again = _by_point(np.atleast_2d(walks.weight - passes), walks, count)
             energies[1] = -_by_point(np.atleast_2d(passes), walks, count)
-        if opaque:
-            reflectance = facets[0].reflectance(np.clip(ggx.dot(i, h), 0, 1))
+        if eta is None:
+            reflectance, _ = facets(np.clip(ggx.dot(i, h), 0, 1), walks.outside)
             leaving, walks.weight = leaving * reflectance, walks.weight * reflectance
         if walks.meetings > 1:
             here = walks.outside, ~walks.outside

@@ -23,7 +23,7 @@ from velatura.optics import fresnel, ggx
 from velatura.sampling.coated import Coated, dielectric_between, dielectric_passing
 from velatura.sampling.low_discrepancy import fibonacci
 from velatura.tables import Tables, coordinates
-from velatura.tables.microsurface_walks import Side, shares_in_the_end
+from velatura.tables.microsurface_walks import shares_in_the_end
 
 Array = NDArray[np.floating]
 
@@ -118,10 +118,18 @@ class Facets:
             return np.zeros((1, *np.shape(cosine)))
         return np.asarray(dielectric_passing(self.films, *self._between(cosine)))
 
-    def _between(self, cosine: Array) -> tuple[Array, Array, Array]:
+    def shares(self, cosine: Array, outside: Array | np.bool_ = np.True_) -> tuple[Array, Array]:
+        """Shares (C, ...) of light that facets reflect, and let pass; with films also of light from below, where it is
+        not `outside`."""
+        if self.films is None or self.opaque:
+            return self.reflectance(cosine), self.passing(cosine)
+        return self.films.shares(outside, *self._between(cosine, outside))
+
+    def _between(self, cosine: Array, outside: Array | np.bool_ = np.True_) -> tuple[Array, Array, Array]:
         """Cosines on both sides of a facet of a dielectric, and the relative index by colour."""
         assert self.below is not None
-        cos_t = fresnel.cos_transmitted(cosine, float(ops.mean(self.below) / ops.mean(self.above)))
+        n12 = float(ops.mean(self.below) / ops.mean(self.above))
+        cos_t = fresnel.cos_transmitted(cosine, np.where(outside, n12, 1 / n12))
         return cosine, np.asarray(cos_t), (self.below / self.above).reshape(-1, *(1,) * np.ndim(cosine))
 
 
@@ -179,7 +187,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
         light = Light(n * w[0], n * w[1], np.concatenate([shares * each for each in kept]))
         return light, (shares * (1 - kept[-1])).sum(axis=-1)
 
-    o, reflectance = ggx.reflect(wi, h), facets.reflectance(cosine)
+    o, (reflectance, passing) = ggx.reflect(wi, h), facets.shares(cosine)
     kept = [escape(o, o[2] > 0, False, often) for often in ways]
     whole = (1 - kept[-1]).sum(axis=-1)[None] * share
     reflected, blocked = divided(o, n, reflectance * share, kept)
@@ -191,7 +199,7 @@ def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[b
     along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
     t = along * h[0] - wi[0] / eta, along * h[1] - wi[1] / eta, along * h[2] - wi[2] / eta
     kept = [escape(t, t[2] < 0, True, often) for often in ways]
-    refracted, not_refracted = divided(t, below, facets.passing(cosine) * share, kept)
+    refracted, not_refracted = divided(t, below, passing * share, kept)
     return _Events(reflected, refracted, back, blocked, not_refracted, whole)
 
 
@@ -451,12 +459,10 @@ def shares_of_films(facets: Facets, made: dict[Hashable, Any], p: Array) -> tupl
     places = (np.arange(WALKED) + 0.5) / WALKED
     critical = np.arcsin(float(ops.mean(facets.below) / ops.mean(facets.above))) if facets.is_exit else None
     if key not in made:
-        sides = [facets] if facets.opaque else [facets, facets.reversed()]
-        eta = float(ops.mean(facets.below) / ops.mean(facets.above))
+        eta = None if facets.opaque else float(ops.mean(facets.below) / ops.mean(facets.above))
         cosines = coordinates.to_cosine(places) if critical is None else coordinates.to_angle(places, critical)
         alpha = np.full(WALKED, mean)
-        each = [Side(side.reflectance, side.passing) for side in sides]
-        made[key] = shares_in_the_end(each, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
+        made[key] = shares_in_the_end(facets.shares, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
     at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
     reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in made[key])
