@@ -61,8 +61,16 @@ class MissingTool(VelaturaError):
     exit_status = 1
 
 
-class Incomplete(UserWarning):
+class VelaturaWarning(UserWarning):
+    """A warning in one line."""
+
+
+class Incomplete(VelaturaWarning):
     """A material of another program of which a stack cannot carry all."""
+
+
+class Damaged(VelaturaWarning):
+    """A store of a sweep whose files are not as they were written."""
 
 
 @contextlib.contextmanager

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,8 +16,9 @@ import pytest
 import yaml
 
 import velatura as vt
+from velatura.errors import Damaged
 from velatura.sweeps import Plan, load_plan
-from velatura.sweeps.store import DONE, FAILED, Store
+from velatura.sweeps.store import DONE, FAILED, Variable, create, existing
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -169,12 +172,13 @@ def test_chunks_hold_every_point_once(shape: tuple[int, ...], tmp_path: Path) ->
     vary = {name: {"range": [0.5, 1.0], "steps": size} for name, size in zip(names, shape)}
     space = {"material": "coated-gold", "vary": vary}
     found = swept(space, number, tmp_path / "chunks.zarr", chunk=4)
-    store = Store(tmp_path / "chunks.zarr", Plan.from_dict({**space, "what": number, "chunk": 4, "options": {}}))
-    numbers = [store.points(chunk) for chunk in range(int(np.prod(store.grid)))]
+    store = existing(tmp_path / "chunks.zarr", Plan.from_dict({**space, "what": number, "chunk": 4, "options": {}}))
+    assert store
+    numbers = [store.points(chunk) for chunk in store.chunks]
     assert sorted(n for each in numbers for n in each) == list(range(int(np.prod(shape))))
     assert max(map(len, numbers)) <= 4
     assert (found.alpha == found.layer0_alpha).all() and found.status.values.min() == DONE
-    assert store.done() == set(range(len(numbers)))
+    assert store.marked() == list(store.chunks) and not any(map(store.damage, store.chunks))
 
 
 def test_a_store_says_what_it_holds(tmp_path: Path) -> None:
@@ -209,6 +213,115 @@ def test_another_plan_is_refused_in_one_line(tmp_path: Path) -> None:
         with pytest.raises(vt.InvalidInput, match=r"holds no sweep|there is no folder"):
             swept(GOLD, number, folder)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr"]
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "cut off": (lambda store: cut(store / "drawn" / "3"), "drawn/3"),
+    "empty": (lambda store: (store / "drawn" / "3").write_bytes(b""), "drawn/3"),
+    "one bit": (lambda store: flip(store / "alpha" / "3"), "alpha/3"),
+    "of values": (lambda store: flip(store / "layer0_alpha" / "3"), "layer0_alpha/3"),
+    "of reasons": (lambda store: (store / "reason" / "3").unlink(), "reason/3"),
+    "marks": (lambda store: flip(store / "status" / "3"), "status/3"),
+    "an array": (lambda store: shutil.rmtree(store / "drawn"), "drawn/0"),
+}
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:3])
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[-5] ^= 4  # before the four bytes of the checksum
+    path.write_bytes(data)
+
+
+def contents(store: Path) -> dict[str, bytes]:
+    """Every file of a store."""
+    return {str(file.relative_to(store)): file.read_bytes() for file in store.rglob("*") if file.is_file()}
+
+
+@pytest.fixture(scope="module")
+def intact(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of 50 points in 5 chunks; one of its points has no answer."""
+    store = tmp_path_factory.mktemp("intact") / "a.zarr"
+    assert (swept(PARTLY, partly, store, chunk=10).status == FAILED).sum() == 1
+    return store
+
+
+def partly(stack: vt.Stack, seed: int) -> dict[str, Any]:
+    """As `number`; no answer where the interface is roughest."""
+    found = number(stack, seed)
+    if found["alpha"] > 0.967:
+        raise ValueError("too rough")
+    return found
+
+
+PARTLY = {**GOLD, **DRAWN, "vary": {"layer0_alpha": {"range": [0, 1]}}}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_points_are_computed_anew(damage: str, intact: Path, tmp_path: Path) -> None:
+    """Expected: of any damage to a file of a chunk, one warning that names the file, and then the store as it was."""
+    store = shutil.copytree(intact, tmp_path / "a.zarr")
+    spoil, file = DAMAGES[damage]
+    spoil(store)
+    points = 50 if damage == "an array" else 10
+    with pytest.warns(Damaged) as caught:
+        swept(PARTLY, partly, store, chunk=10)
+    message = f"{store}: files are missing or altered, {file} the first; {points} points are computed anew"
+    assert [str(each.message) for each in caught] == [message]
+    assert contents(store) == contents(intact)
+
+
+@pytest.mark.parametrize("name", [".zmetadata", ".zgroup", "status/.zarray", "drawn/.zattrs", "layer0_alpha/.zarray"])
+def test_metadata_are_written_anew(name: str, intact: Path, tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    """Expected: of metadata that are missing or cut off, no warning by anyone, and the store as it was."""
+    for n, spoil in enumerate([Path.unlink, cut]):
+        store = shutil.copytree(intact, tmp_path / f"{n}.zarr")
+        spoil(store / name)
+        swept(PARTLY, partly, store, chunk=10)
+        assert not recwarn.list and contents(store) == contents(intact)
+
+
+def test_a_coordinate_of_a_grid_is_written_anew(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    swept(GOLD, number, tmp_path / "a.zarr")
+    before = contents(tmp_path / "a.zarr")
+    flip(tmp_path / "a.zarr" / "layer0_alpha" / "0")
+    assert swept(GOLD, number, tmp_path / "a.zarr").layer0_alpha.values.tolist() == [0.1, 0.2]
+    assert not recwarn.list and contents(tmp_path / "a.zarr") == before
+
+
+def test_foreign_files_are_left_alone(intact: Path, tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    store = shutil.copytree(intact, tmp_path / "a.zarr")
+    for name in ("status/99999", "status/0.0", "status/²", "status/007", "notes.txt"):
+        (store / name).write_text("mine")
+    (store / "status" / "4").unlink()
+    assert (swept(PARTLY, partly, store, chunk=10).status == DONE).sum() == 49
+    assert not recwarn.list and (store / "status" / "99999").read_text() == "mine"
+
+
+def test_a_store_that_another_sweep_has_begun_meanwhile_is_left_to_it(tmp_path: Path) -> None:
+    """Expected: of two sweeps that begin one store at once, the later one ends in one line; then it goes on."""
+    store, plan = tmp_path / "a.zarr", Plan.from_dict({**GOLD, "what": number, "options": {}})
+    layout = dict.fromkeys(("alpha", "drawn"), Variable((), (), "<f8"))
+    create(store, plan, layout)
+    with pytest.raises(vt.InvalidInput) as caught:
+        create(store, plan, layout)
+    assert str(caught.value) == f"{store}: another sweep has begun it meanwhile; the same call goes on with it"
+    assert swept(GOLD, number, store).alpha.values.tolist() == [0.1, 0.2]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.zarr"]
+
+
+@pytest.mark.parametrize(
+    "plan", ["&a [*a]", "!!python/object/apply:os.getcwd []", "{a: &a [1, 1], b: [*a, *a]}", "3", 3]
+)
+def test_a_store_whose_plan_is_none_is_refused(plan: Any, intact: Path, tmp_path: Path) -> None:
+    store = shutil.copytree(intact, tmp_path / "a.zarr")
+    fields = json.loads((store / ".zattrs").read_bytes())
+    (store / ".zattrs").write_text(json.dumps({**fields, "plan": plan}))
+    with pytest.raises(vt.InvalidInput, match=r"a\.zarr: (is there already, and holds no sweep|holds another sweep)"):
+        swept(PARTLY, partly, store, chunk=10)
 
 
 # Questions -----------------------------------------------------------------------------------------------------------
@@ -311,7 +424,7 @@ def test_one_thread_renders_and_the_session_keeps_its_own(tmp_path: Path) -> Non
     import drjit as dr
 
     before = dr.thread_count()
-    options: dict[str, Any] = {"size": [16, 16], "spp": 4, "model": "belcour2018"}
+    options: dict[str, Any] = {"size": 16, "spp": 4, "model": "belcour2018", "env": "lobby"}  # a file of OpenEXR
     pictures = [swept(GOLD, "render", tmp_path / f"{n}.zarr", **options).image for n in range(2)]
     assert pictures[0].dims == ("layer0_alpha", "row", "column", "colour")
     assert dr.thread_count() == before and pictures[0].values.tobytes() == pictures[1].values.tobytes()

@@ -42,7 +42,7 @@ from velatura.cli import (
     sweep,
     tables,
 )
-from velatura.errors import Incomplete, VelaturaError, one_line
+from velatura.errors import VelaturaError, VelaturaWarning, one_line
 from velatura.files import reason
 
 INTERRUPTED = 130  # as a shell reports a process that ended by Ctrl-C
@@ -163,12 +163,12 @@ def _interrupts() -> Iterator[list[int]]:
 
 @contextlib.contextmanager
 def _warnings_in_one_line() -> Iterator[None]:
-    """Prints what a stack cannot carry of a material as errors are printed; other warnings as Python has them."""
+    """Prints warnings of Velatura as errors are printed; other warnings as Python has them."""
     with warnings.catch_warnings():
         usual = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
-            if issubclass(category, Incomplete):
+            if issubclass(category, VelaturaWarning):
                 _complain(str(message))
             else:
                 usual(message, category, *where)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import concurrent.futures
 import math
+import warnings
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from velatura import kernel
-from velatura.errors import InvalidInput, VelaturaError
+from velatura.errors import Damaged, InvalidInput, VelaturaError
 from velatura.progress import bar
 from velatura.sweeps import work
 from velatura.sweeps.engines import Engine, engine
@@ -91,15 +92,34 @@ def carry_out(
     """As `sweep`, of a plan."""
     path = Path(store).absolute()
     found = existing(path, plan)
-    if found is None or len(found.done()) < math.prod(found.grid):
+    done = set[int]() if found is None else _sound(found)
+    if found is None or len(done) < len(found.chunks):
         with kernel.threads_restored(), engine(executor, workers) as runs:
             job = work.Job(plan, path, None, versions())
             if found is None:
                 found = create(path, plan, _looked(runs, job.packed(), plan))
-            course = _Course(runs, found, replace(job, layout=found.layout()).packed())
+            course = _Course(runs, found, replace(job, layout=found.layout).packed(), done)
             with nullcontext(progress) if progress else bar(f"Sweeping {path.name}") as advance:
                 course.run(advance)
     return found.open()
+
+
+def _sound(store: Store) -> set[int]:
+    """The chunks that are done; warns of those that are marked, and were damaged since."""
+    marked, damaged = store.marked(), dict[int, Path]()
+    with bar(f"Checking {store.path.name}") as advance:
+        for n, chunk in enumerate(marked):
+            if file := store.damage(chunk):
+                damaged[chunk] = file
+            advance(n + 1, len(marked))
+    if damaged:
+        points, first = sum(map(store.count, damaged)), next(iter(damaged.values())).relative_to(store.path)
+        warnings.warn(
+            f"{store.path}: files are missing or altered, {first} the first; {points} points are computed anew",
+            Damaged,
+            stacklevel=4,
+        )
+    return set(marked) - damaged.keys()
 
 
 def _looked(runs: Engine, packed: bytes, plan: Plan) -> Layout:
@@ -134,12 +154,12 @@ class _Course:
         runs: the engine.
         store: what is there already.
         packed: the job of the workers.
+        done: chunks that are left as they are.
     """
 
-    def __init__(self, runs: Engine, store: Store, packed: bytes) -> None:
+    def __init__(self, runs: Engine, store: Store, packed: bytes, done: Set[int]) -> None:
         self._runs, self._store, self._packed = runs, store, packed
-        done = store.done()
-        self._todo = deque(chunk for chunk in range(math.prod(store.grid)) if chunk not in done)
+        self._todo = deque(chunk for chunk in store.chunks if chunk not in done)
         self._tasks: dict[Any, tuple[int, ...]] = {}
         self._left = sum(map(store.count, self._todo))
         self._pace: float | None = None  # seconds that a chunk takes

@@ -56,7 +56,8 @@ class Job:
     @functools.cached_property
     def store(self) -> Store:
         """The store, opened once."""
-        return Store(self.path, self.plan)
+        assert self.layout is not None
+        return Store(self.path, self.plan, self.layout)
 
 
 @functools.lru_cache(2)
@@ -111,8 +112,8 @@ def _tidy() -> None:
 def keep(packed: bytes, chunk: int, answers: Sequence[Answered]) -> None:
     """Write the answers of a chunk's points."""
     job = _unpacked(packed)
-    assert job.layout is not None
-    job.store.write(chunk, job.layout, [_fitting(answer, job.layout) for answer in answers])
+    store = job.store
+    store.write(chunk, [_fitting(answer, store.layout) for answer in answers])
 
 
 def _fitting(answer: Answered, layout: Layout) -> Mapping[str, Array] | str:
