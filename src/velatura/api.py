@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -99,7 +99,7 @@ def render(
     scene: str = "ball",
     env: str | None = None,
     spp: int = 64,
-    size: int | tuple[int, int] | None = None,
+    size: int | str | Sequence[int] | None = None,
     model: str | Model = DEFAULT,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
@@ -108,11 +108,11 @@ def render(
     """A picture of a material (a stack, a file, or a preset's name): linear RGB of shape (height, width, 3).
 
     Args:
-        scene: "ball", "sphere", "teapot", "plane", "wedges", "lid", or a Mitsuba scene file whose BSDF "material" is to
-            be replaced.
+        scene: "ball", "sphere", "teapot", "urn", "plane", "wedges", "lid", or a Mitsuba scene file whose BSDF
+            "material" is to be replaced.
         env: "studio", "sky", "furnace", a photograph ("lobby"), or an .exr or .hdr file.
         spp: samples per pixel.
-        size: pixels of a side, or (width, height); by default those of the scene file, or else 512.
+        size: pixels of a side, (width, height), or text ("640x360"); by default those of the scene file, or else 512.
         progress: called with (samples per pixel done, spp) now and then.
 
     Raises:

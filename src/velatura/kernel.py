@@ -139,6 +139,7 @@ def bitmap(path: Path, subject: str = "") -> Any:
 
     pictures.check(path, subject)
     try:
+        allow_pictures()
         return mi.Bitmap(str(path))
     except (RuntimeError, MemoryError):
         raise InvalidInput(f"{subject or f'{path}:'} is no image that Mitsuba can read") from None
@@ -197,10 +198,24 @@ def _drjit() -> ModuleType:
 def use_threads(count: int) -> None:
     """Let Dr.Jit use that many threads of this process, from now on or as soon as it is loaded."""
     global _threads
-    if _threads != count:
-        _threads = count
-        if "drjit" in sys.modules:
-            sys.modules["drjit"].set_thread_count(count)
+    _threads = count
+    limit_threads()
+
+
+def limit_threads() -> None:
+    """Return to the threads of `use_threads`, after pictures have been read. Not while Mitsuba loads a scene."""
+    if _threads is not None and "drjit" in sys.modules and sys.modules["drjit"].thread_count() != _threads:
+        sys.modules["drjit"].set_thread_count(_threads)
+
+
+def allow_pictures() -> None:
+    """Let Dr.Jit have a thread besides this one: Mitsuba reads and writes OpenEXR in it, or else waits for ever.
+
+    It stays, since a scene that is being loaded may use it at once.
+    """
+    dr = _drjit()
+    if dr.thread_count() < 2:
+        dr.set_thread_count(2)
 
 
 @contextlib.contextmanager
@@ -300,13 +315,17 @@ def load_dict(description: dict[str, Any]) -> Any:
     Raises:
         InvalidInput: the error of the plugin, in one line.
     """
+    mi = mitsuba()
+    allow_pictures()
     try:
-        return mitsuba().load_dict(description)
+        return mi.load_dict(description)
     except RuntimeError as error:
         _, refused, reason = str(error).rpartition(f"{InvalidInput.__name__}: ")
         if not refused:
             raise
         raise InvalidInput(reason.strip()) from None
+    finally:
+        limit_threads()
 
 
 # Installed components

@@ -9,8 +9,10 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from velatura import kernel
@@ -162,3 +164,41 @@ def test_doctor_names_the_command_for_a_missing_package(monkeypatch: pytest.Monk
     missing = [row for row in kernel.doctor() if not row.ok]
     assert [row.what for row in missing] == ["mitsuba", "drjit"]
     assert all(row.mend.endswith("-m pip install mitsuba") for row in missing)
+
+
+# OpenEXR
+
+ONE_PROCESSOR = """
+import os, sys
+os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])
+import numpy as np
+import velatura as vt
+from velatura import kernel, scenes
+scenes.write_image(np.full((4, 4, 3), 0.25), sys.argv[1])
+rough = vt.Stack([vt.Interface(conductor="Au", alpha={"texture": sys.argv[1]})])
+assert kernel.is_picture(sys.argv[1])
+picture = vt.render(rough, env="lobby", size="8x6", spp=1, model="belcour2018")
+print(picture.shape)
+"""
+
+
+def test_openexr_is_read_and_written_with_one_processor(tmp_path: Path) -> None:
+    """Rationale: Mitsuba leaves it to threads of Dr.Jit, and waits for ever where there is none but its own."""
+    command = [sys.executable, "-c", ONE_PROCESSOR, str(tmp_path / "alpha.exr")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (done.stderr, done.stdout) == ("", "(6, 8, 3)\n")
+
+
+def test_threads_return_to_the_limit_after_pictures(mi: Any, tmp_path: Path) -> None:
+    """Expected: reading works with one thread, which is all that there is again once a scene is loaded."""
+    import drjit as dr
+
+    path = str(tmp_path / "light.exr")
+    mi.Bitmap(np.ones((2, 2, 3), np.float32)).write(path)
+    with kernel.threads_restored():
+        kernel.use_threads(1)
+        kernel.load_dict({"type": "bitmap", "filename": path})
+        assert dr.thread_count() == 1
+        kernel.allow_pictures()
+        kernel.use_threads(1)
+        assert dr.thread_count() == 1

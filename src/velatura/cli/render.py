@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,7 +9,6 @@ from typing import Annotated, Any
 import typer
 
 from velatura.cli import options, progress
-from velatura.errors import InvalidInput
 
 
 def render(
@@ -41,7 +39,9 @@ def render(
 ) -> None:
     """Render a picture of a material."""
     # Refuse what cannot work before anything slow begins
-    pixels = None if size is None else _size(size)
+    from velatura.scenes.stage import width_and_height
+
+    pixels = None if size is None else width_and_height(size)
     path = output or Path(f"{Path(material).stem}.png")
     stack, switches = options.read(material, settings)
     import velatura
@@ -57,14 +57,3 @@ def render(
     scenes.write_image(image, path)
     height, width = image.shape[:2]
     print(f"{path}: {width} x {height} pixels, {spp} samples each, {time.perf_counter() - start:.1f} s")
-
-
-def _size(text: str) -> tuple[int, int]:
-    """Width and height from `N` or `WxH`."""
-    from velatura.scenes.stage import LARGEST
-
-    match = re.fullmatch(r"(\d{1,5})(?:x(\d{1,5}))?", text)
-    width, height = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
-    if not (1 <= width <= LARGEST and 1 <= height <= LARGEST):
-        raise InvalidInput(f"--size {text}: needs N or WxH in pixels, each from 1 to {LARGEST}")
-    return width, height

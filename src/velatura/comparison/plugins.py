@@ -75,6 +75,7 @@ def _from_file(mi: Any, path: Any) -> Any:
     if root.tag != "bsdf":
         raise InvalidInput(f"{path}: must hold a <bsdf>, got a <{root.tag}>")
     api.register()
+    kernel.allow_pictures()
     return mi.load_file(str(path))
 
 

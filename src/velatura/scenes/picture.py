@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from velatura import files, kernel
 from velatura.errors import InvalidInput
-from velatura.scenes.stage import Name, blamed, scene_dict
+from velatura.scenes.stage import Name, Size, blamed, scene_dict
 
 #: Samples (pixels x spp) of one pass: between two of them progress is reported and an interrupt is handled.
 PASS_SAMPLES = 2**20
@@ -23,7 +23,7 @@ def render(
     scene: Name = "ball",
     env: Name | None = None,
     spp: int = 64,
-    size: int | tuple[int, int] | None = None,
+    size: Size | None = None,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
     zoom: float = 1.0,
@@ -46,6 +46,7 @@ def render(
     described = scene_dict(scene, env, bsdf, size, zoom)  # kept to the end, as it owns the parts of a scene file
     with blamed(scene):
         loaded = mi.load_dict(described)
+    kernel.limit_threads()
     passes = _passes(spp, int(np.prod(loaded.sensors()[0].film().size())))
     seeds = np.random.SeedSequence(seed).generate_state(len(passes))
 
@@ -113,6 +114,7 @@ def write_image(image: ArrayLike, path: Name) -> None:
 
     # Encode it in memory: Mitsuba's own files end in a RuntimeError where the disk is full
     stream = mi.MemoryStream()
+    kernel.allow_pictures()
     mi.Bitmap(pixels).write(stream, format)
     with files.whole(target) as unfinished:
         unfinished.write_bytes(stream.raw_buffer())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from velatura.scenes.objects import OBJECTS, View, ground, plinth
 from velatura.scenes.surfaces import Surface
 
 Name = str | os.PathLike[str]
+Size = int | str | Sequence[int]
 
 #: The id of the bsdf, in a scene file, whose place the material takes.
 MATERIAL_ID = "material"
@@ -34,7 +36,7 @@ def scene_dict(
     scene: Name = "ball",
     env: Name | None = None,
     bsdf: Any = None,
-    size: int | tuple[int, int] | None = None,
+    size: Size | None = None,
     zoom: float = 1.0,
 ) -> dict[str, Any]:
     """A scene for `mi.load_dict`, to be rendered unchanged or after changes.
@@ -45,7 +47,8 @@ def scene_dict(
         env: one of `ENVIRONMENTS`, or an .exr or .hdr file; None means a scene file's own lights, or else the
             studio. In the furnace the object floats alone, so that a material that loses no light vanishes.
         bsdf: a `mi.BSDF`, or the dictionary of one.
-        size: width and height in pixels, or one number for both; None means a scene file's own, or else 512 x 512.
+        size: width and height in pixels, one number for both, or text such as "640x360"; None means a scene file's own,
+            or else 512 x 512.
         zoom: how much larger the object appears; at 1 the ball covers half of the picture, at 1.2 three quarters.
 
     Raises:
@@ -55,7 +58,7 @@ def scene_dict(
     """
     pixels = None if size is None else width_and_height(size)
     mi = kernel.mitsuba()
-    material = mi.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
+    material = kernel.load_dict(bsdf) if isinstance(bsdf, dict) else bsdf
     if is_file(scene):
         return _from_file(mi, os.fspath(scene), env, material, pixels)
     if scene not in OBJECTS:
@@ -73,10 +76,12 @@ def scene_dict(
 
 
 def width_and_height(size: Any) -> tuple[int, int]:
-    """The pixels of a picture along both sides, given as a pair or as one number. Raises InvalidInput."""
+    """The pixels of a picture along both sides, given as a pair, as one number, or as text. Raises InvalidInput."""
+    if isinstance(size, str) and (text := re.fullmatch(r"([0-9]{1,5})(?:x([0-9]{1,5}))?", size)):
+        size = int(text[1]), int(text[2] or text[1])
     sides = size if isinstance(size, (tuple, list)) else (size, size)
     if len(sides) != 2 or not all(isinstance(side, (int, np.integer)) and 1 <= side <= LARGEST for side in sides):
-        raise InvalidInput(f"size is {size!r}, and must be pixels, or (width, height), each from 1 to {LARGEST}")
+        raise InvalidInput(f"size is {size!r}, and must be pixels, (width, height) or 'WxH', each from 1 to {LARGEST}")
     return int(sides[0]), int(sides[1])
 
 
@@ -141,6 +146,7 @@ def _from_file(mi: Any, path: str, env: Name | None, material: Any, size: tuple[
     # Read the scene
     if not os.path.isfile(path):
         raise InvalidInput(f"{path}: no such scene file")
+    kernel.allow_pictures()
     with blamed(path):
         read = mi.load_file(path, optimize=False)
     if not isinstance(read, mi.Scene):

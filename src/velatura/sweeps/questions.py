@@ -177,15 +177,14 @@ def render(
     scene: str = "ball",
     env: str | None = None,
     spp: int = 64,
-    size: tuple[int, int] = (128, 128),
+    size: int | str | Sequence[int] = 128,
     model: str = DEFAULT,
     **switches: Any,
 ) -> Answer:
     """A picture, as `velatura.render` returns it: linear RGB, (height, width, 3)."""
     from velatura import api
 
-    width, height = size
-    picture = api.render(stack, scene, env, spp, (width, height), model, seed, **switches)
+    picture = api.render(stack, scene, env, spp, size, model, seed, **switches)
     return {"image": (("row", "column", "colour"), np.asarray(picture))}
 
 
