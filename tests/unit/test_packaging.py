@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ import yaml
 import velatura
 
 ROOT = Path(__file__).parents[2]
+INSTALL = re.compile(r"pip\s+install\s+(-e )?\\?\"([^\"[]*)\[([^]]*)\]")  # also as JSON has it
 PAGE = ROOT / "src" / "velatura" / "editor" / "page"
 
 
@@ -54,6 +57,27 @@ def test_a_missing_extra_is_named_with_its_command(
     mend = f'{sys.executable} -m pip install "velatura[{extra}]"'
     assert (run.returncode, run.stderr) == (1, f"velatura: {missing} is not installed: run `{mend}`\n")
     assert [path.name for path in tmp_path.iterdir()] == ["target.yaml"]
+
+
+def test_commands_of_the_manual_that_install_need_no_index_but_for_dependencies() -> None:
+    """Rationale: the package is on no index.
+
+    Expected: where nothing is installed yet, on the first pages, they install from a clone; elsewhere they add extras,
+    which pip takes from the metadata of what is installed.
+    """
+    offered = set(metadata.metadata("velatura").get_all("Provides-Extra") or ())
+    first = ROOT / "README.md", ROOT / "docs" / "index.md"
+    added = set()
+    for page in (*first, *(path for path in (ROOT / "docs").rglob("*.*") if path.suffix in {".md", ".rst", ".ipynb"})):
+        commands = INSTALL.findall(page.read_text())
+        for option, what, extras in commands:
+            assert set(extras.split(",")) <= offered, page
+            assert (option, what) == (("-e ", ".") if page in first else ("", "velatura")), page
+            added |= set() if page in first else {f"{what}[{extras}]"}
+        assert commands or page not in first, page
+    command = [sys.executable, "-m", "pip", "install", "--dry-run", "--no-index", "--no-deps", *added]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and "Would install" not in done.stdout, done.stderr
 
 
 def test_what_needs_no_extra_runs_without_any(tmp_path: Path) -> None:
