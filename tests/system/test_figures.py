@@ -14,6 +14,7 @@ import pytest
 
 import velatura.figures
 from velatura import kernel
+from velatura.checks.probe import Probe
 from velatura.cli.figure import figure as figure_verb
 from velatura.figures import (
     FIGURES,
@@ -27,10 +28,16 @@ from velatura.figures import (
     belcour2018_22,
     belcour2018_table2,
     bounces,
+    canvas,
+    evaluation,
     figure,
     linear_space,
     maps,
     store,
+    yamaguchi2019_04,
+    yamaguchi2019_06,
+    yamaguchi2019_07,
+    yamaguchi2019_08,
 )
 from velatura.optics import fresnel
 from velatura.stack import Interface, Stack, Texture, rgb
@@ -88,7 +95,7 @@ SMALL: dict[str, dict[str, Any]] = {
     "belcour2018-20": {"count": 2**13},
     "belcour2018-21": {"alphas": (0, 0.5, 0.9), "angles": (0, 70), "paths": 60_000},
     "belcour2018-22": {"coats": (0.1,), "metals": ("gold",), "size": 48, "spp": 64, "paths": 60_000},
-    "belcour2018-table2": {"names": ("frosted metal",), "size": 32, "spp": 16, "repeats": 1},
+    "belcour2018-table2": {"names": ("frosted metal",), "size": 32, "spp": 16, "repeats": 1, "lanes": 2**12},
     "linear-space": {"count": 2**14},
     "weier2020-01": {"names": ("brushed copper",), "size": 24, "spp": 6, "paths": 20_000},
     "weier2020-04": {"count": 300},
@@ -102,12 +109,12 @@ SMALL: dict[str, dict[str, Any]] = {
     "weier2020-12": {"size": 24, "spp": 32},
     "weier2020-13": {"size": 24, "spp": 32, "paths": 60_000},
     "weier2020-14": {"paths": 300_000},
-    "weier2020-table2": {"size": 24, "spp": 16, "repeats": 1},
+    "weier2020-table2": {"size": 24, "spp": 16, "repeats": 1, "lanes": 2**12},
     "yamaguchi2019-01": {"names": ("(b)",), "size": 32, "spp": 32},
     "yamaguchi2019-02": {},
     "yamaguchi2019-03": {"angles": (0, 45), "count": 800},
     "yamaguchi2019-04": {"names": ("(b)",), "size": 32, "spp": 32},
-    "yamaguchi2019-05": {"counts": (4,), "size": 16, "repeats": 1},
+    "yamaguchi2019-05": {"counts": (4,), "size": 16, "repeats": 1, "lanes": 2**12},
     "yamaguchi2019-06": {"names": ("(b)",), "size": 24, "spp": 32, "paths": 60_000},
     "yamaguchi2019-07": {"names": ("60°",), "size": 24, "spp": 32, "paths": 60_000},
     "yamaguchi2019-08": {"names": ("(b)", "(c)"), "size": 24, "spp": 32, "paths": 60_000},
@@ -228,6 +235,9 @@ def test_the_model_costs_more_than_the_baseline_and_tells_more(tmp_path: Path) -
         name: list(belcour2018_table2.COLUMNS) for name in SMALL["belcour2018-table2"]["names"]
     }
     assert all(seconds > 0 for scene in found.values() for seconds in scene["seconds"].values())
+    for costs in (cost for scene in found.values() for cost in scene["evaluation"].values()):
+        assert costs["weidlich_wilkie"] == {"median": 1, "quartiles": [1, 1]}
+        assert all(cost["median"] > 0 for cost in costs.values())
     # The model is nearer to the walk than the baseline is, in all that is seen
     for scene in found.values():
         mean = scene["mean"]
@@ -421,6 +431,19 @@ def test_layers_are_brushed_each_in_its_own_way(made: Made) -> None:
     assert np.all(alpha(scattering, "yamaguchi2019")[0] > (1.1, 1.6))
 
 
+def test_figures_6_7_and_8_share_a_material() -> None:
+    """Rationale: Yamaguchi et al. 2019, captions of figures 6 and 8, by which both show (d) of figure 4.
+
+    Expected: one stack in all three; on a sphere, whose tangent runs around the axis, the metal is brushed as where its
+    field is concentric, and the coat as where that is radial.
+    """
+    crossed = yamaguchi2019_06.STACKS["(d)"]
+    assert crossed == yamaguchi2019_07.STACKS["90°"] == yamaguchi2019_08.STACKS["(a)"]
+    around = {"concentric": 0.0, "radial": 90.0}
+    fields = [cast(Any, layer.rotation).brushing for layer in yamaguchi2019_04.STACKS["(d)"].interfaces]
+    assert [layer.rotation for layer in crossed.interfaces] == [around[field] for field in fields]
+
+
 def test_scattering_over_gold_blurs_and_does_not_darken(made: Made) -> None:
     """Belcour 2018, figure 14. Expected: the published medium darkens; the truth absorbs nothing, and does not."""
     (cell,) = made("belcour2018-14")["cells"]
@@ -490,12 +513,34 @@ def test_what_anisotropy_costs(made: Made) -> None:
     means = [np.mean(image) for image in found["pictures"]["area light"].values()]
     assert means[0] == pytest.approx(means[1], rel=0.03)
     assert all(min(scene["seconds"].values()) > 0 for scene in found["scenes"].values())
+    assert all(set(scene["evaluation"]) == {"eval_pdf", "sample"} for scene in found["scenes"].values())
     found = made("yamaguchi2019-05")
     assert found["directional"]["ratio"] > 0 and found["walk"]["equal_noise"] > found["walk"]["ratio"] > 0
     seconds = {name: each[0] for name, each in found["seconds"].items()}
     assert min(seconds.values()) > 0
     for other, overhead in found["overhead"].items():
         assert overhead[0] == pytest.approx(seconds["anisotropic"] / seconds[other] - 1)
+
+
+@pytest.mark.parametrize("alpha", [0.2, (0.1, 0.3)])
+def test_what_is_timed_is_the_same_material_with_a_texture(alpha: Any, tmp_path: Path) -> None:
+    """Expected: the values of the uniform material, within the error of the tables that it is prepared in."""
+    stack = Stack([Interface(eta=1.5, alpha=alpha), Interface(eta=0.2, k=3.9, alpha=0.2)])
+    varying = evaluation.textured(stack, tmp_path)
+    assert len(textures({"": varying})) == (1 if isinstance(alpha, float) else 2)
+    wi = np.tile((0.6, 0.0, 0.8), (64, 1))
+    wo = wi * (-1, 1, 1) + np.random.default_rng(0).normal(0, 0.1, (64, 3)) * (1, 1, 0)
+    wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+    values = [Probe(canvas.bsdf(each, "weier2020")).eval_pdf(wi, wo) for each in (stack, varying)]
+    for uniform, read in zip(*values):
+        np.testing.assert_allclose(read, uniform, rtol=5e-3)
+
+
+def test_costs_are_ratios_round_by_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: a round in which the machine is slow for both counts as any other."""
+    times = {"sample": {"a": np.array([2.0, 40.0, 3.0]), "b": np.array([1.0, 10.0, 1.0])}}
+    monkeypatch.setattr(evaluation, "timed", lambda *_: times)
+    assert evaluation.costs({}, {"a": "b"}, 3, 0, 1) == {"sample": {"a": {"median": 3, "quartiles": [2.5, 3.5]}}}
 
 
 # The verb

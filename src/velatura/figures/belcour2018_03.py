@@ -51,8 +51,8 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     left.plot(*np.array([np.cos(t := np.linspace(0, 2 * np.pi, 200)), np.sin(t)]), color="0.5", linewidth=1)
     left.plot([np.sin(np.radians(ANGLE))], [0], "kx")
     left.set(title=f"alpha {LOBE:g}, incidence {ANGLE}° (cross)", xlabel="x", ylabel="y", aspect="equal")
-    for name, colour in (("one", "C0"), ("two", "C3")):
-        right.plot(numbers["alpha"], numbers[name], color=colour, marker=".", label=f"{name} bounce(s)")
+    for name, label, colour in (("one", "one bounce", "C0"), ("two", "two bounces", "C3")):
+        right.plot(numbers["alpha"], numbers[name], color=colour, marker=".", label=label)
     right.set(title="variance on the disc", xlabel="alpha", ylim=(0, None))
     right.legend()
     canvas.save(figure, path)

@@ -41,8 +41,8 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     """
     figure = canvas.canvas(9, 4)
     left, right = figure.subplots(1, 2)
-    for name, colour in (("one", "C0"), ("two", "C3")):
-        left.plot(numbers["alpha"], numbers[name], color=colour, label=f"{name} bounce(s)")
+    for name, label, colour in (("one", "one bounce", "C0"), ("two", "two bounces", "C3")):
+        left.plot(numbers["alpha"], numbers[name], color=colour, label=label)
     left.set(title="variance on the disc", xlabel="alpha")
     right.plot(numbers["alpha"], np.array(numbers["equivalent"], float), color="C3", label="two bounces")
     right.plot(numbers["alpha"], numbers["belcour"], color="C0", linestyle="--", label="belcour's map")

@@ -11,6 +11,7 @@ from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, stack
 
 GAPS = (90, 60, 30)  # degrees
 STACKS = {f"{gap:g}°": stack(SPREAD, float(gap), SPREAD, 0.0) for gap in GAPS}
+CROSSED = STACKS["90°"]  # also (d) of figure 6 and (a) of figure 8
 
 _FIGURE = cells.Cells(STACKS, COLUMNS)
 compute, draw = _FIGURE.compute, _FIGURE.draw
