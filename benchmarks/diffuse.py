@@ -1,6 +1,6 @@
-"""How far the albedo of a diffuse base under a stack is from random walks.
+"""How far the albedo of a diffuse base under a stack, by a model of the papers, is from random walks.
 
-    python benchmarks/diffuse.py [--stacks 60] [--paths 400000] [--seed 2] [--interfaces 2] [--model velatura]
+    python benchmarks/diffuse.py [--stacks 60] [--paths 400000] [--seed 2] [--interfaces 2] [--model belcour2018]
 
 Random stacks of 1, 2, ... interfaces in turn: indices from 1.3 to 2.2, roughness from 0 to .7 (one in ten is smooth);
 below three in five a medium that absorbs, up to an optical depth of 2; albedos of the base from .1 to .95, colours
@@ -16,7 +16,7 @@ import numpy as np
 from rich.progress import track
 
 import velatura as vt
-from velatura.model import DEFAULT, bsdf, named
+from velatura.model import bsdf, named
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
 COSINES = (1.0, 0.6, 0.2)
@@ -34,7 +34,7 @@ def random_stack(rng: np.random.Generator, interfaces: int) -> Stack:
 
 
 def albedo(stack: Stack, cos_theta: tuple[float, ...], model: str) -> np.ndarray:
-    """Of the base as a model has it, shape (3, cosines)."""
+    """Of the base in closed form, shape (3, cosines)."""
     body = bsdf.body(Material.of(stack), named(model))
     cosine = np.array(cos_theta)
     base = body.base((np.sqrt(1 - cosine**2), 0 * cosine, cosine))
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--paths", type=int, default=400_000)
     parser.add_argument("--seed", type=int, default=2)
     parser.add_argument("--interfaces", type=int, default=2, help="at most")
-    parser.add_argument("--model", default=DEFAULT)
+    parser.add_argument("--model", default="belcour2018")
     options = parser.parse_args()
 
     rng = np.random.default_rng(options.seed)
