@@ -134,14 +134,10 @@ def _looks(material: Material, seen: StackLobes) -> Iterator[Look]:
     if not (mixed or metallic):
         color = remainder / (entered * (1 - fresnel.normal_incidence(eta)))
     plain = Look(_rgb(color), share, alpha, turn, max(eta_1, 1.0), film=film)
-    metal = next((each for each in interfaces if each.films and each.kind != "dielectric"), None)
-    under_film = metal and _rgb(np.ravel(fresnel.normal_incidence(metal.eta, metal.k) * np.ones((3, 1))))
     if coated:
         coat_alpha, coat_turn = _along(seen, 0)
         coat = replace(plain, eta=max(eta, 1.0), coat_eta=eta_1, coat_alpha=coat_alpha, coat_turn=coat_turn)
         yield coat
-        if under_film:
-            yield replace(coat, color=under_film)
         if 0 < share < 1:
             yield replace(coat, metalness=1.0)
         deep = _absorbed(material)
@@ -153,8 +149,6 @@ def _looks(material: Material, seen: StackLobes) -> Iterator[Look]:
         yield replace(plain, metalness=0.0)
     else:
         yield replace(plain, color=_rgb(all_light), metalness=1.0)
-        if under_film:
-            yield replace(plain, color=under_film, metalness=1.0)
 
 
 def _clear(seen: StackLobes, eta_1: float, film: Pair | None) -> Iterator[Look]:
