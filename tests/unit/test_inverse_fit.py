@@ -332,6 +332,17 @@ def test_an_rgl_file(tmp_path: Path) -> None:
         load_table(tmp_path / "none.bsdf")
 
 
+def test_a_table_has_an_end(tmp_path: Path) -> None:
+    """Expected: a file of nothing but lines would fill the memory."""
+    path = tmp_path / "lines.csv"
+    path.write_text("theta_i,theta_o,phi,r,g,b\n" + "\n" * 2_000_000)
+    with pytest.raises(InvalidInput, match=r"lines\.csv: holds more than 2000000 values"):
+        load_table(path)
+    path.write_bytes(b" " * (2**25 + 1))
+    with pytest.raises(InvalidInput, match=r"lines\.csv: is larger than 32 MiB"):
+        load_table(path)
+
+
 def test_no_such_table(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"none\.csv: file not found"):
         load_table(tmp_path / "none.csv")

@@ -26,7 +26,7 @@ ALL_AZIMUTHS = ("theta_i", "phi_i", "theta_o", "phi_o", "r", "g", "b")
 GRAZING, BRIGHTEST = 90.0, 1e9  # degrees: directions must be above the surface; 1/sr: more than any lobe has
 MERL_SCALES = np.array([1.0, 1.15, 1.66]) / 1500  # of red, green and blue
 TAKEN = (24, 9, 8)  # of MERL's half-vector tilts, differences and azimuths: enough for a stack's few values
-LARGEST = 2**27  # bytes of a measurement
+LARGEST, LARGEST_TEXT = 2**27, 2**25  # bytes of a measurement, and of a CSV file
 TENSORS = dict(enumerate(("u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8"), start=1))
 ROUND = 1e-3  # share of the brightest value by which a measurement may depend on its azimuth, and be isotropic
 
@@ -52,9 +52,9 @@ def load_table(path: str | Path) -> ReflectanceTable:
 
 
 def _csv(path: Path) -> ReflectanceTable:
-    text = files.text_of(path)
+    text = files.text_of(path, LARGEST_TEXT)
     with files.budget() as left:
-        left.spend(path, "values", text.count(","))
+        left.spend(path, "values", text.count(",") + text.count("\n"))
     try:
         lines = list(csv.reader(io.StringIO(text, newline="")))
     except csv.Error as error:
