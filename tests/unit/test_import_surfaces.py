@@ -302,6 +302,12 @@ def test_what_a_stack_cannot_carry_is_listed() -> None:
     assert plain.left == () and plain.stack.kinds == ("dielectric", "diffuse")
 
 
+def test_switches_may_be_true() -> None:
+    """Expected: of a parameter that is true or false, as 1; the solid of other tests without it."""
+    pane = vt.from_openpbr(transmission_weight=1, geometry_thin_walled=True)
+    assert pane == vt.from_openpbr(transmission_weight=1, geometry_thin_walled=1) and pane.stack.thin is True
+
+
 def test_values_beyond_their_range_take_its_end() -> None:
     found = vt.from_openpbr(base_color=(1.5, 0.5, 0.5), subsurface_radius_scale=(2, 0, 0))
     assert "outside 0 to 1" in str(found.left[0]) and len(found.left) == 1
@@ -337,6 +343,9 @@ def test_all_values_in_range_become_a_stack(source: Any) -> None:
         ({"specular_ior": (1, 1, 1)}, "specular_ior: must be a number, got (1, 1, 1)"),
         ({"coat_weight": float("nan")}, "coat_weight: must be a number, got nan"),
         ({"base_color": {"texture": "none.png"}}, "texture: file not found: "),
+        ({"coat_weight": True}, "coat_weight: must be a number, got True"),
+        ({"coat_weight": 10**400}, "coat_weight: must be a number, got 1000"),
+        ({"coat_weight": 10**5000}, "coat_weight: must be a number, got a value of type int"),
     ],
 )
 def test_other_values_are_refused_in_one_line(parameters: dict[str, Any], message: str) -> None:

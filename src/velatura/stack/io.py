@@ -40,13 +40,13 @@ MaterialLike: TypeAlias = Stack | str | Path | Mapping
 def load(material: MaterialLike) -> Stack:
     """The stack in a material file (.yaml, .yml or .json), or the preset of that name; a stack unchanged.
 
-    A bare word without an extension is a preset. Paths in a file are relative to it; keys and values in place of a file
-    have them relative to the current folder. A file of another program
-    (.mtlx, .gltf, .glb, or a scene of Mitsuba, .xml; FILE#NAME for one of its materials) is imported, with a warning
-    that lists what a stack cannot carry.
+    A bare word without an extension is a preset. Paths in a file are relative to it; in a mapping of the keys of one,
+    to the current folder. A file of another program (.mtlx, .gltf, .glb, or a scene of Mitsuba, .xml; FILE#NAME for one
+    of its materials) is imported, with a warning that lists what a stack cannot carry.
 
     Raises:
-        InvalidInput: no such file or preset, or its content is not a material; one line that names the file.
+        InvalidInput: no such file or preset, or its content is not a material, or beyond the budget of `files`; one
+            line that names the file.
     """
     if isinstance(material, Stack):
         return material
