@@ -13,7 +13,7 @@ def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
 
 def test_any_file_of_other_programs_is_refused_in_one_line_or_read_back_equal() -> None:
     rng = np.random.default_rng(8)
-    assert not [failure for _ in range(400) for failure in imports.trial(rng)]
+    assert not [failure for _ in range(200) for failure in imports.trial(rng)]
 
 
 def test_any_command_line_ends_in_one_line_and_loses_nothing() -> None:
