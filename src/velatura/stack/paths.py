@@ -32,7 +32,7 @@ def rewritten(node: Any, rewrite: Callable[[str], str]) -> Any:
 def hold(data: bytes, name: str, ending: str) -> Path:
     """The file of an image in memory, removed when the process ends.
 
-    It is named after its content, and what of the name is letters and digits.
+    Its name is the letters and digits of `name`, and a digest of the data.
     """
     plain = re.sub(r"[^A-Za-z0-9]+", "-", name)[:40].strip("-") or "image"
     path = _folder() / f"{plain}-{hashlib.sha256(data).hexdigest()[:12]}{ending}"
