@@ -1,9 +1,11 @@
 """The editor's server under hostile requests, many clients, slow calls, and clients that never end their request.
+Then the editor's page under random edits by hand, in headless Chromium.
 
-    python benchmarks/fuzz_server.py [--requests 500] [--messages 200] [--clients 50] [--each 200] [--seed 0]
+    python benchmarks/fuzz_server.py [--requests 500] [--messages 200] [--clients 50] [--each 200]
+                                     [--minutes 10] [--seed 0]
 
-Prints a table. Exit status 1 if any request is answered by 500 or not at all, if the process ends, or if a limit of the
-manual does not hold.
+Prints a table. Exit status 1 if any request is answered by 500 or not at all, if the process ends, if a limit of the
+manual does not hold, if the page's console complains, its state is not that of Python, or its memory grows.
 """
 
 from __future__ import annotations
@@ -23,7 +25,9 @@ from statistics import median
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
+import editor
 from fuzzing import server as fuzzing
+from fuzzing.hands import Hands
 
 from velatura.editor import guard
 
@@ -31,6 +35,8 @@ INVERSIONS = 45
 LOBES = 12
 STALLED, SENT = 20, 24 * 2**20  # uploads, and bytes that each sends of its 30 MiB
 HALF_OPEN = 500
+EDITS, LOOKS = 15, 8  # between two looks at the page, and between two reloads
+HEAP_MB, GROWN_MB = 64.0, 300.0  # of the page, and of the server
 REACH_S, REACH_MB = 1.0, 60.0  # of `list` beside inversions, and of memory for stalled uploads
 
 
@@ -38,6 +44,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in (("requests", 500), ("messages", 200), ("clients", 50), ("each", 200), ("seed", 0)):
         parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--minutes", type=float, default=10)
     options = parser.parse_args()
 
     failures: list[str] = []
@@ -70,6 +77,7 @@ def main() -> None:
         log.seek(0)
         if "Traceback" in (text := log.read()):
             failures.append(f"the server's log holds a traceback: {text[:3000]}")
+    failures += edited(options.minutes, options.seed)
     for failure in failures:
         print(failure)
     sys.exit(1 if failures else 0)
@@ -135,6 +143,25 @@ def half_open(port: int, pid: int) -> list[str]:
     for client in clients:
         client.close()
     return [f"{left} half-open requests stay"] * (left > 0)
+
+
+def edited(minutes: float, seed: int) -> list[str]:
+    """Edit in the page by random hands, which look at what has become of it now and then."""
+    with tempfile.TemporaryDirectory() as folder, editor.server(Path(folder)) as server, editor.browser() as opened:
+        visit = editor.Visit(opened.new_page(viewport={"width": 900, "height": 600}), server.entrance)
+        hands, end = Hands(visit, Path(folder), seed), time.monotonic() + 60 * minutes
+        memories = []
+        while time.monotonic() < end:
+            for _ in range(LOOKS):
+                hands.edit(EDITS)
+                hands.look()
+            hands.reload()
+            memories.append(memory(server.process.pid))
+        heaps, failures = hands.outcome.heaps, hands.outcome.failures
+        pages = f"page {heaps[0]:.0f} to {max(heaps):.0f} MB, server {memories[0]:.0f} to {max(memories):.0f} MB"
+        row(f"{len(hands.outcome.edits)} edits, {len(heaps)} looks", f"{len(failures)} failed; {pages}")
+        grown = max(heaps) > HEAP_MB or max(memories) - memories[0] > GROWN_MB
+        return failures + [f"memory grows: {pages}"] * grown
 
 
 def memory(pid: int) -> float:

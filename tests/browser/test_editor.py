@@ -8,6 +8,7 @@ the browser itself notes there that a server is away, or has refused, which the 
 from __future__ import annotations
 
 import io
+import json
 import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -17,6 +18,8 @@ import chromium
 import numpy as np
 import pytest
 from editor import Server, Visit, difference, unexpected
+from fuzzing import hostile
+from fuzzing.hands import Hands
 from matplotlib.image import imsave
 
 import velatura as vt
@@ -740,6 +743,36 @@ def test_files_out_of_the_folder_are_refused_in_words(visit: Open, served: Serve
     save_as(page, "../stolen.yaml")
     said(page).get_by_text("must be the plain name of a file").wait_for()
     assert not (served.folder.parent / "stolen.yaml").exists()
+
+
+def test_files_of_hostile_names_run_nothing(visit: Open, served: Server) -> None:
+    """Expected: those whose names can be printed are listed and opened, with their names as they are."""
+    files = {f"{name[:200].replace('/', '_')}.yaml": name for name in hostile.NAMES} | {"plain.yaml": "Plain"}
+    for file, name in files.items():
+        (served.folder / file).write_text(json.dumps(hostile.material(name)), "utf-8")
+    page = visit(script=hostile.WATCH)
+    for file, name in files.items():
+        page.page.get_by_role("button", name="Open", exact=True).click()
+        page.page.get_by_role("button", name="plain.yaml").wait_for()
+        listed = page.page.locator("dialog.open").get_by_role("button", name=file, exact=True)
+        assert listed.count() == (1 if file.isprintable() and "\\" not in file else 0)
+        (listed if listed.count() else page.page.get_by_role("button", name="Cancel").first).click()
+        if file.isprintable() and "\\" not in file:
+            page.page.wait_for_function("(name) => velatura.store.get().name === name", arg=name)
+    page.settled()
+    for file in files:
+        (served.folder / file).unlink()
+
+
+def test_random_edits_by_hand(visit: Open, served: Server) -> None:
+    """A slice of those of `benchmarks/fuzz_server.py`."""
+    page = visit(REFUSED)
+    page.page.evaluate("velatura.viewport.setSize(64, 48)")
+    hands = Hands(page, served.folder, seed=2)
+    hands.edit(12)
+    hands.look()
+    hands.reload()
+    assert hands.outcome.failures == []
 
 
 def test_two_tabs_have_a_state_each_and_do_not_overwrite_one_another(visit: Open, served: Server) -> None:

@@ -7,7 +7,9 @@ same every time; a picture by another model differs by more than the bound.
 
 from __future__ import annotations
 
+import functools
 import gzip
+import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +19,7 @@ import chromium
 import numpy as np
 import pytest
 from editor import Server, Visit, require_fresh_page
+from fuzzing import hostile
 from hosted import hosted
 
 import velatura as vt
@@ -30,6 +33,10 @@ SAME = 0.01  # root mean square of differences, white being 1
 MODELS = [named("belcour2018"), named("velatura")]
 LAYERS = 1  # besides the orders of presets; more take longer to write
 FIRST_LOAD = 6e6  # bytes, compressed
+POLICY = (  # as a careful host of the folder may send it
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 
 
 @pytest.fixture(scope="module")
@@ -153,6 +160,62 @@ def test_a_link_is_shared_and_opened(visit: Open, address: str) -> None:
     there.page.get_by_text("from the address").wait_for()
     assert there.state("layers.0.keys.alpha") == here.state("layers.0.keys.alpha") == 0.3
     assert distance(here, there) < SAME
+
+
+@pytest.fixture
+def stranger(opened: Any, folder: Path) -> Iterator[Visit]:
+    """A visit under a strict policy, whose console complains of all that this refuses and of foreign code that runs;
+    presets have hostile names."""
+
+    def session(route: Any) -> None:
+        found = json.loads(gzip.decompress((folder / offline.SESSION).read_bytes()))
+        for preset, name in zip(found["presets"], hostile.NAMES):
+            preset["title"] = preset["material"]["name"] = name
+        route.fulfill(body=gzip.compress(json.dumps(found).encode()))
+
+    with hosted(folder, POLICY) as address:
+        context = opened.new_context(viewport={"width": 900, "height": 600}, accept_downloads=True)
+        context.grant_permissions(["clipboard-read", "clipboard-write"])
+        context.route(f"**/{offline.SESSION}", session)
+        page = context.new_page()
+        page.add_init_script(hostile.WATCH)
+        visit = Visit(page, address)
+        yield visit
+        context.close()
+        assert visit.complaints == []
+
+
+def test_hostile_names_run_nothing_under_a_strict_policy(stranger: Visit) -> None:
+    """Expected: names of presets, addresses, files and fields are shown as they are, downloads have plain letters."""
+    page = stranger.page
+    button = functools.partial(page.get_by_role, "button", exact=True)
+    for name in hostile.NAMES:
+        page.evaluate("(fragment) => (location.hash = fragment)", hostile.fragment(name))
+        page.wait_for_function("(name) => velatura.store.get().name === name", arg=name)
+        assert page.get_by_label("Name", exact=True).input_value() == name
+        page.evaluate(hostile.DROP, [f"{name[:200]}.json", "{"])
+        page.get_by_text("is not JSON").wait_for()
+        page.evaluate(hostile.DROP, [f"{name[:200]}.json", json.dumps(hostile.material(f"{name}."))])
+        page.wait_for_function("(name) => velatura.store.get().name === name", arg=f"{name}.")
+    stranger.settled()
+    button(name="Pin as B").click()
+    button(name="Put beside").click()
+    button(name="Export").click()
+    button(name="Close").click()
+    button(name="Open").click()
+    for name in hostile.NAMES[:3]:
+        assert page.locator("dialog.open").get_by_role("button", name=name, exact=True).count() == 1
+    button(name="Cancel").click()
+    for name in hostile.NAMES:
+        page.get_by_label("Name", exact=True).fill(name)
+        page.get_by_label("Name", exact=True).press("Enter")
+        with page.expect_download() as download:
+            button(name="Download").click()
+        assert re.fullmatch(r"[\w-]{1,60}\.json", download.value.suggested_filename)
+    page.evaluate("localStorage.clear(); location.hash = '#m=' + 'A'.repeat(1e5)")
+    page.get_by_text("The address holds no material that can be read").wait_for()
+    page.reload()
+    stranger.ready()
 
 
 def test_the_first_load_is_small(visit: Open, folder: Path, address: str, requests: list[str]) -> None:

@@ -287,6 +287,13 @@ def test_nothing_is_saved_outside_the_folder(here: Path, port: int, name: str) -
     assert {path.parent for path in here.parent.rglob("*coat.yaml")} <= {here}
 
 
+def test_names_of_pictures_write_no_headers(port: int) -> None:
+    for name in ("a%0d%0aSet-Cookie:%20a=b.png", "%22;%20filename=evil.exe.png", "%E2%80%AE.png", "a" * 5000 + ".png"):
+        status, body, headers = ask(port, "GET", f"/files/{name}")
+        assert status == 404 and b"\n" not in body, (name, body)
+        assert not {"set-cookie", "content-disposition"} & headers.keys()
+
+
 def test_what_is_no_picture_is_no_texture(here: Path, port: int) -> None:
     data = base64.b64encode(b"#!/bin/sh").decode()
     status, answer = call(port, "texture", {"file": "script.png", "data": data})

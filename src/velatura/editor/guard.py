@@ -26,12 +26,11 @@ VARIABLE = "VELATURA_TOKEN"
 
 HEAD_TIME = 15  # seconds for the head of a request
 
-#: Sources that the page may load: this server, and its own objects; it positions elements by style attributes.
+#: Sources that the page may load: this server, and its own objects.
 POLICY = {
     "default-src": "'self' blob: data:",
     "script-src": "'self'",
     "worker-src": "'self' blob:",
-    "style-src-attr": "'unsafe-inline'",
     "object-src": "'none'",
     "base-uri": "'none'",
     "form-action": "'none'",

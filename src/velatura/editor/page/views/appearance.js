@@ -10,7 +10,7 @@ import { described, handles } from './appearance/handles.js';
 import { about, axesOf, blurOf, changed, hue, withBlur, withMean } from './appearance/looks.js';
 import { asker, oneAtATime } from './appearance/questions.js';
 import { colourRow, hex } from './colour.js';
-import { capital, dial, iconButton, menu, number } from './controls.js';
+import { capital, dial, iconButton, menu, number, styles } from './controls.js';
 import { mean, shown } from './plots/scale.js';
 import { line } from './settings.js';
 
@@ -236,7 +236,7 @@ export function mountAppearance(element, services) {
 
   const row = (lobe, index) => html`<li>
     <button type="button" class="lobe" aria-pressed=${index === chosen} @click=${() => choose(index)}>
-      <span class="swatch" style="background:${hex(hue(lobe))}"></span>
+      <span class="swatch" .style=${styles({ background: hex(hue(lobe)) })}></span>
       <b>${index + 1}</b>
       <span>energy ${shown(mean(lobe.energy))}</span>
       <span title=${described(lobe)}>blur ${Array.isArray(lobe.alpha) ? lobe.alpha.map(brief).join(', ') : shown(lobe.alpha)}</span>

@@ -2,7 +2,6 @@
 
 import { html, nothing } from 'lit-html';
 import { live } from 'lit-html/directives/live.js';
-import { styleMap } from 'lit-html/directives/style-map.js';
 import { objection } from '../state/range.js';
 import { icons } from './icons.js';
 import { isTyping, release, text } from './typing.js';
@@ -21,6 +20,12 @@ export function shown(value) {
 
 /** Words that begin with a capital. */
 export const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
+
+/** Styles of an element for its property: a page may be served by a policy that refuses the attribute. */
+export const styles = (declared) =>
+  Object.entries(declared)
+    .map(([name, value]) => (value === '' ? '' : `${name}: ${value};`))
+    .join(' ');
 
 // Numbers --------------------------------------------------------------------------------------------
 
@@ -165,7 +170,7 @@ export function dial({ label, value, spec, edit, low = -180 }) {
       aria-valuemax=${low + 360}
       aria-valuenow=${shown(value)}
       aria-valuetext=${`${shown(value)} degrees`}
-      style=${styleMap({ '--turn': `${-value}deg` })}
+      .style=${styles({ '--turn': `${-value}deg` })}
       @pointerdown=${(event) => {
         event.currentTarget.setPointerCapture(event.pointerId);
         turn(event);

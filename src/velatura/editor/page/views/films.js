@@ -1,11 +1,10 @@
 // The thin films of an interface: from the top down, each with its index, its thickness, and the colours that it may make.
 
 import { html, nothing } from 'lit-html';
-import { styleMap } from 'lit-html/directives/style-map.js';
 import { addFilm, moveFilm, numberOf, removeFilm, setFilm } from '../state/commands.js';
 import { documentOf } from '../state/material.js';
 import { hex } from './colour.js';
-import { iconButton } from './controls.js';
+import { iconButton, styles } from './controls.js';
 import { icons } from './icons.js';
 import { followGrip } from './moving.js';
 
@@ -104,7 +103,7 @@ function strip({ services, layer, film, n, name, act }) {
     role="img"
     aria-label=${`${name}: colours at the normal, thickness 0 to ${end} nm`}
     title=${`What is reflected at the normal, from 0 to ${end} nm; the brightest is shown as white. Click to pick`}
-    style=${styleMap({
+    .style=${styles({
       background: `linear-gradient(to right, ${stops.join(', ')})`,
       '--at': film.thickness_nm / end,
     })}

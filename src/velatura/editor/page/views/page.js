@@ -2,13 +2,12 @@
 
 import { html, nothing } from 'lit-html';
 import { repeat } from 'lit-html/directives/repeat.js';
-import { styleMap } from 'lit-html/directives/style-map.js';
 import { LARGEST_DIFFERENCE } from '../render/glsl/display.glsl.js';
 import { tiling } from '../render/tiles.js';
 import { setView, takeAway } from '../state/commands.js';
 import { besideOf } from '../state/compared.js';
 import { lookOf } from '../state/snapshots.js';
-import { iconButton } from './controls.js';
+import { iconButton, styles } from './controls.js';
 import { splitter } from './splitter.js';
 import { titleOf } from './strip.js';
 
@@ -36,7 +35,7 @@ export function createPage({ store, session, storage, edits, messages, picture, 
 
   const view = () => html`
     ${parts.toolbar()}
-    <main class="stage" style=${styleMap({ '--look': pixels(layout.lookHeight) })}>
+    <main class="stage" .style=${styles({ '--look': pixels(layout.lookHeight) })}>
       <div class="picture">
         ${canvas} ${compared({ store, session, edits, picture })}
         <span class="samples" aria-hidden="true"></span>
@@ -80,7 +79,7 @@ export function createPage({ store, session, storage, edits, messages, picture, 
     <aside
       class="panel"
       aria-label="Material and view"
-      style=${styleMap({ '--panel': pixels(layout.panelWidth) })}
+      .style=${styles({ '--panel': pixels(layout.panelWidth) })}
     >
       ${faces({ face, show, focus, lacks })}
       <div class="material">
@@ -206,7 +205,7 @@ function sideBySide(store, picture) {
   const part = (share, parts) => `${(100 * share) / parts}%`;
   const name = (tile, place) => html`<div
     class="tile"
-    style=${styleMap({
+    .style=${styles({
       left: part(place % columns, columns),
       top: part(Math.floor(place / columns), rows),
       'max-width': `calc(${part(1, columns)} - 1.25rem)`,
@@ -257,7 +256,7 @@ function divider({ view, edits }) {
       aria-valuemin="0"
       aria-valuemax="100"
       aria-valuenow=${Math.round(100 * view.split)}
-      style=${styleMap({ left: `${100 * view.split}%` })}
+      .style=${styles({ left: `${100 * view.split}%` })}
       @keydown=${onKey}
       @pointerdown=${(event) => event.currentTarget.setPointerCapture(event.pointerId)}
       @pointermove=${byHand}

@@ -2,6 +2,7 @@
 
 import { html, nothing, svg } from 'lit-html';
 import { ref } from 'lit-html/directives/ref.js';
+import { styles } from '../controls.js';
 import { shown, ticks } from '../plots/scale.js';
 
 const [WIDTH, LEFT, RIGHT, TOP, BOTTOM] = [330, 50, 14, 8, 34];
@@ -67,16 +68,20 @@ export function plane({ label, axes, cells, outlines, point, dots = [], path = [
     onLetGo();
   };
   const [u, v] = place(point);
-  const inside = { left: LEFT / WIDTH, top: TOP / (bottom + BOTTOM), width: (WIDTH - LEFT - RIGHT) / WIDTH };
+  const part = (share, whole) => `${(100 * share) / whole}%`;
+  const inside = {
+    left: part(LEFT, WIDTH),
+    top: part(TOP, bottom + BOTTOM),
+    width: part(WIDTH - LEFT - RIGHT, WIDTH),
+    height: part(height, bottom + BOTTOM),
+  };
   return html`<div class="plane">
     ${
       cells
         ? html`<canvas
           width=${cells.shape[1]}
           height=${cells.shape[0]}
-          style="left:${100 * inside.left}%;top:${100 * inside.top}%;width:${100 * inside.width}%;height:${
-            (100 * height) / (bottom + BOTTOM)
-          }%"
+          .style=${styles(inside)}
           ${ref((canvas) => canvas && queueMicrotask(() => paint(canvas, cells)))}
         ></canvas>`
         : nothing
