@@ -915,6 +915,24 @@ def test_a_material_is_pinned_and_swapped(visit: Open) -> None:
     assert difference(page.picture()[:, :30], gold[:, :30]) < SAME
 
 
+def test_a_refused_material_beside_another_stops_nothing(visit: Open) -> None:
+    """Expected: the open material is drawn and saved, and what is said of the other goes with it."""
+    page = visit(REFUSED)
+    open_preset(page, "Gold")
+    page.page.get_by_label("Thin pane").check()
+    said(page).get_by_text("thin: only for a stack").wait_for()
+    page.page.get_by_role("button", name="Pin as B").click()
+    page.page.get_by_label("Thin pane").uncheck()
+    before = page.picture()
+    slider(page, 0, "Roughness").fill("80")
+    assert difference(page.picture(), before) > OTHER
+    save_as(page, "beside.yaml")
+    said(page).get_by_text("Saved beside.yaml").wait_for()
+    said(page).get_by_text("thin: only for a stack").wait_for()
+    page.page.get_by_label("Compare", exact=True).select_option("single")
+    said(page).get_by_text("thin: only for a stack").wait_for(state="detached")
+
+
 def test_each_settled_material_is_a_picture_to_go_back_to(visit: Open) -> None:
     """Expected: one for each state that was left alone, none twice; a click or a key goes back, and undo forth."""
     page = visit()

@@ -43,7 +43,7 @@ BODY_TIME, ANSWER_TIME = 60, 60  # seconds for the body of a request, and for it
 
 #: Calls that are answered at once, and those that may wait: none waits for those of another kind.
 LANES = {"quick": (4, 512), "picture": (2, 64), "slow": (4, 32)}
-THREADS = sum(at_once for at_once, _ in LANES.values()) + 8  # the others for answers that were given up
+SPARE = 4  # threads of a kind beside these, for answers that were given up, which go on until they end
 LANE_OF = {
     **dict.fromkeys(("shader", "values", "appearance"), "picture"),
     **dict.fromkeys(("invert", "class", "member", "coat", "targets", "truth", "validation", "film", "export"), "slow"),
@@ -170,7 +170,7 @@ class Desk:
         lane = LANE_OF.get(name, "quick")
         at_once, waiting = LANES[lane]
         free = self.limiters.setdefault(lane, anyio.CapacityLimiter(at_once))
-        threads = self.limiters.setdefault("threads", anyio.CapacityLimiter(THREADS))
+        threads = self.limiters.setdefault(f"threads, {lane}", anyio.CapacityLimiter(at_once + SPARE))
         if self.calls[lane] >= at_once + waiting:
             return 503, _error(BUSY)
         self.calls[lane] += 1

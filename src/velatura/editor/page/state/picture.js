@@ -19,6 +19,7 @@ class Slot {
   #wanted = null; // what Python is to be asked next
   #asked = null; // what it was asked last
   #failed = false; // whether it refused that
+  #followed = false; // whether it is seen
   #busy = false;
   #timer = null;
   #moved = null; // the state whose values Python is to work out next, with the question
@@ -38,8 +39,15 @@ class Slot {
     clearTimeout(this.#timer);
   }
 
+  /** The picture is seen no more, and what is wrong with it is of no interest. */
+  leave() {
+    this.#followed = false;
+    this.#services.onProblem(this.#name, null);
+  }
+
   /** Brings the picture to a state. */
   follow(state) {
+    this.#followed = true;
     const { model, switches } = state;
     const shape = JSON.stringify([pattern(state), model, switches]);
     const material = documentOf(state);
@@ -110,7 +118,7 @@ class Slot {
         if (!this.#wanted) await this.#accept(shader, shape);
       } catch (error) {
         this.#failed = true;
-        if (!this.#wanted) onProblem(this.#name, error);
+        if (!this.#wanted && this.#followed) onProblem(this.#name, error);
         if (error instanceof Offline) break;
       }
     }
@@ -184,9 +192,13 @@ export function follow({ store, viewport, call, lacks, session, files, onProblem
 
   function update(state) {
     const { object, environment, rotation, exposure, mode, split, lobe, other, tiles = [] } = state.view;
-    slots.a.follow(state);
-    if (isPaired(state.view) && !other?.truth) slots.b.follow(otherOf(state, session));
-    if (mode === 'tiles') for (const { slot, kept } of tiles) slots[slot].follow({ ...state, ...kept });
+    const seen = { a: state };
+    if (isPaired(state.view) && !other?.truth) seen.b = otherOf(state, session);
+    if (mode === 'tiles') for (const { slot, kept } of tiles) seen[slot] = { ...state, ...kept };
+    for (const [name, slot] of Object.entries(slots)) {
+      if (seen[name]) slot.follow(seen[name]);
+      else slot.leave();
+    }
     viewport.setView({
       rotation,
       exposure,

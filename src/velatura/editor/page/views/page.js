@@ -182,7 +182,7 @@ function bubbles(messages) {
           <button type="button" class="quiet" @click=${() => messages.forgive(about)}>Dismiss</button>
         </p>`,
     )}
-    ${problems.length || !messages.note ? nothing : html`<p>${messages.note}</p>`}
+    ${messages.note ? html`<p>${messages.note}</p>` : nothing}
   </div>`;
 }
 
