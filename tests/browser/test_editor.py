@@ -915,6 +915,16 @@ def test_a_material_is_pinned_and_swapped(visit: Open) -> None:
     assert difference(page.picture()[:, :30], gold[:, :30]) < SAME
 
 
+def test_a_material_of_more_lobes_is_plotted_beside_one_of_fewer(visit: Open) -> None:
+    page = visit()
+    open_preset(page, "Three dielectric layers over metal")
+    page.page.get_by_role("button", name="Pin as B").click()
+    open_preset(page, "Gold")
+    for tab in ("Blur", "Energy"):
+        page.page.get_by_role("tab", name=tab).click()
+        page.page.locator(".look svg .dashed").first.wait_for(state="attached")
+
+
 def test_a_refused_material_beside_another_stops_nothing(visit: Open) -> None:
     """Expected: the open material is drawn and saved, and what is said of the other goes with it."""
     page = visit(REFUSED)

@@ -285,7 +285,7 @@ export function mountInspector(element, { store, session, viewport, call, lacks,
   /** A line for each channel where a lobe is coloured, else one; the sum of all is thicker. */
   function energyLines({ angles, parts }, look) {
     const all = angles.map((_, i) => [0, 1, 2].map((c) => parts.reduce((sum, { energy }) => sum + energy[i][c], 0)));
-    const named = parts.map(({ energy }, k) => ({ colours: energy, tag: tagOf(k), look: lookOf(k), k }));
+    const named = parts.map(({ energy }, k) => ({ colours: energy, tag: look ? '' : tagOf(k), look: lookOf(k), k }));
     const sum = lobe() === null && parts.length > 1 ? [{ colours: all, tag: 'Σ', look: 'sum', k: null }] : [];
     return [...sum, ...named.filter(({ k }) => seen(k))].flatMap(({ colours, tag, look: own }) => {
       const end = look ? {} : { tag };
