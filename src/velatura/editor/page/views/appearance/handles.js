@@ -48,7 +48,7 @@ export function handles({ lobes, asked, hand, chosen, fixed, onChoose, onMove, o
     )}
     <text text-anchor="middle" x=${(LEFT + WIDTH - RIGHT) / 2} y=${HEIGHT - 4}>blur (alpha)</text>
     <text text-anchor="middle" transform="translate(9 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)">energy</text>
-    ${asked ? lobes.map((lobe, index) => ghost(lobe, asked[index])) : nothing}
+    ${asked?.length === lobes.length ? lobes.map((lobe, index) => ghost(lobe, asked[index])) : nothing}
     ${lobes.map((lobe, index) => (Array.isArray(lobe.alpha) ? brushed(lobe, index, { fixed, onChoose, onMove, onLetGo }) : nothing))}
     ${lobes.map((lobe, index) =>
       handle(lobe, index, { from: hand[index], chosen: index === chosen, fixed, onChoose, onMove, onLetGo }),
