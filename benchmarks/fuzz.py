@@ -1,10 +1,11 @@
 """Random inputs of every kind, and what must hold of each: stacks, laws, files, command lines.
 
-    python benchmarks/fuzz.py [lobes|plugin|check|files|imports|commands ...] [--count N] [--seed 0] [--processes 2]
+    python benchmarks/fuzz.py [PROGRAM ...] [--count N] [--seed 0] [--processes 2]
                               [--failures FOLDER] [--index I]
 
 lobes      stacks through `vt.lobes`, all models and switches, cosines to 1e-6: finite, no energy gained, no jumps
 plugin     stacks through `vt.bsdf`, all models, either side, down to the horizon: its functions agree, see laws
+scalar     stacks through `vt.bsdf` in scalar_rgb, the exact normal and the mirror direction too: as plugin, none raises
 check      `vt.check` on tame stacks: no law is broken that its model does not declare
 files      mutated material files: refused in one line that names the file, or equal once written and read again
 imports    likewise files of other programs, tables, spectra and textures; in bounded time and memory
@@ -32,12 +33,13 @@ from rich.progress import Progress
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
-from fuzzing import Failure, Trial, checking, commands, files, imports, lobes, plugin
+from fuzzing import Failure, Trial, checking, commands, files, imports, lobes, plugin, scalar
 
 # The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
 PROGRAMS: dict[str, tuple[Trial, int, int]] = {
     "lobes": (lobes.trial, 100_000, 5_000),
     "plugin": (plugin.trial, 2_000, 100),
+    "scalar": (scalar.trial, 400, 100),
     "check": (checking.trial, 500, 100),
     "files": (files.trial, 15_000, 1_500),
     "imports": (imports.trial, 15_000, 1_000),

@@ -412,3 +412,20 @@ def test_what_has_no_films_says_so(mi: Any) -> None:
 def test_fresnel_without_films_stays() -> None:
     found = vt.lobes(vt.Stack([vt.Interface(eta=1.5, alpha=0.0)]), [1.0, 0.5], reflectance="fgd").energy[0]
     assert found[0] == pytest.approx(fresnel.dielectric(np.array([1.0, 0.5]), 1.5), abs=1e-6)
+
+
+@pytest.mark.parametrize("model", ["belcour2018", "bati2021"])
+@pytest.mark.parametrize("k", [0.0, 0.2])
+def test_separate_channels_have_films_within(model: str, k: float) -> None:
+    """Each channel is that of a stack whose other channels have its values, too."""
+    within = vt.Interface(eta=1.9, alpha=0.1, films=[vt.Film(eta=1.4, k=k, thickness_nm=200)])
+    metal = vt.Interface(conductor="Au", alpha=0.2, films=[vt.Film(eta=1.8, thickness_nm=300)])
+
+    def energies(depths: tuple[float, float, float]) -> np.ndarray:
+        stack = vt.Stack([vt.Interface(eta=1.5, alpha=0.2), vt.Medium(sigma_a=depths), within, metal])
+        return np.array(vt.lobes(stack, [1, 0.5, 0.2], model=model, channels="separate").energy)
+
+    depths = (0.1, 0.4, 1.6)
+    found = energies(depths)
+    for c, depth in enumerate(depths):
+        assert found[:, c] == pytest.approx(energies((depth,) * 3)[:, c], abs=1e-12)

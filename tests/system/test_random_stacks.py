@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzzing import checking, lobes, pictures, plugin
+from fuzzing import checking, lobes, pictures, plugin, scalar
 from fuzzing.models import random_model
 from fuzzing.stacks import BASES, random_stack, textured
 
@@ -27,6 +27,14 @@ def test_the_bsdf_of_any_stack(model: str, form: str) -> None:
             rng = np.random.default_rng((k, *model.encode()))
             stack = random_stack(rng, absurd=k < 2, most=2, base=base)
             assert not plugin.tried(stack, named(model, form=form), rng)
+
+
+@pytest.mark.parametrize("k", range(len(MODELS)))
+def test_the_bsdf_of_any_stack_in_scalar_rgb(k: int) -> None:
+    """No division by zero raises, at the exact normal and in the mirror direction too; samples are what is asked."""
+    rng = np.random.default_rng((2, k))
+    stack = random_stack(rng, absurd=k % 2 == 1, most=1, base=BASES[k % len(BASES)])
+    assert not scalar.tried(stack, MODELS[k], rng)
 
 
 def test_the_lobes_of_any_stack() -> None:

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import velatura as vt
 from velatura import tables
-from velatura.model import named, solution
+from velatura.model import diffuse, named, solution
 from velatura.model.bsdf import Asked
 from velatura.model.context import Context
-from velatura.model.prepare import variance_kind
+from velatura.model.prepare import prepare, variance_kind
 from velatura.model.solved import Solved
 from velatura.model.transport.energies import Energies, energies
 from velatura.model.widths import nearly_straight
@@ -181,3 +182,25 @@ def test_all_is_finite_at_the_ends(name: str) -> None:
         wi = at(cosine, 0.4, len(ends[0]))
         for x in (*found.eval_pdf(wi, (ends[0], ends[1], ends[2])), *found.sample(wi, *u)[0]):
             assert np.isfinite(x).all(), cosine
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("indices", [(1e4, 1e-3, 1e4), (1e-3, 1e4)])
+def test_lobes_of_indices_far_apart_are_finite(indices: tuple[float, ...]) -> None:
+    """Also their roughnesses, which are worked out in single precision."""
+    coats = [Interface(eta=eta, alpha=0.2) for eta in indices]
+    found = vt.lobes(Stack([*coats, Interface(conductor="Au", alpha=0.2)]), [1, 0.5, 0.05, 1e-4])
+    for alpha in (*found.alpha, *found.own_alpha):
+        assert ((alpha >= 0) & (alpha <= 1)).all()
+
+
+@pytest.mark.parametrize("name", ["realtime", "belcour2018"])
+def test_a_base_below_a_medium_that_is_far_rarer_reflects_a_share_in_single_precision(name: str) -> None:
+    """Light enters it in a cone that the nodes of diffuse light do not resolve."""
+    layers = [Interface(eta=1.0, alpha=1.0), Interface(eta=3000.0, alpha=0.2), Diffuse(albedo=0.5)]
+    prepared = diffuse.with_means(prepare(Material.of(Stack(layers, exterior=1e4)), named(name)))
+    assert prepared.base
+    worth = np.array([np.ravel(x)[0] for x in (*prepared.base.worth, prepared.base.mean_reflectance)])
+    assert np.abs(worth).max() < 1e3  # products of some of them fit
+    base = diffuse.under(prepared, (np.zeros(2), np.array([0.0, 0.6]), np.array([1.0, 0.8])))
+    assert base and ((base.energy >= 0) & (base.energy <= 1)).all()

@@ -91,6 +91,19 @@ def test_fresnel_is_a_share(cos_theta: float, eta: float, kappa: float) -> None:
     assert 0 <= fresnel.dielectric(cos_theta, eta) <= 1
 
 
+def test_an_index_of_any_size_keeps_reflectance_finite_in_single_precision() -> None:
+    """From 1e-3 to 1e4: at the normal 1 - 4 / eta reflects."""
+    found = fresnel.dielectric(np.float32([1.0, 0.5, 1e-4]), 1e7)
+    assert found[0] == pytest.approx(1 - 4e-7, abs=5e-6) and ((found > 0.9) & (found <= 1)).all()
+    (above,) = fresnel.dielectric_between(np.float32([1.0]), np.float32([1.0]), 1e7)
+    assert above == pytest.approx(1, abs=5e-6)
+
+
+def test_opposite_directions_have_a_finite_density_of_normals() -> None:
+    """Their half-vector is 0, in floats, where a division by 0 raises."""
+    assert np.isfinite(ggx.ndf((0.0, 0.0, 0.0), 0.2, 0.2))
+
+
 def test_schlick() -> None:
     assert fresnel.schlick(1.0, 0.04) == 0.04
     assert fresnel.schlick(0.0, 0.04) == 1

@@ -31,6 +31,8 @@ Media = Sequence[tuple[PreparedMedium, Value]]  # with their optical depths alon
 SWEEPS = 6  # down the stack and up; what is missing then follows from how fast they converge
 OPAQUE = 1e-3  # transmittance below which light of a node is taken to be totally reflected
 SLOWEST = 0.95  # ratio of the last two sweeps
+# What a node may be worth, and the part of it that may leave: more, of cones that nodes do not resolve, grows in sweeps
+WORTH, LEAVING = 10.0, 3.0
 
 # Cosines and weights of the mean over directions above; what the stack does is smooth in the cosine
 _NODES = [(0.5 + 0.5 * float(x), 0.5 * float(w)) for x, w in zip(*np.polynomial.legendre.leggauss(6))]
@@ -89,7 +91,7 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
             leaves = [_sum(measure * row[k] for measure, row in zip(measures, entered)) for k in nodes_below]
             even = diffuse_nodes.even(inside.indices[0])
             squared = inside.indices[0] * inside.indices[0]
-            leaves = [ops.divide(x, squared * w) for x, w in zip(leaves, even)]
+            leaves = [ops.minimum(ops.divide(x, squared * w), LEAVING) for x, w in zip(leaves, even)]
         worth, reflected = inside.solved(leaves, settle)
     base = dataclasses.replace(prepared.base, worth=tuple(worth), mean_reflectance=reflected)
     known = dataclasses.replace(prepared, base=base)
@@ -184,7 +186,7 @@ class _Inside:
                 """The gains of the last two sweeps, and the rows before the last one and after it."""
                 now = rows[len(begin) :]
                 *swept, _ = down(up([*_split(now), last]))
-                after = [x for row in swept for x in row]
+                after = [ops.clip(x, -WORTH, WORTH) for row in swept for x in row]
                 return [gain, _sum(b - a for a, b in zip(now, after)), *now, *after]
 
             gain_before, gain, *rows = ops.repeat(sweep, SWEEPS, 0.0, 0.0, *begin, *begin)

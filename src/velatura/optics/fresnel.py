@@ -14,6 +14,7 @@ from velatura.ops import Value
 Complex = tuple[Value, Value]
 
 EDGE = 1 / 7  # cosine at which metals have a second colour, about 82 degrees (Kutz et al. 2021)
+GREATEST = 1e6  # relative index, whose sixth power single precision holds; a greater one reflects as much, but for 4e-6
 SMALL = 1e-18  # fourth power of cosines at which all is reflected
 
 
@@ -24,6 +25,7 @@ def cos_transmitted(cos_theta: Value, eta: Value) -> Value:
 
 def dielectric(cos_theta: Value, eta: Value) -> Value:
     """Reflectance of a dielectric of relative index eta > 0 at cos_theta in [0, 1]; 1 under total reflection."""
+    eta = ops.minimum(eta, GREATEST)
     eta2, cos2 = eta * eta, cos_theta * cos_theta
     inside2 = ops.maximum(eta2 - 1 + cos2, 0.0)
     return _dielectric(cos2, inside2, cos_theta * ops.sqrt(inside2), eta2)
@@ -34,12 +36,14 @@ def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
 
     This lets all colour channels share one refracted direction; the reflectance is the same from either side.
     """
+    eta = ops.minimum(eta, GREATEST)
     inside = eta * cos_t
     return _dielectric(cos_theta * cos_theta, inside * inside, cos_theta * inside, eta * eta)
 
 
 def dielectric_together(cos2: Value, n12: Value, eta: Value) -> Value:
     """As `dielectric_between`, by the square of the cosine and the relative index n12 that refracts all colours."""
+    eta = ops.minimum(eta, GREATEST)
     ratio2 = (eta / n12) * (eta / n12)
     inside2 = ops.maximum(eta * eta - ratio2 + ratio2 * cos2, 0.0)
     return _dielectric(cos2, inside2, ops.sqrt(cos2 * inside2), eta * eta)

@@ -61,7 +61,8 @@ def ndf(h: Direction, alpha_u: Value, alpha_v: Value) -> Value:
     x, y = h[0] / alpha_u, h[1] / alpha_v
     q = x * x + y * y + h[2] * h[2]
     ops.names(x=x, y=y, q=q)
-    return 1 / (pi * alpha_u * alpha_v * q * q)
+    # Opposite directions have no half-vector, and q is 0
+    return 1 / (pi * alpha_u * alpha_v * ops.maximum(q * q, ops.TINY))
 
 
 def masking(w: Direction, alpha_u: Value, alpha_v: Value) -> Value:

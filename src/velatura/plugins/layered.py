@@ -124,6 +124,8 @@ def make(mi: Any) -> type:
                 body = body.lit(wi)
                 drawn, bs.eta = body.sample(wi, sample1, sample2.x, sample2.y, asked)
                 bs.wo = mi.Vector3f(*drawn)
+                # The direction as it is given, whose numbers in scalar variants are rounded
+                drawn = tuple(bs.wo)
                 value, bs.pdf = body.eval_pdf(wi, drawn, asked)
                 weight = value / dr.maximum(bs.pdf, 1e-30)
                 part = body.component(wi, drawn, sample1, asked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import warnings
 from typing import Any
 
@@ -9,11 +10,14 @@ import numpy as np
 
 import velatura as vt
 from fuzzing import Failure
+from fuzzing.filmed import filmed
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
 from velatura.model.lobe_statistics import StackLobes
 from velatura.model.models import Model
 
+FILMED = 0.02  # share of stacks with thin films, which take longer
+SLOW = 8.0  # seconds of processor time that no stack may take, far above what most do: clocks of busy machines err
 COSINES = (1.0, 0.9, 0.7, 0.5, 0.2, 0.03, 1e-3, 1e-6)
 GAIN = 1e-3  # of energy, by which tables may err
 STEP = 1e-6  # relative change of one value,
@@ -25,8 +29,10 @@ STEADY = 6  # at the first so many cosines: at grazing, equal indices that come 
 def trial(rng: np.random.Generator) -> list[Failure]:
     """One random stack with a random model; half of them absurd."""
     absurd = rng.random() < 0.5
-    stack = random_stack(rng, absurd)
-    return tried(stack, random_model(rng), rng, continuous=not absurd)
+    stack, model = random_stack(rng, absurd), random_model(rng)
+    if rng.random() < FILMED:
+        stack = filmed(stack, rng, absurd)
+    return tried(stack, model, rng, continuous=not absurd)
 
 
 def tried(stack: vt.Stack, model: Model, rng: np.random.Generator, continuous: bool = True) -> list[Failure]:
@@ -36,8 +42,12 @@ def tried(stack: vt.Stack, model: Model, rng: np.random.Generator, continuous: b
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            start = time.thread_time()
             found = vt.lobes(stack, COSINES, phi, model)
+            seconds = time.thread_time() - start
             wrong = _wrong(found)
+            if seconds > SLOW:
+                wrong.append(("slow", f"{seconds:.1f} s of processor time"))
             if continuous and not wrong and (name := _changeable(stack, rng)):
                 value: Any = stack.flat()[name]
                 changed = stack.replace(**{name: value * (1 + STEP)})
