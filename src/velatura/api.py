@@ -6,10 +6,12 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from velatura.errors import InvalidInput
 from velatura.model.lobe_statistics import StackLobes
-from velatura.model.models import DEFAULT, SWITCHES, Model, named
+from velatura.model.models import DEFAULT, MODELS, SWITCHES, Model, named
 from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import MaterialLike, dumps, load
+from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -84,8 +86,10 @@ def bsdf(stack: MaterialLike, model: str | Model = DEFAULT, **switches: Any) -> 
     from velatura import kernel
 
     described = load(stack)
-    if model in PLUGINS:
-        options = {"type": PLUGINS[str(model)], **switches}
+    if isinstance(model, str) and model in PLUGINS:
+        options = {"type": PLUGINS[model], **switches}
+    elif isinstance(model, str) and model not in (known := [each.name for each in MODELS]):
+        raise InvalidInput(unknown("model", model, [*known, *PLUGINS]))
     else:
         chosen = named(model, **switches)
         options = {"type": "layered", "model": chosen.name, **{switch: getattr(chosen, switch) for switch in SWITCHES}}

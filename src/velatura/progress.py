@@ -20,7 +20,7 @@ def bar(title: str) -> Iterator[Callable[[int, int], None]]:
     )
 
     times = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), *times)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), *times)
     console = Console(stderr=True)
     shown = console.is_terminal or console.is_jupyter
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:

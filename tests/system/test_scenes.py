@@ -418,12 +418,13 @@ def test_a_path_that_cannot_be_written_is_refused_in_one_line(name: str, says: s
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
 
-@pytest.mark.parametrize("size", [0, (8, -1), (8,), (8, 8, 8), 8.5, (8, "8"), "8x8", 10**6])
+@pytest.mark.parametrize("size", [0, (8, -1), (8,), (8, 8, 8), 8.5, (8, "8"), "8by8", "8x0", "٣", 10**6])
 def test_an_impossible_size_is_refused(size: Any) -> None:
-    allowed = r"must be pixels, or \(width, height\), each from 1 to 16384"
+    allowed = r"must be pixels, \(width, height\) or 'WxH', from 1 to 16384"
     with pytest.raises(InvalidInput, match=rf"^size is .*, and {allowed}$"):
         scenes.render(GOLD, size=size)
 
 
 def test_one_number_is_the_size_of_both_sides() -> None:
     assert scenes.render(GOLD, spp=1, size=8).shape == (8, 8, 3)
+    assert scenes.render(GOLD, spp=1, size="8x6").shape == (6, 8, 3)

@@ -6,6 +6,7 @@ printed here is known.
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -25,6 +26,8 @@ import velatura
 from velatura.cli import options, progress
 from velatura.errors import MissingTool, NoSolution
 from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
+from velatura.kernel import Finding
+from velatura.scenes.stage import width_and_height
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -78,7 +81,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     model = SimpleNamespace(DEFAULT="plain", SWITCHES={"tir": ("off", "published"), "map": ("belcour", "weier")})
     monkeypatch.setitem(sys.modules, "velatura.model", model)
     monkeypatch.setitem(sys.modules, "velatura.scenes", scenes)
-    monkeypatch.setitem(sys.modules, "velatura.scenes.stage", SimpleNamespace(LARGEST=16384))
+    monkeypatch.setitem(sys.modules, "velatura.scenes.stage", SimpleNamespace(width_and_height=width_and_height))
     for name, stub in {"model": model, "scenes": scenes, "lobes": lobes, "render": render}.items():
         monkeypatch.setitem(vars(velatura), name, stub)
     return seen
@@ -155,8 +158,9 @@ def test_size_in_pixels(
         (["render", "M", "--size", "0"], ["--size", "from 1"]),
         (["render", "M", "--size", "10by10"], ["--size", "WxH"]),
         (["render", "M", "--size", "99999"], ["--size", "16384"]),
-        (["render", "M", "--spp", "0"], ["--spp", "1"]),
-        (["render", "M", "--spp", "many"], ["--spp"]),
+        (["render", "M", "--spp", "0"], ["--spp: must be a whole number in 1 to 1048576, got 0\n"]),
+        (["render", "M", "--spp", "many"], ["--spp: must be a whole number in 1 to 1048576, got many\n"]),
+        (["coat", "M", "--eta", "20"], ["--eta: must be a number in 0.1 to 10.0, got 20\n"]),
         (["render", "M", "--seed", "-1"], ["--seed"]),
     ],
 )
@@ -168,6 +172,18 @@ def test_bad_input_is_one_line_and_status_2(
     assert err.startswith("velatura: ")
     assert err.count("\n") == 1
     assert all(word in err for word in words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check", "bare-gold", "--model", "nosuch"], "velatura, reference, weidlich_wilkie)"),
+        (["benchmark", "score", "--model", "nosuch"], "unknown entrant 'nosuch' (known: walk, "),
+    ],
+)
+def test_an_unknown_model_lists_all_that_are_accepted(run: Run, arguments: list[str], words: str) -> None:
+    status, out, err = run(*arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1) and words in err
 
 
 # Results
@@ -228,6 +244,25 @@ def test_tables_are_measured(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (status, json.loads(out)) == (0, [{**row, "shape": [64, 64]}])
     table = run("tables")[1]
     assert all(cell in table for cell in ["dielectric", "64x64", "4096", "1.25", "2.0e-04", "5.0e-06"])
+
+
+def test_text_is_printed_as_it_is(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rationale: commands and names hold what Rich takes for markup. Expected: the same text, in tables and bars."""
+    finding = Finding("Extra sweep", 'pip install "velatura[sweep]" [/] :gold:', True)
+    monkeypatch.setattr("velatura.kernel.extras", lambda: (finding,))
+    assert " ".join(run("doctor")[1].split()).count(finding.found) == 1
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal
+    for title, made in (("[/a] :gold:", progress.bar), ("[/b] :gold:", lambda title: progress.clock(title, after=0))):
+        shown = io.StringIO()
+        monkeypatch.setattr(sys, "stderr", shown)
+        with made(title):
+            time.sleep(0.05)
+        assert title in shown.getvalue()
+
+
+def test_one_function_makes_the_consoles_of_tables() -> None:
+    files = {path.name for path in Path(options.__file__).parent.glob("*.py") if "Console(" in path.read_text()}
+    assert files == {"options.py", "progress.py"}
 
 
 @pytest.mark.parametrize("ok", [True, False])

@@ -67,7 +67,7 @@ def test_a_file_is_the_stack_that_python_builds() -> None:
 
 def test_stacks_are_frozen_and_hashable() -> None:
     stack = loads(COATED_GOLD)
-    with pytest.raises(ValueError, match="frozen"):
+    with pytest.raises(InvalidInput, match=r"^\w+: a \w+ is never changed; make another one with that value$"):
         stack.name = "other"
     assert hash(stack) == hash(loads(COATED_GOLD))
 

@@ -116,5 +116,5 @@ def entrant(name: str) -> Factory:
         InvalidInput: there is none.
     """
     if name not in ENTRANTS:
-        raise InvalidInput(unknown("entrant", name, ENTRANTS))
+        raise InvalidInput(unknown("entrant", name, ENTRANTS, f"known: {', '.join(ENTRANTS)}"))
     return ENTRANTS[name]

@@ -183,7 +183,8 @@ def _explain(error: BaseException) -> int:
         _complain(str(error))
         return error.exit_status
     if isinstance(error, typer.TyperException):  # a wrong option
-        _complain(" ".join(error.format_message().replace("Value error, ", "").split()))  # Pydantic's name for it
+        message = error.format_message().replace("Value error, ", "")  # Pydantic's name for it
+        _complain(_out_of_range(error) or " ".join(message.split()))
         return error.exit_code
     if isinstance(error, BrokenPipeError):  # the reader has gone (`velatura lobes ... | head`): print nothing more
         return 1
@@ -199,6 +200,18 @@ def _explain(error: BaseException) -> int:
     with contextlib.suppress(OSError):
         traceback.print_exception(error)
     return 1
+
+
+def _out_of_range(error: typer.TyperException) -> str:
+    """The message about a number of the command line, as those about numbers of a file; empty for other errors."""
+    from pydantic import ValidationError
+
+    option, cause = getattr(error, "param", None), error.__cause__
+    low, high = (getattr(option, end, None) for end in ("min", "max"))
+    if option is None or low is None or high is None or not isinstance(cause, ValidationError):
+        return ""
+    kind = "a whole number" if isinstance(low, int) else "a number"
+    return f"{option.opts[0]}: must be {kind} in {low} to {high}, got {cause.errors()[0]['input']}"
 
 
 def _complain(message: str) -> None:

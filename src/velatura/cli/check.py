@@ -40,9 +40,7 @@ def check(
     if as_json:
         print(json.dumps({"material": stack.name or material, "model": name, **report.to_dict()}, allow_nan=False))
     else:
-        from rich.console import Console
-
-        Console().print(_table(f"{stack.name or material} ({name})", report))
+        options.console().print(_table(f"{stack.name or material} ({name})", report))
     if not report.passed:
         raise LawBroken(f"{stack.name or material} ({name}) breaks a law: {', '.join(report.broken)}")
 

@@ -50,9 +50,7 @@ def coat(
         answer |= {"losses": list(coated.losses)} if keep_appearance else {}
         print(json.dumps({"model": coated.model.name, **answer}, allow_nan=False))
         return
-    from rich.console import Console
-
-    Console().print(_table(coated))
+    options.console().print(_table(coated))
     for loss in coated.losses:
         print(f"{loss}; this is the nearest")
     if keep_appearance and not coated.losses:

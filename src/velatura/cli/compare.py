@@ -87,9 +87,7 @@ def compare(
     if as_json:
         print(json.dumps({**found.to_dict(), "material": stack.name or material}, allow_nan=False))
         return
-    from rich.console import Console
-
-    console = Console()
+    console = options.console()
     console.print(_lobes(stack.name or material, found))
     console.print(_whole(found))
     console.print(_summary(found))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import typer
 
+from velatura.cli import options
+
 
 def doctor() -> None:
     """List what is installed, and how to install the rest."""
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from velatura import kernel
     from velatura.editor import bundle
@@ -16,8 +18,9 @@ def doctor() -> None:
     findings = (*kernel.doctor(), *kernel.extras(), bundle.finding())
     table = Table(box=None, show_header=False)
     for finding in findings:
-        table.add_row("[green]ok[/]" if finding.ok else "[red]no[/]", finding.what, finding.found)
-    Console().print(table)
+        ok = Text("ok", "green") if finding.ok else Text("no", "red")
+        table.add_row(ok, finding.what, finding.found)
+    options.console().print(table)
 
     # Commands are printed bare, so that they can be copied
     for finding in findings:

@@ -78,9 +78,7 @@ def show(found: Fit, output: Path | None, picture: Path | None, as_json: bool) -
     if as_json:
         print(json.dumps({"model": found.model.name, **found.to_dict()}, allow_nan=False))
         return
-    from rich.console import Console
-
-    console = Console()
+    console = options.console()
     of = "log(1 + f cos), and ten times of energies" if found.energies else "log(1 + f cos)"
     print(f"Error of {of}: {found.error:.2g} (from other starts: {_others(found)})")
     console.print(_table(found))

@@ -100,10 +100,8 @@ def invert(
         report |= {"reached": first.reached.to_dict()} if first.reached else {}
         print(json.dumps(report | ({"stacks": [s.stack.to_dict() for s in found]} if count > 1 else {})))
         return
-    from rich.console import Console
-
     for solution in found:
-        Console().print(_table(solution))
+        options.console().print(_table(solution))
         for line in _missed(solution):
             print(line)
     say_for_which(found[0].model)

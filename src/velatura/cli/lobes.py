@@ -30,7 +30,7 @@ def lobes(
     material: options.Material,
     cos: Annotated[str, typer.Option(metavar="C,C,...", help="Cosines of the incident directions, in (0, 1].")] = "1",
     phi: Annotated[
-        float, typer.Option(min=-360, max=360, metavar="DEGREES", help="Azimuth of the incident directions.")
+        float, typer.Option(min=-360.0, max=360.0, metavar="DEGREES", help="Azimuth of the incident directions.")
     ] = 0.0,
     model: options.Model = None,
     settings: options.Settings = None,
@@ -52,11 +52,9 @@ def lobes(
         others = {name: getattr(found, name).T.tolist() for name in OTHER_LIGHT}
         print(json.dumps(report | {"transmitted": transmitted and _plain(transmitted)} | others, allow_nan=False))
     else:
-        from rich.console import Console
-
         named = {f"R{k}": lobe for k, lobe in enumerate(reflected, 1)} | ({"T": transmitted} if transmitted else {})
         others = {other: getattr(found, other) for other in OTHER_LIGHT if not (transmitted and other == "passed")}
-        Console().print(_table(f"{stack.name or material} ({name})", cosines, named, others))
+        options.console().print(_table(f"{stack.name or material} ({name})", cosines, named, others))
 
 
 def _plain(lobe: dict[str, Any]) -> dict[str, Any]:

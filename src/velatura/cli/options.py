@@ -10,6 +10,8 @@ import typer
 from velatura.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from velatura.stack import Stack
 
 Material = Annotated[
@@ -38,6 +40,13 @@ Settings = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+
+
+def console() -> Console:
+    """Where tables are printed: text as it is, since names and paths may hold what Rich takes for markup."""
+    from rich.console import Console
+
+    return Console(markup=False, emoji=False)
 
 
 def read(material: str, settings: list[str] | None) -> tuple[Stack, dict[str, Any]]:

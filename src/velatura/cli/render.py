@@ -39,9 +39,7 @@ def render(
 ) -> None:
     """Render a picture of a material."""
     # Refuse what cannot work before anything slow begins
-    from velatura.scenes.stage import width_and_height
-
-    pixels = None if size is None else width_and_height(size)
+    pixels = None if size is None else _pixels(size)
     path = output or Path(f"{Path(material).stem}.png")
     stack, switches = options.read(material, settings)
     import velatura
@@ -57,3 +55,9 @@ def render(
     scenes.write_image(image, path)
     height, width = image.shape[:2]
     print(f"{path}: {width} x {height} pixels, {spp} samples each, {time.perf_counter() - start:.1f} s")
+
+
+def _pixels(size: str) -> tuple[int, int]:
+    from velatura.scenes.stage import width_and_height
+
+    return width_and_height(size, "--size")

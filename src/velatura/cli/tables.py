@@ -25,7 +25,6 @@ def tables(
         print(json.dumps(rows, allow_nan=False))
         return
 
-    from rich.console import Console
     from rich.table import Table
 
     table = Table()
@@ -33,7 +32,7 @@ def tables(
         table.add_column(column.replace("_", " "), justify="left" if column == "table" else "right")
     for row in rows:
         table.add_row(*(_cell(name, value) for name, value in row.items()))
-    Console().print(table)
+    options.console().print(table)
 
 
 def _cell(name: str, value: Any) -> str:

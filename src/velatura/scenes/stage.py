@@ -75,13 +75,13 @@ def scene_dict(
     }
 
 
-def width_and_height(size: Any) -> tuple[int, int]:
+def width_and_height(size: Any, name: str = "size") -> tuple[int, int]:
     """The pixels of a picture along both sides, given as a pair, as one number, or as text. Raises InvalidInput."""
-    if isinstance(size, str) and (text := re.fullmatch(r"([0-9]{1,5})(?:x([0-9]{1,5}))?", size)):
-        size = int(text[1]), int(text[2] or text[1])
     sides = size if isinstance(size, (tuple, list)) else (size, size)
+    if isinstance(size, str) and (text := re.fullmatch(r"([0-9]{1,5})(?:x([0-9]{1,5}))?", size)):
+        sides = int(text[1]), int(text[2] or text[1])
     if len(sides) != 2 or not all(isinstance(side, (int, np.integer)) and 1 <= side <= LARGEST for side in sides):
-        raise InvalidInput(f"size is {size!r}, and must be pixels, (width, height) or 'WxH', each from 1 to {LARGEST}")
+        raise InvalidInput(f"{name} is {size!r}, and must be pixels, (width, height) or 'WxH', from 1 to {LARGEST}")
     return int(sides[0]), int(sides[1])
 
 

@@ -102,6 +102,14 @@ class Record(BaseModel):
         except ValidationError as error:
             raise InvalidInput(_first_line(error)) from None
 
+    def __setattr__(self, key: str, value: Any) -> None:
+        if key.startswith("_"):  # what a record keeps of files that it has read
+            return super().__setattr__(key, value)
+        raise InvalidInput(f"{key}: a {type(self).__name__} is never changed; make another one with that value")
+
+    def __delattr__(self, key: str) -> None:
+        raise InvalidInput(f"{key}: a {type(self).__name__} is never changed; make another one without that value")
+
     @classmethod
     def from_dict(cls: type[RecordType], fields: Mapping[Any, Any]) -> RecordType:
         """The model described by a mapping as it stands in a file.
