@@ -10,6 +10,7 @@ check      `vt.check` on tame stacks: no law is broken that its model does not d
 files      mutated material files: refused in one line that names the file, or equal once written and read again
 imports    likewise files of other programs, tables, spectra and textures; in bounded time and memory
 commands   mutated command lines and input files: no traceback, a known status, nothing written or lost on refusal
+plans      mutated plans of sweeps: refused in one line that names the file, or their points have stacks
 
 Without a name all run. FOLDER gets the smallest input of each kind of failure as YAML; `--index` repeats one input in
 this process. Exit status 1 if anything fails, the death of a process included. All take an hour on two quiet cores.
@@ -33,7 +34,7 @@ from rich.progress import Progress
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
-from fuzzing import Failure, Trial, checking, commands, files, imports, lobes, plugin, scalar
+from fuzzing import Failure, Trial, checking, commands, files, imports, lobes, plans, plugin, scalar
 
 # The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
 PROGRAMS: dict[str, tuple[Trial, int, int]] = {
@@ -44,6 +45,7 @@ PROGRAMS: dict[str, tuple[Trial, int, int]] = {
     "files": (files.trial, 15_000, 1_500),
     "imports": (imports.trial, 15_000, 1_000),
     "commands": (commands.trial, 500, 100),
+    "plans": (plans.trial, 1_000, 500),
 }
 
 Found = list[tuple[int, Failure]]

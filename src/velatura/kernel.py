@@ -372,8 +372,9 @@ def extras() -> tuple[Finding, ...]:
 
 
 def _find_extra(extra: str) -> Finding:
-    wanted = re.compile(rf"([\w-]+)[^;]*; extra == ['\"]{extra}['\"]")
-    names = [found[1] for line in importlib.metadata.requires("velatura") or () if (found := wanted.fullmatch(line))]
+    wanted = re.compile(rf"([\w-]+)[^;]*;.*\bextra == ['\"]{extra}['\"]")
+    lines = importlib.metadata.requires("velatura") or ()
+    names = dict.fromkeys(found[1] for line in lines if (found := wanted.fullmatch(line)))  # once, for all Pythons
     try:
         versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
     except importlib.metadata.PackageNotFoundError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from fuzzing import commands, files, imports
+from fuzzing import commands, files, imports, plans
 
 
 def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
@@ -14,6 +14,10 @@ def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
 def test_any_file_of_other_programs_is_refused_in_one_line_or_read_back_equal() -> None:
     rng = np.random.default_rng(8)
     assert not [failure for _ in range(200) for failure in imports.trial(rng)]
+
+
+def test_any_plan_is_refused_in_one_line_or_has_points() -> None:
+    assert not [failure for i in (39, *range(60)) for failure in plans.trial(np.random.default_rng((0, *b"plans", i)))]
 
 
 def test_any_command_line_ends_in_one_line_and_loses_nothing() -> None:

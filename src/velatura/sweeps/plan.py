@@ -30,8 +30,10 @@ class Asked(Parameter):
     what = f"one of {', '.join(QUESTIONS)}, or in Python a function (stack, seed)"
 
     def check(self, value: Any) -> str | Callable[..., Any]:
-        if not callable(value) and value not in QUESTIONS:
-            raise ValueError(unknown("question", value, QUESTIONS)) if isinstance(value, str) else self.refuse(value)
+        if isinstance(value, str) and value not in QUESTIONS:
+            raise ValueError(unknown("question", value, QUESTIONS))
+        if not isinstance(value, str) and not callable(value):
+            raise self.refuse(value)
         return value
 
     def json_schema(self) -> dict[str, Any]:
