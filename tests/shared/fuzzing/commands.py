@@ -42,7 +42,12 @@ SCENE = """\
 <integer name="width" value="8"/><integer name="height" value="8"/></film><transform name="to_world">
 <lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform></sensor></scene>
 """
+GLTF = (
+    '{"asset": {"version": "2.0"}, "materials": [{"name": "Red", "pbrMetallicRoughness": {"baseColorFactor": '
+    '[0.8, 0.1, 0.1, 1], "metallicFactor": 0, "roughnessFactor": 0.4}}]}'
+)
 INPUTS = {
+    "surface.gltf": GLTF,
     "material.yaml": MATERIAL,
     "target.yaml": TARGET,
     "table.csv": TABLE,
@@ -69,6 +74,15 @@ export material.yaml --to glsl -o new.glsl --constant layer0_eta
 export material.yaml --to json -o new.json --set layer0_alpha=0.3
 export material.yaml --to mitsuba-xml -o new.xml --model weier2020
 export material.yaml --to python
+export material.yaml --to gltf -o new.gltf
+export material.yaml --to openpbr -o new.mtlx
+import surface.gltf -o new.yaml
+sweep nowhere.yaml -o new.zarr --workers 1
+benchmark score --values table.csv --kind pane --keep found --json
+benchmark pairs -o found
+edit nowhere.yaml --static kept.txt
+cite weier2020 --format text
+figure no-such -o new.png --size 8
 presets --json
 schema
 doctor
