@@ -42,6 +42,7 @@ Array = NDArray[np.floating]
 
 RGB = 3
 NORMALS = {True: 1597, False: 987}  # over which lobes are integrated, of isotropic materials and of others
+FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is that of values over a step
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
 EVENLY = 377  # directions over which the remainder is integrated
@@ -166,8 +167,8 @@ class Solver:
     """How materials of NumPy's values are solved for the directions of a grid, in a number of colours.
 
     `shape` is that of the grid on which a renderer has the columns. `samples` are those of `velatura.model.exchange`;
-    `normals` are those of facets, and of lobes that are integrated, None for as many as usual. Operators that materials
-    share are `made` once.
+    `normals` are those of facets, and of lobes that are integrated, None for as many as usual, or as are asked for by
+    `finely`. Operators that materials share are `made` once.
     """
 
     model: Model
@@ -178,6 +179,7 @@ class Solver:
     tables: Tables
     samples: int | None = None
     normals: int | None = None
+    finely: bool = False
     made: Made = field(default_factory=dict)
 
     @classmethod
@@ -278,7 +280,7 @@ class Solver:
             self.tables if self.model.microsurface else None,
             widths.nearly_straight,
             self.made,
-            samples=self.normals or SAMPLES,
+            samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
             like=layout.indices,
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
@@ -304,7 +306,7 @@ class Solver:
         whole = polynomial.albedo(cosine) + folded.around(clipped)
         energy, weights, wanted = [], [], []
         for shape, tensor, each in zip(shapes, shown, drawn):
-            normals = self.normals or NORMALS[self.isotropic]
+            normals = self.normals or (FINELY[1] if self.finely else NORMALS[self.isotropic])
             z, squares, largest = own_medium.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, normals)
             light = (veils if each.veil else lobes)[each.interface]
             # The remainder takes what light it can, by which a lobe would be too bright
@@ -458,7 +460,8 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
     packings: list[Packing] = []
 
     def arrays(numbers: list[float]) -> list[Array]:
-        found = solver.solve(given.replaced(start, numbers), layouts)
+        # After the values come their differences
+        found = replace(solver, finely=bool(packings)).solve(given.replaced(start, numbers), layouts)
         if not packings:
             packings.extend(Packing.of(side.rows, side.groups, shared=not given.given) for side in found)
         flat = []

@@ -112,7 +112,8 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     orders: list[Sequence[bool]] = []
 
     def arrays(numbers: list[float]) -> list[Array]:
-        found = solver.solve(given.replaced(start, numbers), layouts)
+        # After the values come their differences
+        found = replace(solver, finely=bool(orders)).solve(given.replaced(start, numbers), layouts)
         orders[:] = [[len(np.atleast_2d(each)) > 1 for each in side.columns.all] for side in found]
         return [flat for side in found for flat in _flat(side, solver, places, nodes)]
 

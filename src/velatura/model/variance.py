@@ -15,6 +15,8 @@ from velatura.ops import Value
 
 V = TypeVar("V", bound="Variance")
 
+ALIKE = 1e-6  # difference of two eigenvalues, as share of their mean, that is rounding
+
 
 class Roughness(NamedTuple):
     """GGX roughness along two axes, the first turned from the tangent by `rotation` (radians, anticlockwise)."""
@@ -135,7 +137,8 @@ class Covariance(Variance):
         with ops.block("Eigenvalues mean +- radius; where they agree the axes stay those of the frame"):
             mean, half = 0.5 * (self.xx + self.yy), 0.5 * (self.xx - self.yy)
             radius = ops.sqrt(half * half + self.xy * self.xy)
-            turned = radius > 1e-9 * mean
+            turned = radius > ALIKE * mean
+            radius = ops.select(turned, radius, half)  # which has a gradient there, too
             rotation = 0.5 * ops.arctan2(ops.select(turned, self.xy, 0.0), ops.select(turned, half, 1.0))
             u = mean + radius
             v = ops.divide(ops.maximum(self.xx * self.yy - self.xy * self.xy, 0.0), u)  # mean - radius would cancel

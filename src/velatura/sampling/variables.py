@@ -13,7 +13,7 @@ from velatura.sampling import differences
 from velatura.stack import Address, Material
 
 # Steps over a value; those of films are small to phases
-RELATIVES = {"alpha_u": 0.04, "alpha_v": 0.04, "rotation": 0.0, "film_thickness_nm": 0.0, "film_eta": 0.004}
+RELATIVES = {"alpha_u": 0.06, "alpha_v": 0.06, "rotation": 0.0, "film_thickness_nm": 0.0, "film_eta": 0.004}
 RELATIVE = 0.02
 STEPS = {
     "alpha_u": 0.004,
