@@ -11,7 +11,7 @@ import functools
 import operator
 import textwrap
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -222,10 +222,18 @@ class Binding:
         return any(image.varies for image in self.images.values())
 
     def update(self) -> None:
-        """Update constants and steering values, after any value has changed."""
+        """Update constants and steering values, after any value has changed.
+
+        Raises:
+            InvalidInput: a number or a texel is not finite.
+        """
         import drjit as dr
 
-        self.constants = {name: self._within_range(name, value) for name, value in self.parameters.items()}
+        for name, image in self.images.items():
+            if isinstance(image, Image) and not all(np.isfinite(texels).all() for _, texels in self._read(image)):
+                raise InvalidInput(f"{name}: has texels that are not finite")
+        within = {name: self._within_range(name, value) for name, value in self.parameters.items()}
+        self.constants = {name: self._shared(value) for name, value in within.items()}
         dr.make_opaque(self.constants)  # a changed value needs no new kernel
         self.coatings = self._coatings()
         if self.mi.is_spectral:
@@ -244,9 +252,9 @@ class Binding:
         """
         import drjit as dr
 
-        declared, channels = self.addresses[name].declared, np.ravel(np.array(dr.detach(value), float))
+        declared, channels = self.addresses[name].declared, _channels(value)
         try:
-            for channel in channels.tolist():
+            for channel in channels:
                 declared.check(channel)
         except ValueError as error:
             if not np.isfinite(channels).all():
@@ -256,6 +264,15 @@ class Binding:
                 warnings.warn(f"{name}: {error}; the nearest value that is allowed stands for it", stacklevel=2)
             return dr.replace_grad(dr.clip(value, *declared.within), value)
         return value
+
+    def _shared(self, value: Any) -> Any:
+        """A colour as one number where that holds all of it, so that a grey material costs what a number does."""
+        import drjit as dr
+
+        if not isinstance(value, self.mi.Color3f):
+            return value
+        apart = len({channel.index_ad for channel in value}) if dr.grad_enabled(value) else len(set(_channels(value)))
+        return value.x if apart == 1 else value
 
     def _coatings(self) -> Sequence[Any]:
         """The films on each layer, worked out."""
@@ -347,10 +364,8 @@ class Binding:
         channels = len(mi.UnpolarizedSpectrum()) if image.colour else 1
         if mi.is_spectral and image.colour:
             return np.tile([unknown.get(address.role, address.declared.within)], (channels, 1))
-        read = mi.traverse(image.texture)
         found = []
-        for value in [value for name, value in read if name.split(".")[-1] in _TEXELS]:
-            texels = np.atleast_2d(np.array(dr.detach(value), float))
+        for value, texels in self._read(image):
             if isinstance(value, mi.TensorXf):
                 texels = texels.reshape(-1, texels.shape[-1]).T
             # One number for all colours lies between them
@@ -361,6 +376,14 @@ class Binding:
             return np.tile([unknown.get(address.role, address.declared.within)], (channels, 1))
         texels = np.concatenate(found, axis=1)
         return np.clip(texels * image.scale + image.offset, image.low, image.high)
+
+    def _read(self, image: Image) -> Iterator[tuple[Any, Any]]:
+        """Values of a texture in `traverse`, as they are and as numbers (rows, ...)."""
+        import drjit as dr
+
+        for name, value in self.mi.traverse(image.texture):
+            if name.split(".")[-1] in _TEXELS:
+                yield value, np.atleast_2d(np.array(dr.detach(value), float))
 
     def at_wavelengths(self, nm: Sequence[float], material: Material | None = None) -> Material:
         """The material of values that are the same everywhere, or another one, with spectra in channels at these
@@ -517,11 +540,11 @@ class Binding:
             self.images[name] = self._spectrum(address, value)
         else:
             value = address.declared.reduced(value) if isinstance(value, Measured) else value
-            if isinstance(value, tuple):
-                colour = mi.Color3f(*value)
-                self.parameters[name] = mi.luminance(colour) if mi.is_monochromatic else colour
+            if isinstance(value, tuple) and mi.is_monochromatic:
+                self.parameters[name] = mi.luminance(mi.Color3f(value))
             else:
-                self.parameters[name] = mi.Float(value)
+                # Three channels even if grey, so that a colour can be optimised from there
+                self.parameters[name] = mi.Color3f(value) if address.colour and mi.is_rgb else mi.Float(value)
 
     def _object(self, address: Address, texture: Any) -> Image:
         colour, kind = address.colour, texture.class_name()
@@ -576,6 +599,13 @@ def texels(mi: Any, name: str, image: Texture, colour: bool) -> Any:
     if image.curve:
         texels = np.interp(texels, np.linspace(0, 1, len(image.curve)), image.curve).astype(texels.dtype)
     return np.ascontiguousarray(texels)
+
+
+def _channels(value: Any) -> list[float]:
+    import drjit as dr
+
+    channels: list[float] = np.ravel(np.array(dr.detach(value), float)).tolist()
+    return channels
 
 
 def _text(value: Any) -> str:

@@ -104,3 +104,22 @@ def test_one_variable_for_both_axes_leaves_an_interface_isotropic(monkeypatch: p
             float(value(vt.bsdf(COATED.replace(**{f"layer{layer}_alpha": end})), UP)[0]) for end in (x - step, x + step)
         )
         assert np.isclose(float(dr.grad(alpha)[0]), (high - low) / (2 * step), rtol=0.02, atol=0.003)
+
+
+def test_a_colour_is_optimised_from_grey() -> None:
+    """The absorption of a coat, from its light in some directions: within .02 of that of the target."""
+    coat = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Medium(sigma_a=0.5), vt.Interface(conductor="Au", alpha=0.3)])
+    truth, key, wo = (0.1, 0.4, 0.9), "layer1_sigma_a", dr.normalize(mi.Vector3f(-0.3, 0.1, 1))
+    si = dr.zeros(mi.SurfaceInteraction3f, 16)
+    angle = dr.two_pi / 16 * dr.arange(mi.Float, 16)
+    si.wi = dr.normalize(mi.Vector3f(dr.cos(angle), dr.sin(angle), 1.5))
+    expected = vt.bsdf(coat.replace(**{key: truth})).eval(mi.BSDFContext(), si, wo)
+    bsdf = vt.bsdf(coat)
+    parameters = mi.traverse(bsdf)
+    optimiser = mi.ad.Adam(lr=0.1, beta_1=0.7, params={key: parameters[key]})
+    for _ in range(25):
+        parameters[key] = optimiser[key]
+        parameters.update()
+        dr.backward(dr.mean(dr.square(bsdf.eval(mi.BSDFContext(), si, wo) / expected - 1), axis=None))
+        optimiser.step()
+    np.testing.assert_allclose(np.ravel(optimiser[key]), truth, atol=0.02)

@@ -351,3 +351,46 @@ def test_an_optimiser_that_overshoots_comes_back(variant: str) -> None:
         dr.backward(dr.sum(bsdf.eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(*WO)))))
         slopes.append(float(dr.grad(parameters["layer1_depth"])[0]))
     assert slopes[0] < 0 and slopes[1] == pytest.approx(slopes[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018"])
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb"], indirect=True)
+def test_every_grey_colour_takes_three_channels(model: str, variant: str) -> None:
+    """Of numbers and of grey `rgb`: the BSDF then equals one that is made with the colours."""
+    si, wo = dr.zeros(mi.SurfaceInteraction3f), dr.normalize(mi.Vector3f(*WO))
+    si.wi = dr.normalize(mi.Vector3f(*WI))
+    coat = {"layer0_eta": 1.5, "layer0_alpha": 0.1, "layer1_sigma_a": 0.5, "layer1_sigma_s": 0.2}
+    for base in ({"layer2_eta": 0.5, "layer2_k": 3.0, "layer2_alpha": 0.2}, {"layer2_albedo": 0.5}):
+        greys = {key: value for key, value in (coat | base).items() if not key.endswith("alpha")}
+        colours = {key: (value, 1.1 * value, 1.2 * value) for key, value in greys.items()}
+        expected = vt.bsdf(vt.Stack.from_flat(None, coat | base | colours), model=model).eval(mi.BSDFContext(), si, wo)
+        rgb = {key: {"type": "rgb", "value": [value] * 3} for key, value in greys.items()}
+        for given in (greys, rgb):
+            bsdf = mi.load_dict({"type": "layered", "model": model, **coat, **base, **given})
+            parameters = mi.traverse(bsdf)
+            for key, colour in colours.items():
+                parameters[key] = mi.Color3f(colour)
+            parameters.update()
+            found = bsdf.eval(mi.BSDFContext(), si, wo)
+            np.testing.assert_allclose(np.ravel(found), np.ravel(expected), rtol=1e-5)
+
+
+@pytest.mark.parametrize("model", ["velatura", "belcour2018"])
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb"], indirect=True)
+def test_texels_that_are_not_finite_are_refused(model: str, variant: str) -> None:
+    """In a texture of a scene, when it is loaded and after a change."""
+    refusal = r"layer0_alpha_u: has texels that are not finite"
+    texels = np.full((2, 2, 1), 0.2, np.float32)
+
+    def bsdf() -> Any:
+        image = {"type": "bitmap", "bitmap": mi.Bitmap(texels), "raw": True}
+        return mi.load_dict({"type": "layered", "model": model, "layer0_conductor": "mirror", "layer0_alpha": image})
+
+    parameters, key = mi.traverse(bsdf()), "layer0_alpha_u.data"
+    for bad in (np.nan, np.inf):
+        texels[0, 1] = bad
+        with pytest.raises(RuntimeError, match=refusal):
+            bsdf()
+        parameters[key] = mi.TensorXf(texels)
+        with pytest.raises(InvalidInput, match=refusal):
+            parameters.update()
