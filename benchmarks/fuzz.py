@@ -6,6 +6,7 @@
 lobes      stacks through `vt.lobes`, all models and switches, cosines to 1e-6: finite, no energy gained, no jumps
 plugin     stacks through `vt.bsdf`, all models, either side, down to the horizon: its functions agree, see laws
 scalar     stacks through `vt.bsdf` in scalar_rgb, the exact normal and the mirror direction too: as plugin, none raises
+gradients  stacks through `vt.bsdf`, every kind of number: gradients are differences of the light that leaves
 check      `vt.check` on tame stacks: no law is broken that its model does not declare
 files      mutated material files: refused in one line that names the file, or equal once written and read again
 imports    likewise files of other programs, tables, spectra and textures; in bounded time and memory
@@ -34,13 +35,14 @@ from rich.progress import Progress
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
-from fuzzing import Failure, Trial, checking, commands, files, imports, lobes, plans, plugin, scalar
+from fuzzing import Failure, Trial, checking, commands, files, gradients, imports, lobes, plans, plugin, scalar
 
 # The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
 PROGRAMS: dict[str, tuple[Trial, int, int]] = {
     "lobes": (lobes.trial, 100_000, 5_000),
     "plugin": (plugin.trial, 2_000, 100),
     "scalar": (scalar.trial, 400, 100),
+    "gradients": (gradients.trial, 300, 50),
     "check": (checking.trial, 500, 100),
     "files": (files.trial, 15_000, 1_500),
     "imports": (imports.trial, 15_000, 1_000),

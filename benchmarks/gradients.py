@@ -1,6 +1,8 @@
 """Processor time of a step of an optimisation (`prb`, there and back): the first, with nothing compiled, and later.
+How smooth values are in a roughness, and how near its gradient is to their slope.
 
 python benchmarks/gradients.py        # all cases, each in a process of its own that has no kernels of an earlier one
+python benchmarks/gradients.py smooth # roughness alone
 """
 
 from __future__ import annotations
@@ -30,6 +32,19 @@ CASES: dict[str, tuple[list[dict[str, Any]], str]] = {  # layers, and the value 
     "paint under lacquer, colour textured": ([COAT, {"diffuse": {"albedo": 0.5}}], "layer1_albedo texture"),
 }
 
+COATED = {"layer0_eta": 1.5, "layer0_alpha_u": 0.1, "layer0_alpha_v": 0.1}
+ROUGH: dict[str, dict[str, Any]] = {
+    "gold under a coat": {**COATED, "layer1_conductor": "Au", "layer1_alpha_u": 0.3, "layer1_alpha_v": 0.3},
+    "brushed aluminium under a coat": {
+        **COATED,
+        "layer1_conductor": "Al",
+        "layer1_alpha_u": 0.1,
+        "layer1_alpha_v": 0.35,
+        "layer1_rotation": 30.0,
+    },
+}
+LIT, SEEN = 48, (96, 192)  # directions of light, and those (angles, azimuths) over which what leaves is integrated
+
 
 def main() -> None:
     for name in CASES:
@@ -39,6 +54,50 @@ def main() -> None:
         first, later = json.loads(run.stdout)
         row("first step", name, first)
         row("later steps", name, later)
+    smooth()
+
+
+def smooth() -> None:
+    """Light that leaves towards a broad lamp, for each roughness over 21 steps of 1 %: the residual of a cubic, and the
+    gradient in the middle beside the cubic's, both times the roughness over the light."""
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_rgb")
+    import drjit as dr
+
+    import velatura as vt
+
+    # Light from all sides of a sphere, without noise
+    z, phi = np.sqrt((np.arange(LIT) + 0.5) / LIT), 2 * np.pi * 0.618034 * np.arange(LIT)
+    wi = np.array([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z])
+    x, weights = np.polynomial.legendre.leggauss(SEEN[0])
+    theta, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(SEEN[1]) + 0.5) / SEEN[1] * 2 * np.pi, indexing="ij")
+    wo = np.array([np.sin(theta) * np.cos(turn), np.sin(theta) * np.sin(turn), np.cos(theta)]).reshape(3, -1)
+    area = (np.sin(theta) * weights[:, None]).ravel() * np.pi**2 / (2 * SEEN[1])
+    lamp = mi.Float(np.tile(area * (1 + 4 * np.clip(np.array([0.48, 0.36, 0.8]) @ wo, 0, 1) ** 8), LIT) / LIT)
+    si = dr.zeros(mi.SurfaceInteraction3f, LIT * area.size)
+    si.wi, towards = mi.Vector3f(np.repeat(wi, area.size, axis=1)), mi.Vector3f(np.tile(wo, LIT))
+
+    def light(bsdf: Any) -> Any:
+        return dr.mean(bsdf.eval(mi.BSDFContext(), si, towards)) * lamp
+
+    places = np.arange(-10, 11)
+    for name, flat in ROUGH.items():
+        for key in (key for key in flat if "alpha" in key):
+            values = []
+            for place in places:
+                bsdf = vt.bsdf(vt.Stack.from_flat(None, {**flat, key: flat[key] * float(1 + 0.01 * place)}))
+                values.append(np.array(light(bsdf), float).sum())
+            cubic = np.polynomial.Polynomial.fit(places, values, 3)
+            bsdf = vt.bsdf(vt.Stack.from_flat(None, flat))
+            parameters = mi.traverse(bsdf)
+            dr.enable_grad(parameters[key])
+            parameters.update()
+            dr.backward(dr.sum(light(bsdf)))
+            share = flat[key] / values[len(values) // 2]
+            slope = float(cubic.deriv()(0)) * 100 / flat[key] * share
+            row("unevenness", f"{name}, {key}", float(np.std(values - cubic(places)) / np.mean(values)), "of the light")
+            row("gradient", f"{name}, {key}", float(dr.grad(parameters[key])[0]) * share, "", f"of a cubic {slope:.3g}")
 
 
 def measure(name: str) -> tuple[float, float]:
@@ -91,6 +150,6 @@ def measure(name: str) -> tuple[float, float]:
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        print(json.dumps(measure(sys.argv[1])))
+        smooth() if sys.argv[1] == "smooth" else print(json.dumps(measure(sys.argv[1])))
     else:
         main()
