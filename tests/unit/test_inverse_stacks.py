@@ -27,6 +27,7 @@ from velatura.inverse import (
     load_target,
     pair,
     plots,
+    stacks,
 )
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model import MODELS, Model, named
@@ -670,3 +671,42 @@ def test_a_lobe_may_end_in_a_mirror_that_what_absorbs_above_it_colours(interface
     assert plots.png(found[0].classes[-1]).startswith(b"\x89PNG")
     with pytest.raises(InvalidInput, match="lobe 1: fixed: eta: a mirror has none"):
         Target([{"energy": 1, "base": "mirror", "fixed": {"eta": [2]}}])
+
+
+def pinned_pairs(count: int, seed: int) -> list[Target]:
+    """Random wishes of pairs, most of which have a fixed index between their interfaces."""
+    rng, wishes = np.random.default_rng(seed), []
+    for _ in range(count):
+        lobes: list[dict[str, Any]] = []
+        for _ in range(int(rng.integers(2, 4))):
+            lobe: dict[str, Any] = {"energy": tuple(rng.uniform(0.01, 0.06, 3).tolist()), "interfaces": 2}
+            lobe["alpha"] = float(0.15 * len(lobes) + rng.uniform(0, 0.3))
+            if rng.random() < 0.6:
+                lobe["fixed"] = {"eta": [float(rng.uniform(1, 1.8)), None]}
+            lobes.append(lobe)
+        wishes.append(Target(lobes))
+    return wishes
+
+
+CROWDED = Target(
+    [
+        {"energy": (0.15, 0.2, 0.12), "alpha": 0.04, "interfaces": 2},
+        {"energy": 0.16, "alpha": 0.33, "interfaces": 2, "fixed": {"eta": [1.49, None]}},
+        {"energy": (0.02, 0.12, 0.045), "alpha": 0.13, "interfaces": 2},
+    ]
+)
+
+
+def test_pairs_with_fixed_indices_are_found_or_refused() -> None:
+    """Expected: stacks with the lobes and the indices that were asked for, or none; never an error of arrays."""
+    found = 0
+    for target in [CROWDED, *pinned_pairs(12, seed=3)]:
+        solution = stacks.search(target, AVERAGED)
+        if solution is None:
+            continue
+        found += 1
+        assert max(read(target, solution.stack, AVERAGED)) < 1e-6
+        for lobe, upper in zip(target.lobes, solution.layers[::2]):
+            if (asked := lobe.fixed.of("eta", 0)) is not None:
+                assert float(np.ravel(upper.eta)[0]) == asked
+    assert found > 2

@@ -94,7 +94,8 @@ def _apart(y: Array, order: np.ndarray, distance: float) -> np.ndarray:
 def _along(target: Target, model: Model, indices: Mapping[int, Array]) -> tuple[Partial, np.ndarray, Array]:
     """The stacks with given indices, (N,) by lobe, which of the N each has, and how near each of the N comes, (N,).
 
-    The last is the number of lobes that it has, and less than 1 for the margin that the next one misses.
+    Other pairs have a fixed index. The last is the number of lobes that it has, and less than 1 for the margin that the
+    next one misses.
     """
     paths = stacks.beginning(target, model)
     count = len(next(iter(indices.values())))
@@ -102,6 +103,8 @@ def _along(target: Target, model: Model, indices: Mapping[int, Array]) -> tuple[
     paths = paths.take(np.zeros(count, int))
     for n, lobe in enumerate(target.lobes):
         given = indices[n][origin] if n in indices else None
+        if lobe.interfaces == 2 and given is None:
+            given = np.full(len(origin), lobe.fixed.of("eta", 0))
         paths = stacks.extended(paths, lobe, target, 1, n == 0, given)
         # Both sides of a dielectric follow each other
         origin = np.tile(origin, len(paths.cost) // len(origin))
