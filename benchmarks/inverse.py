@@ -43,6 +43,8 @@ from velatura.stack import Film, Interface, Layer, Medium, Stack
 EXACT = 1e-6  # of energies and variances, at normal incidence
 CONFIGURATION, PAIRS, REACH = 5e-3, 2e5, 50e-3  # seconds, targets a second, seconds
 LEAST_STEP = 0.08  # of the logarithm of the index, of random stacks
+SMOOTH, ROUGH = ((1.1, 2.2), (0.01, 0.15)), ((1.8, 2.6), (0.25, 0.4))  # indices and first roughnesses of these
+BRUSHED = 0.25  # share of them
 COATED, FILMED = (
     0.5,
     ("velatura", "bati2021"),
@@ -66,6 +68,9 @@ KINDS = (
     ("single", "pair", "metal"),
     ("single", "single", "pair over metal"),
 )
+
+#: The same of rough interfaces, each with a lobe of its own, so that the stack itself is an answer.
+ROUGH_KINDS = (("single", "metal"), ("single", "single"), ("single", "single", "metal"), ("single", "single", "single"))
 
 # Exactness -----------------------------------------------------------------------------------------------------------
 
@@ -187,11 +192,18 @@ def exactness(model: Model, targets: int, seed: int = 0) -> Exactness:
     return result
 
 
-def physical(kinds: Sequence[str], rng: np.random.Generator, model: Model, coated: bool = False) -> Target:
+def physical(
+    kinds: Sequence[str], rng: np.random.Generator, model: Model, coated: bool = False, rough: bool = False
+) -> Target:
     """The lobes of a random stack, rougher from lobe to lobe, as a model reads them: of a pair, their mean blur.
 
-    coated: with films on one of its interfaces at least, which the target fixes.
+    A quarter of the stacks without films is brushed, each interface along axes of its own.
+
+    coated: with films on one of its interfaces at least, which the target fixes. rough: of indices and roughnesses
+    where the lobes of models differ most.
     """
+    brushed = not coated and rng.random() < BRUSHED
+    indices, (least, most) = ROUGH if rough else SMOOTH
     layers: list[Layer] = []
     places = sum(1 + ("pair" in kind) for kind in kinds)
     films = [_films(rng) if rng.random() < COATED else () for _ in range(places)] if coated else [()] * places
@@ -200,8 +212,13 @@ def physical(kinds: Sequence[str], rng: np.random.Generator, model: Model, coate
     each = iter(films)
     lobes, eta, alpha = [], 1.0, 0.0
     for n, kind in enumerate(kinds):
-        alpha = 0.0 if n == 0 and rng.random() < 0.3 else alpha + float(rng.uniform(0.01, 0.15))
+        if n or rough or rng.random() < 0.7:
+            alpha += float(rng.uniform(least, most)) if n == 0 else float(rng.uniform(0.01, 0.15))
         count, metal = 1 + ("pair" in kind), "metal" in kind
+        own, turn = alpha, 0.0
+        if brushed:
+            own = tuple((alpha * np.exp(rng.uniform(-0.7, 0.7, 2))).clip(0, 1).tolist())
+            turn = float(rng.choice([0.0, 90.0, rng.uniform(0, 180)]))
         for k in range(count):
             if layers and rng.random() < 0.6:
                 layers.append(Medium(sigma_a=tuple(rng.uniform(0, 0.4, 3).tolist())))
@@ -209,16 +226,17 @@ def physical(kinds: Sequence[str], rng: np.random.Generator, model: Model, coate
                 index = rng.uniform(0.3, 2, 3)
                 extinction = index * rng.uniform(1.2, 4, 3)
                 metal_index = {"eta": tuple(index.tolist()), "k": tuple(extinction.tolist())}
-                layers.append(Interface(**metal_index, alpha=alpha, films=next(each)))
+                layers.append(Interface(**metal_index, alpha=own, rotation=turn, films=next(each)))
             else:
                 above = eta
                 while abs(np.log(eta / above)) < LEAST_STEP:
-                    eta = float(rng.uniform(1.1, 2.2))
-                layers.append(Interface(eta=eta, alpha=alpha, films=next(each)))
+                    eta = float(rng.uniform(*indices))
+                layers.append(Interface(eta=eta, alpha=own, rotation=turn, films=next(each)))
         base = "conductor" if metal else "dielectric"
-        own = [x or None for x in (layer.films for layer in layers if isinstance(layer, Interface))][-count:]
-        fixed = {"films": own} if any(own) else {}
-        lobes.append({"energy": 0.1, "alpha": alpha, "interfaces": count, "base": base, "fixed": fixed})
+        coats = [x or None for x in (layer.films for layer in layers if isinstance(layer, Interface))][-count:]
+        fixed = {"films": coats} if any(coats) else {}
+        lobe = {"energy": 0.1, "alpha": own, "interfaces": count, "base": base, "fixed": fixed}
+        lobes.append({**lobe, "rotation": turn} if turn else lobe)
     return seen(Stack(layers), Target(lobes), model)
 
 
@@ -230,10 +248,12 @@ def _films(rng: np.random.Generator) -> tuple[Film, ...]:
     )
 
 
-def physical_targets(count: int, model: Model, seed: int = 0, coated: bool = False) -> Iterator[Target]:
+def physical_targets(
+    count: int, model: Model, seed: int = 0, coated: bool = False, rough: bool = False
+) -> Iterator[Target]:
     """Such targets, of all kinds in turn."""
-    rng = np.random.default_rng(seed)
-    return (physical(KINDS[n % len(KINDS)], rng, model, coated) for n in range(count))
+    rng, kinds = np.random.default_rng(seed), ROUGH_KINDS if rough else KINDS
+    return (physical(kinds[n % len(kinds)], rng, model, coated, rough) for n in range(count))
 
 
 def of_coated(targets: int, model: Model, seed: int = 0) -> tuple[list[Target], list[Array], list[float]]:

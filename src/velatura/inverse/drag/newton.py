@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from velatura import ops
 from velatura.inverse.drag.coordinates import SLACK, Bound, Point, Reading
 from velatura.inverse.explain import UNMET
 from velatura.inverse.partial_stack import Array
@@ -19,6 +20,7 @@ SLOW_ROUNDS, PATIENCE = 16, 3  # for models that are slow: of Broyden's method, 
 # rounds with these, shares of a step that are tried, and what may be missing in the end
 NEAR, MEASURED, STEPS, WINDING = 0.05, 4, (1.0, 0.3), 1e-3
 JUMP = 3e-4  # what may be missing of other lobes in the end, since readings jump where nodes are shared out anew
+FURTHER = 0.7  # share of a reflectance by which it changes in a round
 NEARER, SLOW_PATIENCE = 0.8, 5  # share of what was missing that is nearer, and such rounds without any
 
 
@@ -114,9 +116,9 @@ class Problem:
                 break
 
             # Move, within bounds
-            moved = np.linalg.lstsq(slopes, -missing, rcond=1e-12)[0]
+            moved: Array = np.asarray(np.linalg.lstsq(slopes, -missing, rcond=1e-12)[0], float)
             full, full_part = x.copy(), part + float(np.sum(moved[len(free) :]))
-            full[free] += np.clip(moved[: len(free)], -self._reach[free], self._reach[free])
+            full[free] += self._within_reach(moved[: len(free)], x, free)
             x, part = space.clipped(full), min(max(full_part, 0.0), 1.0)
             outside = {int(c) for c in free if abs(full[c] - x[c]) > SLACK}
 
@@ -200,6 +202,24 @@ class Problem:
         k = 3 * self.start.space.lobes
         brightest = np.repeat(self.goal[:k].reshape(-1, 3).max(axis=1), 3)
         return np.r_[np.maximum(brightest, 1e-3), np.abs(self.goal[k:]) + 0.01][self.start.space.counted]
+
+    def _within_reach(self, moved: Array, x: Array, free: Array) -> Array:
+        """A step of some coordinates, not further than what their slopes are good for.
+
+        Broyden's slopes hold along the steps that were taken: there all of a step is shortened alike, and variances,
+        which rough interfaces follow less and less, have a reach, too.
+        """
+        space = self.start.space
+        if not space.slow:
+            return np.clip(moved, -self._reach[free], self._reach[free])
+        reach = np.full(len(x), np.inf)
+        for own in space.interfaces:
+            if own.reflectances is not None:
+                reach[own.reflectances] = np.maximum(FURTHER * x[own.reflectances], 0.05)
+            if own.log_index is not None:
+                reach[own.log_index] = 0.2
+            reach[own.variance] = 0.5 * np.abs(x[own.variance]).max() + 0.02
+        return moved * min(1.0, float(np.min(reach[free] / np.maximum(np.abs(moved), ops.TINY))))
 
     @cached_property
     def _reach(self) -> Array:
