@@ -3,8 +3,8 @@
     python benchmarks/refusals.py [--wishes 200] [--seed 0] [--model velatura]
 
 Random wishes of one to three lobes, of any energies, blurs, forms and fixed values, that have no stack. Each must have
-a nearest target, which is solved when it is fed back, and whose material can be written; and its reason must be one
-that such a lobe can have.
+a nearest target, which is solved when it is fed back, and whose material can be written. No two ways out are the same.
+The reason must be the true one: the lobes down to the one that it names have a stack once just what it names is lifted.
 """
 
 from __future__ import annotations
@@ -20,7 +20,13 @@ import numpy as np
 from velatura.errors import VelaturaError
 from velatura.inverse import Infeasible, Target, invert_stack, stacks
 from velatura.inverse.explain import infeasible
+from velatura.inverse.target import BLUR
 from velatura.model import DEFAULT, named
+
+OF_FIXED = ("absorption", "excess", "index", "fixed", "upper")  # reasons that freeing what is fixed lifts
+DIMMER, BRIGHTER = ("energy", "bright", "unmet energy"), ("metal", "mirror", "upper")  # or another energy
+LIFTED = ("absorption", "colour", "energy", "metal", "blur")  # of which each lifts something else
+STEPS = 12  # by which what a reason names is changed
 
 
 def wish(rng: np.random.Generator, most: int = 3) -> Target:
@@ -60,27 +66,39 @@ def refused(
         yield target, refusal, (begin - start, time.process_time() - begin)
 
 
+def lifted(target: Target, n: int, reason: str) -> Iterator[Target]:
+    """The lobes of a target down to the n-th, with just what a reason names changed, by more and more."""
+    whole = target.model_copy(update={"lobes": target.lobes[: n + 1]})
+    lobe = whole.lobes[n]
+    colour = np.array(lobe.colour)
+    if reason in OF_FIXED and lobe.fixed != lobe.fixed.films_alone:
+        yield whole.with_lobe(n, fixed=lobe.fixed.films_alone)
+    ends = {DIMMER: 1e-3, BRIGHTER: 1 / max(colour.max(), 1e-3)}
+    for scale in (x for reasons, end in ends.items() if reason in reasons for x in np.geomspace(1, end, STEPS)):
+        yield whole.with_lobe(n, energy=tuple((scale * colour).tolist()))
+    if reason == "colour":
+        for energy in np.geomspace(colour.min() + 1e-6, colour.max(), STEPS):
+            yield whole.with_lobe(n, energy=float(energy))
+    if reason in ("blur", "unmet blur"):
+        for variance in BLUR.variance(lobe.roughness) + np.geomspace(1e-4, 4, STEPS):
+            yield whole.with_variance(n, float(variance))
+
+
+def possible(target: Target, n: int, reason: str, model: str) -> bool:
+    """Whether the first lobes have a stack, by the nearest model in closed form, once what a reason names is lifted."""
+    adder = named(model).adder
+    return any(stacks.in_closed_form(other, adder) for other in lifted(target, n, reason))
+
+
 def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | None:
     """What is wrong with a refusal; None where nothing is."""
-    if refusal.constraint != "sum":
-        lobe = target.lobes[refusal.lobe - 1]
-        last, first = lobe.interfaces - 1, refusal.lobe == 1
-        fixed = {key: any(entry is not None for entry in entries) for key, entries in lobe.fixed}
-        possible = {
-            "energy": lobe.base == "dielectric" and lobe.fixed.of("eta", last) is None,
-            "bright": lobe.base == "conductor",
-            "upper": lobe.interfaces == 2 and (fixed["eta"] or fixed["alpha"]),  # either settles the upper index
-            "absorption": lobe.fixed.of("eta", last) is not None,
-            "colour": (first and lobe.interfaces == 1) or fixed["tau"],
-            "metal": lobe.base == "conductor",
-            "blur": not first or lobe.interfaces == 2,
-            "index": fixed["eta"] or fixed["k"],
-            "fixed": fixed["alpha"],
-            "unmet energy": True,
-            "unmet blur": True,
-        }
-        if not possible[refusal.constraint]:
-            return f"a reason that cannot be: {refusal.constraint}"
+    if refusal.constraint != "sum" and not possible(target, refusal.lobe - 1, refusal.constraint, model):
+        # Several may be in the way; then it is wrong only if lifting another one is enough
+        others = [key for key in LIFTED if possible(target, refusal.lobe - 1, key, model)]
+        if others:
+            return f"a reason that is not the true one: {refusal.constraint}, not {' or '.join(others)}"
+    if len({direction.words for direction in refusal.directions}) < len(refusal.directions):
+        return "the same way out twice"
     for direction in refusal.directions:
         try:
             invert_stack(direction.target, model).stack.to_dict()

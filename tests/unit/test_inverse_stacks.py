@@ -184,7 +184,9 @@ def test_the_index_follows_from_a_fixed_lower_roughness(model: Model) -> None:
         ([{"energy": 0.1, "alpha": 0.2}, {"energy": 0.1, "alpha": 0.02}], "blur", "lobe 2: what lies above it blurs"),
         ([{"energy": 0.1, "base": "conductor"}], "metal", "lobe 1: a conductor"),
         ([{"energy": 0.1, "alpha": 0.1, "fixed": {"alpha": [0.2]}}], "fixed", "lobe 1: a fixed roughness"),
-        ([{"energy": 0.1, "fixed": {"eta": [1.5]}}], "colour", "lobe 1:"),
+        ([{"energy": 0.1, "fixed": {"eta": [1.5]}}], "absorption", "lobe 1: the fixed index reflects too little"),
+        ([{"energy": 0.03, "fixed": {"eta": [1.5]}}], "excess", "lobe 1: the fixed index reflects more"),
+        ([{"energy": [0.03, 0.1, 0.1], "fixed": {"eta": [1.5]}}], "colour", "lobe 1: what lies above it absorbs"),
         ([{"energy": 0.04}, {"energy": 0.2, "fixed": {"eta": [2.0]}}], "absorption", "lobe 2: the fixed index"),
     ],
 )
@@ -425,7 +427,7 @@ def test_too_much_energy_is_shared_out_alike() -> None:
         ([{"energy": [0.5, 0.1, 0.1], "base": "conductor"}], "metal", ["its dark channels [0.5, 0.1716, 0.1716]"]),
         ([{"energy": [0.95, 0.75, 0.35], "alpha": 0.4, "base": "conductor"}], "bright", ["lobe 1 energy r [0.7849"]),
         ([{"energy": 0.04}, {"energy": 0.95, "alpha": 0.3, "base": "conductor"}], "bright", ["lobe 2 energy"]),
-        ([{"energy": 0.1, "alpha": 0.2, "fixed": {"eta": [1.5]}}], "colour", ["lobe 1 nothing fixed"]),
+        ([{"energy": 0.1, "alpha": 0.2, "fixed": {"eta": [1.5]}}], "absorption", ["lobe 1 nothing fixed"]),
         ([{"energy": 0.2, "alpha": 0.3}, {"energy": 0.1, "alpha": 0.001}], "blur", ["lobe 2 variance"]),
     ],
 )

@@ -26,6 +26,7 @@ REASONS = {
     "bright": "not even the brightest metal reflects as much, of what its facets lose and what lies above lets through",
     "upper": "its upper interface alone reflects more",
     "absorption": "the fixed index reflects too little",
+    "excess": "the fixed index reflects more, and what lies above it absorbs nothing, or what is fixed",
     "colour": "what lies above it absorbs nothing, or what is fixed, and one index does not give that colour",
     "mirror": "nothing above this mirror absorbs, so that it reflects all light",
     "metal": f"a conductor (k >= eta) reflects more, {CONDUCTOR_MIN:.3f} at least, and what lies above absorbs nothing",
@@ -73,11 +74,13 @@ class Infeasible(NoSolution):
     """No stack gives the target.
 
     lobe: the first one from the top, counted from 1, that cannot be given; 0 where it is all of them. constraint: what
-    forbids it, a key of `REASONS`, or "sum". directions: the targets that can be reached, the nearest first.
+    forbids it, a key of `REASONS`, or "sum". directions: the targets that can be reached, the nearest first, of each
+    description one.
     """
 
     def __init__(self, why: str, lobe: int, constraint: str, directions: list[Direction]) -> None:
-        self.why, self.lobe, self.constraint, self.directions = why, lobe, constraint, directions
+        self.why, self.lobe, self.constraint = why, lobe, constraint
+        self.directions = list({direction.words: direction for direction in reversed(directions)}.values())[::-1]
         hints = "; ".join(direction.words for direction in directions)
         super().__init__(f"no stack: {why}" + (f" (possible: {hints})" if hints else ""))
 

@@ -237,7 +237,13 @@ def _closed_form(
     # With films dark channels are missed by shares of the bright ones
     more = _apart(reflectance, r) if choice.films else tau
     if choice.tau is not None or not choice.absorbs:
-        margins["colour"] = margin(-np.max(np.abs(more), axis=0), choice.slack)
+        off = margin(-np.max(np.abs(more), axis=0), choice.slack)
+        # Where a fixed index alone is in the way, another one would do
+        coloured = np.ptp(more, axis=0) > choice.slack
+        coloured = (coloured & (choice.kind == "dielectric")) | (choice.eta is None)
+        short = ~coloured & (np.min(more, axis=0) < 0)
+        for name, where in (("colour", coloured), ("absorption", short), ("excess", ~coloured & ~short)):
+            margins[name] = np.where(where, off, 0.0)
         tau = choice.tau if choice.tau is not None else 0.0
     else:
         margins["absorption"] = margin(np.min(more, axis=0), choice.slack)
