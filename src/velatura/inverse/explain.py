@@ -153,6 +153,8 @@ def why_not(target: Target, model: Model) -> tuple[int, str]:
             return n, "fixed"  # between no two interfaces is there an index that gives it
         if not len(paths.cost):
             layers = tried.layers[-lobe.interfaces :]
+            if not np.any(layers[0].feasible):  # what it leaves for the one below has no meaning
+                layers = layers[:1]
             names = [key for part in layers for key in part.margins]
             margins = np.array(np.broadcast_arrays(*(m for part in layers for m in part.margins.values())))
             best = margins[:, np.argmax(np.maximum(np.minimum(margins, 0), -1e9).sum(axis=0))]
