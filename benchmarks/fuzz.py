@@ -10,6 +10,7 @@ gradients  stacks through `vt.bsdf`, every kind of number: gradients are differe
 check      `vt.check` on tame stacks: no law is broken that its model does not declare
 files      mutated material files: refused in one line that names the file, or equal once written and read again
 imports    likewise files of other programs, tables, spectra and textures; in bounded time and memory
+targets    mutated target files: refused in one line, or for a part solved, or refused with a reason
 commands   mutated command lines and input files: no traceback, a known status, nothing written or lost on refusal
 plans      mutated plans of sweeps: refused in one line that names the file, or their points have stacks
 
@@ -35,7 +36,7 @@ from rich.progress import Progress
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
-from fuzzing import Failure, Trial, checking, commands, files, gradients, imports, lobes, plans, plugin, scalar
+from fuzzing import Failure, Trial, checking, commands, files, gradients, imports, lobes, plans, plugin, scalar, targets
 
 # The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
 PROGRAMS: dict[str, tuple[Trial, int, int]] = {
@@ -46,6 +47,7 @@ PROGRAMS: dict[str, tuple[Trial, int, int]] = {
     "check": (checking.trial, 500, 100),
     "files": (files.trial, 15_000, 1_500),
     "imports": (imports.trial, 15_000, 1_000),
+    "targets": (targets.trial, 5_000, 500),
     "commands": (commands.trial, 500, 100),
     "plans": (plans.trial, 1_000, 500),
 }
