@@ -1,17 +1,9 @@
-<<<<<<< HEAD
-"""Slices of `benchmarks/fuzz.py`: mutated files of materials, tables and textures, and command lines."""
-=======
-"""Slices of `benchmarks/fuzz.py`: mutated material files and targets, and mutated command lines over mutated files."""
->>>>>>> c329b76 (Mutate target files, and read and invert them)
+"""Slices of `benchmarks/fuzz.py`: mutated files of every kind, and mutated command lines over mutated files."""
 
 from __future__ import annotations
 
 import numpy as np
-<<<<<<< HEAD
-from fuzzing import commands, files, imports, plans
-=======
-from fuzzing import commands, files, targets
->>>>>>> c329b76 (Mutate target files, and read and invert them)
+from fuzzing import commands, files, imports, plans, targets
 
 
 def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
@@ -19,7 +11,6 @@ def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
     assert not [failure for _ in range(300) for failure in files.trial(rng)]
 
 
-<<<<<<< HEAD
 def test_any_file_of_other_programs_is_refused_in_one_line_or_read_back_equal() -> None:
     rng = np.random.default_rng(8)
     assert not [failure for _ in range(200) for failure in imports.trial(rng)]
@@ -27,7 +18,8 @@ def test_any_file_of_other_programs_is_refused_in_one_line_or_read_back_equal() 
 
 def test_any_plan_is_refused_in_one_line_or_has_points() -> None:
     assert not [failure for i in (39, *range(60)) for failure in plans.trial(np.random.default_rng((0, *b"plans", i)))]
-=======
+
+
 def test_any_target_is_refused_in_one_line_or_read_back_equal() -> None:
     rng = np.random.default_rng(2)
     cases = [targets.mutated(rng) for _ in range(300)]
@@ -38,7 +30,6 @@ def test_any_target_has_stacks_or_a_reason() -> None:
     rng = np.random.default_rng(3)
     cases = [targets.mutated(rng) for _ in range(12)]
     assert not [failure for case in cases for failure in targets.tried(case, "bati2021")]
->>>>>>> c329b76 (Mutate target files, and read and invert them)
 
 
 def test_any_command_line_ends_in_one_line_and_loses_nothing() -> None:
