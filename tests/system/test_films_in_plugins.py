@@ -11,6 +11,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
+from velatura.model import solution
 from velatura.optics.films import Film, coherent
 from velatura.stack import luminance_sensitivity, srgb_weights
 
@@ -80,9 +81,15 @@ def test_films_are_listed_by_flat_names(mi: Any) -> None:
         ("belcour2018", OXIDE, "layer0_film0_eta", 0.005),
     ],
 )
-def test_gradients_are_finite_differences(mi: Any, model: str, stack: vt.Stack, name: str, step: float) -> None:
+def test_gradients_are_finite_differences(
+    mi: Any, model: str, stack: vt.Stack, name: str, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Values are solved as finely as those of gradients."""
     import drjit as dr
 
+    facets, normals = solution.FINELY
+    monkeypatch.setattr(solution, "SAMPLES", facets)
+    monkeypatch.setattr(solution, "NORMALS", dict.fromkeys(solution.NORMALS, normals))
     bsdf = vt.bsdf(stack, model=model, reflectance="fgd")
     parameters = mi.traverse(bsdf)
     start = np.ravel(np.array(parameters[name])).tolist()[0]
