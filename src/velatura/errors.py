@@ -9,7 +9,7 @@ import contextlib
 import sys
 from collections.abc import Iterator
 
-MOST = 1000  # characters of a line
+MOST = 2000  # characters of a line
 
 
 def short(text: str, most: int = MOST) -> str:

@@ -102,7 +102,7 @@ def test_paint_without_an_interface_is_coated(run: Run, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "words"),
     [
-        (["fit", "none.csv", "target.yaml"], 2, "none.csv: cannot be read"),
+        (["fit", "none.csv", "target.yaml"], 2, "none.csv: file not found"),
         (["fit", "target.yaml", "target.yaml"], 2, "target.yaml: line 1: must be theta_i"),
         (["fit", "table.csv", "none.yaml"], 2, "none.yaml"),
         (["fit", "table.csv", "target.yaml", "-o", "found.txt"], 2, "found.txt: a material file ends in"),

@@ -252,6 +252,7 @@ def test_text_is_printed_as_it_is(run: Run, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("velatura.kernel.extras", lambda: (finding,))
     assert " ".join(run("doctor")[1].split()).count(finding.found) == 1
     monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal
+    monkeypatch.setenv("TERM", "xterm")
     for title, made in (("[/a] :gold:", progress.bar), ("[/b] :gold:", lambda title: progress.clock(title, after=0))):
         shown = io.StringIO()
         monkeypatch.setattr(sys, "stderr", shown)

@@ -58,7 +58,7 @@ IMPORTED_BY = {
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
 RENDERER = {
     "mitsuba": "kernel",
-    "drjit": "kernel ops sampling tables binding plugins reference checks scenes benchmark",
+    "drjit": "kernel ops sampling tables binding plugins reference checks scenes benchmark figures",
 }
 
 # Modules -> what importing them must not load.

@@ -170,13 +170,14 @@ def test_doctor_names_the_command_for_a_missing_package(monkeypatch: pytest.Monk
 
 ONE_PROCESSOR = """
 import os, sys
+from pathlib import Path
 os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:1])
 import numpy as np
 import velatura as vt
 from velatura import kernel, scenes
 scenes.write_image(np.full((4, 4, 3), 0.25), sys.argv[1])
 rough = vt.Stack([vt.Interface(conductor="Au", alpha={"texture": sys.argv[1]})])
-assert kernel.is_picture(sys.argv[1])
+kernel.bitmap(Path(sys.argv[1]))
 picture = vt.render(rough, env="lobby", size="8x6", spp=1, model="belcour2018")
 print(picture.shape)
 """

@@ -79,7 +79,7 @@ class InOwnMedia(Recursion):
     def solves(self, material: Material) -> bool:
         from velatura.model import solution
 
-        return any(layer.spreads for layer in solution.plain(material).layers)
+        return not _is_bare(material) and any(layer.spreads for layer in solution.plain(material).layers)
 
     def unsolved(self, model: Model) -> Model:
         from velatura.model import solution
@@ -98,9 +98,14 @@ class InOwnMedia(Recursion):
     def textured(self, material: Material, *values: Any) -> Textured | None:
         from velatura.model import textured
 
-        return textured.textured(material, *values)
+        return None if _is_bare(material) else textured.textured(material, *values)
 
     def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
         from velatura.model import solved_lobes  # loads SciPy
 
         return solved_lobes.solved_lobes(material, model, wi)
+
+
+def _is_bare(material: Material) -> bool:
+    """Whether a material is a diffuse base alone, which is exact as it is."""
+    return [layer.kind for layer in material.layers] == ["diffuse"]

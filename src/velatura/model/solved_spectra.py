@@ -145,7 +145,8 @@ def _flat(side: SolvedSide, solver: Solver, places: Array, nodes: int) -> list[A
     """The numbers, the colours and the remainder of a side, at nodes, flat."""
     counts = [len(np.atleast_2d(each)) for each in side.columns.all]
     columns = np.split(solver.spread(side), np.cumsum(counts)[:-1])
-    numbers = np.concatenate([each for each in columns if len(each) == 1])
+    # A table has one column at least; without lobes none is read
+    numbers = np.concatenate([each for each in columns if len(each) == 1] or [np.zeros_like(columns[0][:1])])
     colours = over_nodes(np.array([each.T for each in columns if len(each) > 1]), places, nodes)
     polynomial = np.array(list(vars(side.polynomial).values()))
     return [numbers.T.ravel(), np.moveaxis(colours, 0, -1).ravel(), over_nodes(polynomial, places, nodes).T.ravel()]
