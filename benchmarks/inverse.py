@@ -5,7 +5,7 @@
 Exactness is a round trip: random targets of one to three lobes, those that have a stack, are inverted, written as
 materials, and read by `vt.lobes`. For a model without a closed form they are those of the nearest model that has one;
 which of these it refuses is counted. Lobes that `velatura` reads of random stacks are targets, too, of which
-none may be refused. Times are the best of several runs.
+none may be refused; so are those of rough interfaces (`--parts rough`). Times are the best of several runs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from velatura.inverse import (
 )
 from velatura.inverse.drag import seen
 from velatura.inverse.partial_stack import Array, Layers, join, take
-from velatura.model import MODELS, Model, named
+from velatura.model import DEFAULT, MODELS, Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic, Roughness
@@ -52,7 +52,13 @@ COATED, FILMED = (
 NODES, FINE = equivalence.NODES, 4 * equivalence.NODES  # on which sets of indices are looked for, and truly are
 CHUNK = 4096  # targets at once: what the caches of a core hold
 
-PARTS = ("physical", "films", "exactness", "narrow", "speed")
+#: Parts of random stacks, what those are, and options of `physical_targets`.
+SETS: tuple[tuple[str, str, dict[str, bool]], ...] = (
+    ("physical", "stacks", {}),
+    ("rough", "stacks of rough interfaces", {"rough": True}),
+    ("films", "stacks with films", {"coated": True}),
+)
+PARTS = ("physical", "rough", "films", "exactness", "narrow", "speed")
 
 #: One to three lobes: of one interface or a pair, the last one dielectric or a metal.
 KINDS = (
@@ -256,11 +262,11 @@ def physical_targets(
     return (physical(kinds[n % len(kinds)], rng, model, coated, rough) for n in range(count))
 
 
-def of_coated(targets: int, model: Model, seed: int = 0) -> tuple[list[Target], list[Array], list[float]]:
-    """Lobes of random stacks with films: the refused ones, what stacks of the others miss of energies and variances,
-    (2,) each, and the seconds of processor time of each."""
+def of_stacks(targets: Iterator[Target], model: Model) -> tuple[list[Target], list[Array], list[float]]:
+    """Lobes of random stacks: the refused ones, what stacks of the others miss of energies and variances, (2,) each,
+    and the seconds of processor time of each."""
     refused, missed, seconds = list[Target](), list[Array](), list[float]()
-    for target in physical_targets(targets, model, seed, coated=True):
+    for target in targets:
         start = time.process_time()
         found = stacks.search(target, model)
         seconds.append(time.process_time() - start)
@@ -269,9 +275,27 @@ def of_coated(targets: int, model: Model, seed: int = 0) -> tuple[list[Target], 
             continue
         has = [seen(found.stack, target, model).lobes, target.lobes]
         energy = np.subtract(*([lobe.colour for lobe in lobes] for lobes in has))
-        variance = np.subtract(*([MAPS[model.map].variance(lobe.roughness) for lobe in lobes] for lobes in has))
+        variance = np.subtract(
+            *([MAPS[model.map].variance(np.array(lobe.axes[:2])) for lobe in lobes] for lobes in has)
+        )
         missed.append(np.array([np.abs(energy).max(), np.abs(variance).max()]))
     return refused, missed, seconds
+
+
+def stated(name: str, targets: Iterator[Target], model: Model) -> bool:
+    """Print how lobes of random stacks are met; whether any are refused."""
+    refused, missed, seconds = of_stacks(targets, model)
+    energy, variance = np.max(missed, axis=0)
+    print(
+        f"lobes of random {name}, {model.name}: {len(refused)} of {len(seconds)} refused, energy to {energy:.1e}, "
+        f"variance to {variance:.1e}, {sum((x > EXACT).any() for x in missed)} beyond {EXACT:g}; processor time "
+        f"{np.median(seconds):.2f} s at the median, {np.quantile(seconds, 0.95):.1f} s at the 95th percentile, "
+        f"{max(seconds):.1f} s at most",
+        flush=True,
+    )
+    for target in refused:
+        print(" ", target.to_dict()["lobes"])
+    return bool(refused)
 
 
 def width(members: EquivalenceClass, scale: float, nodes: int) -> float:
@@ -357,36 +381,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--targets", type=int, default=10_000, help="of the round trip, for each model")
     parser.add_argument("--physical", type=int, default=300, help="random stacks whose lobes are asked for")
-    parser.add_argument("--models", nargs="+", help="of the round trip; all unless some are named")
+    parser.add_argument("--models", nargs="+", help="by default all for the round trip, else those that it concerns")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--parts", nargs="+", choices=PARTS, help="all unless named")
     options = parser.parse_args()
-    parts, own = options.parts or PARTS, named("velatura")
+    parts = options.parts or PARTS
     failed = False
 
-    if "physical" in parts:
-        targets = physical_targets(options.physical, own, options.seed)
-        refused = [target for target in targets if stacks.search(target, own) is None]
-        print(f"lobes of random stacks, {own.name}: {len(refused)} of {options.physical} refused", flush=True)
-        for target in refused:
-            print(" ", target.to_dict()["lobes"])
-        failed |= bool(refused)
-
-    for model in map(named, (options.models or FILMED) if "films" in parts else ()):
-        refused, missed, seconds = of_coated(options.physical, model, options.seed)
-        energy, variance = np.max(missed, axis=0)
-        print(
-            f"lobes of random stacks with films, {model.name}: {len(refused)} of {options.physical} refused, energy to "
-            f"{energy:.1e}, variance to {variance:.1e}, {sum((x > EXACT).any() for x in missed)} beyond {EXACT:g}; "
-            f"processor time {np.median(seconds):.2f} s at the median, {np.quantile(seconds, 0.95):.1f} s at the 95th "
-            f"percentile, {max(seconds):.1f} s at most",
-            flush=True,
-        )
-        for target in refused:
-            print(" ", target.to_dict()["lobes"])
+    given = [*map(named, options.models)] if options.models else None
+    for part, name, kind in SETS:
+        for model in given or map(named, FILMED if part == "films" else [DEFAULT]) if part in parts else ():
+            targets = physical_targets(options.physical, model, options.seed, **kind)
+            failed |= stated(name, targets, model) and part != "films"
 
     variants = [named("bati2021", channels="separate"), named("bati2021", reflectance="fresnel")]
-    models = [named(name) for name in options.models] if options.models else [*MODELS, *variants]
+    models = given or [*MODELS, *variants]
     for model in models if "exactness" in parts else ():
         found = exactness(model, options.targets, options.seed)
         failed |= bool(found.beyond)

@@ -36,7 +36,7 @@ COMMANDS = {
     "engines": ["", "--quad"],
     "fidelity": ["--half test"],
     "fit": ["--cases 16 --seed 41"],
-    "inverse": ["", "--parts films --seed 1"],
+    "inverse": ["", "--parts films --seed 1", "--parts physical rough --models bati2021 --physical 500 --seed 1"],
     "laws": ["", "--random 500"],
     "render": ["", "--solids"],
     "shader": ["--language all", "--textured"],

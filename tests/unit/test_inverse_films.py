@@ -46,7 +46,8 @@ def films(stack: Stack) -> list[Any]:
 @pytest.mark.parametrize(("model", "count"), [("velatura", 4), ("bati2021", 1), ("weier2020", 11)])
 def test_lobes_of_random_stacks_with_films_are_met(model: str, count: int) -> None:
     """Rationale: such a target has a stack, at least one, and the answer is read by `vt.lobes` as asked."""
-    refused, off, _ = benchmark("inverse").of_coated(count, named(model), seed=0)
+    own = benchmark("inverse")
+    refused, off, _ = own.of_stacks(own.physical_targets(count, named(model), seed=0, coated=True), named(model))
     assert len(off) >= count - 1, refused
     assert np.max(off) < EXACT
 
