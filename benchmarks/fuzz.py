@@ -13,6 +13,7 @@ imports    likewise files of other programs, tables, spectra and textures; in bo
 targets    mutated target files: refused in one line, or for a part solved, or refused with a reason
 commands   mutated command lines and input files: no traceback, a known status, nothing written or lost on refusal
 plans      mutated plans of sweeps: refused in one line that names the file, or their points have stacks
+candidates hostile functions and files in the benchmark: refused in one line, or scored; the truth stays as it is
 
 Without a name all run. FOLDER gets the smallest input of each kind of failure as YAML; `--index` repeats one input in
 this process. Exit status 1 if anything fails, the death of a process included. All take an hour on two quiet cores.
@@ -36,7 +37,21 @@ from rich.progress import Progress
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
-from fuzzing import Failure, Trial, checking, commands, files, gradients, imports, lobes, plans, plugin, scalar, targets
+from fuzzing import (
+    Failure,
+    Trial,
+    candidates,
+    checking,
+    commands,
+    files,
+    gradients,
+    imports,
+    lobes,
+    plans,
+    plugin,
+    scalar,
+    targets,
+)
 
 # The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
 PROGRAMS: dict[str, tuple[Trial, int, int]] = {
@@ -50,6 +65,7 @@ PROGRAMS: dict[str, tuple[Trial, int, int]] = {
     "targets": (targets.trial, 5_000, 500),
     "commands": (commands.trial, 500, 100),
     "plans": (plans.trial, 1_000, 500),
+    "candidates": (candidates.trial, 2_000, 500),
 }
 
 Found = list[tuple[int, Failure]]

@@ -65,6 +65,9 @@ def test_values_of_a_program_in_any_language_are_scored(tmp_path: Path, monkeypa
     assert status == 2 and "shape" in err
     Path("none.npy").write_text("no numbers")
     assert run("benchmark", "score", "--values", "none.npy")[0] == 2
+    np.save("velatura.npy", np.load("task/mine.npy", mmap_mode="r")[:3])
+    _, _, err = run("benchmark", "score", "--values", "velatura.npy", "--model", "velatura")
+    assert err == "velatura: velatura.npy: --values: has the name of an entrant; rename the file\n"
 
 
 def test_the_table_lists_what_was_scored(run) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from fuzzing import commands, files, imports, plans, targets
+from fuzzing import candidates, commands, files, imports, plans, targets
 
 
 def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
@@ -18,6 +18,11 @@ def test_any_file_of_other_programs_is_refused_in_one_line_or_read_back_equal() 
 
 def test_any_plan_is_refused_in_one_line_or_has_points() -> None:
     assert not [failure for i in (39, *range(60)) for failure in plans.trial(np.random.default_rng((0, *b"plans", i)))]
+
+
+def test_any_candidate_of_the_benchmark_is_refused_in_one_line_or_scored() -> None:
+    rng = np.random.default_rng(4)
+    assert not [failure for _ in range(150) for failure in candidates.trial(rng)]
 
 
 def test_any_target_is_refused_in_one_line_or_read_back_equal() -> None:

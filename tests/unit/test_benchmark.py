@@ -10,6 +10,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from fuzzing import candidates as hostile
 from scipy.stats import chi2, norm
 
 import velatura as vt
@@ -239,6 +240,29 @@ def test_a_black_candidate_has_half_of_the_light_in_wrong_places() -> None:
     assert json.loads(json.dumps(found.to_dict(), allow_nan=False))
 
 
+@pytest.mark.parametrize(("number", "name"), list(enumerate(hostile.FUNCTIONS)))
+def test_a_hostile_candidate_is_refused_in_one_line_or_scored(number: int, name: str) -> None:
+    """Expected: a line that names the stack, or scores that are numbers; stacks and truth as they were."""
+    assert not hostile.scored(name, number)
+
+
+def test_a_failure_has_its_cause() -> None:
+    """Expected: the error of a candidate's own code, for its author to see the place."""
+
+    def broken(case: benchmark.Case):
+        raise KeyError("alpha")
+
+    with pytest.raises(vt.InvalidInput, match=r"^films-00: the candidate failed: KeyError: 'alpha'$") as found:
+        benchmark.score(broken, kinds=["films"])
+    assert isinstance(found.value.__cause__, KeyError)
+
+
+def test_a_name_is_no_formula_in_a_figure(tmp_path: Path) -> None:
+    found = benchmark.score(lambda case: None, "$\\foo{$", ["films"])
+    benchmark.save_figure([found], tmp_path / "scores.svg")
+    assert (tmp_path / "scores.svg").stat().st_size > 1000
+
+
 def test_scores_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     factory = only("one-interface-00")(lambda case: {"type": "roughconductor", "alpha": 0.1})
     place = tmp_path / "new" / "mine.json"
@@ -251,9 +275,18 @@ def test_scores_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert again.summary() == timed.summary()
     with pytest.raises(vt.InvalidInput, match="other kinds"):
         benchmark.kept_score(place, factory, "mine", ["films"])
-    place.write_text("{}")
-    with pytest.raises(vt.InvalidInput, match="holds no scores"):
-        benchmark.kept_score(place, factory, "mine", ["one interface"])
+    good = json.loads(place.read_text())
+    for text in (
+        "{}",
+        "[]",
+        "[" * 100_000,
+        '{"records": NaN}',
+        json.dumps({**good, "cost": "x"}).replace('"x"', "1e999"),
+    ):
+        place.write_text(text)
+        with pytest.raises(vt.InvalidInput, match="holds no scores") as refused:
+            benchmark.kept_score(place, factory, "mine", ["one interface"])
+        assert str(refused.value).isprintable()
 
 
 @pytest.mark.parametrize(

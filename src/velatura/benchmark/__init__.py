@@ -4,7 +4,7 @@ Its protocol is that of Bati et al. 2019, a simulated reference for both sides a
 random stacks.
 """
 
-from velatura.benchmark.candidates import Candidate, Factory, Walk, from_values
+from velatura.benchmark.candidates import Candidate, Factory, Walk, from_values, values_of
 from velatura.benchmark.entrants import ENTRANTS, entrant
 from velatura.benchmark.figure import save_figure
 from velatura.benchmark.scores import Record, Scores, kept_score, score
@@ -30,6 +30,7 @@ __all__ = [
     "save_figure",
     "score",
     "truth",
+    "values_of",
     "walk_all",
     "write_task",
 ]

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from velatura import kernel
+from velatura import files, kernel
 from velatura.benchmark.bins import AZIMUTHAL, NODES, RADIAL, SIDES, Bins
 from velatura.benchmark.stacks import Case
 from velatura.benchmark.walks import Binned, walked
 from velatura.checks.probe import Probe
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, VelaturaError
+from velatura.stack.schema import show
 
 Array = NDArray[np.floating]
+
+BRIGHTEST = 1e30  # 1/sr; sums of such values, and their squares, are still numbers
 
 #: f(wi, wo) |cos theta_o| (n, 3) of energies, for unit vectors (n, 3); NaN where a model does not say.
 Eval: TypeAlias = Callable[[Array, Array], Array]
@@ -78,7 +83,7 @@ def seen(case: Case, candidate: Candidate, nodes: int = NODES) -> dict[tuple[int
     """The light of a candidate, by direction and side, of those that it has values for.
 
     Raises:
-        InvalidInput: values of another shape than (n, 3).
+        InvalidInput: the candidate fails, or its values are no numbers (n, 3) from 0 to BRIGHTEST or NaN.
     """
     if isinstance(candidate, Walk):
         return {
@@ -87,10 +92,40 @@ def seen(case: Case, candidate: Candidate, nodes: int = NODES) -> dict[tuple[int
             for side, light in walked(case, direction, candidate.paths, candidate.seed).items()
         }
     pairs = Pairs.of(case, nodes)
-    value = np.asarray(candidate(pairs.wi, pairs.wo), float)
-    if value.shape != pairs.wo.shape:
-        raise InvalidInput(f"{case.id}: values must have the shape {pairs.wo.shape}, got {value.shape}")
+    with asked(case):
+        value = numbers("values", candidate(pairs.wi, pairs.wo), pairs.wo.shape)
     return pairs.light(value)
+
+
+@contextmanager
+def asked(case: Case) -> Iterator[None]:
+    """Raises InvalidInput, in one line that names the stack, where the candidate's own code fails in the block."""
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(f"{case.id}: {error}") from error
+    except VelaturaError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise InvalidInput(f"{case.id}: the candidate failed: {type(error).__name__}: {error}") from error
+
+
+def numbers(what: str, given: Any, shape: tuple[int, ...]) -> Array:
+    """What a candidate gives, as numbers of a shape.
+
+    Raises:
+        InvalidInput: other types, another shape, or values that are negative, infinite or above BRIGHTEST.
+    """
+    found = np.asarray(given)
+    if found.dtype.kind not in "fiu":
+        raise InvalidInput(f"{what}: must be real numbers, got {show(str(found.dtype))}")
+    if found.shape != shape:
+        raise InvalidInput(f"{what}: must have the shape {shape}, got {found.shape}")
+    wrong = (found < 0) | (found > BRIGHTEST)
+    if wrong.any():
+        first = found[wrong][0]
+        raise InvalidInput(f"{what}: must be 0 to {BRIGHTEST:g}, or NaN, got {first:g} at {int(wrong.sum())} places")
+    return found.astype(float)
 
 
 # Mitsuba -------------------------------------------------------------------------------------------------------------
@@ -148,14 +183,27 @@ def evenly(power: int, seed: int) -> Array:
 # Files ---------------------------------------------------------------------------------------------------------------
 
 
+def values_of(path: Path) -> Array:
+    """The array of an .npy file, which stays on the disk until it is looked at; nothing in it is run.
+
+    Raises:
+        InvalidInput: no such file, or another one; one line that begins with the path.
+    """
+    files.check_regular(path)
+    try:
+        found: Array = np.lib.format.open_memmap(path, mode="r")
+    except Exception as error:  # of any kind, by the parts of the header
+        raise InvalidInput(f"{path}: cannot be read as .npy: {files.reason(error)}") from None
+    return found
+
+
 def from_values(values: Array, cases: Sequence[Case]) -> Factory:
     """A factory that reads values (P, 3) of all pairs of these cases, as `write_task` has them.
 
     Raises:
-        InvalidInput: another shape.
+        InvalidInput: another shape or other types, or values that are negative, infinite or above BRIGHTEST.
     """
     ends = np.cumsum([len(Pairs.of(case).wi) for case in cases])
-    if values.shape != (ends[-1], 3):
-        raise InvalidInput(f"values: must have the shape ({ends[-1]}, 3), got {values.shape}")
-    parts = dict(zip([case.id for case in cases], np.split(values, ends[:-1])))
+    found = numbers("values", values, (int(ends[-1]), 3))
+    parts = dict(zip([case.id for case in cases], np.split(found, ends[:-1])))
     return lambda case: lambda wi, wo: parts[case.id]

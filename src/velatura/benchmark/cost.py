@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import kernel
-from velatura.benchmark.candidates import Candidate, Factory, Plugin, evenly, made
+from velatura.benchmark.candidates import Candidate, Factory, Plugin, asked, evenly, made
 from velatura.benchmark.stacks import Case
 from velatura.checks.probe import Probe
 from velatura.errors import InvalidInput
@@ -25,7 +25,8 @@ def median_cost(factory: Factory, cases: Iterable[Case]) -> float | None:
     for case in cases:
         if case.kind not in first:
             try:
-                candidate = made(factory(case))
+                with asked(case):
+                    candidate = made(factory(case))
             except InvalidInput:
                 continue
             if candidate is not None:

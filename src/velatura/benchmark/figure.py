@@ -53,7 +53,7 @@ def save_figure(scores: Sequence[Scores], path: str | Path) -> None:
                 style="normal" if cell["records"] == cell["asked"] else "italic",
             )
     axes.set_xticks(range(len(columns)), [kind or "all scored" for kind in columns], rotation=35, ha="right")
-    axes.set_yticks(range(len(order)), [each.name for each in order])
+    axes.set_yticks(range(len(order)), [each.name for each in order], parse_math=False)
     axes.set_title("Total variation against the truth (italic: some stacks cannot be expressed)", fontsize=10)
     with files.whole(target) as unfinished:
         figure.savefig(unfinished, dpi=120)

@@ -7,10 +7,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from velatura import files
 from velatura.benchmark import candidates
@@ -25,6 +26,7 @@ Array = NDArray[np.floating]
 
 FAINT = 0.02  # light of a side, or a colour, that is not scored
 SAMPLES = 16  # power of 2, of each direction
+NUMBERS = ConfigDict(allow_inf_nan=False)  # of scores that are read
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class Record:
     width: float | None
     width_noise: float
     spread: float | None
+    __pydantic_config__: ClassVar[ConfigDict] = NUMBERS
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,7 @@ class Scores:
     asked: Mapping[str, int]
     refused: Mapping[str, int]
     cost: float | None = None
+    __pydantic_config__: ClassVar[ConfigDict] = NUMBERS
 
     def summary(self, kind: str | None = None) -> dict[str, float]:
         """Means over the records, of one kind or all; empty where there are none."""
@@ -96,12 +100,6 @@ class Scores:
         summary = {"all": self.summary(), **{kind: self.summary(kind) for kind in self.asked}}
         return {"format": FORMAT, "summary": summary, **asdict(self)}
 
-    @classmethod
-    def from_dict(cls, fields: Mapping[str, Any]) -> Scores:
-        """The inverse of `to_dict`."""
-        records = tuple(Record(**record) for record in fields["records"])
-        return cls(fields["name"], records, fields["asked"], fields["refused"], fields["cost"])
-
 
 def score(
     factory: Factory,
@@ -120,7 +118,8 @@ def score(
         progress: called with (stacks done, all stacks).
 
     Raises:
-        InvalidInput: an unknown kind, values of another shape, or what is no candidate.
+        InvalidInput: an unknown kind, or in a line that begins with the stack: what is no candidate; one that fails or
+            calls `sys.exit`, with its error as the cause; values of another shape or type, negative or infinite.
         MissingTool: LLVM is missing or too old.
     """
     cases, true = chosen(kinds), truth()
@@ -134,12 +133,13 @@ def score(
             if id == case.id and each.total.mean() > FAINT
         }
         asked[case.kind] += len(mine)
-        try:
-            given = factory(case)
-        except InvalidInput as error:
-            given = None
-            refused[str(error)] += 1
-        candidate = candidates.made(given)
+        given = None
+        with candidates.asked(case):
+            try:
+                given = factory(case)
+            except InvalidInput as error:
+                refused[str(error)] += 1
+            candidate = candidates.made(given)
         if candidate is not None:
             found = candidates.seen(case, candidate)
             spreads = _spreads(case, candidate)
@@ -167,9 +167,10 @@ def kept_score(
     """
     if path and path.exists():
         try:
-            found = Scores.from_dict(json.loads(path.read_text(encoding="utf-8")))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InvalidInput(f"{path}: holds no scores: {error}") from None
+            found = TypeAdapter(Scores).validate_json(files.content(path))
+        except ValidationError as error:
+            at, why = error.errors()[0]["loc"], error.errors()[0]["msg"]
+            raise InvalidInput(f"{path}: holds no scores: {'.'.join(map(str, at))}: {why}") from None
         if set(found.asked) != {case.kind for case in chosen(kinds)}:
             raise InvalidInput(f"{path}: holds scores of other kinds of stacks; give another folder")
         if found.cost is not None or not timed:
@@ -244,7 +245,9 @@ def _spreads(case: Case, candidate: Candidate) -> dict[int, float]:
         return {}
     found, u = {}, candidates.evenly(SAMPLES, 0)
     for n, wi in enumerate(case.incident):
-        weight = np.asarray(candidate.sample(np.broadcast_to(wi, u.shape), u)).mean(axis=1)
+        with candidates.asked(case):
+            weight = candidates.numbers("weights", candidate.sample(np.broadcast_to(wi, u.shape), u), u.shape)
+        weight = weight.mean(axis=1)
         if np.isfinite(weight).all() and weight.mean() > 0:
             found[n] = float(weight.var() / weight.mean() ** 2)
     return found

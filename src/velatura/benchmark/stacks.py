@@ -144,7 +144,9 @@ class Case:
     def from_dict(cls, fields: dict[str, Any]) -> Case:
         """The inverse of `to_dict`."""
         stack = Stack.from_dict(fields["material"])
-        return cls(fields["id"], fields["kind"], fields["bounces"] == "any", stack, np.array(fields["incident"]))
+        incident = np.array(fields["incident"])
+        incident.flags.writeable = False  # candidates are handed it
+        return cls(fields["id"], fields["kind"], fields["bounces"] == "any", stack, incident)
 
 
 def _explicit(layer: LayerValues) -> dict[str, Any]:

@@ -199,10 +199,12 @@ def _row(case: Case, key: Key, light: Light) -> list[str]:
 
 @cache
 def truth() -> Mapping[tuple[str, int, str], Light]:
-    """The truth that comes with the package, by stack, direction, and side."""
+    """The truth that comes with the package, by stack, direction, and side; not to be written to."""
     ids = [fields["id"] for fields in json.loads((DATA / "stacks.json").read_text(encoding="utf-8"))["stacks"]]
     with (DATA / "truth.npz").open("rb") as stream, np.load(stream) as found:
         arrays = {name: found[name].astype(float) for name in _names()}
+        for array in arrays.values():
+            array.flags.writeable = False
         keys = zip(found["case"], found["direction"], found["side"])
         return {
             (ids[case], int(direction), SIDES[side]): Light(**{name: array[n] for name, array in arrays.items()})

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from velatura import files
 from velatura.cli import options, progress
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -58,7 +57,7 @@ def score(
         check_figure(plot)
     if values and kinds:
         raise InvalidInput("--values: holds all kinds of stacks; not together with --kind")
-    own = {values.stem: _from_file(values)} if values else {}
+    own = dict([_from_file(values)]) if values else {}
     names = models.split(",") if models else [] if values else list(benchmark.ENTRANTS)
     factories = {**{name: benchmark.entrant(name) for name in names}, **own}
     found = []
@@ -108,17 +107,17 @@ def truth(
     print(f"{output}: stacks.json, truth.npz, energies.csv")
 
 
-def _from_file(path: Path) -> Factory:
-    import numpy as np
-
+def _from_file(path: Path) -> tuple[str, Factory]:
+    """The name of a candidate, and the values that a file has of it."""
     from velatura import benchmark
 
-    files.check_regular(path)
+    name = one_line(path.stem)
+    if name in benchmark.ENTRANTS:
+        raise InvalidInput(f"{path}: --values: has the name of an entrant; rename the file")
     try:
-        found = np.load(path, mmap_mode="r")
-    except (OSError, ValueError) as error:
-        raise InvalidInput(f"{path}: cannot be read as .npy: {error}") from None
-    return benchmark.from_values(found, benchmark.edition())
+        return name, benchmark.from_values(benchmark.values_of(path), benchmark.edition())
+    except InvalidInput as error:
+        raise InvalidInput(f"{path}: {str(error).removeprefix(f'{path}: ')}") from None
 
 
 def _table(scores: Sequence[Scores]) -> Iterator[str]:
