@@ -146,6 +146,9 @@ class Plugin:
 
     def __call__(self, wi: Array, wo: Array) -> Array:
         value = self.probe.eval_pdf(wi, wo).value
+        for wrong in self.probe.wrong:
+            if wrong.function == "eval":
+                raise InvalidInput(f"eval: must be finite and not negative, got {wrong.answer[0]:g}")
         passes = np.sign(wi[:, 2]) != np.sign(wo[:, 2])
         unknown = (passes & (not self.probe.transmits)) | ((wi[:, 2] < 0) & (not self.probe.two_sided))
         return np.where(unknown[:, None], np.nan, value)

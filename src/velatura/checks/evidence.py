@@ -15,7 +15,9 @@ SAMPLES = 2**16  # at each of them
 PILOT = SAMPLES // 4  # samples that only shape the grid
 PAIRS = 2**14
 TURNED = (1.0, 1.0, 0.999, 0.8, 0.3)  # cosines of incidence, where layers are turned
+TURN = 30.0  # degrees, of directions, where the BSDF is isotropic
 EXTREMES = (1.0, 0.999, 0.1, 1e-2, 1e-4, 1e-6)  # cosines where formulas break
+SNAPPED = 1e-12  # component that is 0, so that the mirror direction and the way back are exact
 
 Progress = Callable[[int, int], None]
 STEPS = 4
@@ -146,6 +148,8 @@ def gather(
     report(3, STEPS)
 
     # Ask the other ones
+    if turned is None and probe.isotropic:
+        turned = probe, TURN
     by_turning = _turn(probe, *turned, rng) if turned else None
     other = _draw(expected, wi, u) if expected else None
     report(4, STEPS)
@@ -252,7 +256,7 @@ def _pair(probe: Probe, expected: Probe | None, index: float, rng: np.random.Gen
 
 def _extremes(probe: Probe, rng: np.random.Generator) -> Extremes:
     heights = np.array([*EXTREMES, *(-c for c in EXTREMES)])
-    azimuths = np.array([0.0, 0.3, 0.5, 0.8])  # turns; half a turn holds the mirror direction, none the way back
+    azimuths = np.array([0.0, 0.3, 0.5, 0.8])  # turns; half a turn has the mirror direction, and none the way back
     wi, wo = (
         directions.reshape(-1, 3)
         for directions in np.broadcast_arrays(
@@ -260,6 +264,7 @@ def _extremes(probe: Probe, rng: np.random.Generator) -> Extremes:
             _directions(*np.meshgrid(heights, azimuths, indexing="ij"))[None],
         )
     )
+    wo = np.where(np.abs(wo) < SNAPPED, 0, wo)
     sampled = np.repeat(_directions(heights, np.zeros(len(heights))), 64, axis=0)
     samples = probe.sample(sampled, rng.random((len(sampled), 3), dtype=np.float32))
     return Extremes(wi, wo, probe.eval_pdf(wi, wo), sampled, samples)

@@ -208,6 +208,7 @@ def agreement(evidence: Evidence, alarm: float) -> Finding:
         "pdf and sample": _differ(asked.pdf, samples.pdf),
         "pdf and eval_pdf": _differ(asked.pdf, both.pdf),
         "eval and eval_pdf": _any(_differ(asked.value, both.value)),
+        "kind of sample and flags": ~samples.declared,
     }
     return _count_off("agreement", drawn, off)
 
@@ -232,7 +233,7 @@ def spread(evidence: Evidence, alarm: float) -> Finding:
 
 
 def _count_off(law: str, drawn: Drawn, off: dict[str, Array]) -> Finding:
-    looked_at = drawn.arrived & ~drawn.delta
+    looked_at = drawn.arrived & ~(drawn.delta & drawn.samples.declared.reshape(drawn.delta.shape))
     count = looked_at.sum()
     shares = {
         name: float((wrong.reshape(looked_at.shape) & looked_at).sum() / max(count, 1)) for name, wrong in off.items()
@@ -295,7 +296,7 @@ def limit(evidence: Evidence, alarm: float) -> Finding | None:
 
 
 def turning(evidence: Evidence, alarm: float) -> Finding | None:
-    """Compare with the BSDF whose layers are turned, if there is one: light that goes elsewhere."""
+    """Compare with the BSDF whose layers are turned, or with an isotropic one itself: light that goes elsewhere."""
     if evidence.turned is None:
         return None
     found = evidence.turned
@@ -332,11 +333,19 @@ LAWS: tuple[Law, ...] = (
         normalisation,
     ),
     Law("chi-square", "Samples fall where the pdf says.", chi_square),
-    Law("agreement", "`sample`, `pdf`, `eval` and `eval_pdf` agree about every direction.", agreement),
+    Law(
+        "agreement",
+        "`sample`, `pdf`, `eval` and `eval_pdf` agree about every direction, and `sample` with the flags.",
+        agreement,
+    ),
     Law("weights", "The weight of a sample is its value over its density.", weights),
     Law("spread", "No sample carries more than three times the light that arrives.", spread),
     Law("reciprocity", "f(wi, wo) is f(wo, wi), with the squared index on either side.", reciprocity),
-    Law("turning", "Where all layers are turned, light turns with them, at the normal too.", turning),
+    Law(
+        "turning",
+        "Light turns with the layers, at the normal too; with its direction alone where the BSDF is isotropic.",
+        turning,
+    ),
     Law("limit", "In a limiting case the BSDF equals the one that is expected.", limit),
 )
 

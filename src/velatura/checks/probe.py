@@ -23,13 +23,15 @@ _WAVELENGTHS = (450.0, 530.0, 600.0, 680.0)  # nm, where the variant is spectral
 
 
 class Samples(NamedTuple):
-    """Samples of a BSDF: directions (n, 3), weights (n, channels), densities, indices and kinds (n,)."""
+    """Samples of a BSDF: directions (n, 3), weights (n, channels), densities, indices, and whether they are of a smooth
+    component, and of a kind that the flags have (n,)."""
 
     wo: Array
     weight: Array
     pdf: Array
     eta: Array
     delta: Array
+    declared: Array
 
 
 class Wrong(NamedTuple):
@@ -58,6 +60,7 @@ class Probe:
     Attributes:
         transmits: whether light passes through.
         two_sided: whether it is lit from below as well.
+        isotropic: whether no component has an azimuth.
         asked: how many answers it gave.
         wrong: those that are no number, infinite or negative.
 
@@ -74,12 +77,13 @@ class Probe:
         self.bsdf, self.uv, self.context = bsdf, uv, mi.BSDFContext()
         self.transmits = mi.has_flag(bsdf.flags(), mi.BSDFFlags.Transmission)
         self.two_sided = self.transmits or mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
+        self.isotropic = not mi.has_flag(bsdf.flags(), mi.BSDFFlags.Anisotropic)
         self.asked = 0
         self.wrong: list[Wrong] = []
 
     def sample(self, wi: Array, u: Array) -> Samples:
         """Samples for directions (n, 3) and uniform numbers (n, 3); directions that have no length point upwards."""
-        wo, weight, pdf, eta, delta = _in_batches(self._sample, wi, u)
+        wo, weight, pdf, eta, delta, declared = _in_batches(self._sample, wi, u)
         unit = np.abs(np.linalg.norm(wo, axis=1) - 1) < 1e-3
         wo = np.where(unit[:, None], wo, (0.0, 0.0, 1.0))
         # Ignore the density of samples without weight
@@ -89,7 +93,7 @@ class Probe:
             "density of a sample", wi, wo, np.where(lit, pdf, np.nan_to_num(pdf, posinf=0, neginf=0)), lit
         )
         self._noted("length of a sample", wi, wo, np.where(unit, 1.0, np.nan), lit)
-        return Samples(wo, weight * unit[:, None], pdf * unit, eta, delta)
+        return Samples(wo, weight * unit[:, None], pdf * unit, eta, delta, declared)
 
     def eval_pdf(self, wi: Array, wo: Array, offset: float = 0.0) -> Values:
         """Value and density from `eval_pdf`; where these are noisy, points some offset apart have other noise."""
@@ -122,9 +126,11 @@ class Probe:
         mi, (u1, u2, u3) = self.mi, u.astype(np.float32).T
         si, sample1, sample2 = self.interaction(wi), mi.Float(u1), mi.Point2f(u2, u3)
         bs, weight = self.bsdf.sample(self.context, si, sample1, sample2, True)
-        weight, delta = mi.unpolarized_spectrum(weight), mi.has_flag(mi.UInt32(bs.sampled_type), mi.BSDFFlags.Delta)
-        dr.eval(bs.wo, weight, bs.pdf, bs.eta, delta)
-        return _rows(bs.wo), _rows(weight), _row(bs.pdf), _row(bs.eta), _row(delta).astype(bool)
+        weight, kind = mi.unpolarized_spectrum(weight), mi.UInt32(bs.sampled_type)
+        delta, declared = mi.has_flag(kind, mi.BSDFFlags.Delta), kind & ~mi.UInt32(self.bsdf.flags()) == 0
+        dr.eval(bs.wo, weight, bs.pdf, bs.eta, delta, declared)
+        kinds = (_row(x).astype(bool) for x in (delta, declared))
+        return _rows(bs.wo), _rows(weight), _row(bs.pdf), _row(bs.eta), *kinds
 
     @kernel.exclusive
     def _eval_pdf(self, wi: Array, wo: Array, offset: float) -> tuple[Array, ...]:
