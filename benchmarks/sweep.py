@@ -193,7 +193,7 @@ async def serve(file: str, count: int) -> None:
 def store(point: Any) -> None:
     from velatura.sweeps.questions import lobes
 
-    print("store: points  a chunk  chunks   files of variables  bytes of a file of energies")
+    print("store: points  a chunk  chunks   files of variables  bytes of a file       data")
     answer = lobes(vt.load("coated-gold"), 0, cos_theta=[1.0, 0.5], model="belcour2018")
     layout = {name: Variable.of(*array) for name, array in answer.items()}
     found = {name: array for name, (_, array) in answer.items()}
@@ -208,12 +208,13 @@ def store(point: Any) -> None:
                 noisy = [{name: x * rng.random(x.shape) for name, x in found.items()} for _ in made.points(chunk)]
                 if not chunk:
                     begin = time.perf_counter()
-                made.write(chunk, layout, noisy)
+                made.write(chunk, noisy)
             seconds = (time.perf_counter() - begin) / 10
-            variables = len(layout) + len(plan.vary) + 2
-            chunks, size = int(np.prod(made.grid)), (Path(folder, "a.zarr", "energy", "0.0.0.0")).stat().st_size
-            print(f"  {count:12d} {made.chunk[0]:8d} {chunks:7d} {chunks * variables:9d} of {variables}"
-                  f" {size:9d}  {1e3 * seconds:.0f} ms to write a chunk")  # fmt: skip
+            chunks, files = int(np.prod(made.grid)), Path(folder, "a.zarr").glob("*/[0-9]*")
+            sizes = [file.stat().st_size for file in files if file.name.split(".")[0] == "1"]
+            print(f"  {count:12d} {made.chunk[0]:8d} {chunks:7d} {chunks * len(sizes):9d} of {len(sizes)}"
+                  f" {min(sizes):9d} to {max(sizes)} {chunks * sum(sizes) / 1e6:10.0f} MB,"
+                  f" {1e3 * seconds:.0f} ms to write a chunk")  # fmt: skip
 
 
 PARTS = {part.__name__: part for part in (overhead, small, workers, scheduler, store)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import contextlib
+import functools
 import gc
 import logging
 import os
@@ -20,17 +21,23 @@ POLL = 0.05  # seconds between looks at tasks that do not report their end
 PATIENCE = 10  # seconds for a scheduler to answer
 
 
+#: Errors of an engine that runs no more: of its own, and of tasks that it takes no more care of.
+BREAKDOWNS = (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError)
+
+
 class Engine:
-    """Runs tasks.
+    """Runs tasks; raises one of `BREAKDOWNS` where it cannot.
 
     Args:
-        executor: has `submit`, which returns what has `done`, `result` and `cancel`.
+        submit: of an executor; returns what has `done`, `result` and `cancel`.
         workers: how many tasks run at once.
         fatal: errors of tasks that end the processes that run them.
     """
 
-    def __init__(self, executor: Any, workers: Callable[[], int], fatal: tuple[type[BaseException], ...] = ()) -> None:
-        self.submit, self.fatal = executor.submit, fatal
+    def __init__(
+        self, submit: Callable[..., Any], workers: Callable[[], int], fatal: tuple[type[BaseException], ...] = ()
+    ) -> None:
+        self.submit, self.fatal = submit, fatal
         self._workers, self._counted, self._looked = workers, 0, -REFRESH
 
     @property
@@ -69,7 +76,7 @@ def engine(executor: Any, workers: int | None) -> Iterator[Engine]:
         yield _of_client(executor)
     elif hasattr(executor, "submit"):
         count = workers or getattr(executor, "_max_workers", None) or _cores()
-        yield Engine(executor, lambda: count)
+        yield Engine(executor.submit, lambda: count)
     else:
         raise InvalidInput("executor: must be an executor, a client of dask, or the address of a scheduler")
 
@@ -116,16 +123,54 @@ def _interrupts_wait() -> Iterator[None]:
 def _at(address: str) -> Iterator[Any]:
     from distributed import Client
 
+    with _silent(logging.getLogger("distributed.client")):
+        try:
+            client = Client(address, timeout=PATIENCE)
+        except (OSError, ValueError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InvalidInput(f"{address}: no scheduler of dask answers there ({reason})") from None
+        with client:
+            yield client
+
+
+@contextlib.contextmanager
+def _silent(logger: logging.Logger) -> Iterator[None]:
+    """Nothing is logged in the block, such as the end of a scheduler with its stack of calls."""
+    before = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
     try:
-        client = Client(address, timeout=PATIENCE)
-    except (OSError, ValueError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InvalidInput(f"{address}: no scheduler of dask answers there ({reason})") from None
-    with client:
-        yield client
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 def _of_client(client: Any) -> Engine:
     from distributed.scheduler import KilledWorker
 
-    return Engine(client.get_executor(pure=False), lambda: sum(client.nthreads().values()), (KilledWorker,))
+    executor = client.get_executor(pure=False)
+
+    @_or_broken
+    def submit(*task: Any) -> Any:
+        return executor.submit(*task)
+
+    @_or_broken
+    def workers() -> int:
+        return sum(client.nthreads().values())
+
+    return Engine(submit, workers, (KilledWorker,))
+
+
+def _or_broken(asked: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, which raises BrokenExecutor in place of the errors of a client that has lost its scheduler.
+
+    They are of many classes, some of them plain `Exception`.
+    """
+
+    @functools.wraps(asked)
+    def ask(*arguments: Any) -> Any:
+        try:
+            return asked(*arguments)
+        except Exception as error:
+            raise concurrent.futures.BrokenExecutor(str(error)) from None
+
+    return ask

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import concurrent.futures
 import math
 import warnings
 from collections import deque
@@ -16,7 +15,7 @@ from velatura import kernel
 from velatura.errors import Damaged, InvalidInput, VelaturaError
 from velatura.progress import bar
 from velatura.sweeps import work
-from velatura.sweeps.engines import Engine, engine
+from velatura.sweeps.engines import BREAKDOWNS, Engine, engine
 from velatura.sweeps.plan import Plan, versions
 from velatura.sweeps.space import Space
 from velatura.sweeps.store import OWN, Layout, Store, Variable, create, existing
@@ -97,7 +96,12 @@ def carry_out(
         with kernel.threads_restored(), engine(executor, workers) as runs:
             job = work.Job(plan, path, None, versions())
             if found is None:
-                found = create(path, plan, _looked(runs, job.packed(), plan))
+                try:
+                    layout = _looked(runs, job.packed(), plan)
+                except BREAKDOWNS as error:
+                    broke = f"{path}: the executor broke down ({type(error).__name__}) before a point was stored"
+                    raise VelaturaError(broke) from None
+                found = create(path, plan, layout)
             course = _Course(runs, found, replace(job, layout=found.layout).packed(), done)
             with nullcontext(progress) if progress else bar(f"Sweeping {path.name}") as advance:
                 course.run(advance)
@@ -126,12 +130,24 @@ def _looked(runs: Engine, packed: bytes, plan: Plan) -> Layout:
     """What is found at every point, as one of the first shows it."""
     why, tried = "", min(TRIED, math.prod(plan.shape))
     for number in range(tried):
-        (answer,) = runs.submit(work.look, packed, (number,)).result()
+        answer = _alone(runs, packed, number)
         if not isinstance(answer, str):
             return _checked({name: Variable.of(*array) for name, array in answer.items()}, plan)
         why = why or answer
     points = "the only point has no answer" if tried == 1 else f"none of the first {tried} points has an answer"
     raise InvalidInput(f"{points}: {why}")
+
+
+def _alone(runs: Engine, packed: bytes, number: int) -> work.Answered:
+    """What a point gives that may end its process; one that ends while others begin is asked again."""
+    for _ in range(ATTEMPTS):
+        try:
+            (answer,) = runs.submit(work.look, packed, (number,)).result()
+        except runs.fatal:
+            continue
+        found: work.Answered = answer
+        return found
+    return "the process that looked at it ended"
 
 
 def _checked(layout: Layout, plan: Plan) -> Layout:
@@ -179,7 +195,7 @@ class _Course:
                 for task in self._runs.ended(self._tasks):
                     self._left -= self._ended(task, self._tasks.pop(task))
                     progress(total - self._left, total)
-        except (concurrent.futures.BrokenExecutor, concurrent.futures.CancelledError) as error:
+        except BREAKDOWNS as error:
             raise VelaturaError(
                 f"{self._store.path}: the executor broke down ({type(error).__name__}) with {total - self._left} of "
                 f"{total} points stored; the same call goes on from there"
@@ -208,19 +224,9 @@ class _Course:
                     self._begin((chunk,))
                 return 0
             points = self._store.count(chunks[0])
-            work.keep(self._packed, chunks[0], [self._alone(number) for number in self._store.points(chunks[0])])
+            numbers = self._store.points(chunks[0])
+            work.keep(self._packed, chunks[0], [_alone(self._runs, self._packed, number) for number in numbers])
         else:
             pace = seconds / len(chunks)
             self._pace = pace if self._pace is None else 0.5 * (self._pace + pace)
         return int(points)
-
-    def _alone(self, number: int) -> work.Answered:
-        """What a point gives that may end its process; one that ends while others begin is asked again."""
-        for _ in range(ATTEMPTS):
-            try:
-                (answer,) = self._runs.submit(work.look, self._packed, (number,)).result()
-            except self._runs.fatal:
-                continue
-            found: work.Answered = answer
-            return found
-        return "the process that looked at it ended"
