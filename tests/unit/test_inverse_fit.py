@@ -135,6 +135,19 @@ def test_what_is_simplified_keeps_its_brushing() -> None:
     assert found[0].alpha[0] < found[0].alpha[1]
 
 
+def test_a_start_on_all_bounds_is_simplified() -> None:
+    """Rationale: SciPy steps to where there are no numbers from there, and a solved model reads each point. Expected:
+    one interface, and no failure."""
+    layers = [
+        Interface(eta=0.2011294321788331, alpha=0.6578689976190332),
+        Medium(depth=1638.9793301433326, sigma_a=(0.0, 5067.636835773563, 0.0), sigma_s=1.5135286411278878e-11, g=0.3),
+        Interface(eta=0.10739309740355306, alpha=0.004536524415248689),
+        Interface(eta=2.4013905721153863, alpha=0.2773797026632101),
+    ]
+    found = simplify(Stack(layers, thin=True), 1)
+    assert len(found.stack.interfaces) == 1 and np.isfinite(found.error)
+
+
 def test_the_error_of_a_simplification_is_what_descends() -> None:
     """Expected: errors of log(1 + f cos), and ten times those of energies as shares of the mean of the colours."""
     found, stack = simplify(COATED, 1, AVERAGED), COATED

@@ -414,8 +414,10 @@ class Descent:
     def _read(self, x: Array) -> Array:
         """As `missed`, at one point (free,), of the material there."""
         try:
+            if not np.isfinite(x).all():  # SciPy's step where all coordinates lie on bounds
+                raise InvalidInput("no material")
             found = angles.table_of(self.placed(x)[0], self.table.directions, self.model, with_energy=True)
-        except InvalidInput:  # a rough interface with films between equal indices
+        except InvalidInput:  # also a rough interface with films between equal indices
             lit = 0 if self.table.energy is None else 3 * self.table.directions.incidence[0].size
             return np.full(self.wanted.size + lit, OUTSIDE)
         assert found.energy is not None
