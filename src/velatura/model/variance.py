@@ -15,7 +15,7 @@ from velatura.ops import Value
 
 V = TypeVar("V", bound="Variance")
 
-ALIKE = 1e-6  # difference of two eigenvalues, as share of their mean, that is rounding
+ALIKE = 2e-7  # difference of two eigenvalues, as share of their mean, that is rounding
 
 
 class Roughness(NamedTuple):
