@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -335,6 +336,48 @@ def test_lobes_of_rough_stacks_are_not_refused() -> None:
     """A slice of the benchmark, where models differ by factors; each stack itself is an answer."""
     for target in [METAL_BELOW_A_ROUGH_COAT, *benchmark("inverse").physical_targets(2, MODEL, seed=0, rough=True)]:
         assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
+
+
+def test_lobes_below_crossed_brushings_are_not_refused() -> None:
+    """Three lobes of a stack whose metal has a variance of 5 along one axis, which is seen through rough interfaces."""
+    target = Target(
+        [
+            {"energy": 0.0977950542, "alpha": (0.1952292593, 0.2865580557), "rotation": 56.9166315394},
+            {
+                "energy": (0.00052383882934, 0.00049918184698, 0.00037131076677),
+                "alpha": (0.5519836121, 0.6032901773),
+                "rotation": 0.3202088188,
+            },
+            {
+                "energy": (0.03070980562648, 0.01913767845185, 0.00973124902966),
+                "alpha": (0.5992710787, 0.6141110260),
+                "rotation": 0.0940769644,
+                "base": "conductor",
+            },
+        ]
+    )
+    assert missed(target, invert_stack(target, MODEL).stack) < 1e-4
+
+
+@pytest.mark.parametrize("alpha", [(0.1, 0.1), (0.3, 0.98)])
+def test_a_folded_point_is_the_same_stack_and_its_slopes_are_those_of_its_coordinates(alpha: Any) -> None:
+    """Expected: slopes by differences in the other coordinates."""
+    interfaces = [
+        {"interface": {"eta": 1.5, "alpha": (0.1, 0.2), "rotation": 30}},
+        {"interface": {"eta": 2.0, "alpha": alpha}},
+    ]
+    form = Target([{"energy": 0.04, "alpha": (0.1, 0.2), "rotation": 30}, {"energy": 0.02}])
+    dragged = DraggedStack.of(Stack.from_dict({"layers": interfaces}), form, named("yamaguchi2019"))
+    assert dragged is not None
+    here = dragged.point
+    here = replace(here, known=here.reading)
+    there, back = here.refolded, here.refolded.refolded
+    assert there.space.folded and not back.space.folded
+    assert back.x == pytest.approx(here.x, rel=1e-9, abs=1e-12)
+    free = here.space.free
+    assert there.space.read(there.x[:, None])[:, 0] == pytest.approx(here.reading.value, rel=1e-9, abs=1e-12)
+    slopes = there.space.reading(there.x, free).slopes
+    assert there.reading.slopes == pytest.approx(slopes, rel=0.02, abs=1e-3 * np.abs(slopes).max())
 
 
 def test_three_lobes_are_met_as_closely_as_one() -> None:

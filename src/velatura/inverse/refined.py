@@ -43,17 +43,26 @@ SMALL = 0.01  # variance that is added to that of a goal, for units in which it 
 
 
 def search(target: Target, model: Model) -> Solution | None:
-    """The preferred stack of the model in closed form, moved to one whose lobes, read by the model, are the target."""
+    """The preferred stack of the model in closed form, moved to one whose lobes, read by the model, are the target.
+
+    Of brushed lobes the search goes on from the stack that came nearest, if none of them leads to one.
+    """
     own = _of(target, model.adder, stacks.EFFORTS)
     if own is not None:
         first = next(own)
         others = itertools.chain(_corrected(first, target, model), own, _approaching(target, model.adder))
         tried = itertools.islice(itertools.chain([first], others), TRIES)
-        moves = (moved(found, target, model, giving=n == 0) for n, found in enumerate(tried))
     else:
         tried = itertools.islice(_approaching(target, model.adder), FEWER)
-        moves = (moved(found, target, model, giving=False) for found in tried)
-    return next((met for met in moves if isinstance(met, Solution)), None)
+    nearest, least = None, np.inf
+    for n, found in enumerate(tried):
+        met = moved(found, target, model, giving=own is not None and n == 0)
+        if isinstance(met, Solution):
+            return met
+        if met.missing < least:
+            nearest, least = found, met.missing
+    last = moved(nearest, target, model, giving=False, effort=2) if nearest and target.kind is not Isotropic else None
+    return last if isinstance(last, Solution) else None
 
 
 def _approaching(target: Target, model: Model) -> Iterator[Solution]:
@@ -120,17 +129,17 @@ def _sides(target: Target, paths: Partial) -> Array:
     return sides
 
 
-def moved(found: Solution, target: Target, model: Model, giving: bool = True, closely: bool = True) -> Solution | Bound:
+def moved(found: Solution, target: Target, model: Model, giving: bool = True, effort: int = 1) -> Solution | Bound:
     """A stack near one that is found, with the lobes of a target; the bound that is in the way if there is none.
 
-    giving: whether kept coordinates may change at bounds, which takes longer. closely: as `DraggedStack.met`.
+    giving: whether kept coordinates may change at bounds, which takes longer. effort: as `DraggedStack.met`.
     """
     if any(pinned(lobe, first=n == 0) for n, lobe in enumerate(target.lobes)):
         return _requested(found, target, model)
     dragged = _dragged(found, target, model)
     if dragged is None or dragged.achromatic(target) is not target:
         return GREY
-    there = dragged.met(target, giving, closely)
+    there = dragged.met(target, giving, effort)
     if isinstance(there, Bound):
         return there
     missed = there.missed(target) > MISSED
@@ -173,7 +182,7 @@ def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
     found = stacks.in_closed_form(target, model.adder, EFFORT)
     if found is None:
         return None
-    there = moved(found, target, model, giving=False, closely=False)
+    there = moved(found, target, model, giving=False, effort=0)
     return there if isinstance(there, Bound) else Bound(len(target.lobes) - 1, UNMET[0], 1, 0.0), found
 
 

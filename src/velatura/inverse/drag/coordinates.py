@@ -31,7 +31,7 @@ from velatura.inverse.interface import (
 from velatura.inverse.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
 from velatura.inverse.target import Target
 from velatura.model import Model, lobes, prepare
-from velatura.model.roughness_maps import MAPS, VARIANCE_MAX
+from velatura.model.roughness_maps import AS_IT_IS, MAPS, VARIANCE_MAX
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel
@@ -43,6 +43,7 @@ NEAR = 1e-3  # coordinates above which it is to smaller values
 SAME = 1e-6  # difference of tints that count as equal
 SMOOTH = 1e-10  # variance below which an interface is smooth
 REFLECTANCE_MAX = 0.95  # of a dielectric
+ODDS = MAPS["belcour-release"]  # from x to x / (1 - x)
 DEEP = 50.0  # an optical depth that nothing passes
 CLEARED, OUTSIDE = 1e-7, 1e-4  # optical depths below 0: that are none, and that are read on the way
 SHIFT = 0.01  # change of an index, a reflectance or a tint, to see how what films reflect follows
@@ -91,7 +92,8 @@ class Bound:
     """A bound on a coordinate, on the logarithm of an interface's index, or the optical depth above it in a `channel`,
     or on the least variance of the entries `axes`: `sign` times it is at least `sign * at`.
 
-    lobe, reason: the lobe that cannot be given beyond the bound, and why, a key of `REASONS`.
+    lobe, reason: the lobe that cannot be given beyond the bound, and why, a key of `REASONS`. missing: the share of a
+    goal that the nearest stack of a search misses which ends there.
     """
 
     lobe: int
@@ -102,6 +104,7 @@ class Bound:
     interface: int | None = None
     axes: slice | None = None
     channel: int | None = None
+    missing: float = field(default=np.inf, compare=False)
 
     def why(self, target: Target) -> str:
         """The reason, in words, why a target is not met."""
@@ -123,6 +126,7 @@ class Space:
 
     Points x have shape (D,), or (D, N) for N stacks. factors: of readings, (3 K + V I,), where a model in closed form
     stands in for another one. kind: of the variances. quick: whether films are known roughly, of many points at once.
+    folded: whether entries of variances s are those of s / (1 + s), which is at most 1.
     """
 
     model: Model
@@ -132,6 +136,7 @@ class Space:
     factors: Array | None = None
     kind: type[Variance] = Isotropic
     quick: bool = False
+    folded: bool = False
 
     # Points as layers, and as the model reads them -------------------------------------------------------------------
 
@@ -175,9 +180,23 @@ class Space:
     def _roughness(self, entries: Array, axis: float) -> Roughness:
         """The roughness of a variance, smooth where that is next to nothing, the axis first that is nearer to one."""
         f = MAPS[self.model.map]
-        u, v, rotation = named_as(self.kind(*entries).roughness(f), axis)
+        u, v, rotation = named_as(self._unfolded(entries).roughness(f), axis)
         smooth = f.roughness(SMOOTH)
         return Roughness(np.where(u < smooth, 0.0, u), np.where(v < smooth, 0.0, v), rotation + 0.0 * u)
+
+    def _unfolded(self, entries: Array) -> Variance:
+        """The variance itself of its entries in a point."""
+        s = self.kind(*entries)
+        return self.kind.of(s.roughness(AS_IT_IS), ODDS) if self.folded else s
+
+    def refolded(self, x: Array) -> Array:
+        """A point (D,) of this space in the one that is folded if this one is not, and the other way round."""
+        x = x.copy()
+        for own in self.interfaces:
+            s = self.kind(*x[own.variance])
+            there = self._unfolded(x[own.variance]) if self.folded else self.kind.of(s.roughness(ODDS), AS_IT_IS)
+            x[own.variance] = list(vars(there).values())
+        return x
 
     def read(self, x: Array) -> Array:
         """Energies of all lobes, then variances of all interfaces, (3 K + V I, N), of N points."""
@@ -380,6 +399,20 @@ class Point:
     def reading(self) -> Reading:
         """The model's reading of it."""
         return self.known or self.space.reading(self.x, self.space.free)
+
+    @property
+    def refolded(self) -> Point:
+        """The same stack, where variances are folded if they are not here, and the other way round."""
+        space, known = self.space, self.known
+        if known:
+            steps = STEP * (np.abs(self.x[space.free]) + 0.01)
+            here, there = space.refolded(self.x), np.empty((len(space.free), len(space.free)))
+            for n, c in enumerate(space.free):
+                x = self.x.copy()
+                x[c] += steps[n]
+                there[:, n] = (space.refolded(x) - here)[space.free] / steps[n]
+            known = Reading(known.value, known.slopes @ np.linalg.pinv(there))
+        return Point(dataclasses.replace(space, folded=not space.folded), space.refolded(self.x), known)
 
     @cached_property
     def layers(self) -> list[Layers]:

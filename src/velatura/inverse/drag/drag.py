@@ -244,17 +244,17 @@ class DraggedStack:
             return found, None
         return self._part_of_the_way(wish, self._problem(self._wanted(wish)), found)
 
-    def met(self, wish: Target, giving: bool = True, closely: bool = True) -> DraggedStack | Bound:
+    def met(self, wish: Target, giving: bool = True, effort: int = 1) -> DraggedStack | Bound:
         """The stack with the lobes of a target of the same form, or the bound that is in the way.
 
-        giving: whether kept coordinates may change at bounds. closely: whether all is tried where little is missing.
+        giving: whether kept coordinates may change at bounds. effort: as `Problem.solve`.
         """
         problem = self._problem(self._wanted(wish))
-        found = self._met(problem) if giving else problem.solve(closely=closely)
+        found = self._met(problem) if giving else problem.solve(effort=effort)
         if isinstance(found, Bound):
             return found
         met = self._at(found).renamed(wish)
-        for aside in () if not self.space.slow or not closely else ASIDE:
+        for aside in () if not self.space.slow or not effort else ASIDE:
             beside = None if met._off(wish) < SAME else met._beside(aside)
             if beside is None:
                 break

@@ -17,9 +17,12 @@ ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; als
 SLOW_ALMOST = 1e-6  # the same by Broyden's method, whose rounds gain less
 SLOW_ROUNDS, PATIENCE = 16, 3  # for models that are slow: of Broyden's method, and of these at a bound
 # Of lobes with axes, whose readings wind: what those rounds may miss where differences of the model itself follow,
-# rounds with these, shares of a step that are tried, and what may be missing in the end
-NEAR, MEASURED, STEPS, WINDING = 0.05, 4, (1.0, 0.3), 1e-3
+# rounds with these, and what may be missing in the end
+NEAR, MEASURED, WINDING = 0.05, 4, 1e-3
+FAR, MEASURED_FAR = 0.2, 8  # the same where a search does not give up
+DAMPED, DAMPINGS, GAINED = 1e-3, 3, 0.9  # damping of these rounds at first, tenfold ones that are tried, and least gain
 JUMP = 3e-4  # what may be missing of other lobes in the end, since readings jump where nodes are shared out anew
+BLURRED = 0.2  # most that a folded variance changes by in a round
 FURTHER = 0.7  # share of a reflectance by which it changes in a round
 NEARER, SLOW_PATIENCE = 0.8, 5  # share of what was missing that is nearer, and such rounds without any
 
@@ -67,26 +70,33 @@ class Problem:
     start: Point
     goal: Array
 
-    def solve(self, compromise: Compromise | None = None, closely: bool = True) -> Solution | Bound:
+    def solve(self, compromise: Compromise | None = None, effort: int = 1) -> Solution | Bound:
         """The stack that meets the goal; the violated bound if there is none.
 
-        closely: whether a model that is slow is asked for differences where the search ends near the goal.
+        effort: 0 for no differences of a slow model, 1 for some where the search ends near the goal, 2 for more.
+
+        What a slow model reads follows variances less and less as they grow, and they have no bound. So the last search
+        folds them.
         """
+        if effort > 1 and self.start.space.winds and not self.start.space.folded:
+            met = Problem(self.start.refolded, self.goal).solve(compromise, effort)
+            return replace(met, point=met.point.refolded) if isinstance(met, Solution) else met
         nearest = Nearest()
         found = self._searched(compromise, nearest)
         space = self.start.space
         slow = space.slow
-        if isinstance(found, Bound) and compromise is None and closely and slow:
+        if isinstance(found, Bound) and compromise is None and effort and slow:
             # Near, one step ends the search; from further off, where readings wind, the way leads on: once at a bound,
             # and not where what misses most is at its own
             stopped = space.winds and found.coordinate is not None
             apart = nearest.missing > ALMOST
             if (apart == space.winds or space.coated) and not (stopped and self._ends(nearest)):
-                self._approach(nearest, 1 if stopped else MEASURED)
+                near, rounds = (NEAR, 1 if stopped else MEASURED) if effort == 1 else (FAR, MEASURED_FAR)
+                self._approach(nearest, rounds if nearest.missing < near else 0, giving=effort > 1)
             enough = WINDING if space.winds else JUMP if found.reason in UNMET else ALMOST
             if nearest.missing < enough and not space.broken(nearest.x, None):
                 return Solution(Point(space, nearest.x), 1.0)
-        return found
+        return replace(found, missing=nearest.missing) if isinstance(found, Bound) else found
 
     def _searched(self, compromise: Compromise | None, nearest: Nearest) -> Solution | Bound:
         """The same by Newton's method with the slopes of `Space.reading`; also keeps the nearest point."""
@@ -132,23 +142,35 @@ class Problem:
                 return space.bound_at(min(held), full)
         return space.broken(x, bound) or bound or self._in_the_way(nearest)
 
-    def _approach(self, nearest: Nearest, rounds: int) -> None:
-        """Newton's method from the nearest point, with differences of the model itself."""
-        space, free = self.start.space, self.start.space.free
-        for _ in range(rounds if nearest.missing < NEAR else 0):
+    def _approach(self, nearest: Nearest, rounds: int, giving: bool) -> None:
+        """Newton's method from the nearest point, with differences of the model itself, damped (Levenberg 1944).
+
+        giving: whether what absorbs between lobes moves, too, which may be needed for roughnesses below 1.
+        """
+        from scipy.optimize import lsq_linear  # slow to load
+
+        space, damping = self.start.space, DAMPED
+        depths = [own.depth for own in space.interfaces if giving and own.depth is not None]
+        free = np.r_[space.free, depths].astype(int)
+        for _ in range(rounds):
             x, before = nearest.x, nearest.missing
             points = space.points(x, free)
             read = space.read(points)
-            slopes = (read[:, 1:] - read[:, :1]) / (points[free, 1 + np.arange(len(free))] - x[free])
-            moved = np.linalg.lstsq(self._scaled(slopes), self._scaled(self.goal - read[:, 0]), rcond=1e-12)[0]
-            for step in STEPS:
+            size = np.abs(x[free]) + 0.01
+            slopes = (read[:, 1:] - read[:, :1]) / (points[free, 1 + np.arange(len(free))] - x[free]) * size
+            low, high = ((end[free] - x[free]) / size for end in space.box)
+            for _ in range(DAMPINGS):
+                a = np.vstack([self._scaled(slopes), damping * np.eye(len(free))])
+                b = np.r_[self._scaled(self.goal - read[:, 0]), np.zeros(len(free))]
                 tried = x.copy()
-                tried[free] += step * np.clip(moved, -self._reach[free], self._reach[free])
+                tried[free] += size * lsq_linear(a, b, (low, np.maximum(high, low + SLACK)), method="bvls").x
                 tried = space.clipped(tried)
                 nearest.keep(tried, self._scaled(space.read(tried[:, None])[:, 0] - self.goal))
                 if nearest.missing < before / 2:
+                    damping = damping / 10
                     break
-            if nearest.missing < ALMOST or nearest.missing > before / 2:
+                damping = damping * 10
+            if nearest.missing < ALMOST or nearest.missing > GAINED * before:
                 break
 
     def _in_the_way(self, nearest: Nearest) -> Bound:
@@ -218,7 +240,7 @@ class Problem:
                 reach[own.reflectances] = np.maximum(FURTHER * x[own.reflectances], 0.05)
             if own.log_index is not None:
                 reach[own.log_index] = 0.2
-            reach[own.variance] = 0.5 * np.abs(x[own.variance]).max() + 0.02
+            reach[own.variance] = BLURRED if space.folded else 0.5 * np.abs(x[own.variance]).max() + 0.02
         return moved * min(1.0, float(np.min(reach[free] / np.maximum(np.abs(moved), ops.TINY))))
 
     @cached_property
