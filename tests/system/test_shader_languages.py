@@ -134,6 +134,15 @@ def test_lobes_of_any_model_may_be_baked(name: str) -> None:
     assert np.quantile(np.abs(found.drawn - truth.drawn), 0.9) < 5e-3
 
 
+@pytest.mark.parametrize("to", ["glsl", "wgsl", "osl", "mtlx"])
+def test_a_black_material_has_a_shader(to: str) -> None:
+    """Expected: no column of it varies, so that its texture is a line of zeros."""
+    black = vt.Stack([vt.Interface(eta=1.0, alpha=0.2), vt.Diffuse(albedo=0.0)])
+    columns = shader(black).columns
+    assert columns is not None and columns.shape == (1, 1, 4) and not columns.any()
+    assert vt.export(black, to)
+
+
 def test_what_varies_is_not_baked(tmp_path: Path) -> None:
     (tmp_path / "rough.png").touch()
     stack = vt.Stack([vt.Interface(eta=1.5, k=1, alpha={"texture": str(tmp_path / "rough.png")})])

@@ -208,7 +208,8 @@ def tabulated(material: Material, model: Model, conserving: bool = False) -> Tab
     sides = [material, material.reversed()] if material.transmits else [material]
     etas = [float(np.mean(side.below) / np.mean(side.exterior)) if material.transmits else 1.0 for side in sides]
     each = [_at_nodes(side, model, w, eta, conserving) for side, eta in zip(sides, etas)]
-    kept = [k for k, closures in enumerate(zip(*each)) if max(np.max(c.weight) for c in closures) > FAINT]
+    bright = [k for k, closures in enumerate(zip(*each)) if max(np.max(c.weight) for c in closures) > FAINT]
+    kept = bright or [0]
     rows = np.array([np.concatenate([_columns(closures[k], variance) for k in kept]).T for closures in each])
     return Tabulated([each[0][k].kind for k in kept], variance, shape, etas, rows.astype(np.float32).astype(float))
 
@@ -384,4 +385,4 @@ def losses(material: Material, model: Model, closures: Closures) -> Iterator[Los
             share = 1 / np.maximum(density + also, ops.TINY) / PAIRS
             truth, approximate = truth + (value * share).sum(axis=1), approximate + (other * share).sum(axis=1)
             apart += 0.5 * float(np.sum(np.abs(value - other) * share))
-        yield Loss(cosine, apart / float(truth.sum()), float(np.max(np.abs(approximate - truth))))
+        yield Loss(cosine, apart / (float(truth.sum()) or 1.0), float(np.max(np.abs(approximate - truth))))

@@ -208,7 +208,9 @@ class Tabulated:
         )
 
     def texels(self, rows: Array) -> Array:
-        """The texture of columns, (rows, sides, nodes)."""
+        """The texture of columns, (rows, sides, nodes); a line of zeros where all of them are constant."""
+        if not self.height:
+            return np.zeros((1, 1, 4), np.float32)
         columns = np.zeros((4 * self.columns.texels, self.sides, self.nodes[0], self.turns), np.float32)
         for row, place in zip(rows, self.columns.places, strict=True):
             if isinstance(place, int):
