@@ -3,8 +3,9 @@
     python tools/check_release.py [--pythons 3.10 3.13] [--folder dist]
 
 Each environment sees nothing but the package index and the system's libraries: no Node, no compiler, no variable of
-the caller. In it, the commands of `COMMANDS` must succeed. Prints a line for each step, and ends with status 1 at the
-first that fails.
+the caller. In it, the commands of `COMMANDS` must succeed. One more, of the oldest Python, has the wheel with `EXTRAS`
+and the oldest versions that it allows of all that it requires; there those of `OLDEST` must. Prints a line for each
+step, and ends with status 1 at the first that fails.
 """
 
 from __future__ import annotations
@@ -19,7 +20,10 @@ import tarfile
 import tempfile
 import zipfile
 from collections.abc import Iterator
+from email import message_from_bytes
 from pathlib import Path
+
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
 SUPPORTED = re.findall(r"Python :: (3\.\d+)", (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -38,6 +42,20 @@ COMMANDS = (
     ("lobes", "coated-gold", "--cos", "1,0.5"),
     ("cite", "belcour2018"),
     ("render", "bare-gold", "--size", "32", "--spp", "4", "-o", "gold.png"),
+)
+EXTRAS = ("plots", "editor", "notebook", "sweep")
+PLAN = """\
+material: bare-gold
+vary: {layer0_alpha: {range: [0.1, 0.5], steps: 3}}
+what: lobes
+options: {cos_theta: [1], model: belcour2018}
+"""
+OLDEST = (
+    *COMMANDS,
+    ("check", "bare-gold"),
+    ("compare", "bare-gold", "--models", "belcour2018", "--cos", "1", "--paths", "2000", "--plot", "lobes.png"),
+    ("export", "coated-gold", "--to", "glsl", "-o", "gold.glsl"),
+    ("sweep", "plan.yaml", "-o", "points.zarr", "--workers", "1"),
 )
 SECONDS = 900  # that a command may take
 
@@ -63,6 +81,8 @@ def main() -> None:
                 check_installed(python, distribution)
         else:
             missing.append(version)
+    if python := found(SUPPORTED[0]):
+        check_oldest(python, wheel)
     if missing:
         sys.exit(f"check_release: no Python {', '.join(missing)} on this machine")
 
@@ -86,22 +106,45 @@ def check_contents(wheel: Path, source: Path) -> None:
 def check_installed(python: Path, distribution: Path) -> None:
     """End if a file does not install into an empty environment, or a command fails there."""
     with tempfile.TemporaryDirectory() as folder:
-        home = Path(folder)
-        programs = home / "environment" / "bin"
-        _done(_alone([python, "-m", "venv", home / "environment"], home))
-        install: list[str | Path] = [
-            programs / "python",
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-            distribution,
-        ]
-        _done(_alone(install, home))
-        for command in COMMANDS:
-            _done(_alone([programs / "velatura", *command], home))
+        _check(python, Path(folder), [str(distribution)], COMMANDS)
     print(f"{python}: {distribution.name}: {', '.join(command[0] for command in COMMANDS)}", flush=True)
+
+
+def check_oldest(python: Path, wheel: Path) -> None:
+    """End if the wheel does not install beside the oldest versions that it allows, or a command fails there."""
+    with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder)
+        lines = oldest(wheel, SUPPORTED[0])
+        (home / "oldest.txt").write_text("\n".join(lines), encoding="utf-8")
+        (home / "plan.yaml").write_text(PLAN, encoding="utf-8")
+        _check(python, home, ["--constraint", "oldest.txt", f"{wheel}[{','.join(EXTRAS)}]"], OLDEST)
+    print(f"{python}: {len(lines)} oldest versions: {', '.join(command[0] for command in OLDEST)}", flush=True)
+
+
+def oldest(wheel: Path, version: str) -> list[str]:
+    """The constraints of pip that hold all that a wheel requires of a Python, with `EXTRAS`, at its lowest version."""
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        metadata = message_from_bytes(archive.read(name))
+    found = [Requirement(text) for text in metadata.get_all("Requires-Dist", [])]
+    extras = [{"extra": extra, "python_version": version} for extra in EXTRAS]
+    return [
+        f"{each.name}=={lowest.version}"
+        for each in found
+        if not each.marker or any(map(each.marker.evaluate, extras))
+        for lowest in each.specifier
+        if lowest.operator == ">="
+    ]
+
+
+def _check(python: Path, home: Path, wanted: list[str], commands: tuple[tuple[str, ...], ...]) -> None:
+    """Make an environment in a folder, install into it, and run commands."""
+    programs = home / "environment" / "bin"
+    _done(_alone([python, "-m", "venv", home / "environment"], home))
+    pip: list[str | Path] = [programs / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    _done(_alone([*pip, *wanted], home))
+    for command in commands:
+        _done(_alone([programs / "velatura", *command], home))
 
 
 def found(version: str) -> Path | None:
