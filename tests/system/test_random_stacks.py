@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzzing import checking, lobes, pictures, plugin, scalar
+from fuzzing import checking, gradients, lobes, pictures, plugin, scalar
 from fuzzing.models import random_model
 from fuzzing.stacks import BASES, random_stack, textured
 
@@ -48,6 +48,11 @@ def test_the_laws_of_any_stack(base: str) -> None:
     """No law is broken that is not declared; `vt.check` gives a false alarm in one of 1000 reports."""
     rng = np.random.default_rng((1, *base.encode()))
     assert not checking.tried(random_stack(rng, base=base), random_model(rng, changed=0, keep=["channels"]))
+
+
+def test_the_gradients_of_any_stack() -> None:
+    """Up to four values each: gradients are finite, and the differences of the light that leaves."""
+    assert not gradients.trial(np.random.default_rng((0, *b"gradients", 1)))
 
 
 @pytest.mark.parametrize(("form", "base"), [("forward", "thin"), ("symmetric", "metal")])
