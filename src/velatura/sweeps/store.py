@@ -190,7 +190,7 @@ def _sound(file: Path) -> bool:
 def existing(path: Path, plan: Plan) -> Store | None:
     """The store of a plan that was begun before; None where there is none yet.
 
-    Whatever is missing or altered in it but points is written anew.
+    All that is missing or altered in it but points is written anew.
 
     Raises:
         InvalidInput: something else is there, the store of another plan, or one of other versions; or no store can be
