@@ -390,7 +390,7 @@ def test_messages_have_an_end(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput) as caught:
         load(path)
     message = str(caught.value)
-    assert len(message) == 1000 and "nnn...nnn" in message and message.endswith("nnn.png")
+    assert len(message) == 2000 and "nnn...nnn" in message and message.endswith("nnn.png")
     assert message.startswith(f"{path}: layer 0 (interface): alpha: texture: ")
 
 

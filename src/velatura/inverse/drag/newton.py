@@ -143,7 +143,7 @@ class Problem:
         return space.broken(x, bound) or bound or self._in_the_way(nearest)
 
     def _approach(self, nearest: Nearest, rounds: int, giving: bool) -> None:
-        """Newton's method from the nearest point, with differences of the model itself, damped (Levenberg 1944).
+        """Newton's method from the nearest point, with differences of the model itself, damped (Levenberg, Marquardt).
 
         giving: whether what absorbs between lobes moves, too, which may be needed for roughnesses below 1.
         """
