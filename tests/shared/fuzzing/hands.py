@@ -36,21 +36,21 @@ ACT = """
     e.checkVisibility() && !e.disabled && !outside.test(named(e)) && !(full && adding.test(named(e))));
   if (!possible.length) return null;
   const e = possible[Math.floor(u[0] * possible.length)], name = named(e);
-  const tell = (type) => e.dispatchEvent(new Event(type, { bubbles: true }));
+  const dispatch = (type) => e.dispatchEvent(new Event(type, { bubbles: true }));
   const press = (key) => e.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
   e.focus();
   if (kind === 'range') {
     for (const part of u.slice(1, 4)) {
       e.value = Math.round(part * Number(e.max));
-      tell('input');
+      dispatch('input');
     }
-    tell('change');
+    dispatch('change');
     return `${name}: ${e.value}`;
   }
   if (kind === 'number') {
     e.value = String(Number((Number(e.value) * 2 * u[1] + (u[2] < 0.2 ? u[3] : 0)).toPrecision(3)));
-    tell('input');
-    tell('change');
+    dispatch('input');
+    dispatch('change');
     e.blur();
     return `${name}: ${e.value}`;
   }
@@ -58,7 +58,7 @@ ACT = """
     const options = [...e.options].filter((o) => !o.disabled && !o.selected && o.value !== 'truth');
     if (!options.length) return null;
     e.value = options[Math.floor(u[1] * options.length)].value;
-    tell('change');
+    dispatch('change');
     return `${name}: ${e.value}`;
   }
   if (kind === 'grip') press(u[1] < 0.5 ? 'ArrowUp' : 'ArrowDown');
