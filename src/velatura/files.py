@@ -14,7 +14,7 @@ from contextvars import ContextVar
 from errno import EACCES, EINVAL
 from pathlib import Path
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, one_line, short
 
 _TRIAL = bytes(4096)  # written and thrown away, so that a full disk shows itself
 
@@ -28,6 +28,7 @@ LIMITS = {
     "nodes": 10_000,
     "pixels": 2**28,
 }
+LAST = 253402300799  # second of the year 9999
 SECONDS = 30.0  # of the processor, in which they are read
 
 # Reading -------------------------------------------------------------------------------------------------------------
@@ -127,6 +128,20 @@ def number(text: str) -> float:
 
 
 _NUMBER = re.compile(r"[-+]?(([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|inf|nan)", re.IGNORECASE)
+
+
+def source_date() -> int | None:
+    """Seconds since 1970 of the environment's SOURCE_DATE_EPOCH, of which all that is written has its date.
+
+    Raises:
+        InvalidInput: it is no date.
+    """
+    given = os.environ.get("SOURCE_DATE_EPOCH")
+    if given and not (re.fullmatch("[0-9]{1,12}", given) and int(given) <= LAST):
+        raise InvalidInput(
+            f"SOURCE_DATE_EPOCH: must be whole seconds since 1970, 0 to {LAST}, got {one_line(short(given, 40))!r}"
+        )
+    return int(given) if given else None
 
 
 def _size(count: int) -> str:

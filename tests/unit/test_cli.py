@@ -12,6 +12,7 @@ import math
 import os
 import re
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -419,3 +420,12 @@ def test_a_step_that_takes_long_shows_the_time_that_passes(
             found += err
             assert out == ""
     assert "Solving a.yaml" in found
+
+
+def test_a_date_of_the_environment_that_is_none_gets_one_line() -> None:
+    """Rationale: NumPy reads it, too, when SciPy is loaded, which a process of its own does anew."""
+    environment = {**os.environ, "SOURCE_DATE_EPOCH": "x"}
+    command = [sys.executable, "-m", "velatura", "lobes", "bare-gold"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith("velatura: SOURCE_DATE_EPOCH: must be whole seconds since 1970")

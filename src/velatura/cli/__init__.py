@@ -43,7 +43,7 @@ from velatura.cli import (
     tables,
 )
 from velatura.errors import VelaturaError, VelaturaWarning, one_line
-from velatura.files import reason
+from velatura.files import reason, source_date
 
 INTERRUPTED = 130  # as a shell reports a process that ended by Ctrl-C
 
@@ -105,6 +105,7 @@ def main() -> None:
     with _interrupts() as interrupts, _warnings_in_one_line():
         try:
             _open_streams()
+            source_date()  # NumPy reads it as well, where SciPy is loaded
             status = app(sys.argv[1:] or ["--help"], prog_name="velatura", standalone_mode=False)
             sys.stdout.flush()
         except BaseException as error:

@@ -47,7 +47,6 @@ _BAKES = {
     "mitsuba-principled": (".xml",),
 }
 LICENCE = "BSD-3-Clause"  # of code that is written
-LAST = 253402300799  # second of the year 9999
 _OF_SHADERS = frozenset({"constant", "prefix", "half", "tables", "baked"})
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
 
@@ -215,12 +214,8 @@ def origin() -> str:
     Raises:
         InvalidInput: SOURCE_DATE_EPOCH is no date.
     """
-    from velatura.stack.schema import show
-
-    given = os.environ.get("SOURCE_DATE_EPOCH")
-    if given and not (re.fullmatch("[0-9]{1,12}", given) and int(given) <= LAST):
-        raise InvalidInput(f"SOURCE_DATE_EPOCH: must be whole seconds since 1970, 0 to {LAST}, got {show(given)}")
-    day = datetime.fromtimestamp(int(given) if given else time.time(), timezone.utc)
+    given = files.source_date()
+    day = datetime.fromtimestamp(time.time() if given is None else given, timezone.utc)
     return f"Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}"
 
 
