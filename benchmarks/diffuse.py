@@ -16,7 +16,8 @@ import numpy as np
 from rich.progress import track
 
 import velatura as vt
-from velatura.model import bsdf, named
+from velatura.model import named
+from velatura.model.papers import bsdf
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
 COSINES = (1.0, 0.6, 0.2)

@@ -35,8 +35,8 @@ from velatura.inverse import (
 from velatura.inverse.drag import seen
 from velatura.inverse.partial_stack import Array, Layers, join, take
 from velatura.model import DEFAULT, MODELS, Model, named
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.roughness_maps import MAPS
-from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Isotropic, Roughness
 from velatura.stack import Film, Interface, Layer, Medium, Stack
 

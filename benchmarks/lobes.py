@@ -3,9 +3,9 @@
     python benchmarks/lobes.py [--half fit] [--kind NAME]... [--stacks 12] [--paths 1000000] [--seed 0] [--truth FOLDER]
 
 Walks are those of `walks.py`, of stacks that are lit from above and let no light pass. Energies are those of
-`velatura.model.transport`, widths those of `velatura.model.widths`. Columns, means over stacks and directions: half the
-sum of the absolute differences over 40 by 40 bins of the projected disc, over the true energy, and the part of it that
-the walks make; |energy / true energy - 1|, its mean and the greatest.
+`velatura.model.solved.energies`, widths those of `velatura.model.solved.lobes.widths`. Columns, means over stacks and
+directions: half the sum of the absolute differences over 40 by 40 bins of the projected disc, over the true energy, and
+the part of it that the walks make; |energy / true energy - 1|, its mean and the greatest.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 from walks import FOLDER, HALVES, arguments, chosen, every
 
 from velatura import tables
-from velatura.model import own_medium, remainder, widths
-from velatura.model.own_medium import OwnMediumLobe
-from velatura.model.remainder import Remainder
-from velatura.model.transport.adding import parts
-from velatura.model.transport.energies import INCIDENCES, energies
-from velatura.model.transport.interfaces import Facets
+from velatura.model.solved.energies.adding import parts
+from velatura.model.solved.energies.energies import INCIDENCES, energies
+from velatura.model.solved.energies.interfaces import Facets
+from velatura.model.solved.lobes import refracted_lobe, remainder, widths
+from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.variance import Roughness
 from velatura.stack import Material, Stack
 
@@ -57,13 +57,13 @@ def of_lobe(lobe: OwnMediumLobe, wi: tuple[float, float, float]) -> Array:
     """Light of a lobe on the bins, of energy 1."""
     if min(lobe.roughness.alpha_u, lobe.roughness.alpha_v) > NARROW:
         wo, cell = over_the_disc()
-        value, _ = own_medium.eval_pdf(lobe, tuple(np.full(len(cell), x) for x in wi), wo)
+        value, _ = refracted_lobe.eval_pdf(lobe, tuple(np.full(len(cell), x) for x in wi), wo)
         light = np.bincount(cell, value / wo[2], BINS * BINS)
     else:
         k = np.arange(SAMPLES)
         full = tuple(np.full(SAMPLES, x) for x in wi)
-        wo = own_medium.sample(lobe, full, (k * (STEP / SAMPLES) + 0.5 / SAMPLES) % 1, (k + 0.5) / SAMPLES)
-        value, pdf = own_medium.eval_pdf(lobe, full, wo)
+        wo = refracted_lobe.sample(lobe, full, (k * (STEP / SAMPLES) + 0.5 / SAMPLES) % 1, (k + 0.5) / SAMPLES)
+        value, pdf = refracted_lobe.eval_pdf(lobe, full, wo)
         weight = np.where(pdf > 0, value / np.where(pdf > 0, pdf, 1), 0)
         light = np.bincount(binned(wo[0], wo[1]), weight, BINS * BINS)
     return np.asarray(light.reshape(BINS, BINS) / max(light.sum(), 1e-30))

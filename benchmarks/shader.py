@@ -31,8 +31,10 @@ from agreement import PATTERNS, Changeable, Differences, differences, in_browser
 from machines import MACHINES
 
 import velatura
-from velatura.model import Model, bsdf, named, solution
+from velatura.model import Model, named
 from velatura.model.context import Context, at_a_point
+from velatura.model.papers import bsdf
+from velatura.model.solved import solve
 from velatura.shader import record, shader, variance
 from velatura.shader.glsl import GLSL
 from velatura.stack import Material, Stack
@@ -125,7 +127,7 @@ def closed_form(count: int, seed: int) -> None:
 def _apart(stack: Stack, model: Model, rng: np.random.Generator) -> list[tuple[float, float]]:
     """Total variation and difference of albedo, at each cosine, of a material in closed form from the same solved."""
     material, kind = Material.of(stack), variance(stack)
-    bodies = solution.solve(material, model, kind, Context()), bsdf.body(material, model.adder, kind, at_a_point())
+    bodies = solve.solve(material, model, kind, Context()), bsdf.body(material, model.adder, kind, at_a_point())
     found = []
     for cosine in COSINES:
         wi = (np.full(SAMPLES, np.sqrt(1 - cosine * cosine)), np.zeros(SAMPLES), np.full(SAMPLES, cosine))

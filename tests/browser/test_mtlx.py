@@ -13,7 +13,8 @@ from benchmarks import benchmark
 from materialx import document, drawing, generated
 
 import velatura as vt
-from velatura.model import bsdf, named
+from velatura.model import named
+from velatura.model.papers import bsdf
 from velatura.optics import fresnel
 from velatura.shader import closures, recording
 from velatura.shader.closures import Closure

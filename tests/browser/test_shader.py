@@ -28,8 +28,9 @@ from agreement import (
 )
 
 import velatura as vt
-from velatura.model import bsdf, named
+from velatura.model import named
 from velatura.model.context import at_a_point
+from velatura.model.papers import bsdf
 from velatura.shader import record, shader, structure
 from velatura.stack import Material
 

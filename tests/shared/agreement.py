@@ -14,9 +14,10 @@ from machines import Changing, Machine
 
 from velatura import tables
 from velatura.editor import messages
-from velatura.model import bsdf, solution, turned
 from velatura.model.context import at_a_point
-from velatura.model.solution import Solver
+from velatura.model.papers import bsdf
+from velatura.model.solved import rotation_frame, solve
+from velatura.model.solved.solve import Solver
 from velatura.optics import ggx
 from velatura.sampling import coated as interfaces
 from velatura.shader import Recording, Shader, constant, material, record, shader, variance
@@ -144,8 +145,8 @@ def in_numpy(case: Case, recording: Recording) -> Results:
 
 def _solved(stack: Stack, used: Solver, wi: Any, wo: Any, u: Any) -> Results:
     """On the grid of a solver."""
-    material = solution.plain(Material.of(stack).solid())
-    frame = turned.frame(material)
+    material = solve.plain(Material.of(stack).solid())
+    frame = rotation_frame.frame(material)
     upright, solver = frame.back(material), replace(used, variance=frame.kind(variance(stack)))
     layouts = solver.layouts([upright])
     solved = solver.body(upright, solver.solve(upright, layouts), layouts)

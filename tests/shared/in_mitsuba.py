@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from velatura import kernel
-from velatura.model import Model, bsdf
+from velatura.model import Model
 from velatura.model.context import at_a_point
+from velatura.model.papers import bsdf
 from velatura.optics.ggx import Direction
 from velatura.sampling import coated, directional_grid
 from velatura.shader import closures, recording

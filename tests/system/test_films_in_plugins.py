@@ -11,7 +11,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
-from velatura.model import solution
+from velatura.model.solved import solve
 from velatura.optics.films import Film, coherent
 from velatura.stack import luminance_sensitivity, srgb_weights
 
@@ -87,9 +87,9 @@ def test_gradients_are_finite_differences(
     """Values are solved as finely as those of gradients."""
     import drjit as dr
 
-    facets, normals = solution.FINELY
-    monkeypatch.setattr(solution, "SAMPLES", facets)
-    monkeypatch.setattr(solution, "NORMALS", dict.fromkeys(solution.NORMALS, normals))
+    facets, normals = solve.FINELY
+    monkeypatch.setattr(solve, "SAMPLES", facets)
+    monkeypatch.setattr(solve, "NORMALS", dict.fromkeys(solve.NORMALS, normals))
     bsdf = vt.bsdf(stack, model=model, reflectance="fgd")
     parameters = mi.traverse(bsdf)
     start = np.ravel(np.array(parameters[name])).tolist()[0]

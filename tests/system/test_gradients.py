@@ -9,7 +9,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
-from velatura.model import solution
+from velatura.model.solved import solve
 
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
@@ -30,9 +30,9 @@ UP, DOWN = (-0.45, -0.15, 0.75), (-0.45, -0.15, -0.75)
 @pytest.fixture(autouse=True)
 def finely(monkeypatch: pytest.MonkeyPatch) -> None:
     """Values as finely solved as those of gradients: else their error, over a step, hides slopes."""
-    facets, normals = solution.FINELY
-    monkeypatch.setattr(solution, "SAMPLES", facets)
-    monkeypatch.setattr(solution, "NORMALS", dict.fromkeys(solution.NORMALS, normals))
+    facets, normals = solve.FINELY
+    monkeypatch.setattr(solve, "SAMPLES", facets)
+    monkeypatch.setattr(solve, "NORMALS", dict.fromkeys(solve.NORMALS, normals))
 
 
 def value(bsdf: Any, wo: tuple[float, ...]) -> Any:
@@ -84,9 +84,9 @@ def test_gradients_are_differences(stack: vt.Stack, keys: str, wo: tuple[float, 
 def test_one_variable_for_both_axes_leaves_an_interface_isotropic(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two roughnesses, each one variable for both of its axes: to 2 %, over smaller steps, and so of more normals."""
     facets, normals = 6765, 28657
-    monkeypatch.setattr(solution, "FINELY", (facets, normals))
-    monkeypatch.setattr(solution, "SAMPLES", facets)
-    monkeypatch.setattr(solution, "NORMALS", {True: normals})
+    monkeypatch.setattr(solve, "FINELY", (facets, normals))
+    monkeypatch.setattr(solve, "SAMPLES", facets)
+    monkeypatch.setattr(solve, "NORMALS", {True: normals})
     bsdf = vt.bsdf(COATED)
     parameters = mi.traverse(bsdf)
     roughness = {0: mi.Float(0.1), 2: mi.Float(0.3)}

@@ -11,9 +11,10 @@ import velatura as vt
 from velatura import kernel
 from velatura.comparison.evaluated_lobes import account
 from velatura.errors import InvalidInput
-from velatura.model import named, solution
+from velatura.model import named
 from velatura.model.context import Context
-from velatura.model.prepare import variance_kind
+from velatura.model.papers.prepare import variance_kind
+from velatura.model.solved import solve
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -331,7 +332,7 @@ def test_gradients_of_a_pixel_are_finite_differences(monkeypatch: pytest.MonkeyP
     Lobes have as many normals as those of gradients. Brushed stacks are solved to 2e-4 of a brightness of .13, which
     moves slopes of roughness and index by up to .01.
     """
-    monkeypatch.setattr(solution, "NORMALS", dict.fromkeys(solution.NORMALS, solution.FINELY[1]))
+    monkeypatch.setattr(solve, "NORMALS", dict.fromkeys(solve.NORMALS, solve.FINELY[1]))
     stack = vt.Stack(
         [
             vt.Interface(eta=1.5, alpha=(0.15, 0.25)),

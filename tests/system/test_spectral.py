@@ -13,8 +13,8 @@ import velatura as vt
 from velatura import kernel
 from velatura.binding import STEERING_NM
 from velatura.errors import InvalidInput
-from velatura.model import solution
 from velatura.model.context import Context
+from velatura.model.solved import solve
 from velatura.stack import spectra
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -149,7 +149,7 @@ def test_every_wavelength_is_as_if_it_was_solved_by_itself(name: str) -> None:
     within .005 on average. Samples are shared so that none is heavy at any wavelength: densities within 10 %."""
     bsdf, rng, n = vt.bsdf(name), np.random.default_rng(1), 200
     nm = rng.uniform(365, 825, 12).tolist()
-    material = solution.plain(bsdf.binding.at_wavelengths([*STEERING_NM, *nm])).solid()
+    material = solve.plain(bsdf.binding.at_wavelengths([*STEERING_NM, *nm])).solid()
 
     def colour(*channels: Any) -> np.ndarray:
         return np.stack([np.atleast_1d(x) for x in channels]) if channels else np.zeros(len(STEERING_NM) + len(nm))

@@ -11,9 +11,10 @@ from scipy import stats
 import velatura as vt
 from velatura import kernel, tables
 from velatura.checks.probe import Probe
-from velatura.model import bsdf, named
-from velatura.model.transport.energies import energies
-from velatura.model.widths import nearly_straight
+from velatura.model import named
+from velatura.model.papers import bsdf
+from velatura.model.solved.energies.energies import energies
+from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")

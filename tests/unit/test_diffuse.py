@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura import tables
-from velatura.model import bsdf, named
-from velatura.model.prepare import PreparedBase
+from velatura.model import named
+from velatura.model.papers import bsdf
+from velatura.model.papers.prepare import PreparedBase
 from velatura.optics import fresnel
 from velatura.stack import Material
 from velatura.tables import coordinates, diffuse_nodes

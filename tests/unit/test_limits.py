@@ -9,13 +9,15 @@ import pytest
 
 import velatura as vt
 from velatura import tables
-from velatura.model import diffuse, named, solution
-from velatura.model.bsdf import Asked
+from velatura.model import named
 from velatura.model.context import Context
-from velatura.model.prepare import prepare, variance_kind
-from velatura.model.solved import Solved
-from velatura.model.transport.energies import Energies, energies
-from velatura.model.widths import nearly_straight
+from velatura.model.papers import diffuse_base
+from velatura.model.papers.bsdf import Asked
+from velatura.model.papers.prepare import prepare, variance_kind
+from velatura.model.solved import solve
+from velatura.model.solved.bsdf import Solved
+from velatura.model.solved.energies.energies import Energies, energies
+from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.optics import fresnel
 from velatura.sampling import low_discrepancy
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
@@ -70,7 +72,7 @@ def test_smoke_of_no_depth_changes_no_energy(depth: float) -> None:
 
 def body(layers: list[Any], reflectance: str = "fgd-multi") -> Solved:
     material = Material.of(Stack(layers)).solid()
-    return solution.solve(material, named("velatura", reflectance=reflectance), variance_kind(material), Context())
+    return solve.solve(material, named("velatura", reflectance=reflectance), variance_kind(material), Context())
 
 
 def at(cosine: float, phi: float = 0.0, count: int = 1) -> tuple[np.ndarray, ...]:
@@ -198,9 +200,9 @@ def test_lobes_of_indices_far_apart_are_finite(indices: tuple[float, ...]) -> No
 def test_a_base_below_a_medium_that_is_far_rarer_reflects_a_share_in_single_precision(name: str) -> None:
     """Light enters it in a cone that the nodes of diffuse light do not resolve."""
     layers = [Interface(eta=1.0, alpha=1.0), Interface(eta=3000.0, alpha=0.2), Diffuse(albedo=0.5)]
-    prepared = diffuse.with_means(prepare(Material.of(Stack(layers, exterior=1e4)), named(name)))
+    prepared = diffuse_base.with_means(prepare(Material.of(Stack(layers, exterior=1e4)), named(name)))
     assert prepared.base
     worth = np.array([np.ravel(x)[0] for x in (*prepared.base.worth, prepared.base.mean_reflectance)])
     assert np.abs(worth).max() < 1e3  # products of some of them fit
-    base = diffuse.under(prepared, (np.zeros(2), np.array([0.0, 0.6]), np.array([1.0, 0.8])))
+    base = diffuse_base.under(prepared, (np.zeros(2), np.array([0.0, 0.6]), np.array([1.0, 0.8])))
     assert base and ((base.energy >= 0) & (base.energy <= 1)).all()

@@ -7,8 +7,8 @@ import pytest
 from mixed_films import light_of, random_mixed
 
 from velatura import tables
-from velatura.model.transport.energies import energies
-from velatura.model.widths import nearly_straight
+from velatura.model.solved.energies.energies import energies
+from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.stack import Material
 
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")

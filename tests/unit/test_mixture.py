@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 import velatura as vt
-from velatura.model import MODELS, bsdf, named, variance_kind
+from velatura.model import MODELS, named, variance_kind
 from velatura.model.context import Context
+from velatura.model.papers import bsdf
 from velatura.optics import fresnel
 from velatura.stack import Material, as_described
 

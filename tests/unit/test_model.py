@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, SWITCHES, named
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.roughness_maps import MAPS
-from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Covariance, Roughness
 from velatura.stack import Interface, Material, Medium, Stack, preset
 
@@ -340,8 +340,8 @@ def test_no_stack_or_direction_gives_nan_or_negative_energy(precision) -> None:
 
     In single precision, as renderers have it, and in double.
     """
-    from velatura.model import adding, mixture, prepare
-    from velatura.model.lobe_merging import merged
+    from velatura.model.papers import adding, mixture, prepare
+    from velatura.model.papers.lobe_merging import merged
     from velatura.model.variance import Isotropic, PerAxis
 
     rng = np.random.default_rng(7)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from velatura import reference
 from velatura.model.models import SWITCHES
-from velatura.model.stack_lobes import StackLobes, stack_lobes
+from velatura.model.papers.statistics import StackLobes, stack_lobes
 from velatura.stack import Interface, Medium, Stack
 
 PLAIN = {"model": "yamaguchi2019"}

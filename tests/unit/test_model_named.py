@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from velatura import tables
-from velatura.model import MODELS, adding, named, prepare
-from velatura.model.lobe_merging import merged
+from velatura.model import MODELS, named
+from velatura.model.papers import adding, prepare
+from velatura.model.papers.lobe_merging import merged
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.roughness_maps import MAPS
-from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics import fresnel, ggx
 from velatura.stack import Interface, Material, Medium, Stack, Texture, preset, presets

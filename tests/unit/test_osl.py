@@ -12,8 +12,9 @@ from agreement import PATTERNS, coated, random_case
 from evaluation import evaluate
 
 import velatura as vt
-from velatura.model import MODELS, bsdf, named
+from velatura.model import MODELS, named
 from velatura.model.context import at_a_point
+from velatura.model.papers import bsdf
 from velatura.sampling import coated as interfaces
 from velatura.shader import closures, films, recording, variance
 from velatura.shader.closures import Closure

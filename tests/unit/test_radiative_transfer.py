@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from radiative_transfer import KNOWN, rows
 
-from velatura.model import named, solution
+from velatura.model import named
 from velatura.model.context import Context
-from velatura.model.prepare import variance_kind
+from velatura.model.papers.prepare import variance_kind
+from velatura.model.solved import solve
 from velatura.stack import Interface, Material, Medium, Stack
 
 MOST, MEAN = 2e-3, 5e-4  # of the incident light
@@ -29,7 +30,7 @@ def test_radiance_of_a_slab_is_that_of_van_de_hulst(form: str, part: str, side: 
     sigma_s = known["albedo"]
     slab = Medium(depth=known["depth"], sigma_s=sigma_s, sigma_a=1 - sigma_s, g=known["g"])
     material = Material.of(Stack([slab, Interface(eta=1.0, alpha=0)])).solid()
-    body = solution.solve(material, named("velatura", form=form), variance_kind(material), Context())
+    body = solve.solve(material, named("velatura", form=form), variance_kind(material), Context())
     mu_0, mu = np.array(known[part]["mu0"]), known["mu"]
     for phi in (0.3, 1.2, 2.5):
         wi = np.sqrt(1 - mu_0 * mu_0), 0 * mu_0, mu_0

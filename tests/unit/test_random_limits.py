@@ -10,8 +10,8 @@ import tmm
 from fuzzing.stacks import in_range
 
 from velatura import tables
-from velatura.model.transport.energies import Energies, energies
-from velatura.model.widths import nearly_straight
+from velatura.model.solved.energies.energies import Energies, energies
+from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.optics import fresnel
 from velatura.stack import Interface, Material, Medium, Stack
 

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura import Interface, Medium, Stack, kernel, tables
-from velatura.model import bounced, remainder
-from velatura.model.remainder import Remainder
-from velatura.model.transport.energies import INCIDENCES, energies
-from velatura.model.transport.nodes import Nodes
+from velatura.model.solved.energies.energies import INCIDENCES, energies
+from velatura.model.solved.energies.nodes import Nodes
+from velatura.model.solved.lobes import remainder
+from velatura.model.solved.lobes.remainder import Remainder
+from velatura.model.solved.transmission import internal_reflections
 from velatura.optics import fresnel
 from velatura.shader import record, symbol
 from velatura.shader.solved import Tabulated
@@ -133,7 +134,7 @@ def test_what_passes_is_found_again_by_direction() -> None:
     sines = np.sqrt(1 - COSINES**2) / 1.5
 
     def beyond(wi: Direction, wo: Direction) -> Any:
-        return bounced.diffuse(known, (wi[0] / 1.5, wi[1], wi[2]), wo) / np.pi
+        return internal_reflections.diffuse(known, (wi[0] / 1.5, wi[1], wi[2]), wo) / np.pi
 
     light = measures(beyond, nodes=BEYOND, n=1.5)[0]
     found = remainder.passing(BEYOND, light, 1.5, sines)

@@ -5,13 +5,14 @@ import pytest
 from fuzzing.stacks import random_stack
 
 from velatura import load, tables
-from velatura.model import named, solution, solved
-from velatura.model.bsdf import Asked
+from velatura.model import named
 from velatura.model.context import Context, channels
-from velatura.model.prepare import variance_kind
-from velatura.model.solved import Solved
-from velatura.model.transport.energies import energies
-from velatura.model.widths import nearly_straight
+from velatura.model.papers.bsdf import Asked
+from velatura.model.papers.prepare import variance_kind
+from velatura.model.solved import bsdf, solve
+from velatura.model.solved.bsdf import Solved
+from velatura.model.solved.energies.energies import energies
+from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.stack import Interface, Material, MaterialLike, Medium, Stack
 
 PRESETS = ("coated-rough-metal", "varnished-paint", "scattering-medium-over-gold", "three-dielectrics-over-metal",
@@ -25,7 +26,7 @@ POWER = Asked(radiance=False)
 
 def body(stack: MaterialLike) -> tuple[Material, Solved]:
     material = Material.of(load(stack)).solid()
-    return material, solution.solve(material, named("velatura"), variance_kind(material), Context())
+    return material, solve.solve(material, named("velatura"), variance_kind(material), Context())
 
 
 def uniform(seed: int) -> list[np.ndarray]:
@@ -59,7 +60,7 @@ def test_weights_are_bounded_without_loss(stack: str | int, monkeypatch: pytest.
     """Of the light of samples .1 % at most is more than weights may be; three random stacks with rough dielectrics of
     which few visible facets reflect are among them."""
     _, found = body(stack if isinstance(stack, str) else random_stack(np.random.default_rng((0, stack))))
-    monkeypatch.setattr(solved, "HEAVY", 1e9)
+    monkeypatch.setattr(bsdf, "HEAVY", 1e9)
     for i, cosine in enumerate((0.98, 0.8, 0.55, 0.3, 0.1)):
         wi = from_cosine(cosine, 2.4 * i)
         value, density = found.eval_pdf(wi, found.sample(wi, *uniform(i))[0], POWER)
@@ -159,7 +160,7 @@ def test_one_channel_is_one_of_three(form: str) -> None:
     model, kind, wi = named("velatura", form=form), variance_kind(material), from_cosine(0.6)
     grey = material.each(lambda address, value: value[:1] if address.colour else value)
     one, three = (
-        solution.solve(each, model, kind, Context(colour=colour)).eval_pdf(wi, from_cosine(0.8, 3.0))
+        solve.solve(each, model, kind, Context(colour=colour)).eval_pdf(wi, from_cosine(0.8, 3.0))
         for each, colour in ((grey, lambda *x: np.stack(x or [0.0])), (material, channels))
     )
     assert len(one[0]) == 1 and len(three[0]) == 3
@@ -175,7 +176,7 @@ MILK = Stack([Interface(eta=1.5, alpha=0.1), Interface(eta=1.2, alpha=0.3), Medi
 def test_light_from_below_sees_the_material_turned_over(stack: MaterialLike) -> None:
     """Media that scatter, too, that lie elsewhere as seen from below."""
     material, found = body(stack)
-    turned = solution.solve(material.reversed(), named("velatura"), variance_kind(material), Context())
+    turned = solve.solve(material.reversed(), named("velatura"), variance_kind(material), Context())
     i, o = from_cosine(0.6), from_cosine(0.5, 2.0)
     below = found.eval_pdf((i[0], i[1], -i[2]), (o[0], o[1], -o[2]), POWER)
     above = turned.eval_pdf(i, o, POWER)

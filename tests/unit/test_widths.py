@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura import Interface, Medium, Stack, kernel
-from velatura.model import own_medium, widths
-from velatura.model.own_medium import OwnMediumLobe
-from velatura.model.transport.adding import Part, parts
+from velatura.model.solved.energies.adding import Part, parts
+from velatura.model.solved.lobes import refracted_lobe, widths
+from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
 from velatura.stack import Material
@@ -128,7 +128,7 @@ def binned(lobe: OwnMediumLobe, cosine: float, bins: int) -> Array:
     x, y = np.meshgrid(*[(np.arange(bins * fine) + 0.5) / (0.5 * bins * fine) - 1] * 2, indexing="ij")
     z = np.sqrt(np.maximum(1 - x * x - y * y, 0))
     wi = np.full(x.shape, np.sqrt(1 - cosine**2)), np.zeros(x.shape), np.full(x.shape, cosine)
-    value, _ = own_medium.eval_pdf(lobe, wi, (x, y, z))
+    value, _ = refracted_lobe.eval_pdf(lobe, wi, (x, y, z))
     light = np.where(z > 0, value / np.maximum(z, 1e-6), 0).reshape(bins, fine, bins, fine).sum(axis=(1, 3))
     return np.asarray(light / light.sum())
 

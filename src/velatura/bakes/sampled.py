@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.bakes.look import Described
-from velatura.model import Model, bsdf, variance_kind
+from velatura.model import Model, variance_kind
 from velatura.model.context import Context
+from velatura.model.papers import bsdf
 from velatura.optics import fresnel, ggx, refraction
 from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import square

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
-from velatura.model import Model, adding, bsdf, mixture, variance_kind
+from velatura.model import Model, variance_kind
 from velatura.model.context import Context
-from velatura.model.diffuse import Base
 from velatura.model.lobe_statistics import StackLobes
-from velatura.model.stack_lobes import stack_lobes
+from velatura.model.papers import adding, bsdf, mixture
+from velatura.model.papers.diffuse_base import Base
+from velatura.model.papers.statistics import stack_lobes
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import WalkedLobe

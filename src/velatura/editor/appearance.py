@@ -21,8 +21,8 @@ from velatura.inverse.explain import REASONS, UNMET
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.interface import conductor_tint
 from velatura.model import Model, named
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.roughness_maps import MAPS
-from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Roughness
 from velatura.stack import Diffuse, Interface, Stack, Varying
 

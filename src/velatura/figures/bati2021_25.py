@@ -19,8 +19,8 @@ from velatura.figures import canvas
 from velatura.inverse import Target, invert_stack
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model import named
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.roughness_maps import MAPS
-from velatura.model.stack_lobes import stack_lobes
 from velatura.stack import Stack
 
 Array = NDArray[np.floating]

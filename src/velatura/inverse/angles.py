@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.inverse.partial_stack import Array, take
-from velatura.model import Model, bsdf, mixture, named, variance_kind
+from velatura.model import Model, named, variance_kind
 from velatura.model.context import Context
+from velatura.model.papers import bsdf, mixture
 from velatura.ops import Value
 from velatura.stack import Material, MaterialLike, load
 

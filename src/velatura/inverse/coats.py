@@ -17,9 +17,10 @@ from velatura.inverse.interface import DENSER, RARER, Choice, conductor_tint
 from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, Mask, join
 from velatura.inverse.roots import bisect
 from velatura.inverse.stacks import Partial, pruned
-from velatura.model import DEFAULT, Model, lobes, named, prepare, variance_kind
+from velatura.model import DEFAULT, Model, lobes, named, variance_kind
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
-from velatura.model.stack_lobes import stack_lobes
+from velatura.model.papers.prepare import prepare
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.variance import Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import (
     Diffuse,

@@ -21,8 +21,9 @@ from velatura.inverse import angles
 from velatura.inverse.angles import ReflectanceTable, radiance
 from velatura.inverse.interface import conductor_extinction
 from velatura.inverse.partial_stack import CLEAR, Array
-from velatura.model import Model, bsdf, named, variance_kind
-from velatura.model.mixture import ALPHA_MIN
+from velatura.model import Model, named, variance_kind
+from velatura.model.papers import bsdf
+from velatura.model.papers.mixture import ALPHA_MIN
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.stack import (

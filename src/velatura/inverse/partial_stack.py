@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.inverse import films
 from velatura.inverse.target import ROUND
-from velatura.model import Model, adding, operators, prepare
-from velatura.model.diffuse import Base
+from velatura.model import Model
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
-from velatura.model.prepare import Prepared, PreparedInterface
+from velatura.model.papers import adding, operators
+from velatura.model.papers.diffuse_base import Base
+from velatura.model.papers.prepare import Prepared, PreparedInterface, prepare
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
@@ -241,7 +242,7 @@ def read_whole(path: Sequence[Layers], exterior: float, model: Model) -> StackLo
     material, normal = whole(path, exterior, closely=True), (np.zeros(1), np.zeros(1), np.ones(1))
     if model.recursion.closed_form:
         return model.recursion.statistics(material, model, normal)
-    from velatura.model.solution import plain  # loads SciPy
+    from velatura.model.solved.solve import plain  # loads SciPy
 
     # Nothing passes that would be summed up
     layers = (*(_unbrushed(layer) for layer in material.layers), DiffuseValues(0.0))

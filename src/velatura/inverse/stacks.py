@@ -22,8 +22,8 @@ from velatura.inverse.partial_stack import Above, Array, Batch, Layers, take
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import Target, TargetLobe, read
 from velatura.model import DEFAULT, Model, named
-from velatura.model.mixture import ALPHA_MIN
-from velatura.model.stack_lobes import stack_lobes
+from velatura.model.papers.mixture import ALPHA_MIN
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.stack import Diffuse, MaterialLike, Stack, load

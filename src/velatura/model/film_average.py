@@ -42,7 +42,7 @@ class FilmAverage(Sampled):
 @functools.lru_cache(32)
 def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverage:
     """Of an interface whose facets are met once or often; made once. A `coarse` one is quicker, for what moves."""
-    from velatura.model.transport.interfaces import Facets, of_first_events, shares_of_films
+    from velatura.model.solved.energies.interfaces import Facets, of_first_events, shares_of_films
 
     opaque, n12 = films.n12 is None, films.n12 or 1.0
     critical = None if opaque or n12 >= 1 else float(np.arcsin(n12))

@@ -9,11 +9,11 @@ from velatura.model.variance import Variance
 from velatura.optics.ggx import Direction
 
 if TYPE_CHECKING:  # recursions use records that are prepared for them
-    from velatura.model.bsdf import Body
     from velatura.model.context import Context
     from velatura.model.lobe_statistics import StackLobes
     from velatura.model.models import Model
-    from velatura.model.textured import Textured
+    from velatura.model.papers.bsdf import Body
+    from velatura.model.solved.textures import Textured
     from velatura.stack import Material
 
 
@@ -22,7 +22,7 @@ class Recursion:
 
     Attributes:
         closed_form: an interface that has a given lobe follows in closed form (Bati et al. 2021). Else materials are
-            solved for all directions (`velatura.model.solution`).
+            solved for all directions (`velatura.model.solved.solve`).
     """
 
     closed_form: ClassVar[bool]
@@ -41,20 +41,20 @@ class Recursion:
 
     def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
         """A material as a BSDF, with constants of a renderer."""
-        from velatura.model import bsdf
+        from velatura.model.papers import bsdf
 
         return bsdf.body(material, model, variance, context)
 
     def textured(self, material: Material, *values: Any) -> Textured | None:
-        """A material with textures, by the other values of `velatura.model.textured.textured`; None where it has to be
-        prepared at every point."""
+        """A material with textures, by the other values of `velatura.model.solved.textures.textured`; None where it
+        has to be prepared at every point."""
         return None
 
     def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
         """The lobes of a material with values in NumPy, for directions wi, (N,) each."""
-        from velatura.model import stack_lobes
+        from velatura.model.papers import statistics
 
-        return stack_lobes.added(material, model, wi)
+        return statistics.added(material, model, wi)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ ADDING = Adding()
 
 @dataclass(frozen=True)
 class InOwnMedia(Recursion):
-    """Adding on nodes of tangential momentum, for lobes in their own media (`velatura.model.solution`)."""
+    """Adding on nodes of tangential momentum, for lobes in their own media (`velatura.model.solved.solve`)."""
 
     closed_form = False
 
@@ -77,33 +77,33 @@ class InOwnMedia(Recursion):
         return "fgd", "fgd-multi"
 
     def solves(self, material: Material) -> bool:
-        from velatura.model import solution
+        from velatura.model.solved import solve
 
-        return not _is_bare(material) and any(layer.spreads for layer in solution.plain(material).layers)
+        return not _is_bare(material) and any(layer.spreads for layer in solve.plain(material).layers)
 
     def unsolved(self, model: Model) -> Model:
-        from velatura.model import solution
+        from velatura.model.solved import solve
 
-        return solution.geometry(model)
+        return solve.geometry(model)
 
     def body(self, material: Material, model: Model, variance: type[Variance], context: Context) -> Body:
-        from velatura.model import solution, turned
+        from velatura.model.solved import rotation_frame, solve
 
         if not self.solves(material):
             return super().body(material, self.unsolved(model), variance, context)
-        frame = turned.frame(material)
-        solved = solution.solve(frame.back(material), model, frame.kind(variance), context)
+        frame = rotation_frame.frame(material)
+        solved = solve.solve(frame.back(material), model, frame.kind(variance), context)
         return frame.turned(solved, material)
 
     def textured(self, material: Material, *values: Any) -> Textured | None:
-        from velatura.model import textured
+        from velatura.model.solved import textures
 
-        return None if _is_bare(material) else textured.textured(material, *values)
+        return None if _is_bare(material) else textures.textured(material, *values)
 
     def statistics(self, material: Material, model: Model, wi: Direction) -> StackLobes:
-        from velatura.model import solved_lobes  # loads SciPy
+        from velatura.model.solved import statistics
 
-        return solved_lobes.solved_lobes(material, model, wi)
+        return statistics.solved_lobes(material, model, wi)
 
 
 def _is_bare(material: Material) -> bool:

@@ -9,11 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from velatura.binding import STEERING_NM, Binding
-from velatura.model import axes, bsdf, solved_spectra
-from velatura.model.bsdf import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.models import Model
-from velatura.model.textured import Textured
+from velatura.model.papers import bsdf
+from velatura.model.papers.bsdf import Body
+from velatura.model.solved import spectra, texture_axes
+from velatura.model.solved.textures import Textured
 from velatura.model.variance import Variance
 from velatura.plugins import progress, spectral
 from velatura.plugins.spectral import Spectra
@@ -100,16 +101,16 @@ class OverWavelengths:
 
     mi: Any
     binding: Binding
-    spectra: solved_spectra.Spectra
+    solved: spectra.Spectra
 
     diffuse = True
 
     @property
     def balanced(self) -> bool:
-        return self.spectra.symmetric
+        return self.solved.symmetric
 
     def at(self, si: Any, active: Any) -> Body:
-        return self.spectra.at(self.binding.steered(si, active), _places(self.mi, si))
+        return self.solved.at(self.binding.steered(si, active), _places(self.mi, si))
 
 
 def _places(mi: Any, si: Any) -> Any:
@@ -145,14 +146,14 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     if binding.uniform:
         body = model.recursion.body(binding.uniform_material(), model, variance, context)
         return Uniform(settled(body))
-    nodes = solved_spectra.NODES
+    nodes = spectra.NODES
     if binding.interferes and not binding.varies:
-        nodes = solved_spectra.nodes_of(plain(binding.uniform_material()))
+        nodes = spectra.nodes_of(plain(binding.uniform_material()))
         nodes += -nodes % len(mi.UnpolarizedSpectrum())  # as many as rays carry at a time
     nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, nodes).tolist()]
     places = np.array(spectral.places(nm))
     if not binding.varies and model.recursion.solves(binding.uniform_material()):
-        solved = solved_spectra.solve(binding.at_wavelengths(nm), places, model, variance, context)
+        solved = spectra.solve(binding.at_wavelengths(nm), places, model, variance, context)
         return OverWavelengths(mi, binding, settled(solved))
     if not binding.varies:
         model = model.recursion.unsolved(model)
@@ -160,12 +161,12 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     if binding.varies:
         if mi.is_spectral:
             context = replace(context, colour=partial(_spectrum, mi))
-        material, ranges = binding.tabulated(axes.UNKNOWN)
+        material, ranges = binding.tabulated(texture_axes.UNKNOWN)
         colours = binding.steering or binding.interferes
-        spectra = [solved_spectra.axis(binding.at_wavelengths(nm, material), places)] if colours else []
+        waves = [spectra.axis(binding.at_wavelengths(nm, material), places)] if colours else []
         known = before.textured if isinstance(before, Tabulated) else None
         symbolic = binding.symbolic(binding.looked_at())
-        textured = model.recursion.textured(material, [*spectra, *ranges], symbolic, model, variance, context, known)
+        textured = model.recursion.textured(material, [*waves, *ranges], symbolic, model, variance, context, known)
         if textured:
             return Tabulated(mi, binding, textured)
     if binding.varies or number is None or not binding.stack.interfaces:

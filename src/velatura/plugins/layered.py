@@ -10,9 +10,10 @@ import numpy as np
 from velatura import kernel, tables
 from velatura.binding import Binding, Image, plugin_class
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT, SWITCHES, bsdf, named, variance_kind
-from velatura.model.lobe_merging import merging
+from velatura.model import DEFAULT, SWITCHES, named, variance_kind
 from velatura.model.models import EXCEPTIONS, GAIN
+from velatura.model.papers import bsdf
+from velatura.model.papers.lobe_merging import merging
 from velatura.model.variance import Isotropic
 from velatura.plugins import bodies, spectral
 

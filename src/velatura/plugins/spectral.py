@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from velatura import ops
-from velatura.model import bsdf, precomputed_lobes
-from velatura.model.adding import Lobe
-from velatura.model.prepare import Prepared
+from velatura.model.papers import bsdf, precomputed_lobes
+from velatura.model.papers.adding import Lobe
+from velatura.model.papers.prepare import Prepared
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.sampling import directional_grid, low_discrepancy

@@ -1,7 +1,7 @@
 """The lobes of a uniform material, computed once over direction for a texture, and read back from it.
 
 A tape computes them, so that another stack of layers needs no compilation. The values, and the lobes made of them, are
-those of `velatura.model.precomputed_lobes`: energies, and roughness as a matrix, over the
+those of `velatura.model.papers.precomputed_lobes`: energies, and roughness as a matrix, over the
 cosine, and over the azimuth where an interface is anisotropic.
 """
 
@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from velatura import ops
-from velatura.model import bsdf, precomputed_lobes
 from velatura.model.context import at_a_point
-from velatura.model.diffuse import Base
-from velatura.model.prepare import Prepared
+from velatura.model.papers import bsdf, precomputed_lobes
+from velatura.model.papers.diffuse_base import Base
+from velatura.model.papers.prepare import Prepared
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction

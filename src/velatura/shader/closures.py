@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import Model, bsdf, variance_kind
-from velatura.model.bsdf import Asked
+from velatura.model import Model, variance_kind
 from velatura.model.context import Context, at_a_point
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes
-from velatura.model.mixture import ALPHA_MIN
+from velatura.model.papers import bsdf
+from velatura.model.papers.bsdf import Asked
+from velatura.model.papers.mixture import ALPHA_MIN
 from velatura.model.roughness_maps import AS_IT_IS
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value

@@ -13,7 +13,7 @@ import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, Model, named
-from velatura.model.lobe_merging import merging
+from velatura.model.papers.lobe_merging import merging
 from velatura.shader import atlas, films, material
 from velatura.shader.bake import Bake
 from velatura.shader.cost import Cost, cost

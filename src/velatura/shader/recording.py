@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from velatura import ops
 from velatura.errors import InvalidInput
-from velatura.model import DEFAULT, Model, bsdf, named, precomputed_lobes, variance_kind
-from velatura.model.adding import Lobe
+from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.context import at_a_point
-from velatura.model.diffuse import Base
-from velatura.model.lobe_merging import merging
-from velatura.model.prepare import PreparedInterface
+from velatura.model.papers import bsdf, precomputed_lobes
+from velatura.model.papers.adding import Lobe
+from velatura.model.papers.diffuse_base import Base
+from velatura.model.papers.lobe_merging import merging
+from velatura.model.papers.prepare import PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction

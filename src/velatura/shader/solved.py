@@ -1,6 +1,6 @@
 """A uniform material of a solved model in a shader: a texture of its columns over direction, and numbers for the rest.
 
-The columns are those of `velatura.model.solution`, four to a texel: first what light is drawn with, then energies,
+The columns are those of `velatura.model.solved.solve`, four to a texel: first what light is drawn with, then energies,
 which few programs read. Where a user changes values, they all have a place; else columns that are the same are one, and
 constant ones are numbers in the code.
 """
@@ -17,17 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model import Model, solution, straight_through, turned
-from velatura.model.bsdf import Body
+from velatura.model import Model
 from velatura.model.context import Context, at_a_point
-from velatura.model.passed import Parts
-from velatura.model.prepare import is_same
-from velatura.model.remainder import Remainder
-from velatura.model.solution import Layout, SolvedSide, Solver
-from velatura.model.solved import Columns, Side, Solved
-from velatura.model.straight_through import Passage
-from velatura.model.transport.adding import Made
-from velatura.model.turned import Frame, Turned
+from velatura.model.papers.bsdf import Body
+from velatura.model.papers.prepare import is_same
+from velatura.model.solved import rotation_frame, solve
+from velatura.model.solved.bsdf import Columns, Side, Solved
+from velatura.model.solved.energies.adding import Made
+from velatura.model.solved.lobes.remainder import Remainder
+from velatura.model.solved.rotation_frame import Frame, Turned
+from velatura.model.solved.solve import Layout, SolvedSide, Solver
+from velatura.model.solved.transmission import direct
+from velatura.model.solved.transmission.combined import Parts
+from velatura.model.solved.transmission.direct import Passage
 from velatura.model.variance import Covariance, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
@@ -147,7 +149,7 @@ class Tabulated:
         if columns.passes:
             found |= {f"passed_{name}": value for name, value in vars(columns.passes).items()}
         if general and columns.passes and seen.passage:
-            passes = ops.mean(straight_through.entered(seen.passage, seen.turned(wi, wi)).passes[0])
+            passes = ops.mean(direct.entered(seen.passage, seen.turned(wi, wi)).passes[0])
             straight = columns.passes.of_straight
             found |= {"passed_refracted": straight * passes, "passed_mirrored": straight * (1 - passes)}
         return found
@@ -200,7 +202,7 @@ class Tabulated:
         layouts: Sequence[Layout],
         degrees: Value,
     ) -> Solution:
-        passages = map(solver.passage, solution.sides(material), layouts)
+        passages = map(solver.passage, solve.sides(material), layouts)
         layout = [] if self.angle is None else [degrees]
         layout += [flag for passage in passages if passage for flag in _flags(passage)]
         return Solution(
@@ -233,7 +235,7 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     found = None if general else solver.solve(plain, layouts)
     rows = None if found is None else _rows(solver, found)
     sides = []
-    for k, (seen, layout) in enumerate(zip(solution.sides(material.solid()), layouts)):
+    for k, (seen, layout) in enumerate(zip(solve.sides(material.solid()), layouts)):
         colours = [colour(f"{REMAINDER}[{OF_POLYNOMIAL * k + j}]") for j in range(OF_POLYNOMIAL)]
         polynomial = Remainder(*(_colours(found[k]) if found else colours))
         context = replace(at_a_point(), colour=together)
@@ -347,8 +349,8 @@ class _Weighed(Side):
 
 def _numbers(stack: Stack) -> tuple[Material, Frame]:
     """A stack of numbers, and the axes that it is solved in."""
-    material = solution.plain(Material.of(stack).solid())
-    return material, turned.frame(material)
+    material = solve.plain(Material.of(stack).solid())
+    return material, rotation_frame.frame(material)
 
 
 def _rows(solver: Solver, found: Sequence[SolvedSide]) -> Array:

@@ -30,7 +30,8 @@ from velatura.inverse.interface import (
 )
 from velatura.inverse.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
 from velatura.inverse.target import Target
-from velatura.model import Model, lobes, prepare
+from velatura.model import Model, lobes
+from velatura.model.papers.prepare import prepare
 from velatura.model.roughness_maps import AS_IT_IS, MAPS, VARIANCE_MAX
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value

@@ -29,8 +29,8 @@ from velatura.inverse.interface import CONDUCTOR_MAX, ENERGY_MIN
 from velatura.inverse.partial_stack import Above, Array, Layers, named_as
 from velatura.inverse.target import Fixed, Target, TargetLobe, kind_of
 from velatura.model import Model
+from velatura.model.papers.statistics import stack_lobes
 from velatura.model.roughness_maps import MAPS
-from velatura.model.stack_lobes import stack_lobes
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Layer, Stack, Varying

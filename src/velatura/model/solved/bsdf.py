@@ -1,0 +1,433 @@
+"""A uniform material as a BSDF: lobes in their own media, the remainder, and what passes, each with its own energy.
+
+All that depends on direction is columns of numbers (`velatura.model.solved.solve`): energies over integrals, widths,
+and chances of being sampled. A side is a material as light from above sees it; stacks that transmit have two.
+
+The forward form takes all of a part from the direction of the light. The symmetric form takes the geometric mean of
+the values there and back, with weights by which it keeps the energies (`velatura.model.solved.reciprocal_balance`);
+samples are those of the forward form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+from velatura import ops
+from velatura.model.papers.bsdf import Asked, chosen_direction, upright
+from velatura.model.papers.prepare import PreparedInterface
+from velatura.model.roughness_maps import RoughnessMap
+from velatura.model.solved.lobes import refracted_lobe
+from velatura.model.solved.lobes.refracted_lobe import Index, OwnMediumLobe
+from velatura.model.solved.lobes.remainder import Remainder, Samples
+from velatura.model.solved.transmission import combined
+from velatura.model.solved.transmission.combined import Parts
+from velatura.model.solved.transmission.direct import Passage
+from velatura.model.variance import PerAxis, Roughness, Variance
+from velatura.ops import Value
+from velatura.optics import ggx
+from velatura.optics.ggx import Direction
+from velatura.sampling.coated import OfInterface, either
+
+ALL = Asked()
+FAINT = 1e-9  # energy of a part that is drawn even where it has none
+GRAZING = 1e-6  # cosine
+HEAVY = 2.9  # weight of a sample
+
+
+class _Roots(RoughnessMap):
+    """Needs no bounds."""
+
+    def roughness(self, variance: Value, across: Value | None = None) -> Value:
+        return variance * variance
+
+
+#: What is interpolated are roots of roughness, or matrices of them, so that axes may turn.
+ROOTS = _Roots(lambda along, across: ops.sqrt(along), lambda along, across: along * along)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A lobe but for its columns: number of its interface, index of its medium, the facets that it is of, and what
+    lets it out, with the index above that."""
+
+    interface: int
+    n: Index
+    facets: PreparedInterface | None
+    n_first: Index
+    first: PreparedInterface | None
+
+    def lobe(self, weight: Value, roughness: Roughness) -> OwnMediumLobe:
+        reflect = self.facets.reflect_together if self.facets else None
+        return OwnMediumLobe(weight, roughness, self.n, reflect, self._leaving if self.first else None)
+
+    def _leaving(self, cosine: Value) -> Value:
+        assert self.first
+        n, cos2 = self.n_first, cosine * cosine
+        if not n.is_outside:
+            cos2 = ops.maximum((n.ring2 + cos2) * (n.inverse * n.inverse), 0.0)
+        return self.first.pass_together(cos2)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What depends on direction: one direction's, or arrays (C, M) and (M,) over directions.
+
+    `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
+    """
+
+    weights: list[Value]
+    roughness: list[tuple[Value, ...]]
+    chances: list[Value]
+    energies: list[Value]
+    scale: Value
+    chance: Value
+    rest: Value
+    passes: Parts | None
+    passed: Value | None
+
+    @property
+    def all(self) -> list[Value]:
+        """In the order in which they are read, those of densities first; the chance of the remainder is what the others
+        leave."""
+        found = [x for roughness, chance in zip(self.roughness, self.chances) for x in (*roughness, chance)]
+        found += [*self.weights, self.scale, *self.energies, self.rest]
+        if self.passes:
+            found += [*vars(self.passes).values(), self.passed]
+        return found
+
+    @property
+    def seldom(self) -> list[bool]:
+        """Which of them are energies: only albedos, and samples of some parts alone, need them."""
+        energies = {id(x) for x in (*self.energies, self.rest, self.passed)}
+        return [id(x) in energies for x in self.all]
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a solved material, in a renderer's numbers; a colour is made of `colours` channels.
+
+    The remainder is drawn by `samples`.
+    """
+
+    curves: Any
+    shapes: tuple[Shape, ...]
+    polynomial: Remainder
+    samples: Samples
+    passage: Passage | None
+    colour: Callable[..., Value]
+    colours: int
+    kind: type[Variance]
+
+    def at(self, w: Direction) -> Columns:
+        """The columns for a direction above."""
+        channels = iter(self.curves(w))
+
+        def colour() -> Value:
+            return self.colour(*(ops.channel(next(channels), k) for k in range(self.colours)))
+
+        def number() -> Value:
+            return ops.channel(next(channels))
+
+        roughness, chances = [], []
+        for _ in self.shapes:
+            roughness.append(tuple(number() for _ in fields(self.kind)))
+            chances.append(number())
+        weights, scale = [colour() for _ in self.shapes], colour()
+        found, rest = [colour() for _ in self.shapes], colour()
+        passes, through, chance = None, None, 1 - sum(chances)
+        if self.passage:
+            passes = Parts(colour(), colour(), colour(), *(number() for _ in range(len(fields(Parts)) - 3)))
+            through, chance = colour(), chance - passes.share
+        return Columns(weights, roughness, chances, found, scale, ops.maximum(chance, 0.0), rest, passes, through)
+
+    def seen(self, w: Direction) -> Seen:
+        """What light from a direction above sees."""
+        return self._seen(w, self.at(w))
+
+    def _seen(self, w: Direction, columns: Columns) -> Seen:
+        every = zip(self.shapes, columns.weights, columns.roughness)
+        lobes = [shape.lobe(weight, self.kind(*numbers).roughness(ROOTS)) for shape, weight, numbers in every]
+        # The axes of isotropic interfaces lie in the plane of incidence
+        plane = ggx.plane(w) if self.kind is PerAxis else None
+        return Seen(self.shapes, lobes, plane, self.polynomial, self.samples, self.passage, columns)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A side as light from one direction sees it: its parts are lobes, the remainder, and what passes.
+
+    Lobes are turned from a plane whose azimuth has the cosine and the sine `plane`; None for that of the tangent.
+    """
+
+    shapes: tuple[Shape, ...]
+    lobes: list[OwnMediumLobe]
+    plane: tuple[Value, Value] | None
+    polynomial: Remainder
+    samples: Samples
+    passage: Passage | None
+    columns: Columns
+
+    def turned(self, w: Direction, by: Direction) -> Direction:
+        """A direction as this side sees it; all light comes from above where nothing passes."""
+        return upright(w, by) if self.passage else w
+
+    @property
+    def interfaces(self) -> int:
+        return 1 + max((shape.interface for shape in self.shapes), default=-1)
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of the components that reflected parts belong to."""
+        return [*(shape.interface for shape in self.shapes), self.interfaces]
+
+    @property
+    def chances(self) -> list[Value]:
+        """Of the reflected parts."""
+        return [*self.columns.chances, self.columns.chance]
+
+    @property
+    def energies(self) -> list[Value]:
+        """Of the reflected parts."""
+        return [*self.columns.energies, self.columns.rest]
+
+    @property
+    def passed(self) -> Value:
+        return 0.0 if self.columns.passed is None else self.columns.passed
+
+    def only(self, asked: Asked) -> Drawn:
+        """Chances of what is asked for: as samples are shared among all parts, or by energy where some are not."""
+        passes = self.columns.passes
+        wanted = [asked.reflects(number) for number in self.numbers]
+        if all(wanted) and (asked.transmission or passes is None):
+            return Drawn(wanted, True, self.chances, passes)
+        shares = [ops.mean(e) + FAINT if w else 0.0 for w, e in zip(wanted, self.energies)]
+        through = ops.mean(self.passed) + FAINT if passes and asked.transmission else 0.0
+        total = sum(shares) + through
+        if isinstance(total, float) and total == 0:
+            return Drawn(wanted, False, shares, None)
+        if passes is not None:
+            scale = ops.divide(through / total, passes.share)
+            chances = (scale * x for x in (passes.of_straight, passes.of_bounced, passes.of_rest))
+            passes = replace(passes, **dict(zip(("of_straight", "of_bounced", "of_rest"), chances)))
+        return Drawn(wanted, asked.transmission, [share / total for share in shares], passes)
+
+    def part(self, k: int, i: Direction, o: Direction) -> tuple[Value, Value]:
+        """f |cos theta_o| and density of a reflected part."""
+        if k < len(self.lobes):
+            return refracted_lobe.eval_pdf(self.lobes[k], self._along_plane(i), self._in_plane(o))
+        return self.columns.scale * self.polynomial.value(i, o), self.samples.density(i, o)
+
+    def out_of(self, lobe: OwnMediumLobe, i: Direction, u1: Value, u2: Value) -> Direction:
+        """A direction drawn from a lobe."""
+        o = refracted_lobe.sample(lobe, self._along_plane(i), u1, u2)
+        return ggx.turned(o, self.plane[0], -self.plane[1]) if self.plane else o
+
+    def _in_plane(self, w: Direction) -> Direction:
+        return ggx.turned(w, *self.plane) if self.plane else w
+
+    def _along_plane(self, i: Direction) -> Direction:
+        """The direction that the plane is of."""
+        x, y, z = self._in_plane(i)
+        return x, 0.0 if self.plane else y, z
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Parts that are asked for: whether each one that is reflected is, and what passes; their chances."""
+
+    wanted: list[bool]
+    passing: bool
+    chances: list[Value]
+    passes: Parts | None
+
+    @property
+    def share(self) -> Value:
+        """Of samples that are drawn from what passes."""
+        return self.passes.share if self.passes else 0.0
+
+    @property
+    def all(self) -> bool:
+        """Whether all parts are asked for."""
+        return all(self.wanted) and self.passing
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A material as a BSDF: a uniform one, or one with the values of a point; `known` is what light sees from the only
+    direction that is asked for, None for any."""
+
+    above: Side
+    below: Side | None
+    eta: Value
+    symmetric: bool
+    known: tuple[Seen, Value] | None = None
+
+    diffuse = True  # the remainder comes after the lobes
+
+    @property
+    def balanced(self) -> bool:
+        return self.symmetric
+
+    def lit(self, wi: Direction) -> Solved:
+        return replace(self, known=self.seen(wi))
+
+    def seen(self, wi: Direction) -> tuple[Seen, Value]:
+        """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
+        if self.known:
+            return self.known
+        if self.below is None:
+            return self.above.seen(wi), 1.0
+        turned = upright(wi, wi)
+        where = wi[2] > 0
+        columns = select(where, self.above.at(turned), self.below.at(turned))
+        side = replace(
+            self.above,
+            shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),
+            polynomial=select(where, self.above.polynomial, self.below.polynomial),
+            samples=select(where, self.above.samples, self.below.samples),
+            passage=select(where, self.above.passage, self.below.passage),
+        )
+        return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
+
+    def albedo(self, wi: Direction, asked: Asked = ALL) -> Value:
+        """Energy of the queried parts, a colour."""
+        of, _ = self.seen(wi)
+        reflected = sum(energy for number, energy in zip(of.numbers, of.energies) if asked.reflects(number))
+        return reflected + of.passed if asked.transmission else reflected
+
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
+        """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
+        of, eta = self.seen(wi)
+        back = replace(self, known=None).seen(wo)[0] if self.symmetric else None
+        return eval_pdf(of, back, eta, wi, wo, asked)
+
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ALL) -> tuple[Direction, Value]:
+        """A direction wo, and the index on its side over that on the side of wi."""
+        of, eta = self.seen(wi)
+        i, drawn = of.turned(wi, wi), of.only(asked)
+        begin = 1 - drawn.chances[-1]
+        within, rest = u < begin, ops.divide(u - begin, drawn.chances[-1])
+        wo = of.samples.sample(i, rest, u1, u2)
+        if of.lobes:
+            lobe = of.lobes[-1]
+            for above, chance in zip(of.lobes[-2::-1], drawn.chances[-2:0:-1]):
+                begin = begin - chance
+                lobe = refracted_lobe.either(u < begin, above, lobe)
+            wo = chosen_direction(within, of.out_of(lobe, i, u1, u2), wo)
+        if of.passage is None or drawn.passes is None:
+            return wo, 1.0
+        again = ops.clip(ops.divide(u, drawn.share), 0.0, combined.BELOW_ONE)
+        through = combined.sample(of.passage, drawn.passes, i, again, u1, u2)
+        wo = chosen_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
+        return upright(wo, wi), ops.select(wo[2] < 0, eta, 1.0)
+
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = ALL) -> Value:
+        """Number of the part that `sample` drew wo from: an interface from the top, the remainder, or last what passes.
+        Light that does not pass the facets of a rough dielectric is reflected by the first one."""
+        of, _ = self.seen(wi)
+        drawn = of.only(asked)
+        kept = [(number, chance) for number, chance, w in zip(of.numbers, drawn.chances, drawn.wanted) if w]
+        last = float(of.interfaces + 1)
+        if not kept:
+            return last
+        found: Value = float(kept[0][0])
+        begin = drawn.share
+        for (_, chance), (following, _) in pairwise(kept):
+            begin = begin + chance
+            found = ops.select(u > begin, float(following), found)
+        if self.below is None:
+            return found
+        return ops.select(wi[2] * wo[2] < 0, last, found) if drawn.passing else found
+
+
+def eval_pdf(
+    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Asked
+) -> tuple[Value, Value]:
+    """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
+    i, o, drawn = of.turned(wi, wi), of.turned(wo, wi), of.only(asked)
+    i_back, o_back = of.turned(wi, wo), of.turned(wo, wo)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    value: Value = 0.0
+    whole: Value = 0.0
+    densities: list[Value] = [0.0, 0.0, 0.0]  # of what is asked for; of all, there and back
+    for k, (wanted, chance) in enumerate(zip(drawn.wanted, drawn.chances)):
+        part, pdf = of.part(k, i, o)
+        chances = [chance, of.chances[k], 0.0]
+        pdfs = [pdf, pdf, 0.0]
+        if back:
+            other, pdfs[2] = back.part(k, o_back, i_back)
+            chances[2] = back.chances[k]
+            part = ops.sqrt(part * other * cosines)
+        densities = [total + c * each for total, c, each in zip(densities, chances, pdfs)]
+        whole = whole + part
+        value = value + (part if wanted else 0 * part)
+    columns = of.columns
+    if of.passage and columns.passes:
+        through, pdf = combined.eval_pdf(of.passage, columns.passes, i, o)
+        returned: Value = 0.0
+        if back and back.passage and back.columns.passes:
+            through, pdf, returned = exchanged(of, back, eta, wi, wo)
+            through = through * ops.sqrt(columns.passes.straight * back.columns.passes.straight)
+        share = ops.divide(drawn.share, columns.passes.share)
+        densities = [a + b for a, b in zip(densities, (share * pdf, pdf, returned))]
+        whole = whole + through
+        value = value + (through if drawn.passing else 0 * through)
+    scale = ops.select(wi[2] * wo[2] < 0, eta * eta, 1.0)
+    # No sample is too heavy, there and, in the symmetric form, back
+    most = ops.minimum(densities[1], densities[2] * cosines * scale) if back else densities[1]
+    kept = ops.clip(whole, 0.0, HEAVY * most)
+    value = kept if drawn.all else ops.maximum(value, 0.0) * ops.divide(kept, whole)
+    if of.passage is None:
+        lit = wi[2] > 0
+        return ops.select(lit, value, 0.0), ops.select(lit, densities[0], 0.0)
+    return value / scale if asked.radiance else value, densities[0]
+
+
+def exchanged(of: Seen, back: Seen, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value, Value]:
+    """Mean of what passes there and back, with all that goes straight through, and the densities there and back."""
+    i, o, i_back, o_back = upright(wi, wi), upright(wo, wi), upright(wi, wo), upright(wo, wo)
+    assert of.passage and of.columns.passes and back.passage and back.columns.passes
+    there, density = combined.eval_pdf(of.passage, replace(of.columns.passes, straight=1.0), i, o)
+    other, returned = combined.eval_pdf(back.passage, replace(back.columns.passes, straight=1.0), o_back, i_back)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    return 0.5 * (there + other * (cosines * eta * eta)), density, returned
+
+
+def _either(where: Value, a: Shape, b: Shape) -> Shape:
+    """The shape a where a condition holds, else b."""
+    assert a.facets and b.facets
+    facets = _of_either(where, a.facets, b.facets)
+    if a.first is None and b.first is None:
+        return Shape(a.interface, select(where, a.n, b.n), facets, a.n_first, None)
+    first = _of_either(where, a.first, b.first)
+    return Shape(a.interface, select(where, a.n, b.n), facets, select(where, a.n_first, b.n_first), first)
+
+
+def _of_either(where: Value, a: PreparedInterface | None, b: PreparedInterface | None) -> PreparedInterface:
+    """The indices of either interface; None for one without a step."""
+    some = a or b
+    assert some
+    eta, n12 = (
+        ops.select(where, getattr(a, name) if a else 1.0, getattr(b, name) if b else 1.0) for name in ("eta", "n12")
+    )
+    return replace(some, eta=eta, n12=n12, films=either(where, *(x.films if x else None for x in (a, b))))
+
+
+def select(where: Value, a: Any, b: Any) -> Any:
+    """Records of values, value by value; what is known of a record holds where it does of both."""
+    if isinstance(a, OfInterface) or isinstance(b, OfInterface):
+        return either(where, a, b)
+    if is_dataclass(a) and not isinstance(a, type):
+        return type(a)(*(select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
+    if isinstance(a, tuple) and hasattr(a, "_fields"):
+        return type(a)(*(select(where, x, y) for x, y in zip(a, b)))
+    if isinstance(a, (list, tuple)):
+        return type(a)(select(where, x, y) for x, y in zip(a, b))
+    if isinstance(a, bool) and isinstance(b, bool):
+        return a and b
+    if a is None or (isinstance(a, float) and isinstance(b, float) and a == b):
+        return a
+    return ops.select(where, a, b)

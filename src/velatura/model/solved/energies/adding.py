@@ -1,0 +1,151 @@
+"""Layers of a stack, summed up from the top.
+
+With d the light that first arrives in a slab, `below` what the stack above throws back down, and `out` what it lets
+out, a layer that reflects R and transmits T adds
+
+    E = out R (1 - below R)^-1 d,        d' = T (1 - below R)^-1 d,
+    out' = out (1 - R below)^-1 T',      below' = R' + T (1 - below R)^-1 below T'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.solved.energies.interfaces import Facets, Setting, interface
+from velatura.model.solved.energies.media import Slab, medium
+from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.sampling import coated
+from velatura.stack import DiffuseValues, Material, MediumValues
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Lambert:
+    """A diffuse base of an albedo (C,) under a medium of index n."""
+
+    n: float
+    albedo: Array
+
+
+Part = Facets | Slab | Lambert
+Made = dict[Hashable, tuple[Layer, Layer]]
+
+
+@dataclass(frozen=True)
+class Leaving:
+    """Light that leaves a stack lit from above: for each layer from the top what it is the deepest one to reflect; what
+    passes all of them, and of that what no layer has reflected.
+    """
+
+    reflected: tuple[Operator, ...]
+    passed: Operator
+    straight: Operator
+    setting: Setting
+
+    def energy(self, light: Operator) -> Array:
+        """Energies (C, M) of beams."""
+        basis = self.setting.basis
+        return np.asarray(basis.energy(light.columns) + light.beams[..., 0, 0, :])
+
+
+def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
+    """Sum up layers from the top."""
+    first, *others = stack
+    reflected, d, straight, out, below = [first.r], first.t, first.t, first.t_below, first.r_below
+    for each in others:
+        bounces = (below @ each.r).repeated()
+        reflected.append(out @ each.r @ bounces @ d)
+        d, straight = each.t @ bounces @ d, each.t @ straight
+        out = out @ (each.r @ below).repeated() @ each.t_below
+        below = each.r_below + each.t @ bounces @ below @ each.t_below
+    return Leaving(tuple(reflected), d, straight, setting)
+
+
+def layers(found: Sequence[Part], setting: Setting, made: Made | None = None) -> list[tuple[Layer, Layer]]:
+    """What each layer does to light, where facets are met once, and as the setting says; all are `made` once."""
+    made = {} if made is None else made
+    return [_layer(part, of, made) for part, of in zip(found, settings(found, setting))]
+
+
+def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
+    """That of each layer: beams end at the first rough interface."""
+    ends = [isinstance(part, Lambert) or (isinstance(part, Facets) and not part.is_smooth) for part in found]
+    return [setting.dark if any(ends[:i]) else setting for i in range(len(found))]
+
+
+def _layer(part: Part, setting: Setting, made: Made) -> tuple[Layer, Layer]:
+    numbers = (None if x is None else np.asarray(x).tobytes() for x in vars(part).values())
+    key = type(part), *numbers, setting.key
+    if key not in made:
+        if isinstance(part, Facets):
+            made[key] = interface(part, setting)
+        else:
+            alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
+            made[key] = alike, alike
+    return made[key]
+
+
+def _lambert(part: Lambert, setting: Setting) -> Layer:
+    basis = setting.basis
+    nothing = Operator.nothing(basis.size, len(setting.p))
+    even = basis.rows(basis.nodes.weights(part.n)[None].repeat(len(basis.azimuths), 0).reshape(1, -1), 0.0)
+    even = even / even[:, :1].sum(axis=-1, keepdims=True) * part.albedo[:, None, None]
+    taken = basis.rows(np.ones((1, len(basis.azimuths) * basis.nodes.count)), 0.0)
+    r = Operator.of(basis.outer(even, taken), basis.outer(even, np.ones((1, len(setting.p)))))
+    return Layer(r, nothing, nothing, nothing)
+
+
+def parts(material: Material, straight: Callable[[float], float] | None = None) -> list[Part]:
+    """The layers of a material with values in NumPy, indices relative to the outside above.
+
+    `straight` gives the share of scattered light that goes straight on by the asymmetry g, for light that is in a lobe;
+    None follows all light.
+    """
+    outside = float(ops.mean(_colours(material.exterior)))
+    found: list[Part] = []
+    above = _colours(material.exterior) / outside
+    for each, films in zip(material.solid().layers, coated.of(material)):
+        if isinstance(each, MediumValues):
+            tau_a, tau_s = (_colours(each.depth * sigma) for sigma in (each.sigma_a, each.sigma_s))
+            g = _colours(each.g)
+            kept = None if straight is None else np.array([straight(x) for x in g])
+            found.append(Slab(float(ops.mean(above)), tau_a, tau_s, g, kept))
+        elif isinstance(each, DiffuseValues):
+            found.append(Lambert(float(ops.mean(above)), _colours(each.albedo)))
+        else:
+            below = None if each.kind == "mirror" else _colours(each.eta) / outside
+            k = _colours(each.k) / outside if each.kind == "conductor" else None
+            angle = float(np.radians(each.rotation))
+            facets = Facets(above, below, k, float(each.alpha_u), float(each.alpha_v), angle)
+            found.append(replace(facets, films=films) if films else facets)
+            if each.kind == "dielectric" and below is not None:
+                above = below
+    return found
+
+
+def interfaces(found: Sequence[Part]) -> list[Facets]:
+    return [part for part in found if isinstance(part, Facets)]
+
+
+def indices(found: Sequence[Part]) -> list[float]:
+    """Indices of all media that light may be in."""
+    values = [1.0]
+    for part in found:
+        if isinstance(part, Facets):
+            values.append(float(ops.mean(part.above)))
+            if part.below is not None and part.k is None:
+                values.append(float(ops.mean(part.below)))
+    return values
+
+
+def _colours(value: Any) -> Array:
+    """(3,), or (1,) where all are alike."""
+    flat = np.asarray(value, float).reshape(-1)
+    return flat[:1] if (flat == flat[0]).all() else flat

@@ -1,0 +1,234 @@
+"""The energies of the lobes of a material, for beams from above.
+
+Three systems of layers share their interfaces. In the first, light meets all that there is. In the others a lobe has
+the light that meets one facet of each interface and is not scattered by media (sharp), or is scattered by little (its
+veil). Of light that meets facets of its interface again it has a share: all where nothing above it refracts, and little
+inside a denser medium. What the first system reflects besides is the remainder.
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.model.solved.energies.adding import (
+    Lambert,
+    Leaving,
+    Made,
+    Part,
+    indices,
+    interfaces,
+    layers,
+    leaving,
+    parts,
+    settings,
+)
+from velatura.model.solved.energies.interfaces import Facets, Setting
+from velatura.model.solved.energies.media import Slab, medium
+from velatura.model.solved.energies.modes import TINY, Basis, Even, Relative
+from velatura.model.solved.energies.nodes import Nodes
+from velatura.model.solved.energies.operators import Operator
+from velatura.stack import InterfaceValues, LayerValues, Material
+from velatura.tables import Tables
+
+Array = NDArray[np.floating]
+
+NODES = 24
+SAMPLES = 377  # normals
+MODES = 3  # of the azimuth, of the remainder
+CANCELS = 0.3  # of columns of light: a sum that is less
+INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
+UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
+AGAIN = 1.0  # of light of repeated facets beside that of single ones, that has the shape of a lobe at most
+SMOOTH = 4.0  # power of that minimum
+AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
+
+Straight = Callable[[float], float]  # share of scattered light that counts as going straight on, by asymmetry
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies by colour (C,), or 1 for all, for M beams.
+
+    Attributes:
+        lobes: (K, C, M) of the interfaces from the top, of light that no medium has scattered.
+        veils: (K, C, M), of light that media have scattered by little.
+        rest: (C, M), reflected in no lobe.
+        straight, bounced, passed: (C, M), of what passes: straight through, and after reflections, where facets are met
+            once and media do not scatter; and all of it.
+        remainder: what is reflected in no lobe for beams of the cosines at which it is asked for, by mode of azimuth at
+            the `nodes`, (C, MODES, N, I).
+        around: likewise what passes not straight through, and `again` of that what facets that are met once reflect
+            inside, without scattering media.
+    """
+
+    lobes: Array
+    veils: Array
+    rest: Array
+    straight: Array
+    bounced: Array
+    passed: Array
+    remainder: Array
+    around: Array
+    again: Array
+    nodes: Nodes
+
+
+def energies(
+    material: Material,
+    cos_theta: Array,
+    phi: Array,
+    often: Tables | None,
+    forward: Straight,
+    made: Made | None = None,
+    incidences: Array = INCIDENCES,
+    samples: int = SAMPLES,
+    like: Sequence[float] | None = None,
+) -> Energies:
+    """Energies for beams at cosines and azimuths (M,).
+
+    `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
+    into veils. `made` keeps what materials may share. The remainder is known at the cosines `incidences`, (I,); without
+    any, lobes are all that is worked out, which is quicker. `samples` are normals for light from each node, and of each
+    beam; as many nodes are taken as for media of indices `like` those of the material.
+    """
+    made = {} if made is None else made
+    everything = _ended(parts(material))
+    brushed = any(facets.alpha_u != facets.alpha_v for facets in interfaces(everything))
+    azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
+    cosines = np.concatenate([cos_theta, np.tile(incidences, len(azimuths))])
+    around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
+    nodes = Nodes.of(indices(everything), NODES, like)
+    basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES if len(incidences) else 1)
+    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often, made)
+
+    # Sum up the systems
+    scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
+    each = layers(everything, setting, made)
+    full = leaving([last for _, last in each], setting)
+
+    def system(found: Sequence[Part], as_set: bool = False) -> Leaving:
+        of = settings(found, setting)
+        kept = [medium(part, x) if isinstance(part, Slab) else of_it[as_set] for part, x, of_it in zip(found, of, each)]
+        return leaving(kept, setting)
+
+    clear = _ended(parts(material, lambda g: 0.0))
+    sharp = system(clear) if scatters or often else full
+    kept = system(_ended(parts(material, forward))) if scatters else sharp
+    # A lobe has all that media do not scatter where nothing above it refracts, and else a share of it
+    whole = system(clear, True) if scatters and often else full
+    shares = _undisturbed(everything)
+    more = [_kept(share, whole.reflected[i], sharp.reflected[i], full) for i, share in shares.items()]
+
+    # Sort what leaves
+    total = _sum(full.reflected)
+    reflected = np.maximum(full.energy(total), 0)
+
+    def of_lobes(system: Leaving) -> list[Operator]:
+        found = [system.reflected[i] + each for i, each in zip(shares, more)]
+        return found or [Operator.nothing(basis.size, len(setting.p))]
+
+    unscattered, veiled = (
+        np.maximum(np.broadcast_arrays(*map(full.energy, of_lobes(system)), reflected)[:-1], 0)
+        for system in (sharp, kept)
+    )
+    # No lobe has more than there is: what quadrature says beyond is its error
+    share = np.minimum(reflected / np.maximum(veiled.sum(axis=0), TINY), 1)
+    lobes, veils = unscattered * share, np.maximum(veiled - unscattered, 0) * share
+    rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
+    count = np.size(cos_theta)
+    if brushed and len(incidences):
+        by_node = _of_isotropic(material, rest[:, count:], often, forward, made, incidences, samples, like)
+    else:
+        lights = (
+            total.columns - _sum(of_lobes(kept)).columns,
+            *(x.passed.columns - sharp.straight.columns for x in (full, sharp)),
+        )
+        by_node = tuple(light[..., count:] for light in lights)
+    straight = sharp.energy(sharp.straight)
+    return Energies(
+        lobes=lobes[..., :count],
+        veils=veils[..., :count],
+        rest=rest[:, :count],
+        straight=straight[:, :count],
+        bounced=np.maximum(sharp.energy(sharp.passed) - straight, 0)[:, :count],
+        passed=np.maximum(full.energy(full.passed), 0)[:, :count],
+        remainder=by_node[0],
+        around=by_node[1],
+        again=by_node[2],
+        nodes=nodes,
+    )
+
+
+def media_of(material: Material) -> list[float]:
+    """Indices of the media of a material, as `Nodes` are for."""
+    return indices(_ended(parts(material)))
+
+
+def _ended(found: list[Part]) -> list[Part]:
+    """The layers, without a black base directly below an interface, which is then the last one that light meets."""
+    *others, last = found
+    if others and isinstance(others[-1], Facets) and isinstance(last, Lambert) and not last.albedo.any():
+        return [*others[:-1], replace(others[-1], final=True)]
+    return found
+
+
+def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
+    """Share of the light that meets facets of an interface again, and that no step of the index above takes from its
+    lobe, by the number of the interface among the layers.
+
+    Facets inside a denser medium make such light diffuse, but for its axes, which the remainder has not.
+    """
+    shares, steps = {}, 0.0
+    for i, part in enumerate(found):
+        if isinstance(part, Facets):
+            shares[i] = float(np.exp(-steps / UNDISTURBED)) * (part.brushed if part.is_exit else 1.0)
+            steps += part.step
+    return shares
+
+
+def _kept(share: float, all_light: Operator, once: Operator, leaving: Leaving) -> Operator:
+    """A share of the light of an interface that meets its facets again: no more than a lobe takes, without a kink."""
+    again = all_light + -1.0 * once
+    most = AGAIN * np.maximum(leaving.energy(once), TINY) / np.maximum(leaving.energy(again), TINY)
+    ratio = np.minimum(most, share) / np.maximum(most, share)
+    kept = (np.minimum(most, share) * (1 + ratio**SMOOTH) ** (-1 / SMOOTH))[:, None, None]
+    return replace(again, columns=kept * again.columns, beams=kept * again.beams)
+
+
+def _sum(lights: Sequence[Operator]) -> Operator:
+    return functools.reduce(operator.add, lights)
+
+
+def _of_isotropic(
+    material: Material,
+    energy: Array,
+    often: Tables | None,
+    forward: Straight,
+    made: Made,
+    incidences: Array,
+    *numbers: Any,
+) -> tuple[Array, ...]:
+    """Light of brushed interfaces, by mode and node: that of isotropic ones of the mean roughness, the remainder with
+    the energy that it has on average over azimuths.
+    """
+    stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
+    found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, *numbers)
+    mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
+    # Columns that cancel out are rounding
+    size = np.abs(found.remainder).sum(axis=2).max(axis=1)
+    scale = (mean / np.maximum(np.maximum(found.rest, CANCELS * size), TINY))[:, None, None]
+    return found.remainder * scale, found.around, found.again
+
+
+def _isotropic(each: LayerValues) -> LayerValues:
+    if not isinstance(each, InterfaceValues):
+        return each
+    mean = 0.5 * (each.alpha_u + each.alpha_v)
+    return replace(each, alpha_u=mean, alpha_v=mean)

@@ -1,0 +1,479 @@
+"""Rough interfaces as operators on light.
+
+Light meets visible normals on a lattice. Where it may meet several facets, what first events do is exact, with masking
+correlated to the height; what they block leaves in a way that is reciprocal and loses nothing, in the share that the
+tables of multiple scattering say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from velatura import ops, tables
+from velatura.model.solved.energies.modes import TINY, Basis, Light
+from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.optics import fresnel, ggx
+from velatura.sampling.coated import Coated, dielectric_between, dielectric_passing
+from velatura.sampling.low_discrepancy import fibonacci
+from velatura.tables import Tables, coordinates
+from velatura.tables.microsurface_walks import shares_in_the_end
+
+Array = NDArray[np.floating]
+
+# Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
+# often, and where such light is lost
+STRAIGHT = {True: 0.09, False: 0.01}
+GRAZING = 1e-4  # least cosine of light that meets an interface
+ALPHA_MIN = 1e-3
+BLOCK = 1 << 15  # samples at a time
+BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
+DIGITS = 9  # of lengths of momentum that are alike
+SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
+OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
+WALKED = 16  # directions of walks between facets with films
+PATHS = 2048  # from each
+BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
+
+
+@dataclass(frozen=True)
+class Facets:
+    """An interface between indices `above` and `below`, by colour (C,); `k` is None for a dielectric, and `below` too
+    for a mirror. Roughnesses, and a rotation in radians. `final` says that nothing sends back what it lets through.
+    `films` are thin films on it.
+    """
+
+    above: Array
+    below: Array | None
+    k: Array | None
+    alpha_u: float
+    alpha_v: float
+    rotation: float = 0.0
+    final: bool = False
+    films: Coated | None = None
+
+    @property
+    def opaque(self) -> bool:
+        return self.below is None or self.k is not None
+
+    @property
+    def is_exit(self) -> bool:
+        """Whether it may reflect all light, of a denser medium above."""
+        return not self.opaque and self.below is not None and bool(ops.mean(self.below) < ops.mean(self.above))
+
+    @property
+    def brushed(self) -> float:
+        """0 for isotropic facets, towards 1 for those that are long along an axis."""
+        return 1 - min(self.alpha_u, self.alpha_v) / max(self.alpha_u, self.alpha_v, ALPHA_MIN)
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether it changes no direction."""
+        stepless = not self.opaque and bool((self.above == self.below).all())
+        return max(self.alpha_u, self.alpha_v) < ALPHA_MIN or stepless
+
+    @property
+    def step(self) -> float:
+        """Of the logarithm of the index, for light that it lets through."""
+        if self.below is None or self.opaque:
+            return 0.0
+        return float(abs(np.log(ops.mean(self.below) / ops.mean(self.above))))
+
+    def straight(self, often: bool) -> float:
+        """Share of refracted light that meets further facets and still passes: a small step hardly turns it."""
+        return float(np.exp(-self.step / STRAIGHT[often]))
+
+    def smooth(self, p: Array, transmitted: bool) -> Array:
+        """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
+        n = float(ops.mean(self.above))
+        cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, GRAZING**2))
+        return self.passing(cosine) if transmitted else self.reflectance(cosine)
+
+    def reversed(self) -> Facets:
+        assert self.below is not None
+        films = self.films and self.films.reversed()
+        return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation, False, films)
+
+    def reflectance(self, cosine: Array) -> Array:
+        """Fresnel reflectance (C, ...) of facets."""
+        if self.below is None:
+            return np.ones((1, *np.shape(cosine)))
+        if self.k is None:
+            return np.asarray(dielectric_between(self.films, *self._between(cosine)))
+        shape = (-1, *(1,) * np.ndim(cosine))
+        eta = (self.below / self.above).reshape(shape)
+        if self.films is not None:
+            return np.asarray(self.films.at(cosine, eta))
+        return np.asarray(fresnel.conductor(cosine, eta, (self.k / self.above).reshape(shape)))
+
+    def passing(self, cosine: Array) -> Array:
+        """Share (C, ...) of light that facets let pass."""
+        if self.opaque:
+            return np.zeros((1, *np.shape(cosine)))
+        return np.asarray(dielectric_passing(self.films, *self._between(cosine)))
+
+    def shares(self, cosine: Array, outside: Array | np.bool_ = np.True_) -> tuple[Array, Array]:
+        """Shares (C, ...) of light that facets reflect, and let pass; with films also of light from below, where it is
+        not `outside`."""
+        if self.films is None or self.opaque:
+            return self.reflectance(cosine), self.passing(cosine)
+        return self.films.shares(outside, *self._between(cosine, outside))
+
+    def _between(self, cosine: Array, outside: Array | np.bool_ = np.True_) -> tuple[Array, Array, Array]:
+        """Cosines on both sides of a facet of a dielectric, and the relative index by colour."""
+        assert self.below is not None
+        n12 = float(ops.mean(self.below) / ops.mean(self.above))
+        cos_t = fresnel.cos_transmitted(cosine, np.where(outside, n12, 1 / n12))
+        return cosine, np.asarray(cos_t), (self.below / self.above).reshape(-1, *(1,) * np.ndim(cosine))
+
+
+@dataclass(frozen=True)
+class _Events:
+    """What first events make of light: reflected and refracted samples, by colour, and what they block of either.
+
+    Weights are (C, sources, samples), for all ways to mask light, one after the other. Shares (C, sources) are those of
+    the last way: what is reflected (`kept`), what they block, and what they would if they reflected all (`whole`).
+    """
+
+    reflected: Light
+    refracted: Light | None
+    kept: Array
+    blocked_reflected: Array
+    blocked_refracted: Array
+    whole: Array
+
+
+def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[bool]) -> _Events:
+    """First events for light of momenta of length p at azimuths psi (sources,), in the frame of the interface's axes.
+
+    Momenta are of the direction of travel, which a mirror leaves alone. `ways` says whether masking is correlated with
+    the height of facets, as what follows needs (Heitz et al. 2016); otherwise it is separable.
+    """
+    n = float(ops.mean(facets.above))
+    alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
+    u_1, u_2 = fibonacci(samples)
+    sin = np.minimum(p / n, np.sqrt(1 - GRAZING**2))[:, None]
+    # Light comes from wi, and travels to -wi
+    wi = (-sin * np.cos(psi)[:, None], -sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin))
+    # The same normals from all sides where facets have no axes, with azimuths from the plane of incidence; else about
+    # the normal, where light has no side; and with a steady change between
+    turns = max(1 - facets.brushed / BRUSHED, 0) * psi[:, None] / (2 * np.pi)
+    h = ggx.sample_visible(wi, *alpha, (u_2 + turns) % 1, u_1[None])
+    cosine = np.minimum(ggx.dot(wi, h), 1.0)
+    share = 1 / u_1.size
+
+    def escape(w: tuple[Array, Array, Array], out: Array, through: bool, often: bool) -> Array:
+        towards = (w[0], w[1], np.abs(w[2]))
+        if often:
+            there, here = _smith(towards, alpha), _smith(wi, alpha)
+            both = (
+                np.exp(gammaln(2 + here) + gammaln(1 + there) - gammaln(2 + here + there))
+                if through
+                else (1 + here) / (1 + here + there)
+            )
+        else:
+            both = ggx.masking(towards, *alpha)
+        if through:
+            both = both + facets.straight(ways[-1]) * (1 - both)
+        return np.where(out, both, 0)
+
+    def divided(w: tuple[Array, Array, Array], n: float, shares: Array, kept: Sequence[Array]) -> tuple[Light, Array]:
+        light = Light(n * w[0], n * w[1], np.concatenate([shares * each for each in kept]))
+        return light, (shares * (1 - kept[-1])).sum(axis=-1)
+
+    o, (reflectance, passing) = ggx.reflect(wi, h), facets.shares(cosine)
+    kept = [escape(o, o[2] > 0, False, often) for often in ways]
+    whole = (1 - kept[-1]).sum(axis=-1)[None] * share
+    reflected, blocked = divided(o, n, reflectance * share, kept)
+    back = reflected.weight[-len(blocked) :].sum(axis=-1)
+    if facets.below is None or facets.k is not None:
+        return _Events(reflected, None, back, blocked, np.zeros_like(blocked), whole)
+    below = float(ops.mean(facets.below))
+    eta = below / n
+    along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
+    t = along * h[0] - wi[0] / eta, along * h[1] - wi[1] / eta, along * h[2] - wi[2] / eta
+    kept = [escape(t, t[2] < 0, True, often) for often in ways]
+    refracted, not_refracted = divided(t, below, passing * share, kept)
+    return _Events(reflected, refracted, back, blocked, not_refracted, whole)
+
+
+def _smith(w: tuple[Array, Array, Array], alpha: tuple[float, float]) -> Array:
+    """Smith's Lambda."""
+    x, y = alpha[0] * w[0], alpha[1] * w[1]
+    z = np.maximum(w[2], GRAZING * 0.1)
+    return 0.5 * (np.sqrt(1 + (x * x + y * y) / (z * z)) - 1)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How light is described: its basis, beams of momenta of length p at azimuths phi (M,), and how finely facets are
+    sampled. With the tables of multiple scattering facets are met often, else once. What is `made` of interfaces is
+    kept for others.
+    """
+
+    basis: Basis
+    p: Array
+    phi: Array
+    samples: int
+    often: Tables | None = None
+    made: dict[Hashable, Any] = field(default_factory=dict)
+
+    @property
+    def ways(self) -> list[bool]:
+        """How light is masked, as of `_events`."""
+        return [False] if self.often is None else [False, True]
+
+    @property
+    def key(self) -> Hashable:
+        """All that it is, but for the tables."""
+        known = type(self.basis), self.basis.nodes, self.samples, self.often is None
+        return *known, self.p.tobytes(), self.phi.tobytes()
+
+    @property
+    def dark(self) -> Setting:
+        """Without beams."""
+        return replace(self, p=self.p[:0], phi=self.phi[:0])
+
+
+def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
+    """An interface as a layer, with facets met once, and as the setting says; what is opaque or final lets nothing
+    through, and has no other side."""
+    nothing = Operator.nothing(setting.basis.size, len(setting.p))
+    if facets.is_smooth:
+        r, t = (scaled(partial(facets.smooth, transmitted=side), setting) for side in (False, True))
+        if facets.opaque or facets.final:
+            t = r_below = t_below = nothing
+        else:
+            back = facets.reversed()
+            r_below, t_below = (scaled(partial(back.smooth, transmitted=side), setting) for side in (False, True))
+        smooth = Layer(r, t, r_below, t_below)
+        return smooth, smooth
+    above = _Side.of(facets, setting)
+    if facets.opaque or facets.final:
+        once, first = (Layer(r, nothing, nothing, nothing) for r in above.r)
+        if not above.blocked:
+            return once, once
+        return once, replace(first, r=first.r + _again(above.blocked[0], above.blocked[0], facets, setting))
+    below = _Side.of(facets.reversed(), setting.dark)
+    once, first = (Layer(*each) for each in zip(above.r, above.t, below.r, below.t))
+    if not (above.blocked and below.blocked):
+        return once, once
+    (to_r, to_t), (back_to_r, back_to_t) = above.blocked, below.blocked
+    return once, Layer(
+        first.r + _again(to_r, to_r, facets, setting),
+        first.t + _again(to_t, back_to_t, facets, setting),
+        first.r_below + _again(back_to_r, back_to_r, facets, setting),
+        first.t_below + _again(back_to_t, to_t, facets, setting),
+    )
+
+
+def scaled(share: Callable[[Array], Array], setting: Setting) -> Operator:
+    """An operator that changes no direction, but scales light by shares (C, ...) for lengths of momentum."""
+    nodes = setting.basis.diagonal(share(setting.basis.nodes.p))
+    return Operator(nodes, np.zeros((1, 1, nodes.shape[-1], len(setting.p))), share(setting.p)[:, None, None])
+
+
+@dataclass(frozen=True)
+class _Blocked:
+    """Shares of light that meets further facets, and in the end is reflected, or passes.
+
+    Those of light from the nodes as functionals (C, modes, N), those of beams (C, M); `emitted` is light of one unit
+    that leaves in such directions, by reciprocity those in which light is blocked. `sines` are those of the nodes, and
+    of beams.
+    """
+
+    nodes: Array
+    beams: Array
+    emitted: Array
+    sines: tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class _Met:
+    """First events of all sources: what they reflect and refract, deposited (C, modes, N, sources) for all ways to mask
+    light; of the last one what is reflected of all light, and what they block, (C, sources) as of `_Events`."""
+
+    reflected: Array
+    refracted: Array | None
+    kept: Array
+    blocked_reflected: Array
+    blocked_refracted: Array
+    whole: Array
+
+    @classmethod
+    def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
+        """Once for interfaces that are alike but for their rotation and the unit of momentum."""
+        basis, nodes = setting.basis, setting.basis.nodes
+        if facets.alpha_u == facets.alpha_v and (lengths := np.unique(p)).shape < p.shape:
+            return cls.of(facets, lengths, 0 * lengths, setting)._around(np.searchsorted(lengths, p), psi, basis)
+        momenta = facets.above, facets.below, facets.k, p, nodes.ends
+        key = (
+            *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in momenta),
+            *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes(), setting.samples, *setting.ways),
+            *((facets.films.rarer, facets.films.data.tobytes()) if facets.films else ()),
+            *(type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), nodes.cells),
+        )
+        if key not in setting.made:
+            setting.made[key] = cls._of(facets, p, psi, setting)
+        return setting.made[key]
+
+    @classmethod
+    def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
+        """In blocks of sources that a processor's cache holds."""
+        size = max(BLOCK // setting.samples, 1)
+
+        def met(first: int) -> _Met:
+            each, basis = slice(first, first + size), setting.basis
+            found = _events(facets, p[each], psi[each], setting.samples, setting.ways)
+            light = None if facets.final else found.refracted
+            refracted = None if light is None else basis.deposited(light)
+            blocked = found.blocked_reflected, found.blocked_refracted, found.whole
+            return cls(basis.deposited(found.reflected), refracted, found.kept, *blocked)
+
+        every = [vars(met(first)).values() for first in range(0, max(len(p), 1), size)]
+        whole: list[Any] = [None if each[0] is None else np.concatenate(each, axis=-1) for each in zip(*every)]
+        return cls(*whole)
+
+    def _around(self, places: NDArray[np.integer], psi: Array, basis: Basis) -> _Met:
+        """The sources of numbers `places`, which isotropic facets met at the azimuth 0, at others."""
+        reflected, refracted = (
+            None if x is None else basis.around(x[..., places], psi) for x in (self.reflected, self.refracted)
+        )
+        assert reflected is not None
+        blocked = self.blocked_reflected[:, places], self.blocked_refracted[:, places], self.whole[:, places]
+        return _Met(reflected, refracted, self.kept[:, places], *blocked)
+
+
+@dataclass(frozen=True)
+class _Side:
+    """What becomes of light from one side of an interface at first events, with facets met once, and as the setting
+    says; and what the latter block, that in the end is reflected, and that passes.
+    """
+
+    r: tuple[Operator, Operator]
+    t: tuple[Operator, Operator]
+    blocked: tuple[_Blocked, _Blocked] | None
+
+    @classmethod
+    def of(cls, facets: Facets, setting: Setting) -> _Side:
+        basis, turn = setting.basis, facets.rotation
+        along_axes = replace(facets, rotation=0.0)
+        p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
+        at_nodes = _Met.of(along_axes, p, psi, setting)
+        of_beams = _Met.of(along_axes, setting.p, basis.relative(setting.phi, turn), setting)
+
+        def operators(nodes: Array | None, beams: Array | None) -> tuple[Operator, Operator]:
+            if nodes is None or beams is None:
+                nothing = Operator.nothing(basis.size, len(setting.p))
+                return nothing, nothing
+            both = basis.operators(nodes, turn), basis.columns(beams, turn)
+            found = [Operator.of(*each) for each in zip(*(np.split(x, len(setting.ways)) for x in both))]
+            return found[0], found[-1]
+
+        r, t = operators(at_nodes.reflected, of_beams.reflected), operators(at_nodes.refracted, of_beams.refracted)
+        if setting.often is None:
+            return cls(r, t, None)
+        # Of nodes about the index of a medium some may have less than none
+        n = float(ops.mean(facets.above))
+        weights = np.maximum(basis.nodes.weights(n), 0)
+        blocked = []
+        sines = np.minimum(basis.nodes.p / n, 1), np.minimum(setting.p / n, 1)
+        shares = [_again_shares(facets, setting, q, met) for q, met in ((p, at_nodes), (setting.p, of_beams))]
+        for nodes, beams in zip(*shares):
+            rows = basis.rows(nodes, turn)
+            emitted = rows * weights
+            emitted = emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)
+            blocked.append(_Blocked(rows, beams, emitted, sines))
+        return cls(r, t, (blocked[0], blocked[1]))
+
+
+def _again(taken: _Blocked, there: _Blocked, facets: Facets, setting: Setting) -> Operator:
+    """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
+    turn it, the more of it goes on as it came."""
+    turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (OPAQUE if facets.opaque else facets.step)
+    swing = SWING * float(np.exp(-SWING * turn))
+    nodes, beams = (
+        setting.basis.swung(setting.basis.outer(there.emitted, light), swing, there.sines[0], sines)
+        for light, sines in zip((taken.nodes, taken.beams), taken.sines)
+    )
+    return Operator.of(nodes, beams)
+
+
+def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> tuple[Array, Array]:
+    """Shares (C, sources) of light of lengths p that first events block and that in the end is reflected, or passes.
+
+    Of blocked light, it is reflected in the share that an isotropic interface of the mean roughness reflects: by the
+    tables over any number of events, less what first events reflect.
+    """
+    known = setting.often
+    assert known is not None
+    if facets.below is None:
+        return events.whole, np.zeros_like(events.whole)
+    blocked: Array = events.whole if facets.opaque else events.blocked_reflected + events.blocked_refracted
+    if facets.films is not None:
+        reflected, passed = shares_of_films(facets, setting.made, p)
+        return blocked * reflected, blocked * passed
+    mean = _mean_alpha(facets)
+    cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
+    ratio = (facets.below / facets.above)[:, None]
+    if facets.k is None:
+        row = tables.dielectric_row(known, ratio, True, True)
+    else:
+        row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
+    found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean)))
+    stand_in: _Met | _Events = events
+    if facets.alpha_u != facets.alpha_v:
+        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, setting.samples, [True])
+    often, once = found.reshape(len(stand_in.blocked_reflected), -1), stand_in.kept
+    met: Array
+    little: Array
+    if facets.k is None:
+        met = stand_in.blocked_reflected + stand_in.blocked_refracted
+        little = np.where(ratio < 1, 0.9, 0.15)
+    else:
+        met, little = stand_in.whole, often * often
+    # Little that is blocked has a share that the tables do not resolve
+    seen = np.clip((met - BLOCKED[0]) / (BLOCKED[1] - BLOCKED[0]), 0, 1)
+    share = seen * np.clip((often - once) / np.maximum(met, BLOCKED[0]), 0, 1) + (1 - seen) * little
+    return blocked * share, np.zeros_like(once) if facets.k is not None else blocked * (1 - share)
+
+
+def _mean_alpha(facets: Facets) -> float:
+    return float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
+
+
+def shares_of_films(facets: Facets, made: dict[Hashable, Any], p: Array) -> tuple[Array, Array]:
+    """Shares (C, sources) of blocked light of lengths p that films reflect, and let pass, in the end, by walks, since
+    no table has them."""
+    mean = _mean_alpha(facets)
+    assert facets.below is not None and facets.films
+    numbers = facets.above, facets.below, facets.k, facets.films.data
+    key = mean, facets.films.rarer, *(None if x is None else x.tobytes() for x in numbers)
+    # Walk in directions that crowd where shares bend
+    places = (np.arange(WALKED) + 0.5) / WALKED
+    critical = np.arcsin(float(ops.mean(facets.below) / ops.mean(facets.above))) if facets.is_exit else None
+    if key not in made:
+        eta = None if facets.opaque else float(ops.mean(facets.below) / ops.mean(facets.above))
+        cosines = coordinates.to_cosine(places) if critical is None else coordinates.to_angle(places, critical)
+        alpha = np.full(WALKED, mean)
+        made[key] = shares_in_the_end(facets.shares, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
+    cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
+    at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
+    reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in made[key])
+    return reflected, passed
+
+
+def of_first_events(facets: Facets, p: Array, samples: int, often: bool) -> tuple[Array, Array, Array]:
+    """Shares (C, N) of light of lengths p that facets with films reflect when they are first met, that films of a
+    dielectric absorb, and that meets others then."""
+    events = _events(facets, p, 0 * p, samples, [often])
+    if events.refracted is None:
+        return events.kept, 0 * events.kept, events.whole
+    blocked = events.blocked_reflected + events.blocked_refracted
+    return events.kept, 1 - events.kept - events.refracted.weight.sum(axis=-1) - blocked, blocked

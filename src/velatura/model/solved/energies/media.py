@@ -1,0 +1,105 @@
+"""Media as operators on light, by doubling thin layers with events of Henyey & Greenstein's phase function."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura.model.solved.energies.interfaces import Setting, scaled
+from velatura.model.solved.energies.modes import TINY, Light
+from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.optics import phase
+from velatura.sampling.low_discrepancy import fibonacci
+
+Array = NDArray[np.floating]
+
+THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
+EVENTS = 600
+G_MAX = 0.999  # asymmetry of light that turns by less than nodes resolve
+COS_MIN = 0.01  # light that travels flatter is taken to travel so
+
+
+@dataclass(frozen=True)
+class Slab:
+    """A medium of index n, by optical depths of absorption and scattering along the normal (C,), and asymmetry g (C,).
+
+    `straight` is the share of scattered light that counts as going straight on, where no other scattered light is
+    followed; None to follow it all.
+    """
+
+    n: float
+    tau_a: Array
+    tau_s: Array
+    g: Array
+    straight: Array | None = None
+
+
+def medium(slab: Slab, setting: Setting) -> Layer:
+    """A medium as a layer; it looks alike from both sides."""
+    slab = _resolved(slab)
+    lost = slab.tau_a + (slab.tau_s if slab.straight is None else (1 - slab.straight) * slab.tau_s)
+    if slab.straight is not None or not slab.tau_s.any():
+        t = scaled(partial(_kept, slab, lost), setting)
+        nothing = Operator.nothing(setting.basis.size, len(setting.p))
+        return Layer(nothing, t, nothing, t)
+    doublings = max(int(np.ceil(np.log2(lost.max() / THIN))), 0)
+    r, t = _thin(slab, lost / 2**doublings, setting)
+    for _ in range(doublings):
+        between = (r @ r).repeated(trapped=0.0)
+        r, t = r + t @ r @ between @ t, t @ between @ t
+    return Layer(r, t, r, t)
+
+
+def _resolved(slab: Slab) -> Slab:
+    """With light that turns by less than nodes resolve going straight on: (1 - g) tau_s stays (van de Hulst's
+    similarity relation)."""
+    g = np.clip(slab.g, -G_MAX, G_MAX)
+    return replace(slab, tau_s=slab.tau_s * np.minimum((1 - slab.g) / (1 - g), 1), g=g)
+
+
+def _thin(slab: Slab, depth: Array, setting: Setting) -> tuple[Operator, Operator]:
+    """A layer so thin that light scatters there once at most."""
+    kept = partial(_kept, slab, depth)
+    albedo = (slab.tau_s / np.maximum(slab.tau_a + slab.tau_s, TINY))[:, None]
+    basis = setting.basis
+    p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
+    sources = ((p, psi), (setting.p, basis.relative(setting.phi, 0.0)))
+    shares = [albedo * (1 - kept(q)) for q, _ in sources]
+    found = []
+    # Colours share the directions that they scatter into, where they share g
+    alike = len(set(slab.g.tolist())) == 1
+    for channels in [slice(None)] if alike else [slice(c, c + 1) for c in range(len(slab.g))]:
+        nodes, beams = (
+            _scattered(slab.n, float(slab.g[channels][0]), *source, share[channels if len(share) > 1 else slice(None)])
+            for source, share in zip(sources, shares)
+        )
+        found.append(
+            [
+                Operator.of(basis.operators(basis.deposited(a), 0.0), basis.columns(basis.deposited(b), 0.0))
+                for a, b in zip(nodes, beams)
+            ]
+        )
+    up, down = (
+        Operator.of(np.concatenate([x.nodes for x in each]), np.concatenate([x.columns for x in each]))
+        for each in zip(*found)
+    )
+    return up, scaled(kept, setting) + down
+
+
+def _kept(slab: Slab, depth: Array, p: Array) -> Array:
+    """Share (C, ...) of light of momenta p that passes a depth (C,); none has more than the medium's index."""
+    cosine = np.sqrt(np.maximum(1 - (p / slab.n) ** 2, COS_MIN**2))
+    return np.asarray(np.exp(-depth[:, None] / cosine))
+
+
+def _scattered(n: float, g: float, p: Array, psi: Array, share: Array) -> tuple[Light, Light]:
+    """Light that is scattered up, and down, of light that travels down."""
+    u_1, u_2 = fibonacci(EVENTS)
+    sin = np.minimum(p / n, np.sqrt(1 - COS_MIN**2))[:, None]
+    w = sin * np.cos(psi)[:, None], sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin)
+    x, y, z = phase.deflect(w, phase.sample_henyey_greenstein(g, u_1), 2 * np.pi * u_2)
+    up, down = (Light(n * x, n * y, share[:, :, None] * (there / u_1.size)) for there in (z <= 0, z > 0))
+    return up, down

@@ -1,0 +1,258 @@
+"""Modes of the azimuth of light.
+
+Stacks of isotropic interfaces treat every mode by itself, relative to the azimuth that light came with (`Relative`).
+In others (`Even`), modes 0 and 2 act on one another; odd ones do not act on energies, since a stack does not
+distinguish a direction from its opposite.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array
+
+from velatura.model.solved.energies.nodes import Nodes
+
+Array = NDArray[np.floating]
+
+ROOT = np.sqrt(2)
+TINY = np.finfo(float).tiny
+SHORT = 1e-150  # least length of momentum that has an azimuth
+
+
+@dataclass(frozen=True)
+class Light:
+    """Samples of light: components of their momentum (sources, samples), and weights (C, sources, samples)."""
+
+    x: Array
+    y: Array
+    weight: Array
+
+
+class Basis(ABC):
+    """Coefficients of light: measures are (C, families, n, sources), n rows being nodes, or modes times nodes.
+
+    Attributes:
+        nodes: those of the length of momentum.
+        azimuths: at which light from the nodes meets an interface, (J,), from its first axis.
+    """
+
+    nodes: Nodes
+    azimuths: Array
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """Rows and columns of a matrix, n."""
+
+    @abstractmethod
+    def relative(self, phi: Array, rotation: float) -> Array:
+        """Azimuths of beams from the first axis of an interface."""
+
+    @abstractmethod
+    def deposited(self, light: Light) -> Array:
+        """Sums over the samples of each source, (C, modes, N, sources)."""
+
+    @abstractmethod
+    def around(self, light: Array, psi: Array) -> Array:
+        """What was deposited for sources at the azimuth 0, with all turned to azimuths (sources,)."""
+
+    @abstractmethod
+    def operators(self, light: Array, rotation: float) -> Array:
+        """Matrices (C, families, n, n) of what becomes of light from the nodes, azimuth by azimuth, as deposited."""
+
+    @abstractmethod
+    def columns(self, light: Array, rotation: float) -> Array:
+        """What becomes of single directions, (C, families, n, M), as deposited."""
+
+    @abstractmethod
+    def rows(self, values: Array, rotation: float) -> Array:
+        """A share of light (C, J * N) by azimuth and node, as a functional (C, modes, N)."""
+
+    @abstractmethod
+    def outer(self, emitted: Array, taken: Array) -> Array:
+        """Matrices that emit as (C, modes, N) what (C, modes, N) takes, or columns for what (C, M) takes of beams."""
+
+    def swung(self, light: Array, swing: float, there: Array, here: Array) -> Array:
+        """Even light (C, families, n, sources) that goes on in the direction that it came in, by the sines `there` (N,)
+        and `here` (sources,): with 1 + swing (s cos(phi) + s^2 cos(2 phi)), s being their product."""
+        return light
+
+    @abstractmethod
+    def diagonal(self, values: Array) -> Array:
+        """Matrices that scale light at the nodes by (C, N)."""
+
+    @abstractmethod
+    def energy(self, measure: Array) -> Array:
+        """Energies (C, sources) of measures."""
+
+
+@dataclass(frozen=True)
+class Relative(Basis):
+    """The modes cos(m phi), m = 0 to `count` - 1, each a family of its own, for isotropic interfaces.
+
+    phi is relative to the azimuth of the source.
+    """
+
+    nodes: Nodes
+    count: int = 1
+
+    azimuths = np.zeros(1)
+
+    @property
+    def size(self) -> int:
+        return self.nodes.count
+
+    def relative(self, phi: Array, rotation: float) -> Array:
+        return np.zeros_like(phi)
+
+    def deposited(self, light: Light) -> Array:
+        length, cosine, _ = _polar(light)
+        angular = [np.ones_like(cosine), cosine, 2 * cosine * cosine - 1][: self.count]
+        return _deposited(self.nodes, light, length, angular, [m % 2 == 1 for m in range(self.count)])
+
+    def around(self, light: Array, psi: Array) -> Array:
+        return light
+
+    def columns(self, light: Array, rotation: float) -> Array:
+        return light
+
+    operators = columns
+
+    def rows(self, values: Array, rotation: float) -> Array:
+        return values[:, None]
+
+    def outer(self, emitted: Array, taken: Array) -> Array:
+        found = np.zeros((len(emitted), self.count, self.nodes.count, taken.shape[-1]))
+        found[:, 0] = emitted[:, 0, :, None] * taken.reshape(len(taken), 1, -1)
+        return found
+
+    def swung(self, light: Array, swing: float, there: Array, here: Array) -> Array:
+        both = np.multiply.outer(there, here)
+        waves = [0.5 * swing * both**m * light[:, 0] for m in range(1, self.count)]
+        return np.stack([light[:, 0], *waves], axis=1)
+
+    def diagonal(self, values: Array) -> Array:
+        return values[:, None, :, None] * np.eye(self.nodes.count)
+
+    def energy(self, measure: Array) -> Array:
+        return np.asarray(measure[:, 0].sum(axis=-2))
+
+
+@dataclass(frozen=True)
+class Even(Basis):
+    """Modes 1, sqrt(2) cos(m phi), sqrt(2) sin(m phi) of the azimuth, m = 2, 4, ..., in one family, modes first.
+
+    Sources meet an interface at azimuths of one quarter of a turn: its axes mirror the others.
+    """
+
+    nodes: Nodes
+    orders: tuple[int, ...] = (2,)
+    quarter: int = 3
+
+    @property
+    def modes(self) -> int:
+        return 1 + 2 * len(self.orders)
+
+    @property
+    def size(self) -> int:
+        return self.modes * self.nodes.count
+
+    def relative(self, phi: Array, rotation: float) -> Array:
+        return phi - rotation
+
+    @property
+    def azimuths(self) -> Array:  # type: ignore[override]
+        return (np.arange(self.quarter) + 0.5) * np.pi / (2 * self.quarter)
+
+    def deposited(self, light: Light) -> Array:
+        length, cosine, sine = _polar(light)
+        turn = [cosine * cosine - sine * sine, 2 * cosine * sine]
+        waves = [turn]
+        for _ in self.orders[1:]:
+            c, s = waves[-1]
+            waves.append([c * turn[0] - s * turn[1], c * turn[1] + s * turn[0]])
+        angular = [np.ones_like(cosine), *(ROOT * part for wave in waves for part in wave)]
+        return _deposited(self.nodes, light, length, angular, [False] * self.modes)
+
+    def around(self, light: Array, psi: Array) -> Array:
+        found = [light[:, 0]]
+        for i, m in enumerate(self.orders):
+            c, s, cosine, sine = np.cos(m * psi), np.sin(m * psi), light[:, 2 * i + 1], light[:, 2 * i + 2]
+            found += [c * cosine - s * sine, s * cosine + c * sine]
+        return np.stack(found, axis=1)
+
+    def columns(self, light: Array, rotation: float) -> Array:
+        found = self._turned(rotation).T @ light.reshape(len(light), self.modes, -1)
+        return found.reshape(len(found), 1, self.modes * self.nodes.count, -1)
+
+    def operators(self, light: Array, rotation: float) -> Array:
+        n, modes, azimuths = self.nodes.count, self.modes, self.azimuths
+        found = light.reshape(-1, modes, n, len(azimuths), n)
+        matrix = self._basis(azimuths) @ found / len(azimuths)
+        # Cosines and sines do not mix, by the mirror symmetry of the axes
+        sine = np.arange(modes) % 2 == 0
+        sine[0] = False
+        matrix *= (sine[:, None] == sine)[None, :, None, :, None]
+        turn = self._turned(rotation).T
+        matrix = turn @ (turn @ matrix.reshape(-1, modes, n * modes * n)).reshape(-1, modes * n, modes, n)
+        return matrix.reshape(-1, 1, modes * n, modes * n)
+
+    def rows(self, values: Array, rotation: float) -> Array:
+        each = values.reshape(len(values), len(self.azimuths), self.nodes.count)
+        basis = self._basis(self.azimuths)
+        basis[2::2] = 0
+        projected = np.einsum("cqn,bq->cbn", each, basis) / len(self.azimuths)
+        return np.asarray(np.einsum("ax,can->cxn", self._turned(rotation), projected))
+
+    def outer(self, emitted: Array, taken: Array) -> Array:
+        flat = emitted.reshape(len(emitted), 1, -1, 1)
+        return np.asarray(flat * taken.reshape(len(taken), 1, 1, -1))
+
+    def diagonal(self, values: Array) -> Array:
+        return np.tile(values, self.modes)[:, None, :, None] * np.eye(self.modes * self.nodes.count)
+
+    def energy(self, measure: Array) -> Array:
+        return np.asarray(measure[:, 0, : self.nodes.count].sum(axis=-2))
+
+    def _basis(self, azimuth: Array) -> Array:
+        waves = [ROOT * wave(m * azimuth) for m in self.orders for wave in (np.cos, np.sin)]
+        return np.stack([np.ones_like(azimuth), *waves])
+
+    def _turned(self, rotation: float) -> Array:
+        """Coefficients in a frame that is turned."""
+        found = np.eye(self.modes)
+        for i, m in enumerate(self.orders):
+            c, s = np.cos(m * rotation), np.sin(m * rotation)
+            found[2 * i + 1 : 2 * i + 3, 2 * i + 1 : 2 * i + 3] = [[c, s], [-s, c]]
+        return found
+
+
+def _polar(light: Light) -> tuple[Array, Array, Array]:
+    """Lengths of momenta, and cosine and sine of their azimuths."""
+    length = np.sqrt(light.x * light.x + light.y * light.y)
+    scale = 1 / np.maximum(length, SHORT)
+    return length, light.x * scale, light.y * scale
+
+
+def _deposited(nodes: Nodes, light: Light, length: Array, angular: Sequence[Array], odd: Sequence[bool]) -> Array:
+    """Sums over the samples of each source, (C, modes, N, sources)."""
+    sources, samples = length.shape
+    index, shares = nodes.stencils(length)
+    # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
+    rows = index * np.int32(sources) + np.arange(sources, dtype=np.int32)[:, None, None]
+    shape = (nodes.count + 1) * sources, sources * samples
+    entries = shares.ravel(), rows.ravel(), np.arange(0, shares.size + 1, shares.shape[-1], dtype=np.int32)
+    weights = np.empty((sources, samples, len(light.weight), len(angular)))
+    for c, each in enumerate(light.weight):
+        for m, values in enumerate(angular):
+            np.multiply(each, values, out=weights[..., c, m])
+    found = (csc_array(entries, shape) @ weights.reshape(shape[1], len(light.weight) * len(angular))).T
+    found = found.reshape(len(light.weight), len(angular), nodes.count + 1, sources)
+    sign = np.where(odd, -1, 1)[:, None]
+    found[:, :, 1] += sign * found[:, :, -1]
+    return found[:, :, :-1]

@@ -1,0 +1,202 @@
+"""Directions at which a material is solved: cosines times azimuths, even in the root of the cosine and in half a turn.
+
+Stacks look alike from opposite sides, and mirrored in the axes that all of their brushed interfaces share.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from velatura.model.papers.mixture import ALPHA_MIN
+from velatura.model.solved.bsdf import Columns
+from velatura.model.solved.transmission.combined import Parts
+from velatura.sampling import directional_grid
+from velatura.stack import InterfaceValues, Material
+
+Array = NDArray[np.floating]
+
+COSINES = {True: 32, False: 20}  # where all interfaces are isotropic, and where some are brushed
+AZIMUTHS = {False: 12, True: 24}  # in half a turn, where some are brushed, and where some sharply so
+SHARP = 8.0  # roughness across over that along, beyond which inner lobes turn within few degrees
+COS_MIN = 1e-3
+ALIKE = 1e-6  # steps between azimuths, by which axes may differ
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All directions, and how columns are spread over a finer grid."""
+
+    isotropic: bool
+    cosines: int
+    azimuths: int
+
+    @classmethod
+    def of(cls, isotropic: bool, material: Material | None = None) -> Grid:
+        """For a material of numbers, or None for any of those of tables."""
+        sharp = material is not None and any(map(_is_sharp, material.interfaces))
+        return cls(isotropic, COSINES[isotropic], AZIMUTHS[sharp])
+
+    @property
+    def nodes(self) -> Array:
+        return np.linspace(0, 1, self.cosines)
+
+    @property
+    def turns(self) -> int:
+        return 1 if self.isotropic else self.azimuths
+
+    @property
+    def count(self) -> int:
+        return self.cosines * self.turns
+
+    @property
+    def cosine(self) -> Array:
+        return np.repeat(np.maximum(self.nodes**2, COS_MIN), self.turns)
+
+    @property
+    def phi(self) -> Array:
+        return np.tile(np.pi * np.arange(self.turns) / self.turns, self.cosines)
+
+    @property
+    def directions(self) -> tuple[Array, Array, Array]:
+        sine = np.sqrt(1 - self.cosine * self.cosine)
+        return sine * np.cos(self.phi), sine * np.sin(self.phi), self.cosine
+
+    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
+        """Nodes and weights of the linear interpolation at directions above."""
+        place = np.sqrt(np.clip(w[2], 0, 1)) * (self.cosines - 1)
+        cell = np.minimum(place.astype(int), self.cosines - 2)
+        along = [(cell, 1 - (place - cell)), (cell + 1, place - cell)]
+        if self.isotropic:
+            return along
+        turn = (np.arctan2(w[1], w[0]) % np.pi) * (self.turns / np.pi)
+        first = turn.astype(int)
+        around = [(first % self.turns, 1 - (turn - first)), ((first + 1) % self.turns, turn - first)]
+        return [(k * self.turns + m, x * y) for k, x in along for m, y in around]
+
+    def spread(self, rows: Array, shape: tuple[int, ...]) -> Array:
+        """Values at the nodes, (..., M), interpolated, (..., prod(shape)): by splines over the cosine, by waves over
+        the azimuth, which do not fall below 0 where no value does."""
+        values = rows.reshape(*rows.shape[:-1], self.cosines, self.turns)
+        if not self.isotropic:
+            x, y, _ = directional_grid.directions(shape, None)
+            phi = np.arctan2(y, x).reshape(shape)[0]
+            order = np.arange(self.turns // 2 + 1)
+            both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
+            waves = np.fft.rfft(values, axis=-1) / self.turns * both
+            least = values.min(axis=-1, keepdims=True)
+            values = np.maximum((waves @ np.exp(2j * order[:, None] * phi)).real, np.minimum(least, 0))
+        return self.along(values.swapaxes(-1, -2), shape[0]).swapaxes(-1, -2).reshape(*rows.shape[:-1], -1)
+
+    def beside(self, rows: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
+        """The lesser and the greater of the values at the two cosines beside each place of `spread`, of its shape."""
+        values = self.spread(rows, (self.cosines, *shape[1:])).reshape(*rows.shape[:-1], self.cosines, -1)
+        cell = np.minimum(np.linspace(0, self.cosines - 1, shape[0]).astype(int), self.cosines - 2)
+        ends = values[..., cell, :], values[..., cell + 1, :]
+        low, high = (each(*ends).reshape(*rows.shape[:-1], -1) for each in (np.minimum, np.maximum))
+        return low, high
+
+    def along(self, values: Array, count: int) -> Array:
+        """Values at the cosines, (..., cosines), interpolated by splines at as many places."""
+        with np.errstate(over="ignore"):  # of inverse slopes, where values are hardly above 0
+            return np.asarray(PchipInterpolator(self.nodes, values, axis=-1)(np.linspace(0, 1, count)))
+
+
+@dataclass(frozen=True)
+class Folded:
+    """The directions of a grid but for mirror images of others: those at the azimuths of numbers `kept`. The azimuth of
+    every number looks like the one that `source` numbers among these, or, where `mirrored`, like its mirror image."""
+
+    grid: Grid
+    kept: NDArray[np.integer]
+    source: NDArray[np.integer]
+    mirrored: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, grid: Grid, material: Material) -> Folded:
+        """For a material of numbers, whose axes the azimuths are mirrored in where they lie on one or between two."""
+        turns = grid.turns
+        brushed = [layer for layer in material.interfaces if layer.alpha_u != layer.alpha_v]
+        axes = [(layer.rotation * turns / 90) % turns for layer in brushed] or [0.0]  # the sum of those mirrored
+        steps = round(axes[0])
+        numbers = np.arange(turns)
+        image = (steps - numbers) % turns
+        if any(abs((axis - steps + ALIKE) % turns) > 2 * ALIKE for axis in axes):
+            image = numbers
+        kept, source = np.unique(np.minimum(numbers, image), return_inverse=True)
+        return cls(grid, kept, source, image < numbers)
+
+    @property
+    def count(self) -> int:
+        return self.grid.cosines * len(self.kept)
+
+    @property
+    def cosine(self) -> Array:
+        return self._of(self.grid.cosine)
+
+    @property
+    def phi(self) -> Array:
+        return self._of(self.grid.phi)
+
+    @property
+    def directions(self) -> tuple[Array, Array, Array]:
+        x, y, z = map(self._of, self.grid.directions)
+        return x, y, z
+
+    @property
+    def at_cosines(self) -> tuple[Array, Array, Array]:
+        """One direction for each cosine."""
+        x, y, z = (each.reshape(-1, len(self.kept))[:, 0] for each in self.directions)
+        return x, y, z
+
+    def _of(self, values: Array) -> Array:
+        return values.reshape(-1, self.grid.turns)[:, self.kept].ravel()
+
+    def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
+        """As those of the grid, of these directions: where what is interpolated looks alike in mirrors."""
+        places = np.arange(self.grid.cosines)[:, None] * len(self.kept) + self.source
+        return [(places.ravel()[index], share) for index, share in self.grid.shares(w)]
+
+    def around(self, values: Array) -> Array:
+        """Values for cosines, (..., cosines), at all of these directions."""
+        return np.repeat(values, len(self.kept), axis=-1)
+
+    def everywhere(self, values: Array) -> Array:
+        """Values at these directions, (..., count), that look alike in mirrors, at all of the grid."""
+        found = values.reshape(*values.shape[:-1], self.grid.cosines, len(self.kept))[..., self.source]
+        return found.reshape(*values.shape[:-1], self.grid.count)
+
+    def unfolded(self, columns: Columns) -> Columns:
+        """Columns at these directions, at all of the grid. Matrices are of the frame of the plane of incidence, where
+        middle entries change sign in mirrors; now they are of that of the material, where they hardly vary."""
+
+        def each(values: Any) -> Any:
+            if values is None:
+                return None
+            if isinstance(values, (list, tuple)):
+                return type(values)(each(x) for x in values)
+            if isinstance(values, Parts):
+                return Parts(*(each(x) for x in vars(values).values()))
+            return self.everywhere(values)
+
+        found = Columns(*(each(x) for x in vars(columns).values()))
+        if self.grid.isotropic:
+            return found
+        sign = np.tile(np.where(self.mirrored, -1, 1), self.grid.cosines)
+        c, s = np.cos(self.grid.phi), np.sin(self.grid.phi)
+
+        def turned(xx: Array, xy: Array, yy: Array) -> tuple[Array, ...]:
+            mixed = 2 * c * s * sign * xy
+            across = c * s * (xx - yy) + (c * c - s * s) * sign * xy
+            return c * c * xx - mixed + s * s * yy, across, s * s * xx + mixed + c * c * yy
+
+        return replace(found, roughness=[turned(*matrix) for matrix in found.roughness])
+
+
+def _is_sharp(interface: InterfaceValues) -> bool:
+    u, v = (max(float(alpha), ALPHA_MIN) for alpha in (interface.alpha_u, interface.alpha_v))
+    return max(u, v) > SHARP * min(u, v)

@@ -1,0 +1,265 @@
+"""A reflected lobe in its own medium: GGX above the interface that reflects it, refracted out.
+
+Snell's law leaves the tangential momentum p = n sin(theta) of light alone. So light from wi that leaves along wo meets
+interface k, in a medium of index n, with the momentum i = (p_i, c(p_i)) and goes on with o = (p_o, c(p_o)), of length n
+both, c(p) = sqrt(n^2 - p^2), and leaves with
+
+    f |cos_o| = weight D(h) V(i) V(o) / 4 F(i.h / n) (1 - F_1(cos_o)) cos_o,    h halfway between i and o,
+
+where V(w) = G1(w) / w_z is finite at grazing directions, and cos_o / (n c(p_o)) is the solid angle inside over that
+outside. The shift of the peak, the cut of the cone, the stretch across the plane and the fall-off at grazing directions
+follow; turning the axes turns the lobe. Indices are relative to the medium outside, where that of the first lobe is 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+
+from velatura import ops
+from velatura.model.papers.mixture import ALPHA_MIN
+from velatura.model.variance import Roughness
+from velatura.ops import Value
+from velatura.optics import ggx
+from velatura.optics.ggx import Direction
+from velatura.sampling import low_discrepancy
+
+COS_MIN = 1e-3  # times the index inside; what refraction does not reach meets the interface at this one
+NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
+SPARSE = 3  # of so many normals one, for weights
+BLOCK = 1 << 16  # normals at a time, which a processor's cache holds
+
+Reflectance = Callable[[Value], Value]
+
+
+@dataclass(frozen=True)
+class Index:
+    """An index n relative to the medium outside, and what lobes take of it: its inverse, and the radius of the ring of
+    momenta beyond those that can leave, from 1 to n, in squares and as it is. `denser`: whether n is known to be 1 at
+    least, so that light from any direction gets in."""
+
+    n: Value
+    inverse: Value
+    ring2: Value
+    ring: Value
+    denser: bool = False
+
+    @classmethod
+    def of(cls, n: Value, denser: bool = False) -> Index:
+        if isinstance(n, Index):
+            return n
+        ring2 = n * n - 1
+        return cls(n, 1 / n, ring2, ops.sqrt(ops.maximum(ring2, 0.0)), denser)
+
+    @property
+    def is_outside(self) -> bool:
+        """Whether it is known to be that of the medium outside."""
+        return isinstance(self.n, float) and self.n == 1.0
+
+
+@dataclass(frozen=True)
+class OwnMediumLobe(ops.Named):
+    """A lobe of `weight` (a colour) times a GGX reflection of `roughness` in a medium of index `n`, a number or an
+    `Index`, refracted out.
+
+    `facets` is the Fresnel reflectance of the facets by the square of a cosine, and `leaving` the share of light at a
+    cosine outside that the first interface lets out; None where the weight has all of it, or nothing lies above. With
+    the energy over the `integral` as weight, the lobe has that energy.
+    """
+
+    weight: Value
+    roughness: Roughness
+    n: Value = 1.0
+    facets: Reflectance | None = None
+    leaving: Reflectance | None = None
+
+
+def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
+    alpha_u, alpha_v, n, i = _inside(lobe, wi)
+    p = _in_frame(lobe, wo)
+    cos_o = ops.select(wi[2] > 0, ops.maximum(wo[2], 0.0), 0.0)
+    # Reflect in the medium
+    o, area = (p[0], p[1], _height(n, wo[2])), alpha_u * alpha_v
+    squares = alpha_u * alpha_u, alpha_v * alpha_v, area * area
+    m = _squares((i[0] + o[0], i[1] + o[1], i[2] + o[2]))
+    shown, facing = _shown(o, _height2(n, wo[2]), squares), _facing(m, squares)
+    ops.names(i=i, o=o, m=m, area=area, shown=shown, facing=facing)
+    seen = cos_o * (0.5 / pi) * (area * squares[2]) / (_shown(i, _height2(n, wi[2]), squares) * shown * o[2])
+    if not (n.is_outside or n.denser):
+        seen = ops.select(n.ring2 + wo[2] * wo[2] > 0, seen, 0.0)
+    light = seen * (o[2] + o[2]) * facing
+    if lobe.facets:
+        # Half the angle between i and o
+        light = light * lobe.facets((m[0] + m[1] + m[2]) * (0.25 * n.inverse * n.inverse))
+    if lobe.leaving:
+        light = light * lobe.leaving(cos_o)
+    density = facing
+    # Add what falls outside the cone, and is spread over it
+    if not n.is_outside:
+        p2 = ops.maximum(wo[0] * wo[0] + wo[1] * wo[1], ops.TINY)
+        far, stretch = _far(i, (p[0], p[1]), p2, n)
+        m = _squares(far)
+        ops.names(p2=p2, stretch=stretch, m_far=m)
+        density = density + 2 * n.ring * o[2] * _facing(m, squares)
+    return lobe.weight * light, seen * shown * density
+
+
+def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
+    """A direction wo from uniform numbers, by a normal visible inside.
+
+    Momenta outside the cone, a ring of radii 1 to n, are spread over the disc inside: to the fourth root of
+    (n^2 - p^2) / (n^2 - 1), which keeps the density finite. The direction may lie below the surface, where `eval_pdf`
+    is 0.
+    """
+    alpha_u, alpha_v, n, i = _inside(lobe, wi)
+    o = ggx.reflect(i, ggx.sample_visible(i, alpha_u, alpha_v, u1, u2))
+    if n.is_outside:
+        return _out_of_frame(lobe, o)
+    p2 = o[0] * o[0] + o[1] * o[1]
+    r2 = ops.select(p2 > 1, ops.minimum(ops.divide(ops.absolute(o[2]), n.ring), 1.0), p2)
+    scale = ops.select(p2 > 1, ops.sqrt(r2 / ops.maximum(p2, 1.0)), 1.0)
+    z = ops.sqrt(1 - r2)
+    ops.names(o=o, p2=p2, r2=r2, scale=scale, z=z)
+    return _out_of_frame(lobe, (scale * o[0], scale * o[1], ops.select(o[2] > 0, z, -z)))
+
+
+def either(where: Value, a: OwnMediumLobe, b: OwnMediumLobe) -> OwnMediumLobe:
+    """A lobe to `sample`: that of a where a condition holds, else of b."""
+    roughness = Roughness(*(ops.select(where, x, y) for x, y in zip(a.roughness, b.roughness)))
+    return OwnMediumLobe(1.0, roughness, _chosen(where, a.n, b.n))
+
+
+def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Value:
+    """Albedo of a lobe in NumPy, (N,), or (C, N) of a colour, for directions wi and its roughness, (N,) each.
+
+    A mean over visible normals on a lattice of a Fibonacci number of them, in single precision; within .3 % on average.
+    """
+    return lobe.weight * integrals(lobe, wi, normals)[0]
+
+
+def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value, Value]:
+    """Mean of the weights of samples, and of their squares, and the largest one, as `integral`, for a weight of 1."""
+    count, size = len(wi[2]), max(BLOCK // normals, 1)
+    blocks = [
+        _integrals(replace(lobe, n=_single(Index.of(lobe.n).n), roughness=Roughness(*roughness)), (x, y, z), normals)
+        for x, y, z, *roughness in (
+            [_single(value, slice(k, k + size)) for value in (*wi, *lobe.roughness)] for k in range(0, count, size)
+        )
+    ]
+    mean, squares, largest = (np.concatenate(each, axis=-1) for each in zip(*blocks))
+    return mean, squares, largest
+
+
+def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value, Value, Value]:
+    """For columns of directions (N, 1)."""
+    u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
+    alpha_u, alpha_v, n, i = _inside(lobe, wi)
+    # Azimuths from the plane of incidence: the same normals for any axes of a round lobe
+    if np.any(i[1]):
+        u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
+    h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
+    o = ggx.reflect(i, h)
+    p2 = o[0] * o[0] + o[1] * o[1]
+    value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
+    # Of reflectances, colours are the leading axis, and light the last one
+    if lobe.facets:
+        value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0) ** 2)
+    if lobe.leaving:
+        value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
+    few = value[..., ::SPARSE]
+    weights = few
+    if not n.is_outside:
+        # The light from outside the cone is spread over samples
+        x, y, z, p2 = (each[..., ::SPARSE] for each in (*o, p2))
+        squares = alpha_u * alpha_u, alpha_v * alpha_v, (alpha_u * alpha_v) ** 2
+        near = 0.5 * _facing(_squares((i[0] + x, i[1] + y, i[2] + z)), squares)
+        far = n.ring * z * _facing(_squares(_far(i, (x, y), ops.maximum(p2, ops.TINY), n)[0]), squares)
+        weights = few * near / (near + ops.maximum(far, 0.0))
+    return np.mean(value, axis=-1, dtype=float), np.mean(weights * few, axis=-1, dtype=float), np.max(weights, axis=-1)
+
+
+def _single(x: Value, part: slice = slice(None)) -> Value:
+    """A number, or part of an array as a column."""
+    return float(x) if np.ndim(x) == 0 else np.asarray(x[part], np.float32)[:, None]
+
+
+def _flat(reflectance: Reflectance, cosine: Value) -> Value:
+    """A reflectance at an array of cosines (N, M)."""
+    found = reflectance(cosine.ravel())
+    return found.reshape(*found.shape[:-1], *cosine.shape) if np.ndim(found) else found
+
+
+def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Index, Direction]:
+    """Roughnesses, the index, and the momentum of light from wi in the medium, in the frame of the lobe."""
+    alpha_u, alpha_v = ops.maximum(lobe.roughness.alpha_u, ALPHA_MIN), ops.maximum(lobe.roughness.alpha_v, ALPHA_MIN)
+    x, y, z = _in_frame(lobe, wi)
+    n = Index.of(lobe.n)
+    if n.is_outside or n.denser:
+        return alpha_u, alpha_v, n, (x, y, _height(n, z))
+    inverse = 1 / ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY)
+    scale = ops.minimum(n.n * ((1 - 0.5 * COS_MIN * COS_MIN) * inverse), 1.0)
+    height = _height(n, z)
+    ops.names(scale=scale, height=height)
+    return alpha_u, alpha_v, n, (scale * x, scale * y, height)
+
+
+def _height(n: Index, z: Value) -> Value:
+    """Along the normal of the momentum inside, of light with a cosine outside."""
+    return ops.maximum(z, COS_MIN) if n.is_outside else ops.sqrt(_height2(n, z), None)
+
+
+def _height2(n: Index, z: Value) -> Value:
+    """Its square."""
+    if n.is_outside:
+        return _height(n, z) * _height(n, z)
+    return ops.maximum(n.ring2 + z * z, COS_MIN * COS_MIN)
+
+
+def _squares(w: Direction) -> Direction:
+    return w[0] * w[0], w[1] * w[1], w[2] * w[2]
+
+
+def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: Index) -> tuple[Direction, Value]:
+    """Along the normal of light from outside the cone that is spread to a momentum p inside, and what scales that."""
+    stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
+    return (i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2), stretch
+
+
+def _shown(w: Direction, z2: Value, squares: Direction) -> Value:
+    """2 w_z over Smith's G1(w), which does not vanish at grazing directions, by the square of w_z."""
+    return w[2] + ops.sqrt(w[0] * w[0] * squares[0] + w[1] * w[1] * squares[1] + z2, None)
+
+
+def _facing(m: Direction, squares: Direction) -> Value:
+    """pi D / (alpha_u alpha_v)^3, of GGX's density D of normals along a vector of any length, by its squares, those of
+    roughnesses, and that of their product."""
+    q = (m[0] + m[1] + m[2]) / ggx.dot((squares[1], squares[0], squares[2]), m)
+    ops.names(q=q)
+    return q * q
+
+
+def _in_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
+    return w if _is_straight(lobe.roughness) else ggx.rotate(w, lobe.roughness.rotation)
+
+
+def _out_of_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
+    return w if _is_straight(lobe.roughness) else ggx.rotate(w, -lobe.roughness.rotation)
+
+
+def _is_straight(roughness: Roughness) -> bool:
+    return isinstance(roughness.rotation, float) and roughness.rotation == 0.0
+
+
+def _chosen(where: Value, a: Value, b: Value) -> Value:
+    """Of two indices."""
+    if a is b:
+        return a
+    a, b = Index.of(a), Index.of(b)
+    n, inverse, ring2, ring = (
+        ops.select(where, getattr(a, x), getattr(b, x)) for x in ("n", "inverse", "ring2", "ring")
+    )
+    return Index(n, inverse, ring2, ring, a.denser and b.denser)

@@ -1,0 +1,342 @@
+"""Roughness of the lobe of an interface in its own medium, and of the veil about it that a medium scatters.
+
+Facets of slope m move tangential momentum by 2 n cos(theta) m in a reflection, and by (n_2 cos(theta_2) - n_1
+cos(theta_1)) m in a refraction, to first order. So a lobe has the tensor of its interface and, twice each, for the way
+in and out, those of the interfaces above it, in units of its own moves; they add in the space of a^q, between Cauchy
+(q = 1) and Gauss (q = 2), as the long tails of GGX ask for. Facets that are seen at a slant are those that face the
+light: the cosine at which it meets them grows with their roughness.
+
+What first order leaves open is in `CORRECTION`: light that goes back and forth, and that total reflection picks out.
+It turns above all on how much brighter a lobe is than it would be if its light met each interface once.
+
+Tensors live in the frame of the plane of incidence (x in the plane, y across it), so that they turn with the layers.
+Values are NumPy's, for directions (M,).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.papers.mixture import ALPHA_MIN
+from velatura.model.solved.energies.adding import Part
+from velatura.model.solved.energies.interfaces import Facets
+from velatura.model.solved.energies.media import Slab
+from velatura.model.solved.lobes import refracted_lobe
+from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.variance import Roughness
+from velatura.optics import fresnel
+
+Array = NDArray[np.floating]
+
+Q = 1.52
+# How cosines grow with roughness, in the plane and across it: of the interfaces above, and of the lobe's own
+STEEPNESS = (9.0, 1.2)
+OWN_STEEPNESS = (0.53, 1.5)
+COS_MIN = 0.01
+ALPHA_MAX = 1.0
+NEARLY_STRAIGHT = 0.2  # radians; by how much light of a veil is turned at most, in one event
+ASYMMETRY_MIN = 0.05  # of media that have a veil
+COARSE = 144  # normals
+AXES = (0.0, 0.5 * np.pi)  # of a tensor
+LARGEST = 1.5  # logarithm of a correction
+SLIGHT = 0.2  # step of the index over the greatest one, that does not count
+LEAST_STEP = 0.02  # of the logarithm of the index, that counts at all
+LEAST_TURN = 1e-3  # step times alpha, of facets that turn light
+FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade
+# Pairs of features; of their product, what it adds to the logarithm of the width along an axis, and what, times sin^2,
+# it adds to that of the width in the plane and takes from that across it
+CORRECTION: tuple[tuple[tuple[str, str], float, float], ...] = (
+    (("rarer", "lost"), 0.592, -0.27),
+    (("brighter", "size"), -0.152, 0.081),
+    (("size", "size"), 0.000246, 0.00192),
+    (("rough", "rough"), -1.06, 0.657),
+    (("reflected", "rarer"), -1, 2.03),
+    (("size", "rough"), -0.414, 0.357),
+    (("rough", "near"), -4.1, 2.44),
+    (("coats", "falling"), 0.357, 0.0547),
+    (("brighter", "reflected"), 0.412, 1.05),
+    (("1", "rough"), -1.46, -1.01),
+    (("1", "brighter"), -0.354, -1.2),
+    (("brighter", "near"), -0.0709, 0.84),
+    (("brighter", "brighter"), 0.145, 0.103),
+    (("slant", "coats"), 0.00013, -0.328),
+    (("rough", "reflected"), 0.0687, 1.13),
+    (("rough", "rarer"), 1.33, -1.65),
+    (("coats", "rarer"), 0.202, 0.435),
+    (("rough", "index"), 0.595, -0.0434),
+    (("falling", "lost"), 0.171, 0.25),
+    (("brighter", "rarer"), 0.691, -0.571),
+    (("brighter", "coats"), -0.0305, 0.323),
+    (("coats", "coats"), -0.204, 0.18),
+    (("1", "coats"), 0.224, -0.0153),
+    (("1", "reflected"), 0.0243, 0.0415),
+)
+
+
+@dataclass(frozen=True)
+class Tensor:
+    """Of squares of widths: entries in the frame of the plane of incidence."""
+
+    xx: Array
+    xy: Array
+    yy: Array
+
+    @classmethod
+    def of(cls, facets: Facets, phi: Array) -> Tensor:
+        u, v = (max(alpha, ALPHA_MIN) ** 2 for alpha in (facets.alpha_u, facets.alpha_v))
+        c, s = np.cos(facets.rotation - phi), np.sin(facets.rotation - phi)
+        return cls(u * c * c + v * s * s, (u - v) * c * s, u * s * s + v * c * c)
+
+    @classmethod
+    def turned(cls, u: Array, v: Array, angle: Array) -> Tensor:
+        """Of widths along axes, the first at an angle from the plane."""
+        c, s = np.cos(angle), np.sin(angle)
+        return cls(u * u * c * c + v * v * s * s, (u * u - v * v) * c * s, u * u * s * s + v * v * c * c)
+
+    def stretched(self, x: Array, y: Array) -> Tensor:
+        """Of widths that are longer by x in the plane, and by y across it."""
+        return Tensor(self.xx * x * x, self.xy * x * y, self.yy * y * y)
+
+    @property
+    def angle(self) -> Array:
+        """Of the first axis from the plane."""
+        half = 0.5 * (self.xx - self.yy)
+        turned = np.hypot(half, self.xy) > 1e-9 * (self.xx + self.yy)
+        return np.asarray(0.5 * np.arctan2(np.where(turned, self.xy, 0.0), np.where(turned, half, 1.0)))
+
+    def width(self, angle: Array) -> Array:
+        """In a direction at an angle from the plane."""
+        c, s = np.cos(angle), np.sin(angle)
+        return np.asarray(np.sqrt(np.maximum(self.xx * c * c + 2 * self.xy * c * s + self.yy * s * s, 0)))
+
+    @property
+    def size(self) -> Array:
+        """Width on average over directions."""
+        return np.asarray(np.sqrt(0.5 * (self.xx + self.yy)))
+
+    def roughness(self, phi: Array) -> Roughness:
+        """In the frame of the stack; `phi` is the azimuth of the plane."""
+        u, v = (np.minimum(self.width(self.angle + turn), ALPHA_MAX) for turn in AXES)
+        return Roughness(u, v, self.angle + phi)
+
+    def straight(self) -> Roughness:
+        """In the plane and across it, where these are its axes."""
+        u, v = (np.minimum(self.width(np.asarray(turn)), ALPHA_MAX) for turn in AXES)
+        return Roughness(u, v, 0.0)
+
+
+def _sum(parts: Sequence[Tensor]) -> Tensor:
+    """Along the axes of the sum of all, powers q of widths add."""
+    squares = Tensor(*(np.sum([getattr(part, entry) for part in parts], axis=0) for entry in ("xx", "xy", "yy")))
+    angle = squares.angle
+    u, v = (np.sum([part.width(angle + turn) ** Q for part in parts], axis=0) ** (1 / Q) for turn in AXES)
+    return Tensor.turned(u, v, angle)
+
+
+@dataclass(frozen=True)
+class _Coat:
+    """An interface above others, of a tensor, with its indices, the cosine above it, and what it lets pass there."""
+
+    tensor: Tensor
+    n: float
+    n_below: float
+    cosine: Array
+    passed: Array
+    facets: Facets
+
+    @property
+    def contrast(self) -> float:
+        return abs(float(np.log(self.n_below / self.n)))
+
+    def leaving(self, cos_theta: Array) -> Array:
+        """Share that it lets pass, at cosines outside."""
+        cosine = _cosine(cos_theta, self.n)
+        if self.facets.films is not None:
+            return np.asarray(ops.mean(self.facets.passing(cosine)))
+        return np.asarray(1 - fresnel.dielectric(cosine, self.n_below / self.n))
+
+    def moved(self) -> Tensor:
+        """Displacement of momentum in a refraction."""
+        x, y = (
+            np.sqrt(np.maximum(self.n_below**2 - (1 - cos2) * self.n**2, COS_MIN**2)) - self.n * np.sqrt(cos2)
+            for cos2 in _steeper(self.cosine, np.sqrt(self.tensor.xx), STEEPNESS)
+        )
+        return self.tensor.stretched(np.abs(x), np.abs(y))
+
+
+def stepped(steps: Sequence[float], least: float = LEAST_STEP) -> list[int]:
+    """Numbers of the interfaces that make a step of the index, for the steps of the logarithm of all: slight ones
+    beside greater ones do not count."""
+    most = max(steps, default=0.0)
+    return [k for k, step in enumerate(steps) if step > SLIGHT * most] if most > least else []
+
+
+def first_step(steps: Sequence[float]) -> int | None:
+    """Number of the interface that shapes light on its way out: the outermost step; None without one."""
+    return next(iter(stepped(steps)), None)
+
+
+def roughnesses(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Roughness]:
+    """The roughness of the lobe of each interface in the medium above it, from the top.
+
+    Args:
+        found: the layers, as `transport.parts` has them.
+        cos_theta, phi: of the directions, (M,).
+        energies: of the lobes (K, M), means over colours.
+    """
+    return [tensor.roughness(phi) for tensor in tensors(found, cos_theta, phi, energies)]
+
+
+def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Tensor]:
+    """As `roughnesses`, in the plane of incidence."""
+    result: list[Tensor] = []
+    coats: list[_Coat] = []
+    share = np.ones((1, len(cos_theta)))
+    for part in found:
+        if isinstance(part, Slab):
+            share = share * np.exp(-2 * (part.tau_a + part.tau_s)[:, None] / _cosine(cos_theta, part.n))
+        if not isinstance(part, Facets):
+            continue
+        n = float(ops.mean(part.above))
+        cosine = _cosine(cos_theta, n)
+        own = Tensor.of(part, phi)
+        if coats:
+            first = _first_order(own, coats, n, cosine)
+            seen = features(part, first, own, coats, cos_theta, share, energies[len(result)])
+            result.append(_corrected(first, seen))
+        else:
+            result.append(own)
+        if not part.opaque:
+            assert part.below is not None
+            passed = part.passing(cosine)
+            coats.append(_Coat(own, n, float(ops.mean(part.below)), cosine, passed, part))
+    return result
+
+
+def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -> Tensor:
+    moved = [coat.moved() for coat in coats]
+
+    def total(x: Array, y: Array) -> Tensor:
+        both_ways = [each.stretched(0.5 / (n * x), 0.5 / (n * y)) for each in moved] * 2
+        return _sum([own, *both_ways])
+
+    simple = total(cosine, cosine)
+    return total(*(np.sqrt(cos2) for cos2 in _steeper(cosine, np.sqrt(simple.xx), OWN_STEEPNESS)))
+
+
+def features(
+    part: Facets, first: Tensor, own: Tensor, coats: Sequence[_Coat], cos_theta: Array, share: Array, energy: Array
+) -> dict[str, Array]:
+    """Features of the correction, (M,) each, or (2, M) for the axes; `share` is what media let pass."""
+    n, opener = coats[-1].n_below, coats[first_step([coat.contrast for coat in coats]) or 0]
+    share = share * opener.passed
+    for coat in coats:
+        share = share * (1 if coat is opener else coat.passed**2)
+    cosine = _cosine(cos_theta, n)
+    sin2 = 1 - cos_theta * cos_theta
+    wi = np.sqrt(sin2), np.zeros_like(sin2), cos_theta
+    lobe = OwnMediumLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, opener.leaving)
+    let_out = refracted_lobe.integral(lobe, wi, COARSE)
+    reflected = part.reflectance(cosine)
+    expected = ops.mean(reflected * share) * let_out
+    below = 1.0
+    if not part.opaque:
+        assert part.below is not None
+        below = float(ops.mean(part.below)) / n
+
+        def facets(cos2: Array) -> Array:
+            c = np.sqrt(cos2)
+            if part.films is not None:
+                return np.asarray(ops.mean(part.reflectance(c)))
+            return np.asarray(fresnel.dielectric(c, below))
+
+        both = refracted_lobe.integral(replace(lobe, facets=facets), wi, COARSE)
+        reflected = both / np.maximum(let_out, 1e-9)
+        expected = both * ops.mean(share)
+    brighter = np.log(np.maximum(energy, 1e-9) / np.maximum(expected, 1e-9))
+    moved = max((coat.tensor.size * coat.contrast for coat in coats), key=np.max)
+    axes = np.array([first.width(first.angle + turn) for turn in AXES])
+    return {
+        "1": np.ones_like(sin2),
+        "steps": np.full_like(sin2, sum(coat.contrast for coat in coats)),
+        "brighter": np.clip(brighter, -1.5, 2.0),
+        "slant": sin2,
+        "size": np.log(axes),
+        "coats": 1 - np.minimum(np.array([own.width(first.angle + turn) for turn in AXES]) / axes, 1) ** Q,
+        "rough": moved,
+        "falling": np.full_like(sin2, np.log(max(coat.n_below for coat in coats) / n)),
+        "index": np.full_like(sin2, n - 1),
+        "reflected": np.ones_like(sin2) if part.opaque else reflected,
+        "rarer": np.full_like(sin2, max(1 - below, 0.0)),
+        "near": np.minimum((1 - cosine * cosine) / below**2, 1) * (not part.opaque),
+        "lost": 1 - let_out / np.maximum(opener.leaving(cos_theta), 1e-3),
+        "metal": np.full_like(sin2, float(part.opaque)),
+    }
+
+
+def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
+    """With its axes scaled, and then the components in the plane and across it."""
+    axes, apart = np.zeros((2, *first.xx.shape)), np.zeros_like(first.xx)
+    for (a, b), along, to_difference in CORRECTION:
+        product = np.broadcast_to(seen[a] * seen[b], axes.shape)
+        axes = axes + along * product
+        apart = apart + to_difference * product.mean(axis=0) * seen["slant"]
+    fading = seen["steps"] / (seen["steps"] + FADE)
+    u, v, x = (np.exp(np.clip(fading * each, -LARGEST, LARGEST)) for each in (*axes, apart))
+    scaled = Tensor.turned(u * first.width(first.angle), v * first.width(first.angle + AXES[1]), first.angle)
+    return scaled.stretched(x, 1 / x)
+
+
+def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Tensor:
+    """The tensor of the light of interface k that the media above it scatter by little.
+
+    At small angles Henyey and Greenstein's function is a Cauchy distribution, for which widths of events add; of the
+    light of the veil, each has been scattered at least once.
+    """
+    n = [float(ops.mean(part.above)) for part in found if isinstance(part, Facets)][k]
+    mean, width = np.zeros_like(cos_theta), np.zeros_like(cos_theta)
+    above = 0
+    for part in found:
+        above += isinstance(part, Facets)
+        if above > k or not isinstance(part, Slab):
+            continue
+        g = float(ops.mean(part.g))
+        cosine = _cosine(cos_theta, part.n)
+        events = 2 * nearly_straight(g) * ops.mean(part.tau_s) / cosine
+        mean = mean + events
+        width = width + events * _of_event(g) * part.n * cosine / (n * _cosine(cos_theta, n))
+    width = width / np.maximum(-np.expm1(-mean), np.finfo(float).tiny)
+    scattered = Tensor(width**2, np.zeros_like(width), width**2)
+    return _sum([tensor, scattered])
+
+
+def nearly_straight(g: float) -> float:
+    """Share of the scattered light of a medium of asymmetry g that is deflected by little, and stays in a veil."""
+    if g <= ASYMMETRY_MIN:
+        return 0.0
+    chord = np.sqrt(1 + g * g - 2 * g * np.cos(NEARLY_STRAIGHT))
+    return float((1 - g * g) / (2 * g) * (1 / (1 - g) - 1 / chord))
+
+
+def _of_event(g: float) -> float:
+    """Width in slopes of one event of a veil: half the median angle."""
+    if g <= ASYMMETRY_MIN:
+        return 0.0
+    chord = 1 / (1 / (1 - g) - g * nearly_straight(g) / (1 - g * g))
+    return float(0.5 * np.arccos((1 + g * g - chord * chord) / (2 * g)))
+
+
+def _cosine(cos_theta: Array, n: float) -> Array:
+    """Inside, by Snell's law."""
+    return np.asarray(np.sqrt(np.maximum(1 - (1 - cos_theta * cos_theta) / (n * n), COS_MIN**2)))
+
+
+def _steeper(cosine: Array, width: Array, steepness: Sequence[float]) -> list[Array]:
+    """Mean squares of the cosine at which light meets facets that face it."""
+    cos2 = cosine * cosine
+    return [np.minimum(cos2 + k * (1 - cos2) * width * width, 1) for k in steepness]

@@ -1,0 +1,628 @@
+"""A material, solved once for all directions: what `velatura.model.solved.bsdf` reads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence, Set
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.context import Context, channels
+from velatura.model.models import Model
+from velatura.model.papers.prepare import Prepared, PreparedInterface, prepare
+from velatura.model.solved import reciprocal_balance, sample_allocation
+from velatura.model.solved.bsdf import FAINT, ROOTS, Columns, Shape, Side, Solved
+from velatura.model.solved.energies.adding import Made, Part, interfaces, parts
+from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
+from velatura.model.solved.grid import COS_MIN, Folded, Grid
+from velatura.model.solved.lobes import refracted_lobe, remainder, widths
+from velatura.model.solved.lobes.refracted_lobe import Index
+from velatura.model.solved.lobes.remainder import Remainder
+from velatura.model.solved.lobes.widths import Tensor
+from velatura.model.solved.sample_allocation import Wanted
+from velatura.model.solved.transmission import combined, direct, internal_reflections
+from velatura.model.solved.transmission.combined import Parts
+from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.internal_reflections import Rest
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+from velatura.sampling import differences, directional_grid, low_discrepancy
+from velatura.sampling.directional_grid import Packing
+from velatura.sampling.variables import Variables
+from velatura.sampling.variables import plain as plain
+from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.tables import Tables
+
+Array = NDArray[np.floating]
+
+RGB = 3
+NORMALS = {True: 1597, False: 987}  # over which lobes are integrated, of isotropic materials and of others
+FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is that of values over a step
+BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
+NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
+EVENLY = 377  # directions over which the remainder is integrated
+DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
+BRIGHTEST = 4.0  # by how much it is scaled at most
+LITTLE = 0.05  # by which energies are scaled for their colour
+BRIGHTER = 1.5  # at most, where it takes light of lobes
+VEIL_MIN = 1e-3  # energy of veils that are drawn
+EVEN = 0.2  # share of samples of the symmetric form that the remainder has at least, and of those that pass
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A lobe: the number of its interface from the top, that of the one that shapes its light on the way out, None
+    where none does, whether it is the veil of one, and whether its medium is nowhere of a lower index than outside."""
+
+    interface: int
+    first: int | None
+    veil: bool
+    denser: bool
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, the
+    slabs that scatter, by the number of interfaces above, and the indices of media that nodes are chosen for."""
+
+    lobes: list[Drawn]
+    stepped: list[int]
+    rough: int | None
+    cloudy: list[int]
+    indices: list[float]
+
+
+@dataclass(frozen=True)
+class SolvedSide:
+    """A side of a material in NumPy: columns (C, M) and (M,) over the directions of a grid; numbers of the remainder,
+    (C,), and the albedo that it gains by being clipped at 0, (C, cosines); the shape of each lobe whose integral
+    has an edge between directions, else None; and what passes, in a material that is drawn forward, else None."""
+
+    columns: Columns
+    polynomial: Remainder
+    clipped: Array
+    edged: Sequence[Shape | None]
+    passage: Passage | None = None
+
+    @cached_property
+    def rows(self) -> Array:
+        """All columns, (rows, M), in the order in which `Columns.read` takes them."""
+        return np.concatenate([np.atleast_2d(each) for each in self.columns.all])
+
+    @property
+    def groups(self) -> list[int]:
+        """Which rows are read together: 1 for those that are read seldom."""
+        return self.groups_of(len(self.clipped))
+
+    def groups_of(self, colours: int) -> list[int]:
+        """As `groups`, of colours of so many channels."""
+        columns = self.columns
+        each = (
+            (int(seldom), colours if len(np.atleast_2d(x)) > 1 else 1) for x, seldom in zip(columns.all, columns.seldom)
+        )
+        return [group for group, count in each for _ in range(count)]
+
+    @property
+    def places(self) -> list[int]:
+        """The first rows of the remainder's scale, and of its energy."""
+        return self._places([self.columns.scale, self.columns.rest])
+
+    @property
+    def weights(self) -> list[int]:
+        """The first rows of those of lobes."""
+        return self._places(self.columns.weights)
+
+    @property
+    def light(self) -> list[tuple[int, list[int]]]:
+        """The first rows of each energy, and of all else that is in proportion to it."""
+        columns = self.columns
+        found = [*zip(columns.energies, ([x] for x in columns.weights)), (columns.rest, [columns.scale])]
+        if columns.passes:
+            found.append((columns.passed, [columns.passes.straight, columns.passes.bounced, columns.passes.rest]))
+        return [(self._places([energy])[0], self._places(others)) for energy, others in found]
+
+    @property
+    def chances(self) -> list[int]:
+        """Rows of shares of samples, but for that of the remainder."""
+        passes = self.columns.passes
+        through = [passes.of_straight, passes.of_bounced, passes.of_rest] if passes else []
+        return self._places([*self.columns.chances, *through])
+
+    def _places(self, values: Sequence[Value]) -> list[int]:
+        return [self._first_rows[id(x)] for x in values]
+
+    @cached_property
+    def _first_rows(self) -> dict[int, int]:
+        """Of every column, by its identity."""
+        columns = self.columns.all
+        begins = accumulate((len(x) if np.ndim(x) > 1 else 1 for x in columns), initial=0)
+        return dict(zip(map(id, columns), begins))
+
+    @property
+    def numbers(self) -> Array:
+        """Those of the remainder, (8 C,)."""
+        return np.concatenate(list(vars(self.polynomial).values()))
+
+    def weighed(self, factors: Sequence[Array], wanted: Wanted) -> SolvedSide:
+        """With the weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared anew
+        where nothing passes."""
+        columns = self.columns
+        weights = [factor * weight for factor, weight in zip(factors, columns.weights)]
+        columns = replace(columns, weights=weights, scale=factors[len(weights)] * columns.scale)
+        if columns.passes:
+            columns = replace(columns, passes=replace(columns.passes, straight=factors[-1]))
+        else:
+            *chances, chance = sample_allocation.shared(_evened(wanted))
+            columns = replace(columns, chances=chances, chance=chance)
+        return replace(self, columns=columns)
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How materials of NumPy's values are solved for the directions of a grid, in a number of colours.
+
+    `shape` is that of the grid on which a renderer has the columns. `samples` are those of `reciprocal_balance`;
+    `normals` are those of facets, and of lobes that are integrated, None for as many as usual, or as are asked for by
+    `finely`. Operators that materials share are `made` once.
+    """
+
+    model: Model
+    variance: type[Variance]
+    grid: Grid
+    shape: tuple[int, ...]
+    colours: int
+    tables: Tables
+    samples: int | None = None
+    normals: int | None = None
+    finely: bool = False
+    made: Made = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, model: Model, variance: type[Variance], context: Context, material: Material | None = None) -> Solver:
+        """For a material of numbers, or None for those of tables."""
+        assert context.colour is not None
+        colours = RGB if context.colour is channels else len(context.colour())
+        return cls.over(colours, model, variance, context, material)
+
+    @classmethod
+    def over(
+        cls,
+        colours: int,
+        model: Model,
+        variance: type[Variance],
+        context: Context,
+        material: Material | None = None,
+    ) -> Solver:
+        """As `of`, in a number of colours that is not that of the renderer's."""
+        isotropic = variance is Isotropic
+        shape = directional_grid.LINE if isotropic else directional_grid.PLANE
+        grid = Grid.of(isotropic, material)
+        if isotropic and model.form == "symmetric" and material and not material.transmits:
+            # Factors bend where all light from outside is reflected
+            grid = replace(grid, cosines=grid.cosines * (1 + _reflects_all(parts(material))))
+        return cls(model, variance, grid, shape, colours, context.tables)
+
+    @property
+    def isotropic(self) -> bool:
+        return self.variance is Isotropic
+
+    @property
+    def kind(self) -> type[Variance]:
+        """Of lobes; those of isotropic interfaces have axes in the plane of incidence."""
+        return PerAxis if self.isotropic else Covariance
+
+    def layouts(self, materials: Sequence[Material]) -> list[Layout]:
+        """Of each side, for materials that differ in values."""
+        veiled: set[int] = set()
+        for material in materials:
+            veiled = veiled.union(*map(_veiled, sides(material)))
+        return [layout_of(seen, veiled) for seen in zip(*map(sides, materials))]
+
+    def solve(self, material: Material, layouts: Sequence[Layout]) -> list[SolvedSide]:
+        """A material with values of NumPy, each side."""
+        found = [self._side(*each) for each in zip(sides(material), layouts)]
+        if self.model.form == "forward":
+            return found
+        found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
+        numbers, folded = self.body(material, found, layouts), Folded.of(self.grid, material)
+        factors, wanted = reciprocal_balance.factors(
+            numbers, folded.directions, folded.shares, folded.count, self.samples
+        )
+        spread = folded.everywhere
+        return [
+            side.weighed(list(map(spread, each)), Wanted(*map(spread, of)))
+            for side, each, of in zip(found, factors, wanted)
+        ]
+
+    def body(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
+        """The BSDF in NumPy."""
+        context, made = Context(colour=_stacked, tables=self.tables), []
+        for seen, side, layout in zip(sides(material), found, layouts):
+            curves = directional_grid.curves(list(self.spread(side)), self.shape, None)
+            polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(side.polynomial).values()))
+            made.append(self.side(seen, layout, curves, polynomial, context))
+        return self.bsdf(material, made)
+
+    def side(self, material: Material, layout: Layout, curves: Any, polynomial: Remainder, context: Context) -> Side:
+        """A side of a material of a renderer's values, those of one point or of all."""
+        assert context.colour is not None
+        shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
+        passage = self.passage(material, layout)
+        return Side(
+            curves, tuple(shapes), polynomial, polynomial.samples, passage, context.colour, self.colours, self.kind
+        )
+
+    def passage(self, material: Material, layout: Layout) -> Passage | None:
+        """What passes a material; None where nothing does."""
+        if not material.transmits:
+            return None
+        return direct.passage(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
+
+    def bsdf(self, material: Material, made: Sequence[Side]) -> Solved:
+        """A material of one side or two."""
+        symmetric = self.model.form == "symmetric"
+        if len(made) == 1:
+            return Solved(made[0], None, 1.0, symmetric)
+        return Solved(made[0], made[1], ops.mean(material.below) / ops.mean(material.exterior), symmetric)
+
+    def _side(self, material: Material, layout: Layout) -> SolvedSide:
+        """What a material is at the directions of the grid."""
+        drawn = layout.lobes
+        folded = Folded.of(self.grid, material)
+        cosine, phi, wi, count = folded.cosine, folded.phi, folded.directions, folded.count
+        solved = energies(
+            material,
+            np.concatenate([cosine, INCIDENCES]),
+            np.concatenate([phi, 0 * INCIDENCES]),
+            self.tables if self.model.microsurface else None,
+            widths.nearly_straight,
+            self.made,
+            samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
+            like=layout.indices,
+        )
+        albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
+        polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
+        polynomial = Remainder(*(x[:, None] for x in vars(polynomial).values()))
+        lobes, veils = solved.lobes[..., :count], solved.veils[..., :count]
+        rest, straight, bounces, through = (
+            x[:, :count] for x in (solved.rest, solved.straight, solved.bounced, solved.passed)
+        )
+
+        # Draw lobes and veils
+        shapes, found = shapes_of(prepare(_slim(material), geometry(self.model), self.variance), drawn), parts(material)
+        tensors = widths.tensors(found, cosine, phi, np.array([ops.mean(each) for each in lobes]))
+        shown = [
+            widths.veil(found, each.interface, cosine, tensors[each.interface])
+            if each.veil
+            else tensors[each.interface]
+            for each in drawn
+        ]
+        apart = {each.interface for each in drawn if each.veil}
+        lobes = np.array([lobes[k] + (0 if k in apart else veils[k]) for k in range(len(lobes))])
+        clipped, largest_of_rest = _clipped(polynomial, folded.at_cosines)
+        whole = polynomial.albedo(cosine) + folded.around(clipped)
+        energy, weights, wanted = [], [], []
+        for shape, tensor, each in zip(shapes, shown, drawn):
+            normals = self.normals or (FINELY[1] if self.finely else NORMALS[self.isotropic])
+            z, squares, largest = refracted_lobe.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, normals)
+            light = (veils if each.veil else lobes)[each.interface]
+            # The remainder takes what light it can, by which a lobe would be too bright
+            more = np.clip(light - combined.MOST * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
+            rest = rest + more
+            energy.append(light - more)
+            weights.append(np.where(z > FAINT, ops.divide(energy[-1], z), 1.0))
+            wanted.append(Wanted.of(energy[-1], weights[-1] * ops.divide(squares, z), weights[-1] * largest))
+        scale = _scale(rest, whole)
+        wanted.append(Wanted.of(rest + FAINT, rest, scale * folded.around(largest_of_rest)))
+
+        # Share samples
+        # Light of a single isotropic interface is the same there and back
+        alike = self.isotropic and len(material.layers) == 1
+        least = EVEN if self.model.form == "symmetric" and not alike else 0.0
+        others = Wanted.together(wanted)
+        if least:
+            others = _evened(others)
+        passage, passes = self.passage(_slim(material), layout), None
+        if passage:
+            facets = None
+            if len(drawn) == 1:
+                # What passes is sampled with the facets that reflect
+                facets = wanted[0]
+                others = Wanted(*(np.concatenate([0 * x[:1], x[1:]]) for x in others))
+            met = [*(None if each.veil else each.interface for each in drawn), None]
+            *diffuse, peak = folded.around(_passing(passage, solved, folded.at_cosines[2]))
+            passes, shares = combined.parts(passage, wi, straight, bounces, through, others, met, facets, diffuse, peak)
+            passes = _evenly(passes, least)
+            straight, bounces, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
+            passes = replace(passes, straight=straight, bounced=bounces, rest=scattered)
+        else:
+            shares = sample_allocation.shared(others)
+        columns = Columns(
+            [self._colours(weight) for weight in weights],
+            [tuple(np.broadcast_to(x, count) for x in self._roughness(tensor)) for tensor in shown],
+            list(shares[:-1]),
+            [self._colours(each) for each in energy],
+            self._colours(scale),
+            shares[-1],
+            self._colours(rest),
+            passes,
+            self._colours(through) if passes else None,
+        )
+        columns = folded.unfolded(columns)
+        numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
+        sharp = self.normals is None and _reflects_all(found)  # edges are lost in the error of few normals
+        narrow = [sharp and np.min(tensor.roughness(phi)[:2]) < NARROW for tensor in shown]
+        edged = [shape if each else None for shape, each in zip(shapes, narrow)]
+        forward = self.model.form == "forward"
+        return SolvedSide(columns, numbers, self._colours(clipped), edged, passage if forward else None)
+
+    def spread(self, side: SolvedSide) -> Array:
+        """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
+        energy there, too, and lobes where integrals have edges; energies have the sum that is interpolated, and shares
+        of samples sum up to 1."""
+        light = np.sum([side.rows[k : k + self.colours] for k, _ in side.light], axis=0)
+        rows = self.grid.spread(np.concatenate([side.rows, light, side.columns.chance[None]]), self.shape)
+        rows, whole, left = np.split(rows, [-1 - self.colours, -1])
+        if any(side.edged):
+            self._lobes_between(rows, side)
+        self._scale_energies(rows, side, whole)
+        if side.passage:
+            self._pass_between(rows, side.passage, *side.light[-1])
+        rows[side.chances] /= rows[side.chances].sum(axis=0) + left
+        if self.model.form == "forward":
+            cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
+            polynomial = Remainder(*(x[:, None] for x in vars(side.polynomial).values()))
+            whole = polynomial.albedo(cosine) + self.grid.along(side.clipped, self.shape[0])
+            whole = np.repeat(whole, math.prod(self.shape[1:]), axis=-1)
+            scale, rest = (slice(k, k + self.colours) for k in side.places)
+            rows[scale] = _scale(rows[rest], whole)
+        return rows
+
+    def _pass_between(self, rows: Array, passage: Passage, energy: int, weights: Sequence[int]) -> None:
+        """With all light that passes about the critical angles of inner media, where weights jump from one node to the
+        next: diffuse light has what the other parts lack."""
+        inner = np.array([float(np.mean(n)) for n in passage.indices[1:-1]])
+        nodes = self.grid.cosines - 1
+        edges = np.floor((1 - inner[inner < 1] ** 2) ** 0.25 * nodes)
+        wi = directional_grid.directions(self.shape, None)
+        there = np.flatnonzero(np.isin(np.floor(np.sqrt(wi[2]) * nodes + 1e-9), edges))
+        if not len(there):
+            return
+        x, y, z = (w[there] for w in wi)
+        straight, bounces, light = (rows[k : k + self.colours, there] for k in (*weights[:2], energy))
+        left = light - combined.energy(passage, (x, y, z), straight, bounces)
+        rest = slice(weights[-1], weights[-1] + self.colours)
+        rows[rest, there] = combined.rest(passage, (x, y, z), left)
+
+    def _scale_energies(self, rows: Array, side: SolvedSide, whole: Array) -> None:
+        """So that energies, and what is in proportion to them, have the sum that is interpolated, `whole`. What is grey
+        stays so: other energies make up for the colours of the rest, as far as that is little."""
+        groups = [[slice(k, k + self.colours) for k in (energy, *others)] for energy, others in side.light]
+        found = np.sum([rows[energy] for energy, *_ in groups], axis=0)
+        share = ops.divide(ops.mean(whole), ops.mean(found))
+        share = np.where(share > 0, share, 1)
+        coloured = [group for group in groups if any(np.ptp(rows[each], axis=0).any() for each in group)]
+        light = share * sum((rows[energy] for energy, *_ in coloured), np.zeros_like(found))
+        rest = np.where(light > 0, ops.divide(whole - share * found + light, light), 1)
+        rest = np.clip(rest, 1 - LITTLE, 1 + LITTLE)
+        for group in groups:
+            for each in group:
+                rows[each] *= share * rest if group in coloured else share
+
+    def _lobes_between(self, rows: Array, side: SolvedSide) -> None:
+        """With weights of lobes whose integrals have edges between directions, as near to the light that is
+        interpolated as those at the nodes beside allow. What one lobe has too much of, or lacks, is left to others."""
+        wi = directional_grid.directions(self.shape, None)
+        found = []
+        for shape, place, weight, roughness in zip(
+            side.edged, side.weights, side.columns.weights, side.columns.roughness
+        ):
+            if shape:
+                at_nodes = self._integral(shape, roughness, self.grid.directions)
+                z = self._integral(shape, [self.grid.spread(x[None], self.shape)[0] for x in roughness], wi)
+                light = self.grid.spread(weight * at_nodes, self.shape)
+                ends = self.grid.beside(weight, self.shape)
+                there = slice(place, place + self.colours)
+                rows[there] = np.clip(np.where(z > FAINT, light / np.maximum(z, FAINT), rows[there]), *ends)
+                found.append((there, z, light, ends))
+        lacks = sum(light - rows[there] * z for there, z, light, _ in found)
+        rooms = [np.where(lacks > 0, high - rows[there], rows[there] - low) for there, _, _, (low, high) in found]
+        share = np.clip(ops.divide(lacks, sum(z * room for (_, z, *_), room in zip(found, rooms))), -1, 1)
+        for (there, *_), room in zip(found, rooms):
+            rows[there] += share * room
+
+    def _integral(self, shape: Shape, numbers: Sequence[Array], wi: Direction) -> Array:
+        lobe = shape.lobe(1.0, self.kind(*numbers).roughness(ROOTS))
+        return refracted_lobe.integrals(lobe, wi, BETWEEN[self.isotropic])[0]
+
+    def _colours(self, values: Array) -> Array:
+        return np.broadcast_to(values, (self.colours, np.shape(values)[-1]))
+
+    def _roughness(self, tensor: Tensor) -> Iterator[Array]:
+        """Of a lobe with the plane of incidence, as it is interpolated."""
+        roughness = tensor.roughness(np.zeros_like(tensor.xx))
+        if self.isotropic:  # axes lie in the plane of incidence, and across it
+            u, v = (np.minimum(tensor.width(np.array(axis)), widths.ALPHA_MAX) for axis in widths.AXES)
+            roughness = Roughness(u, v, 0.0)
+        yield from vars(self.kind.of(roughness, ROOTS)).values()
+
+
+def solve(material: Material, model: Model, variance: type[Variance], context: Context) -> Solved:
+    """The BSDF of a material with constants of a renderer; differentiable."""
+    material = material.solid()
+    start, given = plain(material), Variables.of(material)
+    solver = Solver.of(model, variance, context, start)
+    layouts = solver.layouts([start])
+
+    packings: list[Packing] = []
+
+    def arrays(numbers: list[float]) -> list[Array]:
+        # After the values come their differences
+        found = replace(solver, finely=bool(packings)).solve(given.replaced(start, numbers), layouts)
+        if not packings:
+            packings.extend(Packing.of(side.rows, side.groups, shared=not given.given) for side in found)
+        flat = []
+        for side, packing in zip(found, packings):
+            flat += [x.T.ravel() for x in packing.split(solver.spread(side))]
+            flat.append(side.numbers)
+        return flat
+
+    flat, made = iter(differences.differentiable(arrays, given.given, given.around, context.number)), []
+    for seen, layout, packing in zip(sides(material), layouts, packings):
+        tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
+        curves, column = packing.curves(tables), next(flat)
+        numbers = column[:, None] if context.colour is channels else differences.numbers(column, context.number)
+        made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context))
+    return solver.bsdf(material, made)
+
+
+def remainder_of(numbers: Sequence[Value], solver: Solver, context: Context) -> Remainder:
+    """The remainder of a renderer's numbers."""
+    assert context.colour is not None
+    width = solver.colours
+    each = [ops.channel(x, k % width) for k, x in enumerate(numbers)]
+    return Remainder(*(context.colour(*each[k : k + width]) for k in range(0, len(each), width)))
+
+
+def _stacked(*channels: Array) -> Array:
+    return np.stack(channels)
+
+
+def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> Layout:
+    """Of materials that differ in values, as light from above sees them; the first one is in the middle."""
+    each = [interfaces(parts(material)) for material in materials]
+    steps = np.max([[facets.step for facets in found] for found in each], axis=0)
+    turns = np.max([[facets.step * max(facets.alpha_u, facets.alpha_v) for facets in found] for found in each], axis=0)
+    both = [(k, veil) for k in range(len(steps)) for veil in (False, True) if not veil or k in veiled]
+    rough = widths.stepped(turns, widths.LEAST_TURN)
+    above = np.array([[np.mean(facets.above) / np.mean(found[0].above) for facets in found] for found in each])
+    denser = np.all(above >= 1, axis=0).tolist()
+    lobes = [Drawn(k, widths.first_step(steps[:k]), veil, denser[k]) for k, veil in both]
+    cloudy = sorted(set().union(*map(_cloudy, materials)))
+    return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy, media_of(materials[0]))
+
+
+def _cloudy(material: Material) -> set[int]:
+    """Slabs that scatter light, by the number of interfaces above them."""
+    found, above = set(), 0
+    for layer in material.layers:
+        above += isinstance(layer, InterfaceValues)
+        if isinstance(layer, MediumValues) and np.any(layer.sigma_s * layer.depth > 0):
+            found.add(above)
+    return found
+
+
+def sides(material: Material) -> list[Material]:
+    """A material as it is seen from above and, where it transmits, from below."""
+    return [material, material.reversed()] if material.transmits else [material]
+
+
+def _reflects_all(found: Sequence[Part]) -> bool:
+    """Whether an interface reflects all light from outside beyond an angle."""
+    glass = ((x.above, x.below) for x in interfaces(found) if x.k is None and x.below is not None)
+    return any(np.min(below / above) * np.mean(above) < 1 for above, below in glass)
+
+
+def geometry(model: Model) -> Model:
+    """A model by which layers are prepared for no more than the laws of Snell and Fresnel."""
+    return replace(model.in_closed_form, reflectance="fresnel")
+
+
+def _slim(material: Material) -> Material:
+    """With colours of one channel where all are alike, in single precision: what integrals need."""
+
+    def slim(colour: Array) -> Array:
+        alike = (colour == colour[0]).all()
+        return np.asarray(colour[:1] if alike else colour, np.float32)
+
+    return material.each(lambda _, value: slim(value) if np.ndim(value) else value)
+
+
+def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
+    """Of the remainder, by numbers (C, 1): the albedo that it gains by being clipped, and the largest weight of its
+    samples, (C, M)."""
+    numbers = Remainder(*(x[..., None] for x in vars(polynomial).values()))
+    x, y, z = (each[:, None] for each in wi)
+    wo = numbers.sample((x, y, z), *low_discrepancy.at_nodes(1, EVENLY, None))
+    density = numbers.density((x, y, z), wo)
+    value, unclipped = numbers.value((x, y, z), wo) / density, numbers.unclipped((x, y, z), wo)[1] * wo[2]
+    return (value - unclipped / (np.pi * density)).mean(axis=-1), value.max(axis=-1)
+
+
+def _passing(passage: Passage, solved: Energies, cosines: Array) -> Array:
+    """Numbers of light from directions wi that passes neither straight nor after bounces, and the largest weight of its
+    samples, (6, M)."""
+    wi = _of_cosines(INCIDENCES)
+    light = np.mean(
+        solved.around - internal_reflections.share(internal_reflections.bounced(passage, wi)) * solved.again, axis=0
+    )
+    sines = internal_reflections.seen_below(passage, wi)[0]
+    at_incidences = remainder.passing(solved.nodes, light, float(ops.mean(internal_reflections.bound(passage))), sines)
+    numbers = np.array([np.interp(cosines, INCIDENCES, each) for each in at_incidences])
+    o = low_discrepancy.fibonacci(EVENLY)
+    radius, phi = np.sqrt(o[0]), 2 * np.pi * o[1]
+    i = internal_reflections.seen_below(passage, _of_cosines(cosines[:, None]))
+    evenly = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - o[0])
+    numbers = numbers / internal_reflections.diffuse([*numbers[..., None]], i, evenly).mean(axis=-1)
+    value, density = internal_reflections.eval_pdf_rest(Rest(None, 1.0, 1.0, [*numbers[..., None]]), i, evenly)
+    return np.concatenate([numbers, np.max(value / density, axis=-1)[None]])
+
+
+def _of_cosines(cosine: Array) -> Direction:
+    return np.sqrt(1 - cosine * cosine), 0 * cosine, cosine
+
+
+def _scale(energy: Array, albedo: Array) -> Array:
+    """Of a remainder of an albedo, so that it has an energy."""
+    return np.clip(energy / np.maximum(albedo, DIM), 0, BRIGHTEST)
+
+
+def _veiled(material: Material) -> set[int]:
+    """Interfaces below media that scatter light by little."""
+    veiled: set[int] = set()
+    above, k = False, 0
+    for layer in material.layers:
+        if isinstance(layer, MediumValues):
+            events = max(map(widths.nearly_straight, np.ravel(layer.g).tolist())) * np.max(layer.sigma_s * layer.depth)
+            above = above or bool(events > VEIL_MIN)
+        elif isinstance(layer, InterfaceValues):
+            veiled |= {k} if above else set()
+            k += 1
+    return veiled
+
+
+def _evened(wanted: Wanted) -> Wanted:
+    """With samples for a share `EVEN` of the energy at least of the last part."""
+    *lobes, rest = wanted.energy
+    least = np.maximum(EVEN * wanted.energy.sum(axis=0), FAINT)
+    return wanted._replace(energy=np.array([*lobes, np.maximum(rest, least)]))
+
+
+def _evenly(of: Parts, least: float) -> Parts:
+    """With a share of the samples of what passes at least for its rest."""
+    even = np.maximum(least * of.share - of.of_rest, 0) / np.maximum(of.share - of.of_rest, FAINT)
+    straight, bounced = (1 - even) * of.of_straight, (1 - even) * of.of_bounced
+    return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)
+
+
+def shapes_of(prepared: Prepared, drawn: Sequence[Drawn]) -> list[Shape]:
+    """One for each lobe."""
+    found = [layer for layer in prepared.layers if isinstance(layer, PreparedInterface)]
+    indices = [Index.of(1.0)]
+    for layer in found:
+        indices.append(Index.of(indices[-1].n * layer.n12))
+    shapes = []
+    for lobe in drawn:
+        own, k = found[lobe.interface], lobe.first
+        facets = own if k is None or not own.opaque else None
+        out = (indices[0], None) if k is None else (indices[k], found[k])
+        n = replace(indices[lobe.interface], denser=lobe.denser)
+        shapes.append(Shape(lobe.interface, n, facets, *out))
+    return shapes

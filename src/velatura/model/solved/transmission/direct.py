@@ -1,0 +1,532 @@
+"""Light that passes a stack without bouncing inside: a mixture of refractions, one for each interface.
+
+Tails of GGX come from one steep facet. So component j takes the whole step of tangential momentum, from p_i to p_o, at
+a facet of interface j, crosses all interfaces above smoothly at p_i and all below at p_o, and is as wide as all
+together: the widths |w_l| a_l that interfaces give to momentum add as their powers of `EXPONENT`, as tensors where
+interfaces are brushed. Its weight is its share of the squared widths, and far out its share of the tails there, which
+for brushed interfaces depends on the direction. With d = p_o - p_i, cosines
+c_l(p) = sqrt(1 - p^2 / n_l^2) in slabs 0 to K, and w_j = n_{j-1} c_{j-1}(p_i) - n_j c_j(p_o), light of direction wi
+passes to wo as
+
+    f |cos_o| = n_K^2 cos_o sum_j t_j P(d / w_j; a_j) / w_j^2 v_i v_o G1_j(i) G1_j(o) (1 - F_j) S_j(p_i) S_j(p_o)
+
+where P is the density of slopes s of GGX of the width seen at interface j, v_i and v_o the cosines to the facet over
+those to the interface (1 - p.s / (n c)), G1_j Smith's masking of interface j by itself, F_j Fresnel's reflectance at
+the facet, and S_j what the smooth interfaces and the media above j and below it let pass.
+
+For one interface that is microfacet refraction (Walter 2007, Eq. 21) as it stands. It is reciprocal: f / n^2 is the
+same from the other side. Its integral comes close to the energy that passes straight through, which it is normalised
+to in the end.
+
+A sample draws a visible normal of one component, and Fresnel's reflectance decides: light that does not pass is
+reflected about the same normal, as at a rough dielectric. Indices are relative to the outside, that of wi; light from
+below is light from above a material that is turned over (`Material.reversed`).
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, is_dataclass
+from functools import reduce
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.papers.mixture import ALPHA_MIN
+from velatura.model.roughness_maps import RoughnessMap
+from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
+from velatura.ops import Value
+from velatura.optics import fresnel, ggx
+from velatura.optics.ggx import Direction
+from velatura.sampling import coated, low_discrepancy
+from velatura.sampling.coated import Films, dielectric_passing
+from velatura.stack import InterfaceValues, Material, MediumValues
+
+EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
+WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
+NARROW_MIN = 2e-5  # of it, across the brushing
+FLAT = 1e-7  # step of momentum at steep facets, at least
+COS_MIN = 0.02  # in slabs that light crosses, and in those that it cannot enter
+GRAZING = 1e-4  # cosine outside
+NODES = (16, 24)  # of the quadrature
+BLOCK = 1 << 15  # of them at a time, which a processor's cache holds
+EDGE = 0.98  # of the disc of momenta that can leave, where light from beyond it is looked for
+WEIGHT_MIN = 1e-12  # squared width that decides the shares where no interface has any
+
+#: Widths in the space where they add; they have no upper bound.
+WIDTHS = RoughnessMap(lambda a, _: ops.power(a, EXPONENT), lambda s, _: ops.power(s, 1 / EXPONENT))
+
+Momentum = tuple[Value, Value]
+Passing = Callable[[Value, Value], Value]
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Crossing(ops.Named):
+    """An interface between media of mean indices n_1 and n_2; `eta` is the lower over the upper one, by colour.
+
+    `width` is the roughness in the space of `WIDTHS`, `area` its product over the axes, `sign` that of n_1 - n_2: 0
+    where facets turn light by less than single precision has. Then all make the step `least`, none hides another, and
+    light passes as at a smooth interface. `films` are thin films on it.
+    """
+
+    n_1: Value
+    n_2: Value
+    eta: Value
+    roughness: Roughness
+    width: Variance
+    area: Value
+    sign: Value
+    least: Value
+    films: Films = None
+
+    def passing(self, cos_1: Value, cos_2: Value) -> Value:
+        """What facets let pass (a colour) for cosines above and below, by Fresnel."""
+        return dielectric_passing(self.films, cos_1, cos_2, self.eta)
+
+
+@dataclass(frozen=True)
+class Slab(ops.Named):
+    """What lies between two interfaces: optical depths along the normal (colours), in all and for scattering, and the
+    asymmetry g."""
+
+    depth: Value = 0.0
+    scattering: Value = 0.0
+    g: Value = 0.0
+
+    @property
+    def is_clear(self) -> bool:
+        return isinstance(self.depth, float) and self.depth == 0.0
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Interfaces from the top, and the slabs 0 to K above, between and below them.
+
+    Of interfaces, `faces` are 1 for the last two that make a step of the index, or for the only one, else 0; `under`
+    are 1 from the last of them on; `scattered` are 1 below the last medium that scatters, or the last rough interface.
+    """
+
+    crossings: tuple[Crossing, ...]
+    slabs: tuple[Slab, ...]
+    faces: tuple[Value, ...]
+    under: tuple[Value, ...]
+    scattered: tuple[Value, ...]
+    bounces: bool
+    is_cloudy: bool
+
+    @property
+    def indices(self) -> list[Value]:
+        """Those of the slabs."""
+        return [self.crossings[0].n_1, *(crossing.n_2 for crossing in self.crossings)]
+
+
+def passage(
+    material: Material,
+    kind: type[Variance],
+    stepped: Sequence[int] | None = None,
+    rough: int | None = None,
+    cloudy: Sequence[int] | None = None,
+) -> Passage:
+    """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`. `stepped` are the
+    interfaces that make a step of the index, `rough` is the last one whose facets turn light, `cloudy` are the
+    slabs that scatter; None for all, for the last one, and for those of media whose scattering is not known to be 0.
+    """
+    above, n = material.exterior, 1.0
+    crossings: list[Crossing] = []
+    slabs = [Slab()]
+    for layer, films in zip(material.solid().layers, coated.of(material)):
+        if isinstance(layer, MediumValues):
+            tau_s = layer.sigma_s * layer.depth
+            clear = is_none(tau_s) if cloudy is None else len(crossings) not in cloudy
+            slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
+            continue
+        assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
+        crossings.append(_crossing(layer, above, n, kind, films))
+        slabs.append(Slab())
+        above, n = layer.eta, crossings[-1].n_2
+    count = len(crossings)
+    lower, *others = reversed(range(count) if stepped is None else stepped or [count - 1])
+    faces = tuple(float(k in (lower, *others[:1])) for k in range(count))
+    under = tuple(float(k >= lower) for k in range(count))
+    scattering = [l for l, slab in enumerate(slabs) if not is_none(slab.scattering)]
+    last = min(scattering[-1], count - 1) if scattering else 1 + (count - 1 if rough is None else rough)
+    scattered = tuple(float(k >= last) for k in range(count))
+    is_cloudy = bool(scattering)
+    return Passage(tuple(crossings), tuple(slabs), faces, under, scattered, bool(others), is_cloudy)
+
+
+def is_none(x: Value) -> bool:
+    return isinstance(x, float | np.ndarray) and not np.any(x)
+
+
+def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance], films: Films) -> Crossing:
+    eta = layer.eta / above
+    ratio = ops.mean(layer.eta) / ops.mean(above)  # and so its inverse from the other side
+    u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
+    # Across the brushing light has a width, too
+    step = n_1 * ops.absolute(ratio - 1)
+    narrow = ops.divide(NARROW_MIN, step)
+    u, v = ops.maximum(u, ops.minimum(narrow, v)), ops.maximum(v, ops.minimum(narrow, u))
+    roughness = Roughness(u, v, layer.rotation * (pi / 180) if kind is Covariance else 0.0)
+    least = n_1 * ops.sqrt(ratio) * WIDTH_MIN / ops.sqrt(u * v)
+    turns = step > least
+    sign, least = ops.select(turns, ops.select(ratio < 1, 1.0, -1.0), 0.0), ops.select(turns, FLAT, least)
+    return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least, films)
+
+
+@dataclass(frozen=True)
+class Crossed(ops.Named):
+    """A momentum p in all slabs: its cosines there, 0 where it cannot be, and the same bounded; for interfaces, the
+    steps w_l, and the shares (colours) of light that they let pass; the latter for slabs, too."""
+
+    p: Momentum
+    p2: Value
+    n: list[Value]
+    cosines: list[Value]
+    bounded: list[Value]
+    steps: list[Value]
+    passes: list[Value]
+    slabs: list[Value]
+
+
+def entered(passage: Passage, wi: Direction) -> Crossed:
+    """The momentum of light from wi, above."""
+    n = passage.indices[0]
+    return _crossed(passage, (-n * wi[0], -n * wi[1]), ops.maximum(wi[2], 0.0), None)
+
+
+def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -> Crossed:
+    """With the cosines above and below all interfaces, where more exact ones are known."""
+    p2 = p[0] * p[0] + p[1] * p[1]
+    cosines = [ops.sqrt(1 - p2 / (n * n)) for n in passage.indices]
+    bounded = [ops.maximum(c, COS_MIN) for c in cosines]
+    for l, known in ((0, above), (-1, below)):
+        if known is not None:
+            cosines[l], bounded[l] = known, ops.maximum(known, GRAZING)
+    crossings = passage.crossings
+    steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(crossings)]
+    passes = [c.passing(cosines[l], cosines[l + 1]) for l, c in enumerate(crossings)]
+    slabs = [1.0 if slab.is_clear else ops.exp(-slab.depth / c) for slab, c in zip(passage.slabs, bounded)]
+    return Crossed(p, p2, passage.indices, cosines, bounded, steps, passes, slabs)
+
+
+def _smooth(crossed: Crossed, interfaces: slice, slabs: slice) -> Value:
+    """Share (a colour) of light that passes smooth interfaces and slabs."""
+    return reduce(lambda a, b: a * b, [*crossed.passes[interfaces], *crossed.slabs[slabs]], 1.0)
+
+
+@dataclass(frozen=True)
+class _Component(ops.Named):
+    """Interface j as the one that takes the step: that step, bounded, the roughness seen there, and its weight."""
+
+    step: Value
+    roughness: Roughness
+    weight: Value
+
+
+def _component(passage: Passage, j: int, steps: Sequence[Value], d: Momentum | None = None) -> _Component:
+    """For the steps that light makes at all interfaces, and the sum d of what it moves there; None for little. A single
+    interface has its own roughness, and all the weight."""
+    own = passage.crossings[j]
+    size = ops.maximum(own.sign * steps[j], own.least)
+    if len(steps) == 1:
+        return _Component(size, own.roughness, 1.0)
+    width = own.width
+    for l, (step, other) in enumerate(zip(steps, passage.crossings)):
+        if l != j:
+            width = width + other.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY) / size, EXPONENT)
+    weights = [_weight(crossing, step) for crossing, step in zip(passage.crossings, steps)]
+    if d is not None:
+        total = reduce(operator.add, weights)
+        weights = [weight * _tail(crossing, d, total) for weight, crossing in zip(weights, passage.crossings)]
+    return _Component(size, width.roughness(WIDTHS), weights[j] / reduce(operator.add, weights))
+
+
+def _weight(crossing: Crossing, step: Value) -> Value:
+    """Square of the width of a step."""
+    width2 = ops.select(_turns(crossing.sign), step * step * crossing.area, 0.0)
+    return width2 + WEIGHT_MIN * crossing.n_1 * crossing.n_2
+
+
+def _tail(crossing: Crossing, d: Momentum, width2: Value) -> Value:
+    """Density of an interface's tail in the direction of d, over that of one that is isotropic; 1 within the width of
+    all."""
+    alpha_u, alpha_v, rotation = crossing.roughness
+    if isinstance(crossing.width, Isotropic):
+        return 1.0
+    x, y, _ = _turned((*d, 0.0), rotation)
+    near = (x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v) + width2) / (x * x + y * y + width2)
+    return 1 / (near * near)
+
+
+def _drawn(passage: Passage, i: Crossed) -> tuple[list[_Component], list[Value]]:
+    """The components as they are sampled, as wide as at p_o = p_i, and their probabilities."""
+    count = len(passage.crossings)
+    components = [_component(passage, j, i.steps) for j in range(count)]
+    if count == 1:
+        return components, [1.0]
+    # Leave out parts that light does not reach; it always reaches the first interface
+    shares = [c.weight * ops.mean(_smooth(i, slice(j), slice(0))) for j, c in enumerate(components)]
+    shares[0] = shares[0] + WEIGHT_MIN
+    total = sum(shares[1:], shares[0])
+    return components, [share / total for share in shares]
+
+
+def chances(passage: Passage, wi: Direction) -> list[Value]:
+    """Share of samples of light from wi that meet facets of each interface, from the top."""
+    return _drawn(passage, entered(passage, wi))[1]
+
+
+def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+    """f(wi, wo) |cos theta_o|, a colour, of light that passes straight through; the density of `sample` on both sides.
+
+    wi lies above. Radiance is not scaled by the index. The value is 0 for wo above.
+    """
+    return _eval_pdf(passage, wi, wo)
+
+
+def _eval_pdf(passage: Passage, wi: Direction, wo: Direction, passes: bool = False) -> tuple[Value, Value]:
+    """As `eval_pdf`; `passes` if all wo lie below."""
+    n = passage.indices
+    below, cos_o = wo[2] < 0, ops.absolute(wo[2])
+    n_out = ops.select(below, n[-1], n[0])
+    i = entered(passage, wi)
+    o = _crossed(
+        passage, (n_out * wo[0], n_out * wo[1]), cos_o, cos_o
+    )  # no part reads the cosine on the side of wi and that beyond
+    d = o.p[0] - i.p[0], o.p[1] - i.p[1]
+    drawn, shares = _drawn(passage, i)
+    value: Value = 0.0
+    density: Value = 0.0
+    for j, (crossing, sampled, share) in enumerate(zip(passage.crossings, drawn, shares)):
+        with ops.block(f"Pass by a facet of interface {j}"):
+            own = crossing.n_1 * i.bounded[j] - crossing.n_2 * o.bounded[j + 1]
+            component = _component(passage, j, [*i.steps[:j], own, *o.steps[j + 1 :]], d)
+            facet = _facet(crossing, i, o, j, component.step)
+            alone = _masking(crossing.roughness, i, j) * _masking(crossing.roughness, o, j + 1)
+            turns = _turns(crossing.sign)
+            smooth = _smooth(i, slice(j), slice(j + 1)) * _smooth(o, slice(j + 1, None), slice(j + 1, None))
+            seen = component.weight * _slopes(component.roughness, facet.slope) * ops.select(turns, alone, 1.0)
+            value = value + smooth * facet.passes * seen
+            visible = ops.mean(facet.passes) * _masking(sampled.roughness, i, j)
+            evenly = ops.mean(i.passes[j]) / (component.step * component.step)
+            through = _slopes(sampled.roughness, facet.slope) * ops.select(turns, visible, evenly)
+            through = ops.select(o.p2 < _lowest2(n[j + 1 :]), through, 0.0)
+        with ops.block("Or be reflected by it"):
+            if not passes:
+                through = ops.select(below, through, _reflected(passage, i, o, j, sampled.roughness))
+            density = density + share * through
+    # From momentum to solid angle
+    lit, scale = wi[2] > 0, n_out * n_out * cos_o
+    return ops.select(lit & below, value * scale, 0.0), ops.select(lit, density * scale, 0.0)
+
+
+def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction wo from uniform numbers, on either side of the material.
+
+    It lies in the surface where light of the facet drawn would stay inside; `eval_pdf` is 0 there.
+    """
+    n = passage.indices
+    i = entered(passage, wi)
+    components, shares = _drawn(passage, i)
+    with ops.block("Choose an interface"):
+        every, begins = [], []
+        u_chosen, begin = u, 0.0
+        for j, (c, component, share) in enumerate(zip(passage.crossings, components, shares)):
+            bounds = _lowest2(n[: j + 1]), _lowest2(n[j + 1 :])
+            own = c.n_1, c.n_2, c.eta, c.sign, c.least, i.bounded[j], ops.mean(i.passes[j])
+            every.append([*own, *component.roughness, *bounds, share, begin])
+            begins.append(begin)
+            begin = begin + share
+        chosen = every[0]
+        for fields in every[1:]:
+            chosen = [b if a is b else ops.select(u > fields[-1], a, b) for a, b in zip(fields, chosen)]
+        n_1, n_2, eta, sign, least, cosine, evenly, alpha_u, alpha_v, rotation, up2, down2, share, begin = chosen
+        u = (u - begin) / share
+    with ops.block("Draw a normal"):
+        w = i.p[0] / -n_1, i.p[1] / -n_1, cosine
+        h = _turned(ggx.sample_visible(_turned(w, rotation), alpha_u, alpha_v, u1, u2), -rotation)
+    with ops.block("Refract or reflect"):
+        p, passes = _refracted(n_1, n_2, _chosen(passage.crossings, eta, u_chosen, begins), i.p, w, h, down2)
+        r, phi, turns = least * ops.sqrt(ops.divide(u2, 1 - u2)), 2 * pi * u1, _turns(sign)
+        x, y, _ = _turned((r * alpha_u * ops.cos(phi), r * alpha_v * ops.sin(phi), 1.0), -rotation)
+        p = ops.select(turns, p[0], i.p[0] + x), ops.select(turns, p[1], i.p[1] + y)
+        below = u < ops.select(turns, passes, evenly)
+        turned = 2 * ggx.dot(w, h)
+        back = i.p[0] + n_1 * turned * h[0], i.p[1] + n_1 * turned * h[1]
+        leaves = (turned * h[2] > cosine) & (back[0] * back[0] + back[1] * back[1] < up2)
+    n_out = ops.select(below, n[-1], n[0])
+    x, y = (ops.select(below, a, b) / n_out for a, b in zip(p, back))
+    z = ops.sqrt(1 - x * x - y * y)
+    return x, y, ops.select(below, -z, ops.select(leaves, z, 0.0))
+
+
+@dataclass(frozen=True)
+class _Facet(ops.Named):
+    """The facet that refracts light: its slope, up to a sign, and (1 - F) v_i v_o / w^2 (a colour; 0 without one)."""
+
+    slope: Momentum
+    passes: Value
+
+
+def _facet(crossing: Crossing, i: Crossed, o: Crossed, j: int, step: Value) -> _Facet:
+    """Of interface j, for its step as `_component` bounds it."""
+    n_1, n_2, c_1, c_2 = crossing.n_1, crossing.n_2, i.bounded[j], o.bounded[j + 1]
+    slope = (o.p[0] - i.p[0]) / step, (o.p[1] - i.p[1]) / step
+    v_i = 1 - crossing.sign * (i.p[0] * slope[0] + i.p[1] * slope[1]) / (n_1 * c_1)
+    v_o = 1 - crossing.sign * (o.p[0] * slope[0] + o.p[1] * slope[1]) / (n_2 * c_2)
+    turns = _turns(crossing.sign)
+    height = ops.select(turns, 1 / ops.sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]), 1.0)
+    forwards = ops.select(turns, crossing.sign * (n_1 * c_1 - n_2 * c_2), 1.0)
+    faces = (v_i > 0) & (v_o > 0) & (forwards > 0)
+    v_i, v_o = ops.maximum(v_i, 0.0), ops.maximum(v_o, 0.0)
+    passing = crossing.passing(v_i * c_1 * height, v_o * c_2 * height)
+    return _Facet(slope, ops.select(faces, passing * (v_i * v_o / (step * step)), 0.0))
+
+
+def _refracted(
+    n_1: Value, n_2: Value, passing: Passing, p: Momentum, w: Direction, h: Direction, lowest2: Value
+) -> tuple[Momentum, Value]:
+    """Momentum p, of direction w above, after refraction about a normal h, and the probability that light takes it:
+    none unless it crosses all slabs below."""
+    cos_1 = ggx.dot(w, h)
+    cos_2 = ops.sqrt(1 - (1 - cos_1 * cos_1) * (n_1 * n_1) / (n_2 * n_2))
+    step = n_1 * cos_1 - n_2 * cos_2
+    x, y = p[0] + step * h[0], p[1] + step * h[1]
+    crosses = (cos_1 > 0) & (cos_2 > 0) & (n_1 * w[2] > step * h[2]) & (x * x + y * y < lowest2)
+    passes = ops.mean(passing(cos_1, cos_2))
+    return (x, y), ops.select(crosses, passes, 0.0)
+
+
+def _chosen(crossings: Sequence[Crossing], eta: Value, u: Value, begins: Sequence[Value]) -> Passing:
+    """What the facets of the interface of relative index `eta` let pass that u has chosen, by where each begins."""
+    if not any(crossing.films for crossing in crossings):
+        return lambda cos_1, cos_2: 1 - fresnel.dielectric_between(cos_1, cos_2, eta)
+
+    def passing(cos_1: Value, cos_2: Value) -> Value:
+        found = crossings[0].passing(cos_1, cos_2)
+        for crossing, begin in zip(crossings[1:], begins[1:]):
+            found = ops.select(u > begin, crossing.passing(cos_1, cos_2), found)
+        return found
+
+    return passing
+
+
+def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roughness) -> Value:
+    """Density of the momentum o, of light reflected by the facets of interface j that it does not pass."""
+    n, c = passage.indices, passage.crossings[j]
+    cos_i, cos_o = i.bounded[j], o.bounded[j]
+    w = i.p[0] / -c.n_1, i.p[1] / -c.n_1, cos_i
+    h = ggx.normalize((w[0] + o.p[0] / c.n_1, w[1] + o.p[1] / c.n_1, cos_i + cos_o))
+    _, passes = _refracted(c.n_1, c.n_2, c.passing, i.p, w, h, _lowest2(n[j + 1 :]))
+    passes = ops.select(_turns(c.sign), passes, ops.mean(i.passes[j]))
+    visible = ggx.ndf(_turned(h, roughness.rotation), roughness.alpha_u, roughness.alpha_v)
+    density = visible * _masking(roughness, i, j) * (1 - passes) / (4 * cos_i * cos_o * c.n_1 * c.n_1)
+    return ops.select(o.p2 < _lowest2(n[: j + 1]), density, 0.0)
+
+
+def _slopes(roughness: Roughness, slope: Momentum) -> Value:
+    """Density of slopes of GGX."""
+    alpha_u, alpha_v, rotation = roughness
+    x, y, _ = _turned((*slope, 1.0), rotation)
+    x, y = x / alpha_u, y / alpha_v
+    q = 1 + x * x + y * y
+    return 1 / (pi * alpha_u * alpha_v * q * q)
+
+
+def _masking(roughness: Roughness, crossed: Crossed, slab: int) -> Value:
+    """Smith's G1 in a slab; the side from which light comes, and its length, make no difference."""
+    p, z = crossed.p, crossed.n[slab] * crossed.bounded[slab]
+    return ggx.masking(_turned((p[0], p[1], z), roughness.rotation), roughness.alpha_u, roughness.alpha_v)
+
+
+def _turns(sign: Value) -> Value:
+    return ops.absolute(sign) > 0
+
+
+def _turned(w: Direction, rotation: Value) -> Direction:
+    return w if isinstance(rotation, float) and rotation == 0.0 else ggx.rotate(w, rotation)
+
+
+def _lowest2(indices: Sequence[Value]) -> Value:
+    """Square of the momentum that light has at most in all of some slabs."""
+    lowest = reduce(ops.minimum, indices)
+    return lowest * lowest
+
+
+# The integral, in NumPy
+
+
+def integrals(
+    passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int] = NODES
+) -> tuple[Array, Array, Array]:
+    """Energy (3, N) that `eval_pdf` passes from directions wi, (N,) each, the mean square (3, N) of the weights of
+    samples, and the share (N,) of them that pass.
+
+    By quadrature on rays of p_o from p_i, or from the point next to it that can leave, with nodes that crowd as the
+    tails of GGX do; their numbers are those along a ray, and of rays.
+    """
+    size = max(BLOCK // (nodes[0] * nodes[1]), 1)
+    blocks = [tuple(x[k : k + size] for x in wi) for k in range(0, len(wi[2]), size)]
+    energy, squares, share = zip(*(_integrals(passage, (x, y, z), nodes) for x, y, z in blocks))
+    return np.concatenate(energy, axis=-1), np.concatenate(squares, axis=-1), np.concatenate(share)
+
+
+def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int]) -> tuple[Array, Array, Array]:
+    n = passage.indices
+    i = entered(passage, wi)
+    widths = [c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(passage.crossings, i.steps)]
+    u, v, rotation = (np.asarray(x)[..., None, None] for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
+    # Cast rays from the middle
+    share, weight = low_discrepancy.gauss(nodes[0])
+    # Both sides of the plane of incidence are alike where interfaces have no axes
+    alike = all(isinstance(crossing.width, Isotropic) for crossing in passage.crossings)
+    phi = (np.arange(nodes[1]) + 0.5) * ((pi if alike else 2 * pi) / nodes[1])
+    rotation = np.arctan2(i.p[1], i.p[0])[:, None, None] if alike else rotation
+    n_out = np.asarray(n[-1])
+    length = np.sqrt(np.maximum(i.p2, ops.TINY))
+    bound = np.where(length < n_out, np.minimum(1, (1 - WIDTH_MIN) * n_out / length), EDGE * n_out / length)
+    p = [(bound * x)[:, None, None] for x in i.p]
+    gap = ((1 - bound) * length)[:, None, None]
+    u, v = (np.sqrt(width**2 + gap**2 + WIDTH_MIN**2) for width in (u, v))
+    ray = u * np.cos(phi)[:, None], v * np.sin(phi)[:, None]
+    cosine, sine = np.cos(rotation), np.sin(rotation)
+    ray = cosine * ray[0] - sine * ray[1], sine * ray[0] + cosine * ray[1]
+    # Follow each to the rim of the disc, where the distribution r^2 / (1 + r^2) of widths has come to `most`
+    length2, along = ray[0] ** 2 + ray[1] ** 2, ray[0] * p[0] + ray[1] * p[1]
+    inside = n_out * n_out - p[0] ** 2 - p[1] ** 2
+    rim = (np.sqrt(along**2 + length2 * inside) - along) / length2
+    most = rim**2 / (1 + rim**2)
+    odds = share * most / (1 - share * most)
+    r = np.sqrt(odds)
+    area = weight * most * (pi / nodes[1]) * (1 + odds) ** 2 * u * v
+    x, y = (p[0] + r * ray[0]) / n_out, (p[1] + r * ray[1]) / n_out
+    z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-12))
+    area = area / (n_out * n_out * z)
+    # What depends on wi alone is worked out once for all of its rays
+    flat = len(x), -1
+    i_x, i_y, i_z = (w.astype(np.float32)[:, None] for w in wi)
+    o_x, o_y, o_z = (w.reshape(flat).astype(np.float32) for w in (x, y, -z))
+    value, density = _eval_pdf(_wider(passage), (i_x, i_y, i_z), (o_x, o_y, o_z), True)
+    area = area.reshape(flat)
+    value = value if np.ndim(value) > 2 else value[None]
+    squares = np.sum(value * area * ops.divide(value, density), axis=-1)
+    return np.sum(value * area, axis=-1), squares, np.sum(density * area, axis=-1)
+
+
+def _wider(values: Any) -> Any:
+    """Records of arrays, with one axis more."""
+    if isinstance(values, np.ndarray):
+        return values[..., None]
+    if isinstance(values, Roughness):
+        return Roughness(*map(_wider, values))
+    if isinstance(values, tuple):
+        return tuple(map(_wider, values))
+    if is_dataclass(values) and not isinstance(values, type):
+        return type(values)(*(_wider(x) for x in vars(values).values()))
+    return values

@@ -1,0 +1,204 @@
+"""Light that passes a stack after it has bounced between its interfaces, or has been scattered by its media.
+
+Like reflected light, it is drawn in a medium of its own: a GGX reflection about the momentum p_i of light from wi, in
+the slab where light last bounced or was scattered, let out through the smooth interfaces below. In that slab, of index
+m and cosine c, the widths of all that light meets on its way add as in `straight_through`: of refractions |w_l| a_l,
+as seen at a reflection, 2 m c; a share `BOUNCES` of both faces of the last slab for light that bounces; and for
+scattered light, of optical depth x = tau_s / c, the width of N = x / (1 - exp(-x)) scatterings of asymmetry g^N in all,
+whose median angle theta follows from a fit, as that of a mirror with facets of alpha = tan(theta / 2).
+
+Of light that bounces the lobe has the share 1 / (1 + a_u a_v / `WIDE`^2). The rest of it, scattering that is wider than
+GGX can be, and what facets met often add are diffuse: a polynomial over all momenta that can leave, by direction, which
+is fitted to the light at the nodes (`remainder.passing`). All that is seen here is in the frame of the outside below:
+directions are turned up, indices relative to it.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.model.solved.lobes import refracted_lobe, remainder
+from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.solved.lobes.remainder import EVEN, Samples
+from velatura.model.solved.transmission.direct import EXPONENT, WIDTHS, Crossed, Passage, Slab, entered, is_none
+from velatura.model.variance import Roughness, Variance
+from velatura.ops import Value
+from velatura.optics.ggx import Direction
+
+BOUNCES = 0.3  # of the two faces of the slab that light bounces in
+COS_MIN = 0.22  # at which slabs are crossed, for widths
+ALPHA_MAX = 1.5
+DIFFUSE = 0.75  # roughness of scattering that is diffuse
+FAR = 1e3  # index
+THIN = 1e-4  # optical depth of scattering that no light meets twice
+NO_LOBE = 1e-6  # asymmetry
+GRAZING = 1e-4  # cosine
+WIDE = 0.05  # roughness of bounced light of which a lobe holds half
+
+Array = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Light that is scattered: a lobe, None without one, with a diffuse share of `diffuse` over momenta up to `bound`,
+    relative to the index below, by the `numbers` of `remainder.passing`."""
+
+    lobe: OwnMediumLobe | None
+    diffuse: Value
+    bound: Value
+    numbers: Sequence[Value]
+
+    @property
+    def samples(self) -> Samples:
+        """How diffuse light is sampled."""
+        even, _, grazing, once, twice = self.numbers
+        return Samples((even + grazing, 0.0, 0.0), (1.0, 0.0, 0.0), once, twice)
+
+    def within(self, o: Direction) -> Direction:
+        """A direction below as one of all that diffuse light has."""
+        x, y = o[0] / self.bound, o[1] / self.bound
+        return x, y, ops.sqrt(1 - x * x - y * y)
+
+
+def bounced(passage: Passage, wi: Direction) -> OwnMediumLobe | None:
+    """The lobe of light from wi, above, that bounces between the last two interfaces; None for a single one."""
+    if not passage.bounces:
+        return None
+    faces = _sum(passage.faces, [crossing.width for crossing in passage.crossings])
+    return _lobe(passage, entered(passage, wi), passage.under, faces * BOUNCES)
+
+
+def share(lobe: OwnMediumLobe | None) -> Value:
+    """Of the light that bounces, what its lobe holds; the wider that is, the less."""
+    if lobe is None:
+        return 0.0
+    return 1 / (1 + lobe.roughness.alpha_u * lobe.roughness.alpha_v / (WIDE * WIDE))
+
+
+def bound(passage: Passage) -> Value:
+    """Greatest momentum of scattered light that leaves."""
+    return reduce(ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(passage.indices, (*passage.scattered, 1.0))))
+
+
+def rest(passage: Passage, wi: Direction, numbers: Sequence[Value] = EVEN) -> Rest:
+    """The light from wi, above, that is scattered by media, or often by facets; diffuse light has `numbers`."""
+    reached = bound(passage) / passage.indices[-1]
+    if not passage.is_cloudy:
+        return Rest(None, 1.0, reached, numbers)
+    i = entered(passage, wi)
+    scattering = [(slab, cosine) for slab, cosine in zip(passage.slabs, i.bounded) if not is_none(slab.scattering)]
+    alpha = _turned(scattering)
+    diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
+    width = type(passage.crossings[0].width).uniform(WIDTHS.variance(alpha))
+    return Rest(_lobe(passage, i, passage.scattered, width), diffuse, reached, numbers)
+
+
+def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
+    """Roughness of the mirror that deflects light as much as all scattering in slabs with their cosines."""
+    depths = [ops.mean(slab.scattering) / ops.maximum(cosine, COS_MIN) for slab, cosine in slabs]
+    total = reduce(operator.add, depths)
+    g = ops.divide(reduce(operator.add, (depth * slab.g for depth, (slab, _) in zip(depths, slabs))), total)
+    x = ops.maximum(total, THIN)
+    g = ops.exp(x / (1 - ops.exp(-x)) * ops.log(ops.clip(g, NO_LOBE, 1.0)))
+    cos_theta = ops.minimum(0.5 * g * (3 - g * g), 1.0)
+    return ops.sqrt((1 - cos_theta) / (1 + cos_theta))
+
+
+def _lobe(passage: Passage, i: Crossed, under: Sequence[Value], inside: Variance) -> OwnMediumLobe:
+    """The lobe in the slab above the interfaces that are `under` it, of the widths of refractions and those that light
+    takes on inside."""
+    n = _above(under, passage.indices)
+    scale = 1 / (2 * n * ops.maximum(_above(under, i.bounded), COS_MIN))
+    for crossing, step in zip(passage.crossings, i.steps):
+        inside = inside + crossing.width * ops.power(ops.maximum(ops.absolute(step) * scale, ops.TINY), EXPONENT)
+    u, v, rotation = inside.roughness(WIDTHS)
+    roughness = Roughness(ops.minimum(u, ALPHA_MAX), ops.minimum(v, ALPHA_MAX), rotation)
+    return OwnMediumLobe(1.0, roughness, n / passage.indices[-1], leaving=_leaving(passage, under))
+
+
+def _leaving(passage: Passage, under: Sequence[Value]) -> Callable[[Value], Value]:
+    """Share (a colour) that smooth interfaces let pass, by the cosine below all of them."""
+    n, crossings = passage.indices, passage.crossings
+
+    def leaving(cos_o: Value) -> Value:
+        p2 = 1 - cos_o * cos_o
+        passes: Value = 1.0
+        for l, (flag, crossing) in enumerate(zip(under, crossings)):
+            if isinstance(flag, float) and flag == 0.0:
+                continue
+            above, below = (ops.sqrt(1 - p2 * (n[-1] / x) * (n[-1] / x)) for x in n[l : l + 2])
+            below = cos_o if l == len(crossings) - 1 else below
+            passes = passes * (1 - flag + flag * crossing.passing(above, below))
+        return passes
+
+    return leaving
+
+
+def _above(under: Sequence[Value], values: Sequence[Value]) -> Value:
+    """Of values of slabs that of the one above some interfaces; without any, that of the last one."""
+    first = [flag - before for flag, before in zip((*under, 1.0), (0.0, *under))]
+    return _sum(first, values)
+
+
+def _sum(flags: Sequence[Value], values: Sequence[Any]) -> Any:
+    """Of the values whose flags are 1."""
+    kept = [(flag, x) for flag, x in zip(flags, values) if not (isinstance(flag, float) and flag == 0.0)]
+    return reduce(operator.add, (x if isinstance(flag, float) else x * flag for flag, x in kept))
+
+
+def seen_below(passage: Passage, wi: Direction) -> Direction:
+    """The direction below, turned up, of light that a smooth stack would mirror into it: at most a horizontal one."""
+    n = passage.indices
+    x, y = (wi[k] * (n[0] / n[-1]) for k in (0, 1))
+    scale = 1 / ops.sqrt(ops.maximum(x * x + y * y, 1.0))
+    x, y = scale * x, scale * y
+    return x, y, ops.maximum(ops.sqrt(1 - x * x - y * y), refracted_lobe.COS_MIN)
+
+
+def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value]:
+    """f |cos theta_o|, a colour, and the density of `sample_rest`, in the frame of `seen_below`."""
+    within = found.within(o)
+    even = found.diffuse * ops.maximum(o[2], 0.0) / (found.bound * found.bound)
+    value = ops.select(within[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, within), 0.0)
+    density = even / ops.maximum(within[2], GRAZING) * found.samples.density(i, within)
+    if found.lobe:
+        also, density_of_lobe = refracted_lobe.eval_pdf(found.lobe, i, o)
+        value, density = (1 - found.diffuse) * also + value, (1 - found.diffuse) * density_of_lobe + density
+    return value, density
+
+
+def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+    """A direction, in the frame of `seen_below`, from uniform numbers."""
+    even = found.samples.sample(i, u, u1, u2)
+    x, y = found.bound * even[0], found.bound * even[1]
+    even = x, y, ops.sqrt(1 - x * x - y * y)
+    if not found.lobe:
+        return even
+    other = refracted_lobe.sample(found.lobe, i, u1, u2)
+    x, y, z = (ops.select(u < found.diffuse, a, b) for a, b in zip(even, other))
+    return x, y, z
+
+
+def diffuse(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
+    """Density of diffuse light over its mean."""
+    even, cosine, grazing, once, twice = numbers
+    s = -1 * (i[0] * o[0] + i[1] * o[1])
+    both = (i[0] * i[0] + i[1] * i[1]) * (o[0] * o[0] + o[1] * o[1])
+    mean = even + cosine * o[2] + grazing * remainder.grazing(o[2])
+    return ops.maximum(mean + once * s + twice * (2 * s * s - both), 0.0)
+
+
+def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
+    """Energy (3, N) of `eval_pdf_rest` from directions (N,) each."""
+    if not found.lobe:
+        return np.ones((1, len(i[2])))
+    return np.asarray((1 - found.diffuse) * refracted_lobe.integral(found.lobe, i) + found.diffuse)
