@@ -95,7 +95,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for preset in arguments.presets.split(","):
         for model in MODELS:
-            for baking in (False, True) if model.recursion.closed_form else (False,):
+            for baking in (False, True) if model.closed_form else (False,):
                 print(row(preset, model, baking), flush=True)
 
 

@@ -35,7 +35,7 @@ from velatura.inverse import (
 from velatura.inverse.drag import seen
 from velatura.inverse.partial_stack import Array, Layers, join, take
 from velatura.model import DEFAULT, MODELS, Model, named
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Isotropic, Roughness
 from velatura.stack import Film, Interface, Layer, Medium, Stack
@@ -188,7 +188,7 @@ def exactness(model: Model, targets: int, seed: int = 0) -> Exactness:
         while wanted > 0:
             drawn = draw(kinds, model, min(3 * wanted + 8, CHUNK), rng)
             drawn = drawn.take(np.arange(min(len(drawn), wanted)))
-            found = drawn if model.recursion.closed_form else met(drawn, model)
+            found = drawn if model.closed_form else met(drawn, model)
             result.refused += len(drawn) - len(found)
             apart = deviations(found, model)
             energy, variance = apart.max(axis=1, initial=0)

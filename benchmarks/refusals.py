@@ -86,7 +86,7 @@ def lifted(target: Target, n: int, reason: str) -> Iterator[Target]:
 
 def possible(target: Target, n: int, reason: str, model: str) -> bool:
     """Whether the first lobes have a stack, by the nearest model in closed form, once what a reason names is lifted."""
-    adder = named(model).adder
+    adder = named(model).surrogate
     return any(stacks.in_closed_form(other, adder) for other in lifted(target, n, reason))
 
 

@@ -127,7 +127,7 @@ def closed_form(count: int, seed: int) -> None:
 def _apart(stack: Stack, model: Model, rng: np.random.Generator) -> list[tuple[float, float]]:
     """Total variation and difference of albedo, at each cosine, of a material in closed form from the same solved."""
     material, kind = Material.of(stack), variance(stack)
-    bodies = solve.solve(material, model, kind, Context()), bsdf.body(material, model.adder, kind, at_a_point())
+    bodies = solve.solve(material, model, kind, Context()), bsdf.body(material, model.surrogate, kind, at_a_point())
     found = []
     for cosine in COSINES:
         wi = (np.full(SAMPLES, np.sqrt(1 - cosine * cosine)), np.zeros(SAMPLES), np.full(SAMPLES, cosine))

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from velatura.errors import InvalidInput
+from velatura.model.base import SWITCHES, Model
 from velatura.model.lobe_statistics import StackLobes
-from velatura.model.models import DEFAULT, MODELS, SWITCHES, Model, named
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import DEFAULT, MODELS, named, stack_lobes
 from velatura.stack import MaterialLike, dumps, load
 from velatura.stack.schema import unknown
 

@@ -104,7 +104,7 @@ def cycles(folder: Path) -> dict[str, np.ndarray]:
 def _in_mitsuba(name: str, folder: Path) -> np.ndarray:
     stack, model = _stack(name, folder)
     chosen = recording.drawn_by(stack, named(model))
-    if chosen.recursion.closed_form:
+    if chosen.closed_form:
         return pictures(of_layers(stack, chosen), JOB)
     return pictures(of_table(closures.tabulated(Material.of(stack).solid(), chosen)), JOB)
 

@@ -468,7 +468,7 @@ def test_what_cannot_be_had_is_said_beside_the_lobe(visit: Open) -> None:
     chosen(page, 2)
     look.get_by_label("Blur, slider").fill("0")
     answered(page)
-    look.locator(".refused", has_text="Asked: blur 0").wait_for()
+    look.locator(".refused", has_text="Query: blur 0").wait_for()
     assert look.locator("circle.ghost").count() == 1
     check_physical(page)
     page.page.get_by_role("button", name="Undo").click()

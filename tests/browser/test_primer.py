@@ -80,7 +80,7 @@ def test_the_figure_draws_the_lobes(case: tuple[float, ...], page: Any, primer: 
 def evaluated(stack: vt.Stack, model: Model, cosine: float, view: np.ndarray) -> np.ndarray:
     """Light by solid angle at angles of view in the plane of incidence, in NumPy."""
     material = Material.of(stack)
-    body = model.recursion.body(material, model, variance_kind(material), Context())
+    body = model.body(material, variance_kind(material), Context())
     still = np.ones_like(view)
     wi = -np.sqrt(1 - cosine**2) * still, 0 * still, cosine * still
     return np.broadcast_to(body.eval_pdf(wi, (np.sin(view), 0 * still, np.cos(view)))[0], (3, view.size))[1]

@@ -20,8 +20,8 @@ from velatura import checks, kernel
 from velatura.checks import LAWS, Finding, Report, check
 from velatura.errors import InvalidInput
 from velatura.model import SWITCHES
-from velatura.model.models import EXCEPTIONS, GAIN
 from velatura.plugins import weidlich_wilkie
+from velatura.plugins.layered import EXCEPTIONS, GAIN
 from velatura.reference import plugin as reference
 
 mi: Any = kernel.mitsuba("llvm_ad_rgb")

@@ -10,7 +10,7 @@ import pytest
 
 import velatura as vt
 from velatura import kernel
-from velatura.model.models import MODELS
+from velatura.model.registry import MODELS
 from velatura.optics import fresnel
 from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.films import Film, coherent

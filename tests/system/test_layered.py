@@ -13,8 +13,8 @@ from velatura.comparison.evaluated_lobes import account
 from velatura.errors import InvalidInput
 from velatura.model import named
 from velatura.model.context import Context
-from velatura.model.papers.prepare import variance_kind
 from velatura.model.solved import solve
+from velatura.model.variance import variance_kind
 from velatura.stack import Material
 
 mi = kernel.mitsuba("llvm_ad_rgb")
@@ -119,7 +119,7 @@ def test_the_plugin_is_the_model_that_numpy_runs(name: str, model: str) -> None:
     """In single precision, with averages sampled once per material: within 1 % where the lobes are."""
     stack, ctx = vt.preset(name), mi.BSDFContext()
     material = Material.of(stack)
-    body = named(model).recursion.body(material, named(model), variance_kind(material), Context())
+    body = named(model).body(material, variance_kind(material), Context())
     rng, n = np.random.default_rng(11), 2000
     cos_theta, phi = rng.uniform(0.05, 1, n), rng.uniform(0, 2 * np.pi, n)
     sin_theta = np.sqrt(1 - cos_theta**2)

@@ -11,7 +11,7 @@ from fuzzing.models import random_model
 from fuzzing.stacks import BASES, random_stack, textured
 
 from velatura import MODELS
-from velatura.model.models import named
+from velatura.model.registry import named
 
 
 @pytest.mark.parametrize("form", ["forward", "symmetric"])

@@ -154,7 +154,7 @@ def test_every_wavelength_is_as_if_it_was_solved_by_itself(name: str) -> None:
     def colour(*channels: Any) -> np.ndarray:
         return np.stack([np.atleast_1d(x) for x in channels]) if channels else np.zeros(len(STEERING_NM) + len(nm))
 
-    alone = bsdf.model.recursion.body(material, bsdf.model, bsdf.variance, Context(colour=colour))
+    alone = bsdf.model.body(material, bsdf.variance, Context(colour=colour))
     z, phi = rng.uniform(0.15, 1, n), rng.uniform(0, 2 * np.pi, n)
     wi = np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z
     wo, _ = alone.sample(wi, *rng.random((3, n)))

@@ -11,9 +11,9 @@ from scipy import stats
 
 import velatura as vt
 from velatura import kernel
-from velatura.model.papers.prepare import variance_kind
 from velatura.model.solved.transmission import direct
 from velatura.model.solved.transmission.direct import Passage
+from velatura.model.variance import variance_kind
 from velatura.stack import Material, number
 
 Array = NDArray[np.floating]

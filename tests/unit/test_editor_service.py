@@ -285,7 +285,7 @@ def test_the_names_of_all_tables_make_a_key() -> None:
 
 
 def test_threads_share_the_code_of_a_pattern() -> None:
-    """Asked from several threads at once: the same answers, and as many programs as there are patterns."""
+    """Query from several threads at once: the same answers, and as many programs as there are patterns."""
     materials = [changed(alpha=[0.1, 0.2]), COAT, {**COAT, "layers": [COAT["layers"][1]]}] * 8
     shading._made.cache_clear()
     with ThreadPoolExecutor(8) as pool:

@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 import velatura as vt
-from velatura.model.papers.prepare import variance_kind
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.transmission import direct, internal_reflections
 from velatura.model.solved.transmission.direct import Passage
 from velatura.model.solved.transmission.internal_reflections import Rest
+from velatura.model.variance import variance_kind
 from velatura.stack import Material
 
 Array = NDArray[np.floating]

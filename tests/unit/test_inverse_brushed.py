@@ -15,7 +15,7 @@ from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Isotropic, PerAxis
 from velatura.stack import Stack
 
-ADDERS = [model for model in MODELS if model.recursion.closed_form]
+ADDERS = [model for model in MODELS if model.closed_form]
 METAL: dict[str, Any] = {"energy": (0.6, 0.4, 0.2), "alpha": (0.15, 0.4), "rotation": 60, "base": "conductor"}
 COAT: dict[str, Any] = {"energy": 0.04, "alpha": 0.05}
 

@@ -15,8 +15,7 @@ from velatura.inverse.drag import DraggedStack
 from velatura.inverse.interface import DENSER, RARER
 from velatura.inverse.partial_stack import Layers
 from velatura.model import named
-from velatura.model.papers.mixture import ALPHA_MIN
-from velatura.model.variance import Isotropic, Roughness
+from velatura.model.variance import ALPHA_MIN, Isotropic, Roughness
 from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 

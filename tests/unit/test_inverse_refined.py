@@ -197,7 +197,7 @@ def test_a_way_out_is_near_and_brings_the_stack_that_has_it(
 )
 def test_a_refusal_by_the_model_itself_has_its_own_reason_and_way_out(lobes: list[Any], reasons: set[str]) -> None:
     """Of lobes that the nearest model in closed form has a stack for. Expected: a little less energy, and no more."""
-    assert stacks.search(Target(lobes), MODEL.adder) is not None
+    assert stacks.search(Target(lobes), MODEL.surrogate) is not None
     with pytest.raises(Infeasible) as error:
         invert_stack(lobes, MODEL)
     assert error.value.constraint in reasons and error.value.lobe == len(lobes)

@@ -112,7 +112,7 @@ def _told(target) -> list[float]:
 )
 def test_round_trip(model: Model) -> None:
     """What is read of the materials is what was asked for: one to three lobes, of all kinds, coloured."""
-    count = 22 if model.recursion.closed_form else 11
+    count = 22 if model.closed_form else 11
     found = benchmark("inverse").exactness(model, count, seed=5)
     assert found.done == count
     assert found.energy < 1e-6
@@ -170,7 +170,7 @@ def test_the_index_follows_from_a_fixed_lower_roughness(model: Model) -> None:
     assert float(np.ravel(found.layers[-1].alpha)[0]) == pytest.approx(wanted, abs=1e-4)
     energy, variance = read(target, found.stack, model)
     assert energy < 1e-4
-    assert variance < (1e-4 if model.recursion.closed_form else 1e-3)
+    assert variance < (1e-4 if model.closed_form else 1e-3)
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,15 @@ import pytest
 import velatura as vt
 from velatura import tables
 from velatura.model import named
+from velatura.model.base import Query
 from velatura.model.context import Context
 from velatura.model.papers import diffuse_base
-from velatura.model.papers.bsdf import Asked
-from velatura.model.papers.prepare import prepare, variance_kind
+from velatura.model.papers.prepare import prepare
 from velatura.model.solved import solve
 from velatura.model.solved.bsdf import Solved
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.lobes.widths import nearly_straight
+from velatura.model.variance import variance_kind
 from velatura.optics import fresnel
 from velatura.sampling import low_discrepancy
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
@@ -90,7 +91,7 @@ def over_both_sides() -> tuple[np.ndarray, ...]:
 def drawn(layers: list[Any], cosine: float) -> np.ndarray:
     """Light from a cosine over even directions on both sides, by colour."""
     wo = over_both_sides()
-    light, _ = body(layers).eval_pdf(at(cosine, 0.0, len(wo[0])), wo, Asked(radiance=False))
+    light, _ = body(layers).eval_pdf(at(cosine, 0.0, len(wo[0])), wo, Query(radiance=False))
     return np.broadcast_to(light / np.abs(wo[2]), (3, len(wo[0])))
 
 

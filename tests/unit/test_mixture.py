@@ -11,8 +11,8 @@ from scipy.stats import qmc
 
 import velatura as vt
 from velatura.model import MODELS, named, variance_kind
+from velatura.model.base import Query
 from velatura.model.context import Context
-from velatura.model.papers import bsdf
 from velatura.optics import fresnel
 from velatura.stack import Material, as_described
 
@@ -36,7 +36,7 @@ STACKS = {
 
 def body_of(stack: vt.Stack, model: str = "belcour2018", **switches: str) -> Any:
     material, chosen = Material.of(stack).solid(), named(model, **switches)
-    return chosen.recursion.body(material, chosen, variance_kind(material), Context())
+    return chosen.body(material, variance_kind(material), Context())
 
 
 def directions(n: int, both: bool, seed: int) -> tuple[Array, Array, Array]:
@@ -51,7 +51,7 @@ def one_way(stack: vt.Stack, model: str, form: str) -> float:
     body, material = body_of(stack, model, form=form), Material.of(stack)
     both, eta = material.transmits, np.mean(material.below) if material.transmits else 1.0
     wi, wo = directions(2000, both, 1), directions(2000, both, 2)
-    adjoint = bsdf.Asked(radiance=False)
+    adjoint = Query(radiance=False)
     there = body.eval_pdf(wi, wo, adjoint)[0] / np.abs(wo[2])
     back = body.eval_pdf(wo, wi, adjoint)[0] / np.abs(wi[2])
     squared = [np.where(w[2] > 0, 1.0, eta * eta) for w in (wi, wo)]
@@ -137,7 +137,7 @@ def test_what_is_not_asked_for_is_dark() -> None:
     wi, wo = directions(500, True, 7), directions(500, True, 8)
     through = wi[2] * wo[2] < 0
     value, pdf = body.eval_pdf(wi, wo)
-    for asked, lit in ((bsdf.Asked(transmission=False), ~through), (bsdf.Asked(reflection=False), through)):
+    for asked, lit in ((Query(transmission=False), ~through), (Query(reflection=False), through)):
         part, density = body.eval_pdf(wi, wo, asked)
         np.testing.assert_allclose(part, value * lit)
         assert np.all(density[~lit] == 0) and np.all(density[lit] >= pdf[lit])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from velatura.errors import InvalidInput
 from velatura.model import MODELS, SWITCHES, named
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Roughness
 from velatura.stack import Interface, Material, Medium, Stack, preset
@@ -340,8 +340,9 @@ def test_no_stack_or_direction_gives_nan_or_negative_energy(precision) -> None:
 
     In single precision, as renderers have it, and in double.
     """
-    from velatura.model.papers import adding, mixture, prepare
+    from velatura.model.papers import adding, mixture
     from velatura.model.papers.lobe_merging import merged
+    from velatura.model.papers.prepare import prepare
     from velatura.model.variance import Isotropic, PerAxis
 
     rng = np.random.default_rng(7)

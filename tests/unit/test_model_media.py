@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from velatura import reference
-from velatura.model.models import SWITCHES
-from velatura.model.papers.statistics import StackLobes, stack_lobes
+from velatura.model.base import SWITCHES
+from velatura.model.lobe_statistics import StackLobes
+from velatura.model.registry import stack_lobes
 from velatura.stack import Interface, Medium, Stack
 
 PLAIN = {"model": "yamaguchi2019"}

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from velatura import tables
 from velatura.model import MODELS, named
-from velatura.model.papers import adding, prepare
+from velatura.model.papers import adding
 from velatura.model.papers.lobe_merging import merged
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.papers.prepare import prepare
+from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.optics import fresnel, ggx

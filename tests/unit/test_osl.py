@@ -22,7 +22,7 @@ from velatura.shader.osl import osl
 from velatura.shader.symbol import in_order
 from velatura.stack import Material
 
-CLOSED = [model.name for model in MODELS if model.recursion.closed_form]
+CLOSED = [model.name for model in MODELS if model.closed_form]
 PASSING = ("refraction", "straight", "translucent")
 
 

@@ -8,8 +8,8 @@ from radiative_transfer import KNOWN, rows
 
 from velatura.model import named
 from velatura.model.context import Context
-from velatura.model.papers.prepare import variance_kind
 from velatura.model.solved import solve
+from velatura.model.variance import variance_kind
 from velatura.stack import Interface, Material, Medium, Stack
 
 MOST, MEAN = 2e-3, 5e-4  # of the incident light

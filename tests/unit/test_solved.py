@@ -6,13 +6,13 @@ from fuzzing.stacks import random_stack
 
 from velatura import load, tables
 from velatura.model import named
+from velatura.model.base import Query
 from velatura.model.context import Context, channels
-from velatura.model.papers.bsdf import Asked
-from velatura.model.papers.prepare import variance_kind
 from velatura.model.solved import bsdf, solve
 from velatura.model.solved.bsdf import Solved
 from velatura.model.solved.energies.energies import energies
 from velatura.model.solved.lobes.widths import nearly_straight
+from velatura.model.variance import variance_kind
 from velatura.stack import Interface, Material, MaterialLike, Medium, Stack
 
 PRESETS = ("coated-rough-metal", "varnished-paint", "scattering-medium-over-gold", "three-dielectrics-over-metal",
@@ -21,7 +21,7 @@ BRUSHED = ("coated-gold",)
 COSINES = (1.0, 0.7, 0.35)
 SAMPLES = 1 << 13
 HEAVIEST = 3.0  # sample
-POWER = Asked(radiance=False)
+POWER = Query(radiance=False)
 
 
 def body(stack: MaterialLike) -> tuple[Material, Solved]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 import velatura as vt
 from velatura import kernel
-from velatura.model.papers.prepare import variance_kind
 from velatura.model.solved.sample_allocation import Wanted
 from velatura.model.solved.transmission import combined, direct
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Passage
+from velatura.model.variance import variance_kind
 from velatura.optics import fresnel, ggx
 from velatura.shader import symbol
 from velatura.stack import Material

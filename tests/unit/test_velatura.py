@@ -99,7 +99,7 @@ def test_one_interface_is_the_reflection_by_facets_that_it_is() -> None:
 
     stack = Stack([Interface(alpha=(0.1, 0.3), rotation=20, **GOLD)])
     material, model = Material.of(stack), named("velatura", reflectance="fgd")
-    body = model.recursion.body(material, model, variance_kind(material), Context())
+    body = model.body(material, variance_kind(material), Context())
     rng = np.random.default_rng(0)
     wi, wo = (w / np.linalg.norm(w, axis=0) for w in abs(rng.normal(size=(2, 3, 200))))
     value, _ = body.eval_pdf(tuple(wi), tuple(wo))

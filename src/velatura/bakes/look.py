@@ -63,7 +63,7 @@ class Described:
         solid = material.solid()
         below = float(np.mean(solid.interfaces[-1].eta / solid.exterior)) if solid.transmits else None
         x, y, z = (np.array([w]) for w in (0.0, 0.0, 1.0))
-        seen = model.recursion.statistics(solid, model, (x, y, z))
+        seen = model.statistics(solid, (x, y, z))
         lobes = [(*alpha, turn) for alpha, turn in (_along(seen, k) for k in range(len(seen.alpha)))]
         brushed = () if variance_kind(solid) is Isotropic else tuple(lobes)
         return cls(solid, brushed, below, tuple(_looks(solid, seen)))

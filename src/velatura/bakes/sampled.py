@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from velatura.bakes.look import Described
 from velatura.model import Model, variance_kind
+from velatura.model.base import Query
 from velatura.model.context import Context
-from velatura.model.papers import bsdf
 from velatura.optics import fresnel, ggx, refraction
 from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import square
@@ -47,12 +47,12 @@ class Sampled:
     def of(cls, stack: Described, model: Model, wi: Array, nodes: int) -> Sampled:
         """For wi (M, 3), and about so many nodes for each."""
         material = stack.material
-        body = model.recursion.body(material, model, variance_kind(material), Context())
+        body = model.body(material, variance_kind(material), Context())
         drawn = (*WIDTHS, *((max(u, ALPHA_MIN), max(v, ALPHA_MIN), turn) for u, v, turn in stack.brushed))
         each = [_nodes(w, stack.below or 0.0, nodes, drawn) for w in wi]
         which = np.repeat(np.arange(len(wi)), [wo.shape[1] for wo, _ in each])
         pair = Pair(wi[which].T, np.concatenate([wo for wo, _ in each], axis=1))
-        value, _ = body.eval_pdf(tuple(pair.wi), tuple(pair.wo), bsdf.Asked(radiance=False))
+        value, _ = body.eval_pdf(tuple(pair.wi), tuple(pair.wo), Query(radiance=False))
         value = np.maximum(np.broadcast_to(value, pair.wi.shape), 0.0)
         weight = np.concatenate([weight for _, weight in each])
         return cls(pair, weight, which, len(wi), wi[:, 2] / wi[:, 2].sum(), value)

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
 from velatura.model import Model, variance_kind
+from velatura.model.base import Body, Query
 from velatura.model.context import Context
 from velatura.model.lobe_statistics import StackLobes
 from velatura.model.papers import adding, bsdf, mixture
 from velatura.model.papers.diffuse_base import Base
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import WalkedLobe
@@ -47,7 +48,7 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     if model.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since the truth has one roughness a lobe")
     material = Material.of(stack).solid()
-    body = model.recursion.body(material, model, variance_kind(material), Context())
+    body = model.body(material, variance_kind(material), Context())
     remainder: Array | float = 0.0
     if isinstance(body, bsdf.Lobed):
         columns = [_column(body, wi) for wi in directions(cos_theta, 0.0)]
@@ -82,9 +83,7 @@ def _column(body: bsdf.Lobed, incident: Array) -> tuple[list[WalkedLobe], Array]
     return lobes, np.sum([distribution(light) for light in lights], axis=0)
 
 
-def _drawn(
-    body: bsdf.Body, stack: Stack, statistics: StackLobes, j: int, incident: Array
-) -> tuple[list[WalkedLobe], Array]:
+def _drawn(body: Body, stack: Stack, statistics: StackLobes, j: int, incident: Array) -> tuple[list[WalkedLobe], Array]:
     """As `_column`, of a body that is solved, by its components. The remainder is the light of a diffuse base, if there
     is one, and else in no lobe."""
     x, y, z = incident[:, None]
@@ -93,7 +92,7 @@ def _drawn(
 
     def light(part: int | None) -> Light:
         each = [k == part for k in range(count + 1)]
-        asked = bsdf.Asked(each if part is not None else False, part is None, radiance=False)
+        asked = Query(each if part is not None else False, part is None, radiance=False)
         wo, _ = body.sample(wi, *u, asked)
         return _light(wo, *body.eval_pdf(wi, wo, asked))
 
@@ -130,7 +129,7 @@ def _sampled_below(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction) -> Light:
     """The transmitted lobe as it is evaluated, as energy."""
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
         return Light(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
-    asked = bsdf.Asked(reflection=False, radiance=False)
+    asked = Query(reflection=False, radiance=False)
     wo, _ = body.sample(wi, 0.0, *square(LIT_SAMPLES), asked)
     return _light(wo, *body.eval_pdf(wi, wo, asked))
 

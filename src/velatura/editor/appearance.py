@@ -21,7 +21,7 @@ from velatura.inverse.explain import REASONS, UNMET
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.interface import conductor_tint
 from velatura.model import Model, named
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Roughness
 from velatura.stack import Diffuse, Interface, Stack, Varying
@@ -68,8 +68,8 @@ def dragged(body: Body, target: Target) -> DraggedStack | None:
     model, material, read = reader_of(body, target), body.get("material") or {}, body.get("read")
     if read is None:
         return held(material, target, model)
-    near = held(material, target, model.adder)
-    if near is None or (model.recursion.closed_form and not near.space.coated):
+    near = held(material, target, model.surrogate)
+    if near is None or (model.closed_form and not near.space.coated):
         return near
     return near.quickly.known(Target.from_dict(read))
 
@@ -307,7 +307,7 @@ def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
     """A stack with the lobes, found independently of the present one; a medium that scatters would be lost."""
     if near.scatters:
         return None
-    found = stacks.in_closed_form(wish, near.model.in_closed_form, EFFORT)
+    found = stacks.in_closed_form(wish, near.model.without_tir, EFFORT)
     fresh = DraggedStack.of(found.stack, wish, near.model) if found else None
     if fresh is None:
         return None
@@ -338,7 +338,7 @@ def _further(wish: Target, found: DraggedStack) -> DraggedStack:
 
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
-    found = stacks.in_closed_form(wish, model.in_closed_form)
+    found = stacks.in_closed_form(wish, model.without_tir)
     fresh = DraggedStack.of(found.stack, wish, model) if found else None
     if fresh is not None:
         moved, bound = fresh.towards(wish)

@@ -170,7 +170,7 @@ def _write(
 
 def _tasks(plain: Sequence[Order], models: Sequence[Model]) -> list[Callable[[], Made]]:
     brushed = [order._replace(brushed=True) for order in plain if order.stack.interfaces]
-    solved = [model.name for model in models if model.adder is not model]
+    solved = [model.name for model in models if model.surrogate is not model]
     coated = [name for name in presets() if any(layer.films for layer in preset(name).interfaces)]
     return [
         *(functools.partial(_coated, model, name) for model in models for name in coated),
@@ -236,7 +236,7 @@ def _shader(model: str, order: Order) -> Made:
     """The shaders of an order of layers in closed form: that which the page draws, and that which it exports."""
     chosen, stack = named(model), order.stack
     drawn = in_closed_form(stack, chosen, order.brushed)
-    written = shader(pattern(stack, order.brushed), chosen.adder)
+    written = shader(pattern(stack, order.brushed), chosen.surrogate)
     costs = {name: str(cost) for name, cost in written.costs.items()}
     exported = {"text": headed(written.text), "tables": ",".join(written.looked_up) or None, "costs": costs}
     names = [*written.looked_up, *(drawn["tables"] or "").split(","), *(drawn["baked"] or {}).get("tables", [])]

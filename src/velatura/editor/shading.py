@@ -67,15 +67,15 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
         "transmitted": stack.transmits,
         "base": stack.base is not None,
         "thin": stack.thin,
-        "closed_form": bool(stack.interfaces) and model.adder is not model and _tabulated(made) is None,
+        "closed_form": bool(stack.interfaces) and model.surrogate is not model and _tabulated(made) is None,
         **_contents(stack, made, model),
     }
 
 
 def in_closed_form(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
     """As `shading`, for all values, of what the model comes to without a solution."""
-    made = shading(stack, model.adder, stretched)
-    return {**made, "closed_form": bool(stack.interfaces) and model.adder is not model}
+    made = shading(stack, model.surrogate, stretched)
+    return {**made, "closed_form": bool(stack.interfaces) and model.surrogate is not model}
 
 
 def contents(stack: Stack, model: Model, stretched: bool, coarse: bool) -> dict[str, Any]:

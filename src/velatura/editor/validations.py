@@ -100,7 +100,7 @@ def transmission(eta: float, alpha: float, angle: float) -> dict[str, Any]:
 
     Belcour 2018, Eq. 10.
     """
-    from velatura.model.papers.statistics import stack_lobes
+    from velatura.model.registry import stack_lobes
 
     stack = Stack([Interface(eta=eta, alpha=alpha)])
     sine = np.sin(np.radians(angle))
@@ -120,7 +120,7 @@ def absorption(depth: float, alpha: float, angle: float) -> dict[str, Any]:
 
     Belcour 2018, Eqs. 15-17.
     """
-    from velatura.model.papers.statistics import stack_lobes
+    from velatura.model.registry import stack_lobes
 
     stack = Stack([Medium(sigma_a=depth), Interface(conductor="mirror", alpha=alpha)])
     sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))
@@ -141,7 +141,7 @@ def scattering(depth: float, g: float, angle: float) -> dict[str, Any]:
 
     Belcour 2018, Eq. 21.
     """
-    from velatura.model.papers.statistics import stack_lobes
+    from velatura.model.registry import stack_lobes
 
     stack = Stack([Medium(sigma_s=depth, g=g), Interface(eta=1.0)])
     sine, cosine = np.sin(np.radians(angle)), np.cos(np.radians(angle))

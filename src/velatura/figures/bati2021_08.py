@@ -14,7 +14,7 @@ import numpy as np
 
 from velatura.figures import canvas
 from velatura.inverse import smooth_pair
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.stack import Interface, Stack
 
 ENERGY = 0.15

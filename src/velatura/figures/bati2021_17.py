@@ -17,7 +17,7 @@ from velatura.figures import canvas, looks
 from velatura.figures.looks import MODEL
 from velatura.inverse import alternatives, grazing, invert_stack, plots
 from velatura.inverse.figure_targets import FIGURES
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.stack import Stack
 
 ORDERS = ("17 blue over red", "17 red over blue")

@@ -14,7 +14,7 @@ import numpy as np
 from velatura.figures import bati2021_15, canvas, looks
 from velatura.figures.looks import COSINES, MODEL
 from velatura.inverse import plots
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 
 NAMES = {"15 b, low": "low absorption", "15 b, high": "high absorption"}
 

@@ -19,7 +19,7 @@ from velatura.figures import canvas
 from velatura.inverse import Target, invert_stack
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model import named
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.stack import Stack
 

@@ -8,7 +8,6 @@ has the symmetric form, which the paper renders; the forward one stands beside i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +39,7 @@ def compute(
     """
     cells: list[dict[str, Any]] = []
     pictures: list[dict[str, Any]] = []
-    models = [replace(named(MODEL, form=form, **canvas.CHOICES), name=form) for form in canvas.FORMS]
+    models = [named(MODEL, form=form, **canvas.CHOICES).replaced(name=form) for form in canvas.FORMS]
     for alpha in canvas.track(alphas, progress):
         # As numbers
         stack = Stack([Interface(eta=2.0, alpha=alpha), Interface(eta=0.01, k=1.0, alpha=alpha)])

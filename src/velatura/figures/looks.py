@@ -18,7 +18,7 @@ from velatura.inverse import Layers, invert_stack, on_black
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.plots import CHANNELS, FILLS
 from velatura.model.lobe_statistics import StackLobes
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.scenes.environments import studio
 from velatura.stack import Stack
 

@@ -14,7 +14,7 @@ import numpy as np
 from velatura.imports.metals import MOST, of_edge
 from velatura.imports.result import Imported, Notes
 from velatura.imports.values import Array, Value, changed, middle, rounded
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.optics import fresnel
 from velatura.stack import RGB, Diffuse, Film, Interface, Layer, Medium, Stack, Texture
 from velatura.stack.coatings import STEP_MIN

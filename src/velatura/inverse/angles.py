@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from velatura.inverse.partial_stack import Array, take
 from velatura.model import Model, named, variance_kind
+from velatura.model.base import Query
 from velatura.model.context import Context
 from velatura.model.papers import bsdf, mixture
 from velatura.ops import Value
@@ -150,10 +151,10 @@ def table_of(
 
 def read(material: Material, directions: Directions, model: Model) -> tuple[Value, Value]:
     """As `radiance`, of a material with values of NumPy by any model."""
-    seen = model.recursion.body(material, model, variance_kind(material), Context())
+    seen = model.body(material, variance_kind(material), Context())
     if isinstance(seen, bsdf.Lobed):
         return radiance(seen, directions)
-    reflected = bsdf.Asked(transmission=False)
+    reflected = Query(transmission=False)
     value, _ = seen.eval_pdf(tuple(directions.wi), tuple(directions.wo), reflected)
     return value, seen.albedo(tuple(directions.lit), reflected)
 
@@ -168,7 +169,7 @@ def radiance(seen: bsdf.Lobed, directions: Directions) -> tuple[Value, Value]:
     lit = bsdf.scattered(seen, tuple(directions.lit))
     energy = sum(part.energy for part in (*lit.reflected, lit.base) if part)
     if seen.above.model.form == "symmetric":
-        return seen.eval_pdf(wi, wo, bsdf.Asked(transmission=False))[0], energy
+        return seen.eval_pdf(wi, wo, Query(transmission=False))[0], energy
     reflected, base = take((tuple(lit.reflected), lit.base), directions.which, directions.lit.shape[-1])
     return mixture.eval_pdf(reflected, base, wi, wo)[0], energy
 

@@ -17,10 +17,11 @@ from velatura.inverse.interface import DENSER, RARER, Choice, conductor_tint
 from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, Mask, join
 from velatura.inverse.roots import bisect
 from velatura.inverse.stacks import Partial, pruned
-from velatura.model import DEFAULT, Model, lobes, named, variance_kind
+from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
+from velatura.model.papers.adding import lobes
 from velatura.model.papers.prepare import prepare
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.model.variance import Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import (
     Diffuse,
@@ -155,7 +156,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> Kept:
         return [(np.broadcast_to(lobe.energy, (3, 1)), above.variance_of(lobe.roughness)) for lobe in found]
 
     wanted = solver_reads(material)
-    if (model.recursion.closed_form and not any(material.films)) or not wanted:
+    if (model.closed_form and not any(material.films)) or not wanted:
         return _solved(stack, above, eta_max, wanted)
 
     # Ask for other lobes, until the model itself reads those of the bare stack

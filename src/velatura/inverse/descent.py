@@ -23,7 +23,7 @@ from velatura.inverse.interface import conductor_extinction
 from velatura.inverse.partial_stack import CLEAR, Array
 from velatura.model import Model, named, variance_kind
 from velatura.model.papers import bsdf
-from velatura.model.papers.mixture import ALPHA_MIN
+from velatura.model.variance import ALPHA_MIN
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.stack import (
@@ -193,9 +193,9 @@ def descended(
     coated = [start for start in map(load, starts) if any(start.films)]
     ends = [Descent(table, start, model, eta_max, darkest, films=films).run(ALONE) for start in coated]
     bare = [start for start in map(load, starts) if not any(start.films)]
-    ends += [Descent(table, start, model.adder, eta_max, darkest).run().of(model) for start in bare]
+    ends += [Descent(table, start, model.surrogate, eta_max, darkest).run().of(model) for start in bare]
     ends.sort(key=lambda end: end.cost)
-    if ends and not model.recursion.closed_form and not any(ends[0].descent.start.films):
+    if ends and not model.closed_form and not any(ends[0].descent.start.films):
         ends[0] = ends[0].descent.run(LAST)
     return ends
 
@@ -230,7 +230,7 @@ class End:
         What the two differ by at one end is added to the residuals of the next descent: space mapping
         (Bandler et al. 1994), of residuals in place of parameters. Where slopes differ, it ends beside the minimum.
         """
-        if model.recursion.closed_form:
+        if model.closed_form:
             return self
         end = self
         for _ in range(MAPPED):
@@ -355,7 +355,7 @@ class Descent:
     @property
     def slow(self) -> bool:
         """Whether one point is read at a time."""
-        return not self.model.recursion.closed_form or any(self.start.films)
+        return not self.model.closed_form or any(self.start.films)
 
     @cached_property
     def wanted(self) -> Array:
@@ -391,7 +391,7 @@ class Descent:
                 bounds=bounds,
                 x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
                 xtol=TOLERANCE,
-                ftol=TOLERANCE if self.model.recursion.closed_form else COARSE,
+                ftol=TOLERANCE if self.model.closed_form else COARSE,
                 gtol=None,
                 max_nfev=rounds,
             )

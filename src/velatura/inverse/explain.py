@@ -106,7 +106,7 @@ def infeasible(target: Target, model: Model) -> Infeasible:
         return Infeasible(
             bound.why(target), bound.lobe + 1, bound.reason, refined.ways_from(found, target, bound, model)
         )
-    closed = _in_closed_form(target, model.adder, ROUGHLY)
+    closed = _in_closed_form(target, model.surrogate, ROUGHLY)
     return Infeasible(closed.why, closed.lobe, closed.constraint, refined.ways(closed.directions, target, model))
 
 

@@ -61,7 +61,7 @@ def fit_target(
     """
     wanted = read(target)
     chosen = model_of(wanted, model, **switches)
-    found = [_with_media(solution.stack) for solution in _first(wanted, starts, chosen.adder, seed)]
+    found = [_with_media(solution.stack) for solution in _first(wanted, starts, chosen.surrogate, seed)]
     if table.directions.brushed:
         turned = [_brushed(stack, angle) for stack in found for angle in BRUSHED]
         found = _closest(table, turned, chosen, wanted.eta_max, starts)
@@ -129,7 +129,7 @@ def _simplest(stack: Stack, interfaces: int, table: ReflectanceTable, model: Mod
     Where one interface less comes as close, a descent begins at that stack with another interface, without effect; if
     it gains nothing either, that stack is the closest.
     """
-    count, opaque, closed = len(stack.interfaces), stack.interfaces[-1].opaque, model.recursion.closed_form
+    count, opaque, closed = len(stack.interfaces), stack.interfaces[-1].opaque, model.closed_form
 
     def itself(start: Stack) -> End:
         return Descent(table, start, model, eta_max, DARKEST, films=False).run(ROUNDS if closed else ALONE)

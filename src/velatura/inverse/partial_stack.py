@@ -129,8 +129,8 @@ class Above(Batch):
     @classmethod
     def nothing(cls, model: Model, exterior: Value = 1.0, variance: type[Variance] = Isotropic) -> Above:
         """Only the exterior medium."""
-        prepared = Prepared(model.adder, (), variance, MAPS[model.map], load())
-        return cls(model.adder, adding.top(prepared, 1.0), exterior, None, variance)
+        prepared = Prepared(model.surrogate, (), variance, MAPS[model.map], load())
+        return cls(model.surrogate, adding.top(prepared, 1.0), exterior, None, variance)
 
     @property
     def f(self) -> RoughnessMap:
@@ -139,7 +139,7 @@ class Above(Batch):
 
     def prepared(self, layers: Layers, reflectance: Value | None = None) -> Prepared:
         """The interfaces as the next layer of each stack; `reflectance` if it is known already."""
-        model = self.model if reflectance is None else dataclasses.replace(self.model, reflectance="fresnel")
+        model = self.model if reflectance is None else self.model.with_switches(reflectance="fresnel")
         material = Material((_interface(layers, self.eta),), self.eta)
         if self.over is not None and self.model.tir != "off":
             # The interface above is there for its indices alone, which total reflection depends on
@@ -240,14 +240,14 @@ def whole(path: Sequence[Layers], exterior: Value, closely: bool = False) -> Mat
 def read_whole(path: Sequence[Layers], exterior: float, model: Model) -> StackLobes:
     """The reflected lobes of one stack of interfaces and the media above them, as the model itself has them."""
     material, normal = whole(path, exterior, closely=True), (np.zeros(1), np.zeros(1), np.ones(1))
-    if model.recursion.closed_form:
-        return model.recursion.statistics(material, model, normal)
+    if model.closed_form:
+        return model.statistics(material, normal)
     from velatura.model.solved.solve import plain  # loads SciPy
 
     # Nothing passes that would be summed up
     layers = (*(_unbrushed(layer) for layer in material.layers), DiffuseValues(0.0))
     material = dataclasses.replace(material, layers=layers)
-    return model.recursion.statistics(plain(material), model, normal)
+    return model.statistics(plain(material), normal)
 
 
 def _unbrushed(layer: LayerValues) -> LayerValues:

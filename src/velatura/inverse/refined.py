@@ -47,13 +47,13 @@ def search(target: Target, model: Model) -> Solution | None:
 
     Of brushed lobes the search goes on from the stack that came nearest, if none of them leads to one.
     """
-    own = _of(target, model.adder, stacks.EFFORTS)
+    own = _of(target, model.surrogate, stacks.EFFORTS)
     if own is not None:
         first = next(own)
-        others = itertools.chain(_corrected(first, target, model), own, _approaching(target, model.adder))
+        others = itertools.chain(_corrected(first, target, model), own, _approaching(target, model.surrogate))
         tried = itertools.islice(itertools.chain([first], others), TRIES)
     else:
-        tried = itertools.islice(_approaching(target, model.adder), FEWER)
+        tried = itertools.islice(_approaching(target, model.surrogate), FEWER)
     nearest, least = None, np.inf
     for n, found in enumerate(tried):
         met = moved(found, target, model, giving=own is not None and n == 0)
@@ -88,7 +88,7 @@ def _corrected(found: Solution, target: Target, model: Model) -> Iterator[Soluti
         for k, (lobe, axes) in enumerate(zip(target.lobes, f.roughness(x[count:]).reshape(-1, 2))):
             asked = asked.with_lobe(k, energy=tuple(x[3 * k : 3 * k + 3].tolist()))
             asked = asked.with_roughness(k, Roughness(axes[0], axes[1], lobe.axes.rotation))
-        return stacks.in_closed_form(asked, model.adder, EFFORT)
+        return stacks.in_closed_form(asked, model.surrogate, EFFORT)
 
     request = goal = numbers(target)
     for _ in range(MAPPED):
@@ -179,7 +179,7 @@ def _keeps(layers: Sequence[Layers], target: Target) -> bool:
 def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
     """What keeps the model from lobes that the nearest one in closed form has a stack for, and that stack; None if it
     has none."""
-    found = stacks.in_closed_form(target, model.adder, EFFORT)
+    found = stacks.in_closed_form(target, model.surrogate, EFFORT)
     if found is None:
         return None
     there = moved(found, target, model, giving=False, effort=0)
@@ -198,7 +198,7 @@ def ways(offered: Sequence[Direction], target: Target, model: Model) -> list[Dir
         if (form, loose) in tried or (found and readings < LEAST_READINGS):
             continue
         tried.append((form, loose))
-        start = stacks.in_closed_form(way.target, model.adder, EFFORT)
+        start = stacks.in_closed_form(way.target, model.surrogate, EFFORT)
         if start is not None:
             near = nearest(start, form, loose, model, max(readings, LEAST_READINGS))
             left -= READINGS // 2

@@ -22,9 +22,8 @@ from velatura.inverse.partial_stack import Above, Array, Batch, Layers, take
 from velatura.inverse.roots import false_position
 from velatura.inverse.target import Target, TargetLobe, read
 from velatura.model import DEFAULT, Model, named
-from velatura.model.papers.mixture import ALPHA_MIN
-from velatura.model.papers.statistics import stack_lobes
-from velatura.model.variance import Variance
+from velatura.model.registry import stack_lobes
+from velatura.model.variance import ALPHA_MIN, Variance
 from velatura.ops import Value
 from velatura.stack import Diffuse, MaterialLike, Stack, load
 
@@ -92,7 +91,9 @@ class Solution:
             return self
         from velatura.inverse.drag import seen  # which solves with this
 
-        return Solution(seen(self.stack, self.target, self.model.adder, quick=True), self.model.adder, self.layers)
+        return Solution(
+            seen(self.stack, self.target, self.model.surrogate, quick=True), self.model.surrogate, self.layers
+        )
 
     @cached_property
     def classes(self) -> tuple[EquivalenceClass, ...]:
@@ -162,7 +163,7 @@ def search(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EF
 
 def exact(target: Target, model: Model) -> bool:
     """Whether the closed form reads lobes as the model itself does: films it knows roughly."""
-    return model.recursion.closed_form and not target.has_films
+    return model.closed_form and not target.has_films
 
 
 def in_closed_form(target: Target, model: Model, efforts: Sequence[tuple[int, int]] = EFFORTS) -> Solution | None:

@@ -7,14 +7,18 @@ interfaces; the recursion does not care which.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from velatura import ops
 from velatura.model.roughness_maps import VARIANCE_MAX, RoughnessMap
 from velatura.ops import Value
 
+if TYPE_CHECKING:
+    from velatura.stack import Material
+
 V = TypeVar("V", bound="Variance")
 
+ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 ALIKE = 2e-7  # difference of two eigenvalues, as share of their mean, that is rounding
 
 
@@ -147,3 +151,17 @@ class Covariance(Variance):
 
     def matrix(self) -> tuple[Value, Value, Value]:
         return self.xx, self.xy, self.yy
+
+
+def variance_kind(material: Material) -> type[Variance]:
+    """The cheapest kind of variance that holds all interfaces; values are only compared, never computed."""
+    same = [is_same(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
+    straight = [is_same(layer.rotation, 0.0) for layer in material.interfaces]
+    if all(same):
+        return Isotropic
+    return PerAxis if all(s or t for s, t in zip(same, straight)) else Covariance
+
+
+def is_same(a: object, b: object) -> bool:
+    """Whether two values are known to be the same."""
+    return a is b or (isinstance(a, float) and isinstance(b, float) and a == b)

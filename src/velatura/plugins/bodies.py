@@ -9,10 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from velatura.binding import STEERING_NM, Binding
+from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
-from velatura.model.models import Model
 from velatura.model.papers import bsdf
-from velatura.model.papers.bsdf import Body
 from velatura.model.solved import spectra, texture_axes
 from velatura.model.solved.textures import Textured
 from velatura.model.variance import Variance
@@ -144,7 +143,7 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     shown = progress.line("velatura: solving textured materials")
     context = Context(number=number, colour=mi.UnpolarizedSpectrum, settle=settled, progress=shown)
     if binding.uniform:
-        body = model.recursion.body(binding.uniform_material(), model, variance, context)
+        body = model.body(binding.uniform_material(), variance, context)
         return Uniform(settled(body))
     nodes = spectra.NODES
     if binding.interferes and not binding.varies:
@@ -152,11 +151,11 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         nodes += -nodes % len(mi.UnpolarizedSpectrum())  # as many as rays carry at a time
     nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, nodes).tolist()]
     places = np.array(spectral.places(nm))
-    if not binding.varies and model.recursion.solves(binding.uniform_material()):
-        solved = spectra.solve(binding.at_wavelengths(nm), places, model, variance, context)
-        return OverWavelengths(mi, binding, settled(solved))
     if not binding.varies:
-        model = model.recursion.unsolved(model)
+        over = model.over_wavelengths(binding.at_wavelengths(nm), places, variance, context)
+        if over:
+            return OverWavelengths(mi, binding, settled(over))
+        model = model.pointwise
     prepared = Prepared(binding, model, variance)
     if binding.varies:
         if mi.is_spectral:
@@ -166,7 +165,7 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
         waves = [spectra.axis(binding.at_wavelengths(nm, material), places)] if colours else []
         known = before.textured if isinstance(before, Tabulated) else None
         symbolic = binding.symbolic(binding.looked_at())
-        textured = model.recursion.textured(material, [*waves, *ranges], symbolic, model, variance, context, known)
+        textured = model.textured(material, [*waves, *ranges], symbolic, variance, context, known)
         if textured:
             return Tabulated(mi, binding, textured)
     if binding.varies or number is None or not binding.stack.interfaces:

@@ -11,11 +11,28 @@ from velatura import kernel, tables
 from velatura.binding import Binding, Image, plugin_class
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, SWITCHES, named, variance_kind
-from velatura.model.models import EXCEPTIONS, GAIN
+from velatura.model.base import Query
 from velatura.model.papers import bsdf
 from velatura.model.papers.lobe_merging import merging
 from velatura.model.variance import Isotropic
 from velatura.plugins import bodies, spectral
+
+GAIN = frozenset({"energy", "white furnace"})  # laws that a gain breaks
+
+#: By form and shape of the stack, the laws that BSDFs do not keep. Light that a lobe sends below the surface is lost.
+#: The forward form is not reciprocal, the symmetric one gains at grazing angles, and its samples have any weight. Of
+#: materials that are solved, the forms are `solved` and `exchanged`, or `balanced` where opaque, isotropic and uniform.
+EXCEPTIONS: dict[tuple[str, str], frozenset[str]] = {
+    ("forward", "opaque"): frozenset({"lossless", "reciprocity"}),
+    ("forward", "pane"): frozenset({"lossless", "reciprocity"}),
+    ("solved", "opaque"): frozenset({"lossless", "reciprocity"}),
+    ("solved", "pane"): frozenset({"lossless", "reciprocity"}) | GAIN,
+    ("symmetric", "opaque"): frozenset({"lossless", "spread"}) | GAIN,
+    ("symmetric", "pane"): frozenset({"lossless", "spread"}) | GAIN,
+    ("exchanged", "opaque"): frozenset({"lossless"}) | GAIN,
+    ("exchanged", "pane"): frozenset({"lossless"}) | GAIN,
+    ("balanced", "opaque"): frozenset({"lossless"}),
+}
 
 
 @kernel.plugin("layered")
@@ -64,7 +81,7 @@ def make(mi: Any) -> type:
         @property
         def exceptions(self) -> frozenset[str]:
             """Laws of `velatura.checks` that it is known not to keep."""
-            solved = not self.model.recursion.closed_form
+            solved = not self.model.closed_form
             if solved and self.delta:
                 return frozenset()
             shape, form = "pane" if self.transmits else "opaque", self.model.form
@@ -149,11 +166,11 @@ def make(mi: Any) -> type:
             lit = active & (si.wi.z != 0 if self.transmits else si.wi.z > 0)
             return dr.clip(spectral.carried(mi, albedo), 0, 1) & lit
 
-        def _asked(self, ctx: Any) -> bsdf.Asked:
+        def _asked(self, ctx: Any) -> Query:
             """The components that are wanted, and of what."""
             wanted = [ctx.is_enabled(kind, component) for component, kind in enumerate(self.kinds)]
             passing = wanted.pop() if self.transmits else False
-            return bsdf.Asked(all(wanted) or wanted, passing, ctx.mode == mi.TransportMode.Radiance)
+            return Query(all(wanted) or wanted, passing, ctx.mode == mi.TransportMode.Radiance)
 
         @property
         def facts(self) -> dict[str, str]:

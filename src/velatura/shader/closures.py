@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import Model, variance_kind
+from velatura.model.base import Query
 from velatura.model.context import Context, at_a_point
+from velatura.model.directions import upright
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes
 from velatura.model.papers import bsdf
-from velatura.model.papers.bsdf import Asked
-from velatura.model.papers.mixture import ALPHA_MIN
 from velatura.model.roughness_maps import AS_IT_IS
-from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.model.variance import ALPHA_MIN, Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.directions import directions
@@ -70,7 +70,7 @@ Closures = Callable[[Direction], list[Closure]]
 def of_body(body: bsdf.Lobed, wi: Direction, straight: bool) -> list[Closure]:
     """The closures for light from wi, of lobes that a model draws outside; `straight` if light leaves into the medium
     that it comes from."""
-    seen, w = bsdf.scattered(body, wi), bsdf.upright(wi, wi)
+    seen, w = bsdf.scattered(body, wi), upright(wi, wi)
     found = [
         Closure("reflection", lobe.energy * _separable(w, lobe.roughness), bounded(lobe.roughness))
         for lobe in seen.reflected
@@ -168,7 +168,7 @@ class Tabulated:
 
     def at(self, wi: Direction, read: Callable[[Direction], Columns], eta: Value) -> list[Closure]:
         """The closures for light from wi, of the columns that are read at an upright direction."""
-        columns, k, found = read(bsdf.upright(wi, wi)), 0, list[Closure]()
+        columns, k, found = read(upright(wi, wi)), 0, list[Closure]()
         for kind in self.kinds:
             weight, k = columns.colour(k), k + 3
             if kind in _SMOOTH:
@@ -217,8 +217,8 @@ def tabulated(material: Material, model: Model, conserving: bool = False) -> Tab
 
 def _at_nodes(side: Material, model: Model, w: Direction, eta: float, conserving: bool) -> list[Closure]:
     """Closures at directions (N,) on a side; models in closed form lose the light that facets block."""
-    if not model.recursion.closed_form:
-        return _of_statistics(model.recursion.statistics(side, model, w), w, eta, conserving)
+    if not model.closed_form:
+        return _of_statistics(model.statistics(side, w), w, eta, conserving)
     found = of_body(bsdf.body(side, model), w, straight=side.transmits and abs(eta - 1) < FAINT)
     return [c._replace(weight=c.weight * albedo(c, w)) if conserving and c.kind not in _SMOOTH else c for c in found]
 
@@ -367,8 +367,8 @@ class Loss:
 def losses(material: Material, model: Model, closures: Closures) -> Iterator[Loss]:
     """Of the closures of a material with values in NumPy, for light from above."""
     material = material.solid()
-    body = model.recursion.body(material, model, variance_kind(material), Context())
-    asked = Asked(radiance=False)
+    body = model.body(material, variance_kind(material), Context())
+    asked = Query(radiance=False)
     u1, u2 = square(PAIRS)
     u = (np.arange(PAIRS) + 0.5) / PAIRS
     for cosine, direction in zip(COSINES, directions(COSINES, 0.0)):

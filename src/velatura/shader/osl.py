@@ -157,7 +157,7 @@ def osl(
     baked: Tabulated | None = None
     known: Closures
     with ops.readable():
-        if chosen.recursion.closed_form:
+        if chosen.closed_form:
             found, known = closures.in_closed_form(stack, chosen, constant, wi)
         else:
             baked = closures.tabulated(numbers, chosen)

@@ -198,7 +198,7 @@ def described(model: Model) -> str:
     """The name of a model, with the switches that were changed."""
     shipped = named(model.name)
     changed = [f"{key}={getattr(model, key)}" for key in SWITCHES if getattr(model, key) != getattr(shipped, key)]
-    changed += ["in closed form"] if model.recursion is not shipped.recursion else []
+    changed += ["in closed form"] if model.closed_form and not shipped.closed_form else []
     return " ".join([model.name, *([f"({', '.join(changed)})"] if changed else [])])
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeGuard
 from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named, variance_kind
+from velatura.model.base import Body
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf, precomputed_lobes
 from velatura.model.papers.adding import Lobe
@@ -108,7 +109,7 @@ def record(
     uniform = is_uniform(stack)
     if baking and not uniform:
         raise InvalidInput("baked: only for materials without textures, since lobes are those of one point")
-    solved = not chosen.recursion.closed_form
+    solved = not chosen.closed_form
     fixed = (solved or baking) and not parameters
     constants = flat if fixed else {*constant, *([] if parameters else films.beside(stack))}
     recorded = films.recorded(symbols(stack, constants), stack, parameters)
@@ -129,7 +130,7 @@ def record(
     with ops.readable():
         energies: list[Value] = []
         if baked is None or isinstance(baked, Bake):
-            body: bsdf.Body
+            body: Body
             body, fields, shown = _lobed(baked.body if baked else prepared(), wi, baked is None, parameters)
         else:
             body, fields, energies = baked.body, baked.fields(wi, parameters), baked.energies(wi)
@@ -160,7 +161,7 @@ def drawn_by(stack: Stack, model: Model) -> Model:
     if model.channels == "separate":
         raise InvalidInput("channels=separate: only for lobes and inverse, since a shader has one lobe for all colours")
     # In closed form a diffuse base alone is Lambert's law
-    return model if is_uniform(stack) and stack.interfaces else model.adder
+    return model if is_uniform(stack) and stack.interfaces else model.surrogate
 
 
 def is_uniform(stack: Stack) -> bool:

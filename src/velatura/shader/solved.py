@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model import Model
+from velatura.model.base import Body
 from velatura.model.context import Context, at_a_point
-from velatura.model.papers.bsdf import Body
-from velatura.model.papers.prepare import is_same
 from velatura.model.solved import rotation_frame, solve
 from velatura.model.solved.bsdf import Columns, Side, Solved
 from velatura.model.solved.energies.adding import Made
@@ -30,7 +29,7 @@ from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.transmission import direct
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Passage
-from velatura.model.variance import Covariance, Variance
+from velatura.model.variance import Covariance, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction

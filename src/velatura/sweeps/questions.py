@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.optics.directions import directions
 from velatura.stack import InterfaceValues, Material, MediumValues, Stack
 

@@ -8,7 +8,7 @@ import velatura as vt
 from fuzzing import Failure
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
-from velatura.model.models import Model
+from velatura.model.base import Model
 
 
 def trial(rng: np.random.Generator) -> list[Failure]:

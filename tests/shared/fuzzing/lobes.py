@@ -13,8 +13,8 @@ from fuzzing import Failure
 from fuzzing.filmed import filmed
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
+from velatura.model.base import Model
 from velatura.model.lobe_statistics import StackLobes
-from velatura.model.models import Model
 
 FILMED = 0.02  # share of stacks with thin films, which take longer
 SLOW = 8.0  # seconds of processor time that no stack may take, far above what most do: clocks of busy machines err

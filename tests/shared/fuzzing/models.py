@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from velatura.model import MODELS, SWITCHES
-from velatura.model.models import Model
+from velatura.model.base import Model
 
 
 def random_model(rng: np.random.Generator, changed: float = 0.25, keep: Sequence[str] = ()) -> Model:

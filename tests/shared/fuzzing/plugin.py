@@ -14,7 +14,7 @@ from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack, textured
 from velatura.checks.grid import Grid, integrate
 from velatura.checks.probe import Array, Probe
-from velatura.model.models import Model
+from velatura.model.base import Model
 
 TEXTURED = 0.05  # share of stacks: varying values are compiled anew, which takes long
 COSINES = (1.0, 0.8, 0.5, 0.2, 0.02, 1e-4, 1e-6)

@@ -11,7 +11,7 @@ from fuzzing import Failure
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack
 from velatura import kernel
-from velatura.model.models import Model
+from velatura.model.base import Model
 
 HEIGHTS = (1.0, 0.6, 0.02, 1e-4, 1e-6)  # cosines, on either side
 SAMPLES = 6  # at each of them

@@ -30,7 +30,8 @@ from velatura.inverse.interface import (
 )
 from velatura.inverse.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
 from velatura.inverse.target import Target
-from velatura.model import Model, lobes
+from velatura.model import Model
+from velatura.model.papers.adding import lobes
 from velatura.model.papers.prepare import prepare
 from velatura.model.roughness_maps import AS_IT_IS, MAPS, VARIANCE_MAX
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
@@ -279,7 +280,7 @@ class Space:
     @property
     def slow(self) -> bool:
         """Whether one point is read at a time."""
-        return not self.quick and (not self.model.recursion.closed_form or self.coated)
+        return not self.quick and (not self.model.closed_form or self.coated)
 
     @property
     def coated(self) -> bool:
@@ -289,12 +290,12 @@ class Space:
     @property
     def quickly(self) -> Space:
         """The space as the nearest model reads it that adds up layers, many points at a time."""
-        return dataclasses.replace(self, model=self.model.adder, quick=True)
+        return dataclasses.replace(self, model=self.model.surrogate, quick=True)
 
     @property
     def winds(self) -> bool:
         """Whether readings wind as coordinates change, as those of a slow model do of lobes with axes."""
-        return self.entries > 1 and not self.model.recursion.closed_form
+        return self.entries > 1 and not self.model.closed_form
 
     @property
     def entries(self) -> int:

@@ -29,7 +29,7 @@ from velatura.inverse.interface import CONDUCTOR_MAX, ENERGY_MIN
 from velatura.inverse.partial_stack import Above, Array, Layers, named_as
 from velatura.inverse.target import Fixed, Target, TargetLobe, kind_of
 from velatura.model import Model
-from velatura.model.papers.statistics import stack_lobes
+from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
@@ -109,7 +109,7 @@ class DraggedStack:
 
     def in_closed_form(self) -> DraggedStack:
         """The same stack and its lobes, read by the model with a closed form."""
-        model = self.model.in_closed_form
+        model = self.model.without_tir
         if model == self.model and not self.space.slow:
             return self
         point = Point(dataclasses.replace(self.space, model=model, quick=True), self.point.x)

@@ -11,19 +11,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
 
 from velatura import ops
+from velatura.model.base import ALL, Model, Query
 from velatura.model.context import Context
-from velatura.model.models import Model
+from velatura.model.directions import refracted, select_direction, upright
 from velatura.model.papers import mixture, precomputed_lobes
 from velatura.model.papers.adding import Lobe, lobes
 from velatura.model.papers.diffuse_base import Base, under, with_means
 from velatura.model.papers.lobe_merging import merged
-from velatura.model.papers.prepare import Prepared, prepare, variance_kind
-from velatura.model.variance import Roughness, Variance
+from velatura.model.papers.prepare import Prepared, prepare
+from velatura.model.variance import Roughness, Variance, variance_kind
 from velatura.ops import Value
-from velatura.optics import fresnel, ggx
+from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.stack import Material
 
@@ -31,53 +31,6 @@ MIN_BRANCH_PROBABILITY = 0.1  # of reflection and of transmission, in the symmet
 EVEN = 0.1  # share of samples that do not go by energy, in the symmetric form
 GRAZING = 0.05  # cosine
 ROUNDING = 1e-6  # share of samples that reflection gets at least: less than that single precision takes for none
-
-
-@dataclass(frozen=True)
-class Asked:
-    """The query to a BSDF: reflection, transmission or both; of radiance, which scales with the squared index, or not.
-
-    `reflection` may also be given for every reflected lobe, and then for the diffuse base.
-    """
-
-    reflection: bool | Sequence[bool] = True
-    transmission: bool = True
-    radiance: bool = True
-
-    def lobes(self, lobes: Sequence[Lobe]) -> Sequence[Lobe]:
-        """The queried reflected lobes."""
-        return [lobe for k, lobe in enumerate(lobes) if self.reflects(k)]
-
-    def reflects(self, k: int) -> bool:
-        """Whether the k-th reflected part is queried: a lobe, from the top, or after all lobes the base."""
-        if isinstance(self.reflection, bool):
-            return self.reflection
-        return k < len(self.reflection) and self.reflection[k]
-
-
-class Body(Protocol):
-    """A material as light meets it, from either side.
-
-    `diffuse` says whether a diffuse part comes after the lobes, among what is reflected; `balanced`, whether its
-    symmetric form conserves energy.
-    """
-
-    @property
-    def diffuse(self) -> bool: ...
-
-    @property
-    def balanced(self) -> bool: ...
-
-    def lit(self, wi: Direction) -> Body:
-        """The same for light from wi alone, which is looked up once."""
-
-    def albedo(self, wi: Direction, asked: Asked = ...) -> Value: ...
-
-    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ...) -> tuple[Value, Value]: ...
-
-    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ...) -> tuple[Direction, Value]: ...
-
-    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = ...) -> Value: ...
 
 
 @dataclass(frozen=True)
@@ -113,11 +66,11 @@ class Lobed:
     def lit(self, wi: Direction) -> Lobed:
         return self
 
-    def albedo(self, wi: Direction, asked: Asked = Asked()) -> Value:
+    def albedo(self, wi: Direction, asked: Query = ALL) -> Value:
         """Energy of the queried parts, a colour."""
         return scattered(self, wi).only(asked).albedo
 
-    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = Asked()) -> tuple[Value, Value]:
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Query = ALL) -> tuple[Value, Value]:
         """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; 0 from below an opaque stack."""
         seen, i, o = scattered(self, wi).only(asked), upright(wi, wi), upright(wo, wi)
         symmetric = self.above.model.form == "symmetric"
@@ -150,7 +103,7 @@ class Lobed:
         value = ops.select(passes, through, value)
         return value, ops.select(passes, share * density_through, (1 - share) * density)
 
-    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = Asked()) -> tuple[Direction, Value]:
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Query = ALL) -> tuple[Direction, Value]:
         """A direction wo from uniform numbers, and the index on its side over that on the side of wi.
 
         Where light cannot go the way that is drawn, `eval_pdf` is 0.
@@ -163,12 +116,12 @@ class Lobed:
         if seen.transmitted is None:
             return upright(o, wi), 1.0
         beyond = _down(mixture.sample([seen.transmitted], None, _beyond(self, i, seen.eta), u, u1, u2, self.even))
-        x, y, z = chosen_direction(passes, beyond, o)
+        x, y, z = select_direction(passes, beyond, o)
         # Clamp samples that end up in the wrong hemisphere
         z = ops.select(passes, ops.minimum(z, 0.0), ops.maximum(z, 0.0))
         return upright((x, y, z), wi), ops.select(passes, seen.eta, 1.0)
 
-    def sample_smooth(self, wi: Direction, u: Value, asked: Asked = Asked()) -> tuple[Direction, Value, Value, Value]:
+    def sample_smooth(self, wi: Direction, u: Value, asked: Query = ALL) -> tuple[Direction, Value, Value, Value]:
         """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
         seen, i = scattered(self, wi).only(asked), upright(wi, wi)
         share = seen.share()
@@ -178,13 +131,13 @@ class Lobed:
             return (-wi[0], -wi[1], wi[2]), 1.0, ops.select(lit, 1.0 if seen.reflected else 0.0, 0.0), reflected
         passes = u < share
         x, y, z = refracted(i, seen.eta)
-        o = chosen_direction(passes, (-x, -y, -z), (-i[0], -i[1], i[2]))
+        o = select_direction(passes, (-x, -y, -z), (-i[0], -i[1], i[2]))
         through = seen.transmitted.energy / (seen.eta * seen.eta) if asked.radiance else seen.transmitted.energy
         probability = ops.select(passes, share, 1 - share)
         weight = ops.divide(ops.select(passes, through, reflected), probability)
         return upright(o, wi), ops.select(passes, seen.eta, 1.0), probability, weight
 
-    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = Asked(), smooth: bool = False) -> Value:
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Query = ALL, smooth: bool = False) -> Value:
         """Number of the part that `sample` draws from, or `sample_smooth`: of all reflected lobes, from the top, then
         of the diffuse base or the transmitted lobe."""
         every = scattered(self, wi)
@@ -207,7 +160,7 @@ class Scattered:
     transmitted: Lobe | None
     eta: Value
 
-    def only(self, asked: Asked) -> Scattered:
+    def only(self, asked: Query) -> Scattered:
         """The queried parts."""
         if asked.reflection is True and asked.transmission:
             return self
@@ -304,7 +257,7 @@ def exchangeable(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Sequence[L
     if stack.below is None:
         return stack.lobes_above(half)[0], None
     half_below = _difference(*_pair_below(stack, wi, wo))
-    seen = chosen_direction(o[2] > 0, half, refracted(half_below, 1 / stack.eta))
+    seen = select_direction(o[2] > 0, half, refracted(half_below, 1 / stack.eta))
     reflected, passed = stack.lobes_above(seen)
     reflected_below, _ = stack.lobes_below(half)
     assert passed is not None
@@ -332,30 +285,12 @@ def _pair_below(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Direction, 
     """Transmitted light in the medium below: wi and wo turned up, the one from above refracted."""
     i, o = upright(wi, wi), _down(upright(wo, wi))
     from_above = wi[2] > 0
-    i_below = chosen_direction(from_above, refracted(i, stack.eta), i)
-    return i_below, chosen_direction(from_above, o, refracted(o, stack.eta))
-
-
-# Directions on either side
-
-
-def upright(w: Direction, wi: Direction) -> Direction:
-    """The direction flipped with wi, so that wi lies in the upper hemisphere."""
-    return w[0], w[1], ops.select(wi[2] < 0, -w[2], w[2])
+    i_below = select_direction(from_above, refracted(i, stack.eta), i)
+    return i_below, select_direction(from_above, o, refracted(o, stack.eta))
 
 
 def _down(w: Direction) -> Direction:
     return w[0], w[1], -w[2]
-
-
-def refracted(w: Direction, eta: Value) -> Direction:
-    """The refracted direction turned up; its height is 0 under total internal reflection."""
-    return w[0] / eta, w[1] / eta, fresnel.cos_transmitted(w[2], eta)
-
-
-def chosen_direction(where: Value, a: Direction, b: Direction) -> Direction:
-    x, y, z = (ops.select(where, p, q) for p, q in zip(a, b))
-    return x, y, z
 
 
 def _chosen(where: Value, a: Lobe, b: Lobe) -> Lobe:

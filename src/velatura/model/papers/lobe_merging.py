@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from velatura import ops
-from velatura.model.models import Model
+from velatura.model.base import Model
 from velatura.model.papers.adding import Lobe
 from velatura.model.papers.prepare import Prepared
 

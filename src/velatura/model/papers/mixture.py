@@ -11,12 +11,10 @@ from math import pi
 from velatura import ops
 from velatura.model.papers.adding import Lobe
 from velatura.model.papers.diffuse_base import Base
-from velatura.model.variance import Roughness
+from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-
-ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 
 
 def probabilities(lobes: Sequence[Lobe], base: Base | None, even: float = 0.0) -> list[Value]:

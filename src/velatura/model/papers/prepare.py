@@ -5,84 +5,42 @@ Values arrive as a `Material`, in any dialect; a renderer hands in constants onc
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import pi
 
 from velatura import ops, tables
+from velatura.model.base import Model
 from velatura.model.context import Context
 from velatura.model.film_average import film_average
-from velatura.model.models import Model
 from velatura.model.roughness_maps import MAPS, RoughnessMap
-from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.model.smooth_interface import SmoothInterface
+from velatura.model.variance import Roughness, Variance, variance_kind
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.sampling import coated
-from velatura.sampling.coated import Coated, Either, Films, absorbs
+from velatura.sampling.coated import Coated, Either, absorbs
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
+from velatura.stack.chain import Meeting, chain
 from velatura.tables import Average, Row, Tables
 
 COS_MIN = 1e-4  # keeps ways through media, and Snell's factors, finite at grazing
 
 
 @dataclass(frozen=True)
-class PreparedInterface(ops.Named):
-    """An interface between media of indices eta_1 above and eta_2 below (colours; kappa None for a dielectric).
+class PreparedInterface(SmoothInterface):
+    """An interface with its roughness, and what a model says of it.
 
-    `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is that of means
-    over the channels: one refracted direction for all colours. `reflectance` is its directional albedo, None where
-    the model takes Fresnel at the mean direction; `leaving` the share of light going up from it that total internal
-    reflection lets out, None where that is all; `absorbed` what films of a dielectric absorb, None for nothing.
+    `reflectance` is its directional albedo, None where the model takes Fresnel at the mean direction; `leaving` the
+    share of light going up from it that total internal reflection lets out, None where that is all; `absorbed` what
+    films of a dielectric absorb, None for nothing.
     """
 
-    eta: Value | None
-    kappa: Value | None
-    n12: Value
     roughness: Roughness
     s_r: Variance
     reflectance: Average | None
     leaving: Average | None
-    films: Films = None
     absorbed: Average | None = None
-
-    @property
-    def opaque(self) -> bool:
-        return self.eta is None or self.kappa is not None
-
-    def reflect(self, cos_theta: Value) -> Value:
-        """Fresnel reflectance of its facets."""
-        if self.eta is None:
-            return 1.0
-        if self.films:
-            if self.opaque and not isinstance(self.films, Either):
-                return self.films.at(cos_theta, self.eta)
-            return self.films.between(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
-        if self.kappa is None:
-            return fresnel.dielectric(cos_theta, self.eta)
-        return fresnel.conductor(cos_theta, self.eta, self.kappa)
-
-    def reflect_together(self, cos2: Value) -> Value:
-        """As `reflect`, by the square of the cosine, with the one refracted direction: all colours are totally
-        reflected from the same angle on."""
-        if self.eta is None or self.kappa is not None or self.films:
-            return self.reflect(ops.sqrt(cos2))
-        return fresnel.dielectric_together(cos2, self.n12, self.eta)
-
-    def pass_together(self, cos2: Value) -> Value:
-        """What facets of a dielectric let pass, likewise."""
-        if self.films:
-            cos_theta = ops.sqrt(cos2)
-            return self.films.passing(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
-        return 1 - self.reflect_together(cos2)
-
-    def absorb(self, cos_theta: Value) -> Value:
-        """What films on the facets of a dielectric absorb."""
-        return 1 - self.reflect(cos_theta) - self.pass_together(cos_theta * cos_theta)
-
-    def reflect_back(self, cos_theta: Value, cos_t: Value) -> Value:
-        """Fresnel reflectance of the facets of a dielectric with films from below, for cosines on both sides."""
-        assert self.films
-        return self.films.reversed().between(cos_t, cos_theta, self.eta)
 
 
 @dataclass(frozen=True)
@@ -130,20 +88,6 @@ class Prepared:
     base: PreparedBase | None = None
 
 
-def variance_kind(material: Material) -> type[Variance]:
-    """The cheapest kind of variance that holds all interfaces; values are only compared, never computed."""
-    same = [is_same(layer.alpha_u, layer.alpha_v) for layer in material.interfaces]
-    straight = [is_same(layer.rotation, 0.0) for layer in material.interfaces]
-    if all(same):
-        return Isotropic
-    return PerAxis if all(s or t for s, t in zip(same, straight)) else Covariance
-
-
-def is_same(a: object, b: object) -> bool:
-    """Whether two values are known to be the same."""
-    return a is b or (isinstance(a, float) and isinstance(b, float) and a == b)
-
-
 def prepare(
     material: Material, model: Model, variance: type[Variance] | None = None, context: Context | None = None
 ) -> Prepared:
@@ -152,16 +96,16 @@ def prepare(
     variance = variance or variance_kind(material)
     averages = _Averages(model, context)
     layers: list[PreparedInterface | PreparedMedium] = []
-    eta_1, n_leaving, base = material.exterior, None, None
+    n_leaving, base = None, None
     n: Value = 1.0  # index so far, over that outside
-    for layer, films in zip(material.layers, coated.of(material)):
+    for meeting in chain(material, coated.of(material)):
+        layer, above = meeting.layer, meeting.above
         if isinstance(layer, InterfaceValues):
-            layers.append(_interface(layer, eta_1, n_leaving, averages, variance, films))
+            layers.append(_interface(layer, meeting, n_leaving, averages, variance))
             if layer.kind == "dielectric":
-                n = n * ops.mean(layer.eta / eta_1)
-                n_leaving = ops.mean(eta_1 / layer.eta)
+                n = n * ops.mean(layer.eta / above)
+                n_leaving = ops.mean(above / layer.eta)
                 ops.names(n_leaving=n_leaving)
-                eta_1 = layer.eta
         elif isinstance(layer, DiffuseValues):
             base = PreparedBase(layer.albedo, n)
         else:
@@ -176,20 +120,13 @@ def _medium(layer: MediumValues) -> PreparedMedium:
 
 
 def _interface(
-    layer: InterfaceValues,
-    eta_1: Value,
-    n_leaving: Value | None,
-    averages: _Averages,
-    variance: type[Variance],
-    films: Films,
+    layer: InterfaceValues, meeting: Meeting, n_leaving: Value | None, averages: _Averages, variance: type[Variance]
 ) -> PreparedInterface:
     roughness = Roughness(layer.alpha_u, layer.alpha_v, layer.rotation * (pi / 180))
     s_r = variance.of(roughness, MAPS[averages.model.map])
-    eta = layer.eta / eta_1 if layer.kind != "mirror" else None
-    kappa = layer.k / eta_1 if layer.kind == "conductor" else None
-    n12 = ops.mean(layer.eta) / ops.mean(eta_1) if layer.kind == "dielectric" else 1.0
-    facets = PreparedInterface(eta, kappa, n12, roughness, s_r, None, averages.leaving(n_leaving), films)
-    return replace(facets, reflectance=averages.reflectance(facets), absorbed=averages.absorbed(facets))
+    facets = SmoothInterface.of(meeting)
+    known = averages.reflectance(facets), averages.leaving(n_leaving), averages.absorbed(facets)
+    return PreparedInterface(facets.eta, facets.kappa, facets.n12, roughness, s_r, *known, films=facets.films)
 
 
 @dataclass(frozen=True)
@@ -199,7 +136,7 @@ class _Averages:
     model: Model
     context: Context
 
-    def reflectance(self, facets: PreparedInterface) -> Average | None:
+    def reflectance(self, facets: SmoothInterface) -> Average | None:
         eta, kappa = facets.eta, facets.kappa
         if self.model.reflectance in ("fresnel", "fg"):
             return None
@@ -226,7 +163,7 @@ class _Averages:
             row = tables.with_films(self.context.tables, row, facets.reflect, absorbs(films))
         return self._of(row)
 
-    def absorbed(self, facets: PreparedInterface) -> Average | None:
+    def absorbed(self, facets: SmoothInterface) -> Average | None:
         """What films of a dielectric absorb, by the cosine and the roughness."""
         films, multiple = facets.films, self.model.microsurface
         if facets.opaque or films is None or not absorbs(films):

@@ -6,29 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from velatura.model.base import Model
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_axis, with_axes_named
-from velatura.model.models import DEFAULT, Model, named
 from velatura.model.papers.adding import Lobe, lobes
 from velatura.model.papers.diffuse_base import under, with_means
 from velatura.model.papers.prepare import prepare
-from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
-from velatura.stack import Material, Stack
-
-
-def stack_lobes(
-    stack: Stack,
-    cos_theta: ArrayLike,
-    phi: ArrayLike = 0.0,
-    model: str | Model = DEFAULT,
-    **switches: str,
-) -> StackLobes:
-    """The lobes of a stack; see `velatura.lobes`."""
-    chosen = named(model, **switches)
-    x, y, z = directions(cos_theta, phi).T
-    return chosen.recursion.statistics(Material.of(stack).solid(), chosen, (x, y, z))
+from velatura.stack import Material
 
 
 def added(material: Material, model: Model, wi: Direction) -> StackLobes:

@@ -16,9 +16,10 @@ from itertools import pairwise
 from typing import Any
 
 from velatura import ops
-from velatura.model.papers.bsdf import Asked, chosen_direction, upright
-from velatura.model.papers.prepare import PreparedInterface
+from velatura.model.base import ALL, Query
+from velatura.model.directions import select_direction, upright
 from velatura.model.roughness_maps import RoughnessMap
+from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import Index, OwnMediumLobe
 from velatura.model.solved.lobes.remainder import Remainder, Samples
@@ -31,7 +32,6 @@ from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.sampling.coated import OfInterface, either
 
-ALL = Asked()
 FAINT = 1e-9  # energy of a part that is drawn even where it has none
 GRAZING = 1e-6  # cosine
 HEAVY = 2.9  # weight of a sample
@@ -55,9 +55,9 @@ class Shape:
 
     interface: int
     n: Index
-    facets: PreparedInterface | None
+    facets: SmoothInterface | None
     n_first: Index
-    first: PreparedInterface | None
+    first: SmoothInterface | None
 
     def lobe(self, weight: Value, roughness: Roughness) -> OwnMediumLobe:
         reflect = self.facets.reflect_together if self.facets else None
@@ -197,7 +197,7 @@ class Seen:
     def passed(self) -> Value:
         return 0.0 if self.columns.passed is None else self.columns.passed
 
-    def only(self, asked: Asked) -> Drawn:
+    def only(self, asked: Query) -> Drawn:
         """Chances of what is asked for: as samples are shared among all parts, or by energy where some are not."""
         passes = self.columns.passes
         wanted = [asked.reflects(number) for number in self.numbers]
@@ -292,19 +292,19 @@ class Solved:
         )
         return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
 
-    def albedo(self, wi: Direction, asked: Asked = ALL) -> Value:
+    def albedo(self, wi: Direction, asked: Query = ALL) -> Value:
         """Energy of the queried parts, a colour."""
         of, _ = self.seen(wi)
         reflected = sum(energy for number, energy in zip(of.numbers, of.energies) if asked.reflects(number))
         return reflected + of.passed if asked.transmission else reflected
 
-    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Query = ALL) -> tuple[Value, Value]:
         """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`."""
         of, eta = self.seen(wi)
         back = replace(self, known=None).seen(wo)[0] if self.symmetric else None
         return eval_pdf(of, back, eta, wi, wo, asked)
 
-    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ALL) -> tuple[Direction, Value]:
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Query = ALL) -> tuple[Direction, Value]:
         """A direction wo, and the index on its side over that on the side of wi."""
         of, eta = self.seen(wi)
         i, drawn = of.turned(wi, wi), of.only(asked)
@@ -316,15 +316,15 @@ class Solved:
             for above, chance in zip(of.lobes[-2::-1], drawn.chances[-2:0:-1]):
                 begin = begin - chance
                 lobe = refracted_lobe.either(u < begin, above, lobe)
-            wo = chosen_direction(within, of.out_of(lobe, i, u1, u2), wo)
+            wo = select_direction(within, of.out_of(lobe, i, u1, u2), wo)
         if of.passage is None or drawn.passes is None:
             return wo, 1.0
         again = ops.clip(ops.divide(u, drawn.share), 0.0, combined.BELOW_ONE)
         through = combined.sample(of.passage, drawn.passes, i, again, u1, u2)
-        wo = chosen_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
+        wo = select_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
         return upright(wo, wi), ops.select(wo[2] < 0, eta, 1.0)
 
-    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = ALL) -> Value:
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Query = ALL) -> Value:
         """Number of the part that `sample` drew wo from: an interface from the top, the remainder, or last what passes.
         Light that does not pass the facets of a rough dielectric is reflected by the first one."""
         of, _ = self.seen(wi)
@@ -344,7 +344,7 @@ class Solved:
 
 
 def eval_pdf(
-    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Asked
+    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Query
 ) -> tuple[Value, Value]:
     """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
     i, o, drawn = of.turned(wi, wi), of.turned(wo, wi), of.only(asked)
@@ -406,7 +406,7 @@ def _either(where: Value, a: Shape, b: Shape) -> Shape:
     return Shape(a.interface, select(where, a.n, b.n), facets, select(where, a.n_first, b.n_first), first)
 
 
-def _of_either(where: Value, a: PreparedInterface | None, b: PreparedInterface | None) -> PreparedInterface:
+def _of_either(where: Value, a: SmoothInterface | None, b: SmoothInterface | None) -> SmoothInterface:
     """The indices of either interface; None for one without a step."""
     some = a or b
     assert some

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.papers.mixture import ALPHA_MIN
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import Index, OwnMediumLobe
 from velatura.model.solved.transmission import combined, internal_reflections
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Passage
-from velatura.model.variance import Roughness
+from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.sampling import low_discrepancy

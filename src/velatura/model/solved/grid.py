@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from velatura.model.papers.mixture import ALPHA_MIN
 from velatura.model.solved.bsdf import Columns
 from velatura.model.solved.transmission.combined import Parts
+from velatura.model.variance import ALPHA_MIN
 from velatura.sampling import directional_grid
 from velatura.stack import InterfaceValues, Material
 

@@ -10,10 +10,8 @@ from collections.abc import Set
 from dataclasses import dataclass, replace
 from math import pi
 
-from velatura.model.papers.bsdf import Asked, Body
-from velatura.model.papers.prepare import is_same
-from velatura.model.solved.bsdf import ALL
-from velatura.model.variance import PerAxis, Variance
+from velatura.model.base import ALL, Body, Query
+from velatura.model.variance import PerAxis, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
@@ -102,17 +100,17 @@ class Turned:
     def lit(self, wi: Direction) -> Turned:
         return replace(self, body=self.body.lit(self._inside(wi)))
 
-    def albedo(self, wi: Direction, asked: Asked = ALL) -> Value:
+    def albedo(self, wi: Direction, asked: Query = ALL) -> Value:
         return self.body.albedo(self._inside(wi), asked)
 
-    def eval_pdf(self, wi: Direction, wo: Direction, asked: Asked = ALL) -> tuple[Value, Value]:
+    def eval_pdf(self, wi: Direction, wo: Direction, asked: Query = ALL) -> tuple[Value, Value]:
         return self.body.eval_pdf(self._inside(wi), self._inside(wo), asked)
 
-    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Asked = ALL) -> tuple[Direction, Value]:
+    def sample(self, wi: Direction, u: Value, u1: Value, u2: Value, asked: Query = ALL) -> tuple[Direction, Value]:
         wo, eta = self.body.sample(self._inside(wi), u, u1, u2, asked)
         return ggx.rotate(wo, -self.angle), eta
 
-    def component(self, wi: Direction, wo: Direction, u: Value, asked: Asked = ALL) -> Value:
+    def component(self, wi: Direction, wo: Direction, u: Value, asked: Query = ALL) -> Value:
         return self.body.component(self._inside(wi), self._inside(wo), u, asked)
 
     def _inside(self, w: Direction) -> Direction:

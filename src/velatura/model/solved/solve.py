@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model.base import Model
 from velatura.model.context import Context, channels
-from velatura.model.models import Model
-from velatura.model.papers.prepare import Prepared, PreparedInterface, prepare
+from velatura.model.smooth_interface import SmoothInterface, smooth_interfaces
 from velatura.model.solved import reciprocal_balance, sample_allocation
 from velatura.model.solved.bsdf import FAINT, ROOTS, Columns, Shape, Side, Solved
 from velatura.model.solved.energies.adding import Made, Part, interfaces, parts
@@ -253,7 +253,7 @@ class Solver:
     def side(self, material: Material, layout: Layout, curves: Any, polynomial: Remainder, context: Context) -> Side:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
-        shapes = shapes_of(prepare(material, geometry(self.model), self.variance, context), layout.lobes)
+        shapes = shapes_of(smooth_interfaces(material), layout.lobes)
         passage = self.passage(material, layout)
         return Side(
             curves, tuple(shapes), polynomial, polynomial.samples, passage, context.colour, self.colours, self.kind
@@ -296,7 +296,7 @@ class Solver:
         )
 
         # Draw lobes and veils
-        shapes, found = shapes_of(prepare(_slim(material), geometry(self.model), self.variance), drawn), parts(material)
+        shapes, found = shapes_of(smooth_interfaces(_slim(material)), drawn), parts(material)
         tensors = widths.tensors(found, cosine, phi, np.array([ops.mean(each) for each in lobes]))
         shown = [
             widths.veil(found, each.interface, cosine, tensors[each.interface])
@@ -530,11 +530,6 @@ def _reflects_all(found: Sequence[Part]) -> bool:
     return any(np.min(below / above) * np.mean(above) < 1 for above, below in glass)
 
 
-def geometry(model: Model) -> Model:
-    """A model by which layers are prepared for no more than the laws of Snell and Fresnel."""
-    return replace(model.in_closed_form, reflectance="fresnel")
-
-
 def _slim(material: Material) -> Material:
     """With colours of one channel where all are alike, in single precision: what integrals need."""
 
@@ -612,9 +607,8 @@ def _evenly(of: Parts, least: float) -> Parts:
     return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)
 
 
-def shapes_of(prepared: Prepared, drawn: Sequence[Drawn]) -> list[Shape]:
+def shapes_of(found: Sequence[SmoothInterface], drawn: Sequence[Drawn]) -> list[Shape]:
     """One for each lobe."""
-    found = [layer for layer in prepared.layers if isinstance(layer, PreparedInterface)]
     indices = [Index.of(1.0)]
     for layer in found:
         indices.append(Index.of(indices[-1].n * layer.n12))

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
+from velatura.model.base import Body, Model
 from velatura.model.context import Context
-from velatura.model.models import Model
-from velatura.model.papers.bsdf import Body
 from velatura.model.solved.energies.adding import Lambert, Part, parts
 from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.lobes.remainder import Remainder

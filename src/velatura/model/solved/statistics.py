@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import tables
+from velatura.model.base import Model
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_axis, with_axes_named
-from velatura.model.models import Model
-from velatura.model.papers.prepare import prepare, variance_kind
 from velatura.model.roughness_maps import MAPS
+from velatura.model.smooth_interface import smooth_interfaces
 from velatura.model.solved import equivalent_roughness
 from velatura.model.solved.bsdf import Shape
 from velatura.model.solved.energies.adding import Part, parts
@@ -21,9 +21,9 @@ from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.lobes import refracted_lobe, widths
 from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.sample_allocation import Wanted
-from velatura.model.solved.solve import Layout, geometry, layout_of, shapes_of
+from velatura.model.solved.solve import Layout, layout_of, shapes_of
 from velatura.model.solved.transmission import combined, direct
-from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
+from velatura.model.variance import Covariance, Isotropic, Roughness, Variance, variance_kind
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.stack import InterfaceValues, Material, MediumValues
@@ -64,7 +64,7 @@ def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
 
     layout = layout_of([material])
     facets = [place for place, part in enumerate(found) if isinstance(part, Facets)]
-    drawn = shapes_of(prepare(material, geometry(model), kind), layout.lobes)
+    drawn = shapes_of(smooth_interfaces(material), layout.lobes)
     tensors = widths.tensors(found, cos_theta, phi, solved.lobes.mean(axis=1)) if facets else []
     reflected = []
     for k, (place, shape, tensor) in enumerate(zip(facets, drawn, tensors)):

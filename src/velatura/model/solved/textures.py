@@ -21,9 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
-from velatura.model.models import Model
-from velatura.model.papers.bsdf import Body
 from velatura.model.solved import solve, texture_axes
 from velatura.model.solved.bsdf import FAINT, Columns, Side, Solved
 from velatura.model.solved.lobes import remainder

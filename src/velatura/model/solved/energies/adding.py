@@ -22,6 +22,7 @@ from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.sampling import coated
 from velatura.stack import DiffuseValues, Material, MediumValues
+from velatura.stack.chain import chain
 
 Array = NDArray[np.floating]
 
@@ -110,8 +111,8 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
     """
     outside = float(ops.mean(_colours(material.exterior)))
     found: list[Part] = []
-    above = _colours(material.exterior) / outside
-    for each, films in zip(material.solid().layers, coated.of(material)):
+    for meeting in chain(material.solid(), coated.of(material)):
+        each, above = meeting.layer, _colours(meeting.above) / outside
         if isinstance(each, MediumValues):
             tau_a, tau_s = (_colours(each.depth * sigma) for sigma in (each.sigma_a, each.sigma_s))
             g = _colours(each.g)
@@ -124,9 +125,7 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
             k = _colours(each.k) / outside if each.kind == "conductor" else None
             angle = float(np.radians(each.rotation))
             facets = Facets(above, below, k, float(each.alpha_u), float(each.alpha_v), angle)
-            found.append(replace(facets, films=films) if films else facets)
-            if each.kind == "dielectric" and below is not None:
-                above = below
+            found.append(replace(facets, films=meeting.films) if meeting.films else facets)
     return found
 
 

@@ -20,8 +20,7 @@ from math import pi
 import numpy as np
 
 from velatura import ops
-from velatura.model.papers.mixture import ALPHA_MIN
-from velatura.model.variance import Roughness
+from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction

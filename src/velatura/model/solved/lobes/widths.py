@@ -22,13 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.papers.mixture import ALPHA_MIN
 from velatura.model.solved.energies.adding import Part
 from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
-from velatura.model.variance import Roughness
+from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.optics import fresnel
 
 Array = NDArray[np.floating]

@@ -36,15 +36,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.papers.mixture import ALPHA_MIN
 from velatura.model.roughness_maps import RoughnessMap
-from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
+from velatura.model.variance import ALPHA_MIN, Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.sampling import coated, low_discrepancy
 from velatura.sampling.coated import Films, dielectric_passing
 from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.stack.chain import chain
 
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
 WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
@@ -132,23 +132,24 @@ def passage(
     rough: int | None = None,
     cloudy: Sequence[int] | None = None,
 ) -> Passage:
-    """A material that transmits, ready for light from above; `kind` as of `prepare.variance_kind`. `stepped` are the
+    """A material that transmits, ready for light from above; `kind` as of `variance_kind`. `stepped` are the
     interfaces that make a step of the index, `rough` is the last one whose facets turn light, `cloudy` are the
     slabs that scatter; None for all, for the last one, and for those of media whose scattering is not known to be 0.
     """
-    above, n = material.exterior, 1.0
+    n = 1.0
     crossings: list[Crossing] = []
     slabs = [Slab()]
-    for layer, films in zip(material.solid().layers, coated.of(material)):
+    for meeting in chain(material.solid(), coated.of(material)):
+        layer = meeting.layer
         if isinstance(layer, MediumValues):
             tau_s = layer.sigma_s * layer.depth
             clear = is_none(tau_s) if cloudy is None else len(crossings) not in cloudy
             slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
-        crossings.append(_crossing(layer, above, n, kind, films))
+        crossings.append(_crossing(layer, meeting.above, n, kind, meeting.films))
         slabs.append(Slab())
-        above, n = layer.eta, crossings[-1].n_2
+        n = crossings[-1].n_2
     count = len(crossings)
     lower, *others = reversed(range(count) if stepped is None else stepped or [count - 1])
     faces = tuple(float(k in (lower, *others[:1])) for k in range(count))

@@ -1,0 +1,94 @@
+"""The model whose lobes are GGX in their own media, with energies that are solved for all directions at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from velatura.model.base import SWITCHES, Body, Model
+from velatura.model.papers.model import PaperModel
+from velatura.optics.ggx import Direction
+
+if TYPE_CHECKING:
+    from velatura.model.context import Context
+    from velatura.model.lobe_statistics import StackLobes
+    from velatura.model.solved.spectra import Spectra
+    from velatura.model.solved.textures import Textured
+    from velatura.model.variance import Variance
+    from velatura.stack import Material
+
+REFLECTANCES = "fgd", "fgd-multi"
+
+
+@dataclass(frozen=True)
+class SolvedModel(Model):
+    """Adding on nodes of tangential momentum (docs/explanation/model.md). It is calibrated for one value of each switch
+    but the reflectance and the form."""
+
+    closed_form: ClassVar[bool] = False
+
+    name: str
+    reflectance: str
+    form: str = "forward"
+    tir: str = field(default="published", init=False)
+    map: str = field(default="belcour", init=False)
+    scale: str = field(default="shipped", init=False)
+    channels: str = field(default="mean", init=False)
+    medium: str = field(default="shipped", init=False)
+    fetch: str = field(default="averaged", init=False)
+    lobes: str = field(default="all", init=False)
+
+    @property
+    def surrogate(self) -> PaperModel:
+        return PaperModel(self.name, self.reflectance, tir="off", form=self.form)
+
+    @property
+    def without_tir(self) -> PaperModel:
+        return self.surrogate
+
+    @property
+    def pointwise(self) -> PaperModel:
+        return self.surrogate.with_switches(reflectance="fresnel")
+
+    def allowed(self, key: str) -> tuple[str, ...]:
+        return REFLECTANCES if key == "reflectance" else SWITCHES[key] if key == "form" else (getattr(self, key),)
+
+    def body(self, material: Material, variance: type[Variance], context: Context) -> Body:
+        from velatura.model.solved import rotation_frame, solve
+
+        if not _is_solved(material):
+            return self.pointwise.body(material, variance, context)
+        frame = rotation_frame.frame(material)
+        return frame.turned(solve.solve(frame.back(material), self, frame.kind(variance), context), material)
+
+    def statistics(self, material: Material, wi: Direction) -> StackLobes:
+        from velatura.model.solved import statistics
+
+        return statistics.solved_lobes(material, self, wi)
+
+    def over_wavelengths(
+        self, material: Material, places: Any, variance: type[Variance], context: Context
+    ) -> Spectra | None:
+        from velatura.model.solved import spectra
+
+        return spectra.solve(material, places, self, variance, context) if _is_solved(material) else None
+
+    def textured(
+        self, material: Material, ranges: Any, symbolic: Any, variance: type[Variance], context: Context, known: Any
+    ) -> Textured | None:
+        from velatura.model.solved import textures
+
+        if _is_bare(material):
+            return None
+        return textures.textured(material, ranges, symbolic, self, variance, context, known)
+
+
+def _is_solved(material: Material) -> bool:
+    """Whether a material with constants of a renderer spreads light, but for a diffuse base alone, which is exact."""
+    from velatura.sampling.variables import plain
+
+    return not _is_bare(material) and any(layer.spreads for layer in plain(material).layers)
+
+
+def _is_bare(material: Material) -> bool:
+    return material.kinds == ("diffuse",)
