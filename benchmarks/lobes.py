@@ -25,7 +25,7 @@ from velatura.model.solved.energies.adding import parts
 from velatura.model.solved.energies.energies import INCIDENCES, energies
 from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.lobes import refracted_lobe, remainder, widths
-from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.variance import Roughness
 from velatura.stack import Material, Stack
@@ -53,7 +53,7 @@ def binned(x: Array, y: Array) -> Any:
     return i * BINS + j
 
 
-def of_lobe(lobe: OwnMediumLobe, wi: tuple[float, float, float]) -> Array:
+def of_lobe(lobe: RefractedLobe, wi: tuple[float, float, float]) -> Array:
     """Light of a lobe on the bins, of energy 1."""
     if min(lobe.roughness.alpha_u, lobe.roughness.alpha_v) > NARROW:
         wo, cell = over_the_disc()
@@ -97,7 +97,7 @@ def modelled(stack: Stack, cosines: Array, often: bool) -> Array:
     return light
 
 
-def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> OwnMediumLobe:
+def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> RefractedLobe:
     """The lobe of an interface, for the mean over colours."""
 
     def reflected(cos2: Array) -> Array:
@@ -111,8 +111,8 @@ def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> OwnMedium
     first = widths.first_step([each.step for each in facets[:k]])
     n = float(np.mean(facets[k].above))
     if first is None:
-        return OwnMediumLobe(1.0, roughness, n, reflected)
-    return OwnMediumLobe(1.0, roughness, n, None if facets[k].opaque else reflected, leaving)
+        return RefractedLobe(1.0, roughness, n, reflected)
+    return RefractedLobe(1.0, roughness, n, None if facets[k].opaque else reflected, leaving)
 
 
 def main() -> None:

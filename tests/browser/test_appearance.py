@@ -354,7 +354,7 @@ def test_scattering_media_and_mirrors_are_dragged_and_say_what_cannot_be(visit: 
     assert look.get_by_text("A medium that scatters stays where it is.").is_visible()
     assert look.get_by_label("Energy", exact=True).is_enabled()
 
-    open_material(page, "Crossed brushing")
+    open_material(page, "MomentumInSlabs brushing")
     chosen(page, 2)
     look.get_by_label("Energy", exact=True).fill("0.5")
     look.get_by_label("Energy", exact=True).press("Enter")

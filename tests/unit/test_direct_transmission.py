@@ -12,7 +12,7 @@ from scipy import stats
 import velatura as vt
 from velatura import kernel
 from velatura.model.solved.transmission import direct
-from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.variance import variance_kind
 from velatura.stack import Material, number
 
@@ -33,11 +33,11 @@ BRUSHED = vt.Stack(
 STACKS = {"rough": ROUGH, "inside": INSIDE, "pane": PANE, "brushed": BRUSHED}
 
 
-def passages(stack: vt.Stack) -> tuple[Passage, Passage]:
+def transmissions(stack: vt.Stack) -> tuple[Transmission, Transmission]:
     """From above and from below."""
     material = Material.of(stack, number)
     kind = variance_kind(material)
-    return tuple(direct.passage(m, kind) for m in (material, material.reversed()))  # type: ignore[return-value]
+    return tuple(direct.transmission(m, kind) for m in (material, material.reversed()))  # type: ignore[return-value]
 
 
 def random_stack(rng: np.random.Generator, count: int, brushed: bool = True) -> vt.Stack:
@@ -75,7 +75,7 @@ def test_it_is_reciprocal_to_rounding() -> None:
     differences = []
     for case in range(60):
         stack = random_stack(rng, 1 + case % 4)
-        above, below = passages(stack)
+        above, below = transmissions(stack)
         n = float(np.mean(Material.of(stack, number).below))
         wi, wo = directions(rng, 200), directions(rng, 200)
         there = direct.eval_pdf(above, wi, down(wo))[0] / (wo[2] * n * n)
@@ -91,7 +91,7 @@ def test_it_is_reciprocal_to_rounding() -> None:
 def test_samples_follow_their_density_on_both_sides(name: str, cos_theta: float) -> None:
     """Chi-square over cells of the sphere, and of what is lost; beyond the critical angle, too (inside, cosine 0.5). A
     false alarm in 10^5 each."""
-    above, _ = passages(STACKS[name])
+    above, _ = transmissions(STACKS[name])
     rng, count, rows, columns, fine = np.random.default_rng(1), 100_000, 24, 12, 12
     wo = direct.sample(above, at(cos_theta, 0.4, count), *rng.random((3, count)))
     cell_z = np.clip(((wo[2] + 1) * 0.5 * rows).astype(int), 0, rows - 1)
@@ -114,7 +114,7 @@ def test_samples_follow_their_density_on_both_sides(name: str, cos_theta: float)
 @pytest.mark.parametrize("name", STACKS)
 def test_the_integral_is_the_mean_of_samples(name: str) -> None:
     """Energy and the share of samples that pass, each within 4 standard errors and 0.003."""
-    above, _ = passages(STACKS[name])
+    above, _ = transmissions(STACKS[name])
     rng, count = np.random.default_rng(2), 40_000
     for cos_theta, phi in ((1.0, 0.0), (0.6, 1.0), (0.3, 2.0)):
         wi = at(cos_theta, phi, count)
@@ -132,10 +132,10 @@ def test_few_samples_weigh_much(brushed: bool, most: float) -> None:
     """Of 1 to 4 interfaces, from both sides: 199 of 200 at most 1.5 times what was spent on them."""
     rng = np.random.default_rng(5)
     for case in range(40):
-        for passage in passages(random_stack(rng, 1 + case % 4, brushed)):
+        for transmission in transmissions(random_stack(rng, 1 + case % 4, brushed)):
             wi = directions(rng, 2000)
-            wo = direct.sample(passage, wi, *rng.random((3, 2000)))
-            value, density = direct.eval_pdf(passage, wi, wo)
+            wo = direct.sample(transmission, wi, *rng.random((3, 2000)))
+            value, density = direct.eval_pdf(transmission, wi, wo)
             assert np.mean(value > 1.5 * density) < 0.005
             assert np.all(value <= most * density)
 
@@ -146,15 +146,15 @@ def test_an_interface_without_contrast_changes_nothing() -> None:
     rng = np.random.default_rng(6)
     wi, wo = directions(rng, 500), directions(rng, 500)
     layers = [vt.Interface(eta=1.5, alpha=0.15), vt.Interface(eta=1.2, alpha=0.3)]
-    plain, _ = passages(vt.Stack(layers))
+    plain, _ = transmissions(vt.Stack(layers))
     for extra in (
         [*layers, vt.Interface(eta=1.2, alpha=0.5)],
         [layers[0], vt.Interface(eta=1.5, alpha=0.5), layers[1]],
     ):
-        more, _ = passages(vt.Stack(extra))
+        more, _ = transmissions(vt.Stack(extra))
         for a, b in zip(direct.eval_pdf(plain, wi, down(wo)), direct.eval_pdf(more, wi, down(wo))):
             np.testing.assert_allclose(a, b, rtol=1e-4, atol=1e-6)
-    alone, _ = passages(vt.Stack([vt.Interface(eta=1.0, alpha=0.4)]))
+    alone, _ = transmissions(vt.Stack([vt.Interface(eta=1.0, alpha=0.4)]))
     wo = direct.sample(alone, wi, *rng.random((3, 500)))
     moved = np.hypot(wo[0] + wi[0], wo[1] + wi[1])
     assert np.quantile(moved, 0.9) < 5e-4
@@ -168,16 +168,16 @@ def test_an_interface_without_contrast_changes_nothing() -> None:
 def test_samples_of_hardly_a_step_follow_their_density(eta: float, alpha: float | tuple[float, float]) -> None:
     """From both sides: the mean over samples of a narrow distribution over their density is its integral, 1, within 4
     standard errors; a false alarm in 10^4 each."""
-    for passage in passages(vt.Stack([vt.Interface(eta=eta, alpha=alpha, rotation=30)])):
+    for transmission in transmissions(vt.Stack([vt.Interface(eta=eta, alpha=alpha, rotation=30)])):
         rng, count = np.random.default_rng(4), 20_000
         wi = at(0.6, 1.0, count)
-        wo = direct.sample(passage, wi, *rng.random((3, count)))
-        density = direct.eval_pdf(passage, wi, wo)[1] + (wo[2] >= 0)
-        x, y = (w * passage.indices[-1] + i for w, i in zip(wo, wi[:2]))
+        wo = direct.sample(transmission, wi, *rng.random((3, count)))
+        density = direct.eval_pdf(transmission, wi, wo)[1] + (wo[2] >= 0)
+        x, y = (w * transmission.indices[-1] + i for w, i in zip(wo, wi[:2]))
         x, y = 0.75**0.5 * x + 0.5 * y, 0.75**0.5 * y - 0.5 * x
         u, v = np.median(np.abs(x)), np.median(np.abs(y))
         narrow = np.exp(-((x / u) ** 2) - (y / v) ** 2) / (np.pi * u * v)
-        share = np.where(wo[2] < 0, narrow / density, 0) * np.abs(wo[2]) * passage.indices[-1] ** 2
+        share = np.where(wo[2] < 0, narrow / density, 0) * np.abs(wo[2]) * transmission.indices[-1] ** 2
         assert abs(share.mean() - 1) < 4 * share.std() / np.sqrt(count)
 
 
@@ -190,7 +190,9 @@ def test_narrow_and_grazing_light_is_finite() -> None:
     for n_1 in (1.0, 1.0 + 1e-7, 1.5):
         for n_2 in (1.0, n_1, n_1 + 1e-7, 1.8):
             for alpha in (0.0, 0.5):
-                above, _ = passages(vt.Stack([vt.Interface(eta=n_1, alpha=0.2), vt.Interface(eta=n_2, alpha=alpha)]))
+                above, _ = transmissions(
+                    vt.Stack([vt.Interface(eta=n_1, alpha=0.2), vt.Interface(eta=n_2, alpha=alpha)])
+                )
                 for o in (wo, down(wo)):
                     assert all(np.isfinite(x).all() for x in direct.eval_pdf(above, wi, o))
                 assert np.isfinite(direct.sample(above, wi, *np.full((3, len(wi[0])), 0.5))).all()
@@ -198,9 +200,9 @@ def test_narrow_and_grazing_light_is_finite() -> None:
 
 def test_energy_rises_smoothly_towards_the_critical_angle() -> None:
     """From inside glass, 1.5: light passes beyond it, and the energy has no step there."""
-    passage, _ = passages(INSIDE)
+    transmission, _ = transmissions(INSIDE)
     sine = np.linspace(0.6, 0.8, 41)
-    energy, *_ = direct.integrals(passage, (sine, 0 * sine, np.sqrt(1 - sine * sine)))
+    energy, *_ = direct.integrals(transmission, (sine, 0 * sine, np.sqrt(1 - sine * sine)))
     assert energy[0, -1] > 0.05
     assert all(0 < a - b < 0.05 for a, b in pairwise(energy[0]))
 
@@ -217,9 +219,9 @@ def test_drjit_agrees_with_numpy() -> None:
     theirs = Material.of(stack, lambda name, x: mi.Color3f(x) if np.ndim(x) else mi.Float(float(x)))
     dr.enable_grad(theirs.interfaces[0].alpha_u, theirs.interfaces[1].eta)
     kind = variance_kind(material)
-    ours = direct.passage(theirs, kind)
+    ours = direct.transmission(theirs, kind)
     value, density = direct.eval_pdf(ours, *(tuple(mi.Float(x) for x in w) for w in (wi, wo)))
-    expected = direct.eval_pdf(direct.passage(material, kind), wi, wo)
+    expected = direct.eval_pdf(direct.transmission(material, kind), wi, wo)
     dr.backward(value.y + density)
     assert np.isfinite(np.array(dr.grad(theirs.interfaces[0].alpha_u))).all()
     assert np.isfinite(np.array(dr.grad(theirs.interfaces[1].eta))).all()
@@ -227,7 +229,7 @@ def test_drjit_agrees_with_numpy() -> None:
     np.testing.assert_allclose(np.array(density), expected[1], rtol=2e-3, atol=1e-5)
     u = rng.random((3, 300))
     samples = direct.sample(ours, tuple(mi.Float(x) for x in wi), *(mi.Float(x) for x in u))
-    there = direct.sample(direct.passage(material, kind), wi, *u)
+    there = direct.sample(direct.transmission(material, kind), wi, *u)
     assert np.mean(np.abs(np.array(samples) - np.array(there)).max(0) < 1e-3) > 0.99
 
 
@@ -243,7 +245,7 @@ def test_one_interface_is_the_rough_dielectric_of_mitsuba(n_above: float, n_belo
     rng, count = np.random.default_rng(8), 2000
     wi, wo = directions(rng, count), directions(rng, count)
     wo = (wo[0], wo[1], wo[2] * np.where(np.arange(count) % 2, 1, -1))
-    value, density = direct.eval_pdf(passages(stack)[0], wi, wo)
+    value, density = direct.eval_pdf(transmissions(stack)[0], wi, wo)
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = mi.Vector3f(*wi)
     known, known_density = theirs.eval_pdf(mi.BSDFContext(mi.TransportMode.Importance), si, mi.Vector3f(*wo))

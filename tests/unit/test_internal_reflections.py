@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import velatura as vt
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.transmission import direct, internal_reflections
-from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.solved.transmission.internal_reflections import Rest
 from velatura.model.variance import variance_kind
 from velatura.stack import Material
@@ -28,9 +28,9 @@ def milk(g: float, depth: float, cut: int = 1) -> vt.Stack:
     return vt.Stack([vt.Interface(eta=1.5, alpha=0.1), *parts[1:], vt.Interface(eta=1.2, alpha=0.2)])
 
 
-def passage_of(stack: vt.Stack) -> Passage:
+def passage_of(stack: vt.Stack) -> Transmission:
     material = Material.of(stack)
-    return direct.passage(material, variance_kind(material))
+    return direct.transmission(material, variance_kind(material))
 
 
 def at(cos_theta: float, count: int = 1) -> Direction:
@@ -44,16 +44,16 @@ def at(cos_theta: float, count: int = 1) -> Direction:
 def test_the_rest_has_the_energy_and_the_share_of_its_densities(stack: vt.Stack) -> None:
     """Sampled, against the quadrature of the energy and a mean of the density over the sphere: within 5 standard
     errors and 0.005."""
-    passage, rng, count = passage_of(stack), np.random.default_rng(1), 100_000
+    transmission, rng, count = passage_of(stack), np.random.default_rng(1), 100_000
     for cos_theta in (0.9, 0.4):
         wi = at(cos_theta, count)
-        found, i = internal_reflections.rest(passage, wi), internal_reflections.seen_below(passage, wi)
+        found, i = internal_reflections.rest(transmission, wi), internal_reflections.seen_below(transmission, wi)
         o = internal_reflections.sample_rest(found, i, *rng.random((3, count)))
         value, density = internal_reflections.eval_pdf_rest(found, i, o)
         weight = np.atleast_2d(np.where(density > 0, value / np.maximum(density, 1e-30), 0))
         wi = at(cos_theta)
         energy = internal_reflections.integral_rest(
-            internal_reflections.rest(passage, wi), internal_reflections.seen_below(passage, wi)
+            internal_reflections.rest(transmission, wi), internal_reflections.seen_below(transmission, wi)
         )
         error = 5 * weight.std(1) / np.sqrt(count) + 0.005
         assert np.all(np.abs(weight.mean(1) - energy[:, 0]) < error)
@@ -67,11 +67,11 @@ def test_the_rest_has_the_energy_and_the_share_of_its_densities(stack: vt.Stack)
 def test_light_that_bounces_is_about_the_direction_that_light_goes_on_in() -> None:
     """Brightest for a pane where light goes straight on; a single interface has none."""
     assert internal_reflections.bounced(passage_of(ROUGH), at(0.7)) is None
-    passage = passage_of(PANE)
+    transmission = passage_of(PANE)
     wi = at(0.7)
-    lobe = internal_reflections.bounced(passage, wi)
+    lobe = internal_reflections.bounced(transmission, wi)
     assert lobe
-    np.testing.assert_allclose(internal_reflections.seen_below(passage, wi), wi, atol=1e-12)
+    np.testing.assert_allclose(internal_reflections.seen_below(transmission, wi), wi, atol=1e-12)
     z, phi = (x.ravel() for x in np.meshgrid(np.linspace(0.01, 1, 200), np.linspace(0, 2 * np.pi, 201)))
     r = np.sqrt(1 - z * z)
     wo = r * np.cos(phi), r * np.sin(phi), z
@@ -103,21 +103,21 @@ def test_light_of_the_pane_leaves_within_the_cone_of_its_rarest_medium() -> None
     """From 1.5 into 2, through a smooth interface below the last rough one: up to a sine of 0.75, none beyond."""
     stack = vt.Stack([vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=2.0, alpha=0)])
     material = Material.of(stack)
-    passage = direct.passage(material, variance_kind(material), rough=0)
+    transmission = direct.transmission(material, variance_kind(material), rough=0)
     sine = np.array([0.2, 0.74, 0.76, 0.99])
     wi, o = at(0.5, 4), (sine, 0 * sine, np.sqrt(1 - sine * sine))
     value, density = internal_reflections.eval_pdf_rest(
-        internal_reflections.rest(passage, wi), internal_reflections.seen_below(passage, wi), o
+        internal_reflections.rest(transmission, wi), internal_reflections.seen_below(transmission, wi), o
     )
     assert ((value > 0) == [True, True, False, False]).all() and ((density > 0) == (value > 0)).all()
 
 
 def test_grazing_light_and_light_beyond_the_critical_angle_is_finite() -> None:
     for stack in (PANE, milk(0.9, 1), vt.Stack([vt.Interface(eta=1.0, alpha=0.2)], exterior=1.5)):
-        passage = passage_of(stack)
+        transmission = passage_of(stack)
         for cos_theta in (1e-6, 0.1, 0.5, 1.0):
             wi = at(cos_theta)
-            found, i = internal_reflections.rest(passage, wi), internal_reflections.seen_below(passage, wi)
+            found, i = internal_reflections.rest(transmission, wi), internal_reflections.seen_below(transmission, wi)
             assert np.isfinite(internal_reflections.integral_rest(found, i)).all()
             for o in (at(1e-6), at(0.5), at(1.0)):
                 assert all(np.isfinite(x).all() for x in internal_reflections.eval_pdf_rest(found, i, o))

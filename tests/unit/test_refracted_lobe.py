@@ -16,7 +16,7 @@ from velatura import kernel, ops
 from velatura.model.papers import mixture
 from velatura.model.papers.adding import Lobe
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import Index, OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
 from velatura.shader import symbol
@@ -35,12 +35,12 @@ def leaving(eta: float) -> Callable[[Any], Any]:
 
 # name -> of the first interface, of metals and dielectrics under coats, in a medium that light leaves easily
 LOBES = {
-    "first": OwnMediumLobe(1.0, Roughness(0.3, 0.1, 0.4), facets=reflectance(1.5)),
-    "narrow": OwnMediumLobe(1.0, Roughness(0.05, 0.05, 0.0), 1.5, leaving=leaving(1.5)),
-    "brushed": OwnMediumLobe(1.0, Roughness(0.4, 0.1, -0.7), 1.3, leaving=leaving(1.5)),
-    "very rough": OwnMediumLobe(1.0, Roughness(0.6, 0.6, 0.0), 1.8, leaving=leaving(1.6)),
-    "dielectric": OwnMediumLobe(1.0, Roughness(0.2, 0.3, 1.0), 2.0, reflectance(1 / 1.5), leaving(1.4)),
-    "air gap": OwnMediumLobe(1.0, Roughness(0.2, 0.2, 0.0), 0.8, reflectance(1.5), leaving(1.3)),
+    "first": RefractedLobe(1.0, Roughness(0.3, 0.1, 0.4), facets=reflectance(1.5)),
+    "narrow": RefractedLobe(1.0, Roughness(0.05, 0.05, 0.0), 1.5, leaving=leaving(1.5)),
+    "brushed": RefractedLobe(1.0, Roughness(0.4, 0.1, -0.7), 1.3, leaving=leaving(1.5)),
+    "very rough": RefractedLobe(1.0, Roughness(0.6, 0.6, 0.0), 1.8, leaving=leaving(1.6)),
+    "dielectric": RefractedLobe(1.0, Roughness(0.2, 0.3, 1.0), 2.0, reflectance(1 / 1.5), leaving(1.4)),
+    "air gap": RefractedLobe(1.0, Roughness(0.2, 0.2, 0.0), 0.8, reflectance(1.5), leaving(1.3)),
 }
 COSINES = (1.0, 0.7, 0.3, 0.1)
 AZIMUTH = 0.5
@@ -188,7 +188,7 @@ def test_a_denser_medium_needs_no_bounds(name: str) -> None:
 def test_a_smooth_lobe_is_the_reflection_of_a_smooth_layer(cosine: float) -> None:
     """Its albedo is the product of the Fresnel factors, and its light goes in the mirror direction."""
     n, eta = 1.7, 0.8
-    lobe = OwnMediumLobe(1.0, Roughness(0.0, 0.0, 0.0), n, reflectance(eta), leaving(1.4))
+    lobe = RefractedLobe(1.0, Roughness(0.0, 0.0, 0.0), n, reflectance(eta), leaving(1.4))
     inside = np.sqrt(1 - (1 - cosine**2) / n**2)
     smooth = fresnel.dielectric(inside, eta) * (1 - fresnel.dielectric(cosine, 1.4))
     wi = incident(cosine)
@@ -216,7 +216,7 @@ def test_all_dialects_agree() -> None:
     u = np.random.default_rng(14).random((2, 200))
 
     def outputs(number: Callable[[Any], Any], colour: Any, *values: Any) -> list[Any]:
-        lobe = OwnMediumLobe(
+        lobe = RefractedLobe(
             0.5, Roughness(number(0.2), number(0.4), number(0.3)), number(1.6), reflectance(colour), leaving(1.5)
         )
         w, o = values[:3], values[3:6]
@@ -247,7 +247,7 @@ def test_values_and_gradients_are_finite() -> None:
     for x in parameters:
         dr.enable_grad(x)
     u, v, index, rotation, eta = parameters
-    lobe = OwnMediumLobe(1.0, Roughness(u, v, rotation), index, reflectance(eta), leaving(1.5))
+    lobe = RefractedLobe(1.0, Roughness(u, v, rotation), index, reflectance(eta), leaving(1.5))
     value, pdf = refracted_lobe.eval_pdf(lobe, wi, wo)
     x, y, z = refracted_lobe.sample(lobe, wi, ad.Float(np.abs(o[0])), ad.Float(phi / 4))
     dr.backward(dr.sum(value + pdf + x + y + z))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from velatura.model.solved.sample_allocation import LIGHT, Wanted, shared
+from velatura.model.solved.sample_allocation import TARGET_SAMPLE_WEIGHT, Demand, shared
 
 
-def wanted(energy: list[float], usual: list[float], heaviest: list[float]) -> Wanted:
-    return Wanted(*(np.array([x]).T for x in (energy, usual, heaviest)))
+def wanted(energy: list[float], usual: list[float], heaviest: list[float]) -> Demand:
+    return Demand(*(np.array([x]).T for x in (energy, usual, heaviest)))
 
 
 def test_parts_whose_samples_are_light_have_shares_in_proportion_to_their_energies() -> None:
@@ -25,8 +25,8 @@ def test_shares_keep_samples_light_as_far_as_they_suffice(usual: list[float], he
     found = shared(wanted([0.3, 0.1, 0.1], usual, heaviest))[:, 0]
     assert found.sum() == pytest.approx(1)
     for weights in (heaviest, usual):
-        if sum(weights) <= LIGHT:
-            assert np.all(np.array(weights) / found <= LIGHT * (1 + 1e-9))
+        if sum(weights) <= TARGET_SAMPLE_WEIGHT:
+            assert np.all(np.array(weights) / found <= TARGET_SAMPLE_WEIGHT * (1 + 1e-9))
             break
     else:
         np.testing.assert_allclose(found, np.array(usual) / sum(usual), rtol=0.01)

@@ -60,7 +60,7 @@ def test_weights_are_bounded_without_loss(stack: str | int, monkeypatch: pytest.
     """Of the light of samples .1 % at most is more than weights may be; three random stacks with rough dielectrics of
     which few visible facets reflect are among them."""
     _, found = body(stack if isinstance(stack, str) else random_stack(np.random.default_rng((0, stack))))
-    monkeypatch.setattr(bsdf, "HEAVY", 1e9)
+    monkeypatch.setattr(bsdf, "MAX_SAMPLE_WEIGHT", 1e9)
     for i, cosine in enumerate((0.98, 0.8, 0.55, 0.3, 0.1)):
         wi = from_cosine(cosine, 2.4 * i)
         value, density = found.eval_pdf(wi, found.sample(wi, *uniform(i))[0], POWER)

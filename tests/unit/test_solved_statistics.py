@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import velatura as vt
 from velatura.model.solved import equivalent_roughness
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
 from velatura.reference import roughness
@@ -114,10 +114,10 @@ def leaving(cosine: Array) -> Array:
 @pytest.mark.parametrize(("n", "alpha"), [(1.6, (0.1, 0.1)), (1.6, (0.3, 0.15)), (1.3, (0.1, 0.4))])
 def test_equivalents_are_those_of_the_reference(n: float, alpha: tuple[float, float]) -> None:
     """Of many random samples, by medians and a search of the reference's own; its medians have steps."""
-    lobe = OwnMediumLobe(1.0, Roughness(*alpha, 0.0), n, None, leaving)
+    lobe = RefractedLobe(1.0, Roughness(*alpha, 0.0), n, None, leaving)
     sine = np.sqrt(1 - COSINES**2)
     wi = sine, 0 * sine, COSINES
-    each = OwnMediumLobe(1.0, Roughness(*(np.full(3, a) for a in (*alpha, 0.0))), n, None, leaving)
+    each = RefractedLobe(1.0, Roughness(*(np.full(3, a) for a in (*alpha, 0.0))), n, None, leaving)
     found = equivalent_roughness.roughness(equivalent_roughness.of_lobe(each, wi), np.zeros(3))
     u1, u2 = np.random.default_rng(5).random((2, 200_000))
     for k, one in enumerate(np.stack(wi, axis=-1)):
@@ -134,7 +134,7 @@ def test_equivalents_are_those_of_the_reference(n: float, alpha: tuple[float, fl
 
 def test_a_lobe_outside_is_its_own_equivalent() -> None:
     sine = np.sqrt(1 - COSINES**2)
-    lobe = OwnMediumLobe(1.0, Roughness(np.full(3, 0.3), np.full(3, 0.1), np.full(3, 0.5)))
+    lobe = RefractedLobe(1.0, Roughness(np.full(3, 0.3), np.full(3, 0.1), np.full(3, 0.5)))
     found = equivalent_roughness.roughness(equivalent_roughness.of_lobe(lobe, (sine, 0 * sine, COSINES)))
     np.testing.assert_allclose([found.alpha_u, found.alpha_v], [[0.3] * 3, [0.1] * 3], rtol=0.01)
     np.testing.assert_allclose(found.rotation, 0.5, atol=0.02)
@@ -174,7 +174,7 @@ def test_the_roughness_of_what_a_pane_passes_is_that_of_walks() -> None:
 def test_roughness_outside_has_no_steps() -> None:
     """Of a wide lobe in a dense medium, part of whose light is totally reflected: it grows steadily with its own."""
     alpha = np.linspace(0.22, 0.34, 61)
-    lobe = OwnMediumLobe(1.0, Roughness(alpha, alpha, 0 * alpha), 2.15, None, leaving)
+    lobe = RefractedLobe(1.0, Roughness(alpha, alpha, 0 * alpha), 2.15, None, leaving)
     found = equivalent_roughness.roughness(
         equivalent_roughness.of_lobe(lobe, (0 * alpha, 0 * alpha, 1 + 0 * alpha)), 0 * alpha
     )

@@ -12,7 +12,7 @@ import velatura as vt
 from velatura import Interface, Medium, Stack, kernel
 from velatura.model.solved.energies.adding import Part, parts
 from velatura.model.solved.lobes import refracted_lobe, widths
-from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.variance import Roughness
 from velatura.optics import fresnel
 from velatura.stack import Material
@@ -122,7 +122,7 @@ WALKED = {
 }
 
 
-def binned(lobe: OwnMediumLobe, cosine: float, bins: int) -> Array:
+def binned(lobe: RefractedLobe, cosine: float, bins: int) -> Array:
     """Light of a lobe on a grid over the projected disc, of energy 1."""
     fine = 8
     x, y = np.meshgrid(*[(np.arange(bins * fine) + 0.5) / (0.5 * bins * fine) - 1] * 2, indexing="ij")
@@ -156,7 +156,7 @@ def test_lobes_are_as_wide_as_walks(name: str) -> None:
                 return 1 - fresnel.dielectric(c, layers[0].eta)
 
             roughness = Roughness(*(np.broadcast_to(x, cosines.shape)[i] for x in shape))
-            lobe = OwnMediumLobe(1.0, roughness, n, None if layer.k else facets, leaving if k else None)
+            lobe = RefractedLobe(1.0, roughness, n, None if layer.k else facets, leaving if k else None)
             light += energies[k, i] * binned(lobe, cosine, bins)
             n *= eta
         if name != "brushed":

@@ -74,7 +74,7 @@ class Body(Protocol):
     @property
     def balanced(self) -> bool: ...
 
-    def lit(self, wi: Direction) -> Body:
+    def at_direction(self, wi: Direction) -> Body:
         """The same for light from wi alone, which is looked up once."""
 
     def albedo(self, wi: Direction, asked: Query = ...) -> Value: ...

@@ -139,7 +139,7 @@ def make(mi: Any) -> type:
                 bs.wo = mi.Vector3f(*drawn)
                 part = smooth.component(wi, drawn, sample1, asked, smooth=True)
             else:
-                body = body.lit(wi)
+                body = body.at_direction(wi)
                 drawn, bs.eta = body.sample(wi, sample1, sample2.x, sample2.y, asked)
                 bs.wo = mi.Vector3f(*drawn)
                 # The direction as it is given, whose numbers in scalar variants are rounded

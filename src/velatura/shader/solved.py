@@ -21,14 +21,15 @@ from velatura.model import Model
 from velatura.model.base import Body
 from velatura.model.context import Context, at_a_point
 from velatura.model.solved import rotation_frame, solve
-from velatura.model.solved.bsdf import Columns, Side, Solved
+from velatura.model.solved.bsdf import Side, Solved
+from velatura.model.solved.columns import Columns
 from velatura.model.solved.energies.adding import Made
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.rotation_frame import Frame, Turned
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
 from velatura.model.solved.transmission import direct
 from velatura.model.solved.transmission.combined import Parts
-from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.variance import Covariance, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
@@ -109,7 +110,7 @@ class Tabulated:
     def numbers(self) -> int:
         """Of its layout."""
         bodies = [self.straight.above, *([self.straight.below] if self.straight.below else [])]
-        return sum(len(_flags(side.passage)) for side in bodies if side.passage) + (self.angle is not None)
+        return sum(len(_flags(side.transmission)) for side in bodies if side.transmission) + (self.angle is not None)
 
     @property
     def turns(self) -> int:
@@ -147,8 +148,8 @@ class Tabulated:
         found |= {"remainder": columns.scale, "remainder_chance": columns.chance}
         if columns.passes:
             found |= {f"passed_{name}": value for name, value in vars(columns.passes).items()}
-        if general and columns.passes and seen.passage:
-            passes = ops.mean(direct.entered(seen.passage, seen.turned(wi, wi)).passes[0])
+        if general and columns.passes and seen.transmission:
+            passes = ops.mean(direct.entered(seen.transmission, seen.turned(wi, wi)).passes[0])
             straight = columns.passes.of_straight
             found |= {"passed_refracted": straight * passes, "passed_mirrored": straight * (1 - passes)}
         return found
@@ -201,9 +202,9 @@ class Tabulated:
         layouts: Sequence[Layout],
         degrees: Value,
     ) -> Solution:
-        passages = map(solver.passage, solve.sides(material), layouts)
+        transmissions = map(solver.transmission, solve.sides(material), layouts)
         layout = [] if self.angle is None else [degrees]
-        layout += [flag for passage in passages if passage for flag in _flags(passage)]
+        layout += [flag for transmission in transmissions if transmission for flag in _flags(transmission)]
         return Solution(
             self.texels(_rows(solver, found)), np.concatenate(list(map(_colours, found))), np.array(layout, np.float32)
         )
@@ -239,7 +240,9 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
         polynomial = Remainder(*(_colours(found[k]) if found else colours))
         context = replace(at_a_point(), colour=together)
         side = solver.side(seen, layout, None, polynomial, context)
-        sides.append(replace(side, passage=_any(side.passage, flags)) if general and side.passage else side)
+        sides.append(
+            replace(side, transmission=_any(side.transmission, flags)) if general and side.transmission else side
+        )
     columns = _placed(sides[0], rows)
     for k, beam in enumerate(_beams(len(sides), model)):
         curves = _Curves(columns, tuple(Texture(solver.shape, group, beam) for group in columns.groups))
@@ -249,16 +252,16 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     return made if found is None else replace(made, solved=made.solution(solver, found, plain, layouts, degrees))
 
 
-def _flags(passage: Passage) -> list[Value]:
+def _flags(transmission: Transmission) -> list[Value]:
     """Which interfaces shape the light that passes."""
-    return [*passage.faces, *passage.under, *passage.scattered]
+    return [*transmission.faces, *transmission.under, *transmission.scattered]
 
 
-def _any(passage: Passage, flags: Iterator[Value]) -> Passage:
-    """A passage of any layout."""
-    faces, under, scattered = (tuple(next(flags) for _ in passage.crossings) for _ in range(3))
-    bounces = len(passage.crossings) > 1
-    return replace(passage, faces=faces, under=under, scattered=scattered, bounces=bounces)
+def _any(transmission: Transmission, flags: Iterator[Value]) -> Transmission:
+    """A transmission of any layout."""
+    faces, under, scattered = (tuple(next(flags) for _ in transmission.refractions) for _ in range(3))
+    bounces = len(transmission.refractions) > 1
+    return replace(transmission, faces=faces, under=under, scattered=scattered, bounces=bounces)
 
 
 def _beams(sides: int, model: Model) -> list[Value]:
@@ -270,10 +273,8 @@ def _beams(sides: int, model: Model) -> list[Value]:
 
 def _placed(side: Side, rows: Array | None) -> Places:
     """Where columns lie; those that are the same, if they are known, lie in one place."""
-    counted = count()
-    numbered = replace(side, curves=lambda w: counted, colour=lambda *channels: channels).at(NORMAL)
-    total = next(counted)
-    energies = {k for each in (*numbered.energies, numbered.rest, numbered.passed or ()) for k in each}
+    seldom = side.declaration.groups(side.colours)
+    total = len(seldom)
     constants: list[float | None] = [None] * total
     first = list(range(total))
     if rows is not None:
@@ -281,8 +282,8 @@ def _placed(side: Side, rows: Array | None) -> Places:
         constants = [float(row.flat[0]) if np.ptp(row) == 0 else None for row in rows]
         first = [next(k for k, other in enumerate(rows) if np.array_equal(row, other)) for row in rows]
     groups, places, begin = [], dict[int, int](), 0
-    for name, wanted in (("columns", False), ("energies", True)):
-        own = [k for k in range(total) if first[k] == k and constants[k] is None and (k in energies) == wanted]
+    for name, wanted in (("columns", 0), ("energies", 1)):
+        own = [k for k in range(total) if first[k] == k and constants[k] is None and seldom[k] == wanted]
         places |= {k: 4 * begin + j for j, k in enumerate(own)}
         texels = -(-len(own) // 4)
         groups += [Group(name, begin, texels)] if texels else []

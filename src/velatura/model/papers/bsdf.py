@@ -63,7 +63,7 @@ class Lobed:
         """Whether a diffuse base is the last reflected part."""
         return self.above.base is not None
 
-    def lit(self, wi: Direction) -> Lobed:
+    def at_direction(self, wi: Direction) -> Lobed:
         return self
 
     def albedo(self, wi: Direction, asked: Query = ALL) -> Value:

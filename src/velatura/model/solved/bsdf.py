@@ -20,21 +20,22 @@ from velatura.model.base import ALL, Query
 from velatura.model.directions import select_direction, upright
 from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.smooth_interface import SmoothInterface
+from velatura.model.solved.columns import Column, Columns, Declaration
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import Index, OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
 from velatura.model.solved.lobes.remainder import Remainder, Samples
 from velatura.model.solved.transmission import combined
 from velatura.model.solved.transmission.combined import Parts
-from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.sampling.coated import OfInterface, either
 
-FAINT = 1e-9  # energy of a part that is drawn even where it has none
+ENERGY_EPS = 1e-9  # energy of a part that is drawn even where it has none
 GRAZING = 1e-6  # cosine
-HEAVY = 2.9  # weight of a sample
+MAX_SAMPLE_WEIGHT = 2.9  # weight of a sample
 
 
 class _Roots(RoughnessMap):
@@ -59,9 +60,9 @@ class Shape:
     n_first: Index
     first: SmoothInterface | None
 
-    def lobe(self, weight: Value, roughness: Roughness) -> OwnMediumLobe:
+    def lobe(self, weight: Value, roughness: Roughness) -> RefractedLobe:
         reflect = self.facets.reflect_together if self.facets else None
-        return OwnMediumLobe(weight, roughness, self.n, reflect, self._leaving if self.first else None)
+        return RefractedLobe(weight, roughness, self.n, reflect, self._leaving if self.first else None)
 
     def _leaving(self, cosine: Value) -> Value:
         assert self.first
@@ -69,40 +70,6 @@ class Shape:
         if not n.is_outside:
             cos2 = ops.maximum((n.ring2 + cos2) * (n.inverse * n.inverse), 0.0)
         return self.first.pass_together(cos2)
-
-
-@dataclass(frozen=True)
-class Columns:
-    """What depends on direction: one direction's, or arrays (C, M) and (M,) over directions.
-
-    `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
-    """
-
-    weights: list[Value]
-    roughness: list[tuple[Value, ...]]
-    chances: list[Value]
-    energies: list[Value]
-    scale: Value
-    chance: Value
-    rest: Value
-    passes: Parts | None
-    passed: Value | None
-
-    @property
-    def all(self) -> list[Value]:
-        """In the order in which they are read, those of densities first; the chance of the remainder is what the others
-        leave."""
-        found = [x for roughness, chance in zip(self.roughness, self.chances) for x in (*roughness, chance)]
-        found += [*self.weights, self.scale, *self.energies, self.rest]
-        if self.passes:
-            found += [*vars(self.passes).values(), self.passed]
-        return found
-
-    @property
-    def seldom(self) -> list[bool]:
-        """Which of them are energies: only albedos, and samples of some parts alone, need them."""
-        energies = {id(x) for x in (*self.energies, self.rest, self.passed)}
-        return [id(x) in energies for x in self.all]
 
 
 @dataclass(frozen=True)
@@ -116,63 +83,56 @@ class Side:
     shapes: tuple[Shape, ...]
     polynomial: Remainder
     samples: Samples
-    passage: Passage | None
+    transmission: Transmission | None
     colour: Callable[..., Value]
     colours: int
     kind: type[Variance]
+
+    @property
+    def declaration(self) -> Declaration:
+        return Declaration(len(self.shapes), len(fields(self.kind)), self.transmission is not None)
 
     def at(self, w: Direction) -> Columns:
         """The columns for a direction above."""
         channels = iter(self.curves(w))
 
-        def colour() -> Value:
-            return self.colour(*(ops.channel(next(channels), k) for k in range(self.colours)))
+        def value(column: Column) -> Value:
+            found = [ops.channel(next(channels), k) for k in range(column.rows(self.colours))]
+            return self.colour(*found) if column.colour else found[0]
 
-        def number() -> Value:
-            return ops.channel(next(channels))
+        found = self.declaration.read(map(value, self.declaration.columns))
+        return replace(found, chance=ops.maximum(found.chance, 0.0))
 
-        roughness, chances = [], []
-        for _ in self.shapes:
-            roughness.append(tuple(number() for _ in fields(self.kind)))
-            chances.append(number())
-        weights, scale = [colour() for _ in self.shapes], colour()
-        found, rest = [colour() for _ in self.shapes], colour()
-        passes, through, chance = None, None, 1 - sum(chances)
-        if self.passage:
-            passes = Parts(colour(), colour(), colour(), *(number() for _ in range(len(fields(Parts)) - 3)))
-            through, chance = colour(), chance - passes.share
-        return Columns(weights, roughness, chances, found, scale, ops.maximum(chance, 0.0), rest, passes, through)
-
-    def seen(self, w: Direction) -> Seen:
+    def seen(self, w: Direction) -> SideView:
         """What light from a direction above sees."""
         return self._seen(w, self.at(w))
 
-    def _seen(self, w: Direction, columns: Columns) -> Seen:
+    def _seen(self, w: Direction, columns: Columns) -> SideView:
         every = zip(self.shapes, columns.weights, columns.roughness)
         lobes = [shape.lobe(weight, self.kind(*numbers).roughness(ROOTS)) for shape, weight, numbers in every]
         # The axes of isotropic interfaces lie in the plane of incidence
         plane = ggx.plane(w) if self.kind is PerAxis else None
-        return Seen(self.shapes, lobes, plane, self.polynomial, self.samples, self.passage, columns)
+        return SideView(self.shapes, lobes, plane, self.polynomial, self.samples, self.transmission, columns)
 
 
 @dataclass(frozen=True)
-class Seen:
+class SideView:
     """A side as light from one direction sees it: its parts are lobes, the remainder, and what passes.
 
     Lobes are turned from a plane whose azimuth has the cosine and the sine `plane`; None for that of the tangent.
     """
 
     shapes: tuple[Shape, ...]
-    lobes: list[OwnMediumLobe]
+    lobes: list[RefractedLobe]
     plane: tuple[Value, Value] | None
     polynomial: Remainder
     samples: Samples
-    passage: Passage | None
+    transmission: Transmission | None
     columns: Columns
 
     def turned(self, w: Direction, by: Direction) -> Direction:
         """A direction as this side sees it; all light comes from above where nothing passes."""
-        return upright(w, by) if self.passage else w
+        return upright(w, by) if self.transmission else w
 
     @property
     def interfaces(self) -> int:
@@ -197,22 +157,22 @@ class Seen:
     def passed(self) -> Value:
         return 0.0 if self.columns.passed is None else self.columns.passed
 
-    def only(self, asked: Query) -> Drawn:
+    def only(self, asked: Query) -> Selection:
         """Chances of what is asked for: as samples are shared among all parts, or by energy where some are not."""
         passes = self.columns.passes
         wanted = [asked.reflects(number) for number in self.numbers]
         if all(wanted) and (asked.transmission or passes is None):
-            return Drawn(wanted, True, self.chances, passes)
-        shares = [ops.mean(e) + FAINT if w else 0.0 for w, e in zip(wanted, self.energies)]
-        through = ops.mean(self.passed) + FAINT if passes and asked.transmission else 0.0
+            return Selection(wanted, True, self.chances, passes)
+        shares = [ops.mean(e) + ENERGY_EPS if w else 0.0 for w, e in zip(wanted, self.energies)]
+        through = ops.mean(self.passed) + ENERGY_EPS if passes and asked.transmission else 0.0
         total = sum(shares) + through
         if isinstance(total, float) and total == 0:
-            return Drawn(wanted, False, shares, None)
+            return Selection(wanted, False, shares, None)
         if passes is not None:
             scale = ops.divide(through / total, passes.share)
             chances = (scale * x for x in (passes.of_straight, passes.of_bounced, passes.of_rest))
             passes = replace(passes, **dict(zip(("of_straight", "of_bounced", "of_rest"), chances)))
-        return Drawn(wanted, asked.transmission, [share / total for share in shares], passes)
+        return Selection(wanted, asked.transmission, [share / total for share in shares], passes)
 
     def part(self, k: int, i: Direction, o: Direction) -> tuple[Value, Value]:
         """f |cos theta_o| and density of a reflected part."""
@@ -220,7 +180,7 @@ class Seen:
             return refracted_lobe.eval_pdf(self.lobes[k], self._along_plane(i), self._in_plane(o))
         return self.columns.scale * self.polynomial.value(i, o), self.samples.density(i, o)
 
-    def out_of(self, lobe: OwnMediumLobe, i: Direction, u1: Value, u2: Value) -> Direction:
+    def out_of(self, lobe: RefractedLobe, i: Direction, u1: Value, u2: Value) -> Direction:
         """A direction drawn from a lobe."""
         o = refracted_lobe.sample(lobe, self._along_plane(i), u1, u2)
         return ggx.turned(o, self.plane[0], -self.plane[1]) if self.plane else o
@@ -235,7 +195,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class Selection:
     """Parts that are asked for: whether each one that is reflected is, and what passes; their chances."""
 
     wanted: list[bool]
@@ -263,7 +223,7 @@ class Solved:
     below: Side | None
     eta: Value
     symmetric: bool
-    known: tuple[Seen, Value] | None = None
+    known: tuple[SideView, Value] | None = None
 
     diffuse = True  # the remainder comes after the lobes
 
@@ -271,10 +231,10 @@ class Solved:
     def balanced(self) -> bool:
         return self.symmetric
 
-    def lit(self, wi: Direction) -> Solved:
+    def at_direction(self, wi: Direction) -> Solved:
         return replace(self, known=self.seen(wi))
 
-    def seen(self, wi: Direction) -> tuple[Seen, Value]:
+    def seen(self, wi: Direction) -> tuple[SideView, Value]:
         """What light from wi sees, turned up; the index of the medium beyond over that on its own side."""
         if self.known:
             return self.known
@@ -288,7 +248,7 @@ class Solved:
             shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),
             polynomial=select(where, self.above.polynomial, self.below.polynomial),
             samples=select(where, self.above.samples, self.below.samples),
-            passage=select(where, self.above.passage, self.below.passage),
+            transmission=select(where, self.above.transmission, self.below.transmission),
         )
         return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
 
@@ -317,10 +277,10 @@ class Solved:
                 begin = begin - chance
                 lobe = refracted_lobe.either(u < begin, above, lobe)
             wo = select_direction(within, of.out_of(lobe, i, u1, u2), wo)
-        if of.passage is None or drawn.passes is None:
+        if of.transmission is None or drawn.passes is None:
             return wo, 1.0
         again = ops.clip(ops.divide(u, drawn.share), 0.0, combined.BELOW_ONE)
-        through = combined.sample(of.passage, drawn.passes, i, again, u1, u2)
+        through = combined.sample(of.transmission, drawn.passes, i, again, u1, u2)
         wo = select_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
         return upright(wo, wi), ops.select(wo[2] < 0, eta, 1.0)
 
@@ -344,7 +304,7 @@ class Solved:
 
 
 def eval_pdf(
-    of: Seen, back: Seen | None, eta: Value, wi: Direction, wo: Direction, asked: Query
+    of: SideView, back: SideView | None, eta: Value, wi: Direction, wo: Direction, asked: Query
 ) -> tuple[Value, Value]:
     """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
     i, o, drawn = of.turned(wi, wi), of.turned(wo, wi), of.only(asked)
@@ -365,10 +325,10 @@ def eval_pdf(
         whole = whole + part
         value = value + (part if wanted else 0 * part)
     columns = of.columns
-    if of.passage and columns.passes:
-        through, pdf = combined.eval_pdf(of.passage, columns.passes, i, o)
+    if of.transmission and columns.passes:
+        through, pdf = combined.eval_pdf(of.transmission, columns.passes, i, o)
         returned: Value = 0.0
-        if back and back.passage and back.columns.passes:
+        if back and back.transmission and back.columns.passes:
             through, pdf, returned = exchanged(of, back, eta, wi, wo)
             through = through * ops.sqrt(columns.passes.straight * back.columns.passes.straight)
         share = ops.divide(drawn.share, columns.passes.share)
@@ -378,20 +338,20 @@ def eval_pdf(
     scale = ops.select(wi[2] * wo[2] < 0, eta * eta, 1.0)
     # No sample is too heavy, there and, in the symmetric form, back
     most = ops.minimum(densities[1], densities[2] * cosines * scale) if back else densities[1]
-    kept = ops.clip(whole, 0.0, HEAVY * most)
+    kept = ops.clip(whole, 0.0, MAX_SAMPLE_WEIGHT * most)
     value = kept if drawn.all else ops.maximum(value, 0.0) * ops.divide(kept, whole)
-    if of.passage is None:
+    if of.transmission is None:
         lit = wi[2] > 0
         return ops.select(lit, value, 0.0), ops.select(lit, densities[0], 0.0)
     return value / scale if asked.radiance else value, densities[0]
 
 
-def exchanged(of: Seen, back: Seen, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value, Value]:
+def exchanged(of: SideView, back: SideView, eta: Value, wi: Direction, wo: Direction) -> tuple[Value, Value, Value]:
     """Mean of what passes there and back, with all that goes straight through, and the densities there and back."""
     i, o, i_back, o_back = upright(wi, wi), upright(wo, wi), upright(wi, wo), upright(wo, wo)
-    assert of.passage and of.columns.passes and back.passage and back.columns.passes
-    there, density = combined.eval_pdf(of.passage, replace(of.columns.passes, straight=1.0), i, o)
-    other, returned = combined.eval_pdf(back.passage, replace(back.columns.passes, straight=1.0), o_back, i_back)
+    assert of.transmission and of.columns.passes and back.transmission and back.columns.passes
+    there, density = combined.eval_pdf(of.transmission, replace(of.columns.passes, straight=1.0), i, o)
+    other, returned = combined.eval_pdf(back.transmission, replace(back.columns.passes, straight=1.0), o_back, i_back)
     cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
     return 0.5 * (there + other * (cosines * eta * eta)), density, returned
 

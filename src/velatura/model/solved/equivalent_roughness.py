@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import Index, OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
 from velatura.model.solved.transmission import combined, internal_reflections
 from velatura.model.solved.transmission.combined import Parts
-from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
@@ -32,7 +32,7 @@ ENOUGH = 1e-7  # change of a roughness at which it ends
 ALPHA_LIMITS = 1e-4, 1.0
 ROUND = 1e-4  # difference of variances, of their sum, below which a lobe hardly has axes
 COS_MIN = 1e-6  # of sums of directions
-FAINT = 1e-30  # energy
+ENERGY_EPS = 1e-30  # energy
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Samples:
     energy: Array
 
 
-def of_lobe(lobe: OwnMediumLobe, wi: Direction) -> Samples:
+def of_lobe(lobe: RefractedLobe, wi: Direction) -> Samples:
     """Of a lobe with numbers (N,), and a weight (C, N), for directions wi.
 
     Samples are those of a GGX reflection outside that is as wide to first order: there the value of a lobe falls off
@@ -61,13 +61,13 @@ def of_lobe(lobe: OwnMediumLobe, wi: Direction) -> Samples:
     return _weighted(wi, (x, y, z), refracted_lobe.eval_pdf(each, _direction(wi), (x, y, z))[0], density.ravel())
 
 
-def of_passed(passage: Passage, parts: Parts, wi: Direction) -> Samples:
+def of_passed(transmission: Transmission, parts: Parts, wi: Direction) -> Samples:
     """Of light that passes, in the medium beyond, turned up; that of wi is refracted by all interfaces."""
     u, u1, u2 = low_discrepancy.at_nodes(len(wi[2]), SAMPLES, None)
     i, each = _direction(wi), Parts(*map(_each, vars(parts).values()))
-    x, y, z = combined.sample(passage, each, i, u, u1, u2)
-    value, density = combined.eval_pdf(passage, each, i, (x, y, z))
-    return _weighted(internal_reflections.seen_below(passage, wi), (x, y, -z), value, density)
+    x, y, z = combined.sample(transmission, each, i, u, u1, u2)
+    value, density = combined.eval_pdf(transmission, each, i, (x, y, z))
+    return _weighted(internal_reflections.seen_below(transmission, wi), (x, y, -z), value, density)
 
 
 def together(samples: Sequence[Samples]) -> Samples:
@@ -82,7 +82,7 @@ def roughness(samples: Samples, axis: Array | None = None) -> Roughness:
     x, y, z = ggx.normalize((i[0] + o[0], i[1] + o[1], np.maximum(i[2] + o[2], COS_MIN)))
     # Light of no energy has the shape of its samples
     total = samples.energy.sum(axis=-1, keepdims=True)
-    weight = np.where(total > FAINT, samples.energy / np.maximum(total, FAINT), 1 / z.shape[-1])
+    weight = np.where(total > ENERGY_EPS, samples.energy / np.maximum(total, ENERGY_EPS), 1 / z.shape[-1])
     azimuth = _azimuth(samples.wi)
     rotation = _axis((x, y, z), weight, azimuth) if axis is None else axis
     x, y, z = ggx.rotate((x, y, z), rotation[:, None])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from velatura.model.solved.bsdf import Columns
+from velatura.model.solved.columns import Columns
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.variance import ALPHA_MIN
 from velatura.sampling import directional_grid

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model.solved.bsdf import Solved, exchanged
-from velatura.model.solved.sample_allocation import Wanted
+from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import combined
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -33,7 +33,7 @@ DARK = 1e-6
 
 def factors(
     solved: Solved, wi: Direction, shares: Shares, count: int, samples: int | None
-) -> tuple[list[list[Array]], list[Wanted]]:
+) -> tuple[list[list[Array]], list[Demand]]:
     """Squares of the factors, (C, M) at nodes wi, of each reflected part of a side and then of what passes; and by side
     the weights of samples of reflected parts.
 
@@ -53,18 +53,18 @@ def factors(
                 colour += np.bincount(nodes * count + index, light * (share / samples), count * count)
         return found.reshape(-1, count, count)
 
-    def wanted(value: Array, reached: Sequence[tuple[Array, Array]], squares: Array, energy: Array) -> Wanted:
+    def wanted(value: Array, reached: Sequence[tuple[Array, Array]], squares: Array, energy: Array) -> Demand:
         """Of a part with its factors."""
         s = np.sqrt(squares)
         weights = value * s[:, nodes] * sum(share * s[:, index] for index, share in reached)
         weights = weights.reshape(len(value), count, samples)
         usual = ops.divide((weights**2).mean(axis=-1), weights.mean(axis=-1))
-        return Wanted.of(energy, usual, weights.max(axis=-1))
+        return Demand.of(energy, usual, weights.max(axis=-1))
 
     sides = [side for side in (solved.above, solved.below) if side]
     result: list[list[Array]] = []
-    samples_of: list[Wanted] = []
-    crossing: list[tuple[Array, Array]] = []
+    samples_of: list[Demand] = []
+    refraction: list[tuple[Array, Array]] = []
     for side, other in zip(sides, reversed(sides)):
         of, at_nodes = side.seen(i), side.seen(wi)
         result.append([])
@@ -77,17 +77,17 @@ def factors(
             reached = list(shares(up))
             result[-1].append(_balanced(kernel(value, reached), energy, most))
             found.append(wanted(value, reached, result[-1][-1], energy))
-        samples_of.append(Wanted.together(found))
-        if side.passage and of.columns.passes:
-            wo = combined.sample(side.passage, of.columns.passes, i, np.minimum(u[0], combined.BELOW_ONE), *u[1:])
+        samples_of.append(Demand.together(found))
+        if side.transmission and of.columns.passes:
+            wo = combined.sample(side.transmission, of.columns.passes, i, np.minimum(u[0], combined.BELOW_ONE), *u[1:])
             down = wo[0], wo[1], np.maximum(-wo[2], 0.0)
             eta = solved.eta if side is solved.above else 1 / solved.eta
             value, density, _ = exchanged(of, other.seen(down), eta, i, wo)
             value = np.where(density > 0, ops.divide(value * of.columns.passes.share, density), 0.0)
             value = np.where(wo[2] < 0, value, 0.0)
-            crossing.append((kernel(value, shares(down)), at_nodes.passed))
-    if crossing:
-        for factor, passing in zip(result, _balanced_between(*crossing)):
+            refraction.append((kernel(value, shares(down)), at_nodes.passed))
+    if refraction:
+        for factor, passing in zip(result, _balanced_between(*refraction)):
             factor.append(passing)
     return result, samples_of
 

@@ -97,8 +97,8 @@ class Turned:
     def balanced(self) -> bool:
         return self.body.balanced
 
-    def lit(self, wi: Direction) -> Turned:
-        return replace(self, body=self.body.lit(self._inside(wi)))
+    def at_direction(self, wi: Direction) -> Turned:
+        return replace(self, body=self.body.at_direction(self._inside(wi)))
 
     def albedo(self, wi: Direction, asked: Query = ALL) -> Value:
         return self.body.albedo(self._inside(wi), asked)

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from velatura import ops
 
-LIGHT = 2.7  # weight of samples of a part, where they can be kept so light
+TARGET_SAMPLE_WEIGHT = 2.7  # weight of samples of a part, where they can be kept so light
 KEPT = 0.7  # of the share by its energy that a part keeps at least
 STEPS = 8  # of halving
-SLIGHT = 2e-3  # share of the energy, of parts whose samples may be cut
+STARGET_SAMPLE_WEIGHT = 2e-3  # share of the energy, of parts whose samples may be cut
 
 Array = NDArray[np.floating]
 
 
-class Wanted(NamedTuple):
+class Demand(NamedTuple):
     """Of K parts, for N directions, (K, N) each, or (N,) of one part: their energies, and where a part takes all
     samples, the mean weight of these over the light that they carry, and the largest one."""
 
@@ -27,29 +27,29 @@ class Wanted(NamedTuple):
     heaviest: Array
 
     @classmethod
-    def of(cls, energy: Array, usual: Array, heaviest: Array) -> Wanted:
+    def of(cls, energy: Array, usual: Array, heaviest: Array) -> Demand:
         """Of values by colour, (C, N)."""
         return cls(ops.mean(energy), np.max(usual, axis=0), np.max(heaviest, axis=0))
 
     @classmethod
-    def together(cls, parts: Sequence[Wanted]) -> Wanted:
+    def together(cls, parts: Sequence[Demand]) -> Demand:
         """Parts one after another."""
         energy, usual, heaviest = (np.concatenate([np.atleast_2d(x) for x in each]) for each in zip(*parts))
         return cls(energy, usual, heaviest)
 
-    def spared(self, k: int, weight: Array) -> Wanted:
+    def spared(self, k: int, weight: Array) -> Demand:
         """With weights (N,) less of part k, which other samples carry."""
         less = np.zeros_like(self.energy)
         less[k] = weight
-        return Wanted(self.energy, *(np.maximum(x - less, 0) for x in self[1:]))
+        return Demand(self.energy, *(np.maximum(x - less, 0) for x in self[1:]))
 
 
-def shared(wanted: Wanted) -> Array:
+def shared(demand: Demand) -> Array:
     """Shares of samples (K, N) in proportion to the energies; but as many as keep the weights of its samples down to
-    `LIGHT` to each part that is not too slight, as far as they suffice."""
-    energy, usual, heaviest = wanted
+    `TARGET_SAMPLE_WEIGHT` to each part that is not too slight, as far as they suffice."""
+    energy, usual, heaviest = demand
     even = ops.divide(energy, energy.sum(axis=0))
-    counts = np.minimum(even / SLIGHT, 1) / LIGHT
+    counts = np.minimum(even / STARGET_SAMPLE_WEIGHT, 1) / TARGET_SAMPLE_WEIGHT
 
     def least(part: Array) -> Array:
         weight = usual + part * np.maximum(heaviest - usual, 0)

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,8 @@ from velatura.model.base import Model
 from velatura.model.context import Context, channels
 from velatura.model.smooth_interface import SmoothInterface, smooth_interfaces
 from velatura.model.solved import reciprocal_balance, sample_allocation
-from velatura.model.solved.bsdf import FAINT, ROOTS, Columns, Shape, Side, Solved
+from velatura.model.solved.bsdf import ENERGY_EPS, ROOTS, Shape, Side, Solved
+from velatura.model.solved.columns import Columns, Declaration
 from velatura.model.solved.energies.adding import Made, Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
 from velatura.model.solved.grid import COS_MIN, Folded, Grid
@@ -25,10 +25,10 @@ from velatura.model.solved.lobes import refracted_lobe, remainder, widths
 from velatura.model.solved.lobes.refracted_lobe import Index
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.lobes.widths import Tensor
-from velatura.model.solved.sample_allocation import Wanted
+from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import combined, direct, internal_reflections
 from velatura.model.solved.transmission.combined import Parts
-from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.solved.transmission.internal_reflections import Rest
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
@@ -53,11 +53,11 @@ BRIGHTEST = 4.0  # by how much it is scaled at most
 LITTLE = 0.05  # by which energies are scaled for their colour
 BRIGHTER = 1.5  # at most, where it takes light of lobes
 VEIL_MIN = 1e-3  # energy of veils that are drawn
-EVEN = 0.2  # share of samples of the symmetric form that the remainder has at least, and of those that pass
+MIN_DEFENSIVE_SHARE = 0.2  # of samples of the symmetric form, that the remainder and the rest of what passes have
 
 
 @dataclass(frozen=True)
-class Drawn:
+class LobeSpec:
     """A lobe: the number of its interface from the top, that of the one that shapes its light on the way out, None
     where none does, whether it is the veil of one, and whether its medium is nowhere of a lower index than outside."""
 
@@ -72,7 +72,7 @@ class Layout:
     """The lobes of a side, the interfaces that make a step of the index, the last one whose facets turn light, the
     slabs that scatter, by the number of interfaces above, and the indices of media that nodes are chosen for."""
 
-    lobes: list[Drawn]
+    lobes: list[LobeSpec]
     stepped: list[int]
     rough: int | None
     cloudy: list[int]
@@ -89,68 +89,23 @@ class SolvedSide:
     polynomial: Remainder
     clipped: Array
     edged: Sequence[Shape | None]
-    passage: Passage | None = None
+    transmission: Transmission | None = None
 
     @cached_property
     def rows(self) -> Array:
-        """All columns, (rows, M), in the order in which `Columns.read` takes them."""
+        """All columns, (rows, M), in the order of their declaration."""
         return np.concatenate([np.atleast_2d(each) for each in self.columns.all])
 
     @property
-    def groups(self) -> list[int]:
-        """Which rows are read together: 1 for those that are read seldom."""
-        return self.groups_of(len(self.clipped))
-
-    def groups_of(self, colours: int) -> list[int]:
-        """As `groups`, of colours of so many channels."""
-        columns = self.columns
-        each = (
-            (int(seldom), colours if len(np.atleast_2d(x)) > 1 else 1) for x, seldom in zip(columns.all, columns.seldom)
-        )
-        return [group for group, count in each for _ in range(count)]
-
-    @property
-    def places(self) -> list[int]:
-        """The first rows of the remainder's scale, and of its energy."""
-        return self._places([self.columns.scale, self.columns.rest])
-
-    @property
-    def weights(self) -> list[int]:
-        """The first rows of those of lobes."""
-        return self._places(self.columns.weights)
-
-    @property
-    def light(self) -> list[tuple[int, list[int]]]:
-        """The first rows of each energy, and of all else that is in proportion to it."""
-        columns = self.columns
-        found = [*zip(columns.energies, ([x] for x in columns.weights)), (columns.rest, [columns.scale])]
-        if columns.passes:
-            found.append((columns.passed, [columns.passes.straight, columns.passes.bounced, columns.passes.rest]))
-        return [(self._places([energy])[0], self._places(others)) for energy, others in found]
-
-    @property
-    def chances(self) -> list[int]:
-        """Rows of shares of samples, but for that of the remainder."""
-        passes = self.columns.passes
-        through = [passes.of_straight, passes.of_bounced, passes.of_rest] if passes else []
-        return self._places([*self.columns.chances, *through])
-
-    def _places(self, values: Sequence[Value]) -> list[int]:
-        return [self._first_rows[id(x)] for x in values]
-
-    @cached_property
-    def _first_rows(self) -> dict[int, int]:
-        """Of every column, by its identity."""
-        columns = self.columns.all
-        begins = accumulate((len(x) if np.ndim(x) > 1 else 1 for x in columns), initial=0)
-        return dict(zip(map(id, columns), begins))
+    def declaration(self) -> Declaration:
+        return self.columns.declaration
 
     @property
     def numbers(self) -> Array:
         """Those of the remainder, (8 C,)."""
         return np.concatenate(list(vars(self.polynomial).values()))
 
-    def weighed(self, factors: Sequence[Array], wanted: Wanted) -> SolvedSide:
+    def weighed(self, factors: Sequence[Array], wanted: Demand) -> SolvedSide:
         """With the weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared anew
         where nothing passes."""
         columns = self.columns
@@ -162,6 +117,40 @@ class SolvedSide:
             *chances, chance = sample_allocation.shared(_evened(wanted))
             columns = replace(columns, chances=chances, chance=chance)
         return replace(self, columns=columns)
+
+
+@dataclass(frozen=True)
+class _Light:
+    """Energies (..., C, M) of the parts of a side at the directions of a grid, as `Energies` has them."""
+
+    solved: Energies
+    lobes: Array
+    veils: Array
+    rest: Array
+    straight: Array
+    bounced: Array
+    passed: Array
+
+    @classmethod
+    def of(cls, solved: Energies, count: int) -> _Light:
+        """Of the first `count` directions."""
+        names = "lobes", "veils", "rest", "straight", "bounced", "passed"
+        return cls(solved, *(getattr(solved, name)[..., :count] for name in names))
+
+
+class _Lobe(NamedTuple):
+    """A lobe that is drawn, and its width at the directions of a grid."""
+
+    shape: Shape
+    tensor: Tensor
+
+
+class _Weighed(NamedTuple):
+    """The energy of a lobe, that over its integral, and how it is to be sampled."""
+
+    energy: Array
+    weight: Array
+    wanted: Demand
 
 
 @dataclass(frozen=True)
@@ -237,7 +226,7 @@ class Solver:
         )
         spread = folded.everywhere
         return [
-            side.weighed(list(map(spread, each)), Wanted(*map(spread, of)))
+            side.weighed(list(map(spread, each)), Demand(*map(spread, of)))
             for side, each, of in zip(found, factors, wanted)
         ]
 
@@ -254,16 +243,16 @@ class Solver:
         """A side of a material of a renderer's values, those of one point or of all."""
         assert context.colour is not None
         shapes = shapes_of(smooth_interfaces(material), layout.lobes)
-        passage = self.passage(material, layout)
+        transmission = self.transmission(material, layout)
         return Side(
-            curves, tuple(shapes), polynomial, polynomial.samples, passage, context.colour, self.colours, self.kind
+            curves, tuple(shapes), polynomial, polynomial.samples, transmission, context.colour, self.colours, self.kind
         )
 
-    def passage(self, material: Material, layout: Layout) -> Passage | None:
+    def transmission(self, material: Material, layout: Layout) -> Transmission | None:
         """What passes a material; None where nothing does."""
         if not material.transmits:
             return None
-        return direct.passage(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
+        return direct.transmission(material, self.variance, layout.stepped, layout.rough, layout.cloudy)
 
     def bsdf(self, material: Material, made: Sequence[Side]) -> Solved:
         """A material of one side or two."""
@@ -273,122 +262,143 @@ class Solver:
         return Solved(made[0], made[1], ops.mean(material.below) / ops.mean(material.exterior), symmetric)
 
     def _side(self, material: Material, layout: Layout) -> SolvedSide:
-        """What a material is at the directions of the grid."""
-        drawn = layout.lobes
+        """A side of a material at the directions of the grid, in the order of the physics."""
         folded = Folded.of(self.grid, material)
-        cosine, phi, wi, count = folded.cosine, folded.phi, folded.directions, folded.count
+        light, polynomial = self._light(material, layout, folded)
+        lobes = self._lobes(material, layout, folded, light)
+        clipped, peak = _clipped(polynomial, folded.at_cosines)
+        whole = polynomial.albedo(folded.cosine) + folded.around(clipped)
+        drawn, rest = self._hand_over(layout, folded, light, lobes, whole)
+        scale = _scale(rest, whole)
+        wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
+        transmission = self.transmission(_slim(material), layout)
+        shares, passes = self._allocate(material, layout, folded, light, wanted, transmission)
+        columns = Columns(
+            [self._colours(each.weight) for each in drawn],
+            [tuple(np.broadcast_to(x, folded.count) for x in self._roughness(lobe.tensor)) for lobe in lobes],
+            list(shares[:-1]),
+            [self._colours(each.energy) for each in drawn],
+            self._colours(scale),
+            shares[-1],
+            self._colours(rest),
+            passes,
+            self._colours(light.passed) if passes else None,
+        )
+        numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
+        edged = self._edged(material, lobes, folded.phi)
+        forward = transmission if self.model.form == "forward" else None
+        return SolvedSide(folded.unfolded(columns), numbers, self._colours(clipped), edged, forward)
+
+    def _light(self, material: Material, layout: Layout, folded: Folded) -> tuple[_Light, Remainder]:
+        """Solve for the energies of all parts, and fit the remainder's polynomial."""
         solved = energies(
             material,
-            np.concatenate([cosine, INCIDENCES]),
-            np.concatenate([phi, 0 * INCIDENCES]),
+            np.concatenate([folded.cosine, INCIDENCES]),
+            np.concatenate([folded.phi, 0 * INCIDENCES]),
             self.tables if self.model.microsurface else None,
             widths.nearly_straight,
             self.made,
             samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
             like=layout.indices,
         )
-        albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, count:]
+        albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
-        polynomial = Remainder(*(x[:, None] for x in vars(polynomial).values()))
-        lobes, veils = solved.lobes[..., :count], solved.veils[..., :count]
-        rest, straight, bounces, through = (
-            x[:, :count] for x in (solved.rest, solved.straight, solved.bounced, solved.passed)
-        )
+        return _Light.of(solved, folded.count), Remainder(*(x[:, None] for x in vars(polynomial).values()))
 
-        # Draw lobes and veils
-        shapes, found = shapes_of(smooth_interfaces(_slim(material)), drawn), parts(material)
-        tensors = widths.tensors(found, cosine, phi, np.array([ops.mean(each) for each in lobes]))
-        shown = [
-            widths.veil(found, each.interface, cosine, tensors[each.interface])
-            if each.veil
-            else tensors[each.interface]
-            for each in drawn
-        ]
-        apart = {each.interface for each in drawn if each.veil}
-        lobes = np.array([lobes[k] + (0 if k in apart else veils[k]) for k in range(len(lobes))])
-        clipped, largest_of_rest = _clipped(polynomial, folded.at_cosines)
-        whole = polynomial.albedo(cosine) + folded.around(clipped)
-        energy, weights, wanted = [], [], []
-        for shape, tensor, each in zip(shapes, shown, drawn):
-            normals = self.normals or (FINELY[1] if self.finely else NORMALS[self.isotropic])
-            z, squares, largest = refracted_lobe.integrals(shape.lobe(1.0, tensor.roughness(phi)), wi, normals)
-            light = (veils if each.veil else lobes)[each.interface]
-            # The remainder takes what light it can, by which a lobe would be too bright
-            more = np.clip(light - combined.MOST * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
+    def _lobes(self, material: Material, layout: Layout, folded: Folded, light: _Light) -> list[_Lobe]:
+        """Work out the widths of lobes and veils."""
+        found, energy = parts(material), np.array([ops.mean(each) for each in light.lobes])
+        tensors = widths.tensors(found, folded.cosine, folded.phi, energy)
+
+        def tensor(spec: LobeSpec) -> Tensor:
+            own = tensors[spec.interface]
+            return widths.veil(found, spec.interface, folded.cosine, own) if spec.veil else own
+
+        shapes = shapes_of(smooth_interfaces(_slim(material)), layout.lobes)
+        return [_Lobe(shape, tensor(spec)) for shape, spec in zip(shapes, layout.lobes)]
+
+    def _hand_over(
+        self, layout: Layout, folded: Folded, light: _Light, lobes: Sequence[_Lobe], whole: Array
+    ) -> tuple[list[_Weighed], Array]:
+        """Divide energies of lobes by their integrals; the remainder takes what light it can, by which a lobe would be
+        too bright, and has the energy that is returned. `whole` is its albedo without a scale."""
+        rest, drawn, apart = light.rest, [], {each.interface for each in layout.lobes if each.veil}
+        normals = self.normals or (FINELY[1] if self.finely else NORMALS[self.isotropic])
+        for (shape, tensor), spec in zip(lobes, layout.lobes):
+            lobe = shape.lobe(1.0, tensor.roughness(folded.phi))
+            z, squares, largest = refracted_lobe.integrals(lobe, folded.directions, normals)
+            k = spec.interface
+            own = light.veils[k] if spec.veil else light.lobes[k] + (0 if k in apart else light.veils[k])
+            more = np.clip(own - combined.MAX_GAIN * z, 0, np.maximum(BRIGHTER * whole - rest, 0))
             rest = rest + more
-            energy.append(light - more)
-            weights.append(np.where(z > FAINT, ops.divide(energy[-1], z), 1.0))
-            wanted.append(Wanted.of(energy[-1], weights[-1] * ops.divide(squares, z), weights[-1] * largest))
-        scale = _scale(rest, whole)
-        wanted.append(Wanted.of(rest + FAINT, rest, scale * folded.around(largest_of_rest)))
+            energy = own - more
+            weight = np.where(z > ENERGY_EPS, ops.divide(energy, z), 1.0)
+            wanted = Demand.of(energy, weight * ops.divide(squares, z), weight * largest)
+            drawn.append(_Weighed(energy, weight, wanted))
+        return drawn, rest
 
-        # Share samples
+    def _allocate(
+        self,
+        material: Material,
+        layout: Layout,
+        folded: Folded,
+        light: _Light,
+        wanted: Sequence[Demand],
+        transmission: Transmission | None,
+    ) -> tuple[Array, Parts | None]:
+        """Share samples among what is reflected, and what passes, which gets its weights."""
         # Light of a single isotropic interface is the same there and back
         alike = self.isotropic and len(material.layers) == 1
-        least = EVEN if self.model.form == "symmetric" and not alike else 0.0
-        others = Wanted.together(wanted)
-        if least:
-            others = _evened(others)
-        passage, passes = self.passage(_slim(material), layout), None
-        if passage:
-            facets = None
-            if len(drawn) == 1:
-                # What passes is sampled with the facets that reflect
-                facets = wanted[0]
-                others = Wanted(*(np.concatenate([0 * x[:1], x[1:]]) for x in others))
-            met = [*(None if each.veil else each.interface for each in drawn), None]
-            *diffuse, peak = folded.around(_passing(passage, solved, folded.at_cosines[2]))
-            passes, shares = combined.parts(passage, wi, straight, bounces, through, others, met, facets, diffuse, peak)
-            passes = _evenly(passes, least)
-            straight, bounces, scattered = map(self._colours, (passes.straight, passes.bounced, passes.rest))
-            passes = replace(passes, straight=straight, bounced=bounces, rest=scattered)
-        else:
-            shares = sample_allocation.shared(others)
-        columns = Columns(
-            [self._colours(weight) for weight in weights],
-            [tuple(np.broadcast_to(x, count) for x in self._roughness(tensor)) for tensor in shown],
-            list(shares[:-1]),
-            [self._colours(each) for each in energy],
-            self._colours(scale),
-            shares[-1],
-            self._colours(rest),
-            passes,
-            self._colours(through) if passes else None,
-        )
-        columns = folded.unfolded(columns)
-        numbers = Remainder(*(np.broadcast_to(x[:, 0], self.colours) for x in vars(polynomial).values()))
-        sharp = self.normals is None and _reflects_all(found)  # edges are lost in the error of few normals
-        narrow = [sharp and np.min(tensor.roughness(phi)[:2]) < NARROW for tensor in shown]
-        edged = [shape if each else None for shape, each in zip(shapes, narrow)]
-        forward = self.model.form == "forward"
-        return SolvedSide(columns, numbers, self._colours(clipped), edged, passage if forward else None)
+        least = MIN_DEFENSIVE_SHARE if self.model.form == "symmetric" and not alike else 0.0
+        reflected = _evened(Demand.together(wanted)) if least else Demand.together(wanted)
+        if not transmission:
+            return sample_allocation.shared(reflected), None
+        facets = None
+        if len(layout.lobes) == 1:
+            # What passes is sampled with the facets that reflect
+            facets = wanted[0]
+            reflected = Demand(*(np.concatenate([0 * x[:1], x[1:]]) for x in reflected))
+        met = [*(None if each.veil else each.interface for each in layout.lobes), None]
+        *diffuse, peak = folded.around(_passing(transmission, light.solved, folded.at_cosines[2]))
+        energy = light.straight, light.bounced, light.passed
+        passes, shares = combined.parts(transmission, folded.directions, *energy, reflected, met, facets, diffuse, peak)
+        passes = _evenly(passes, least)
+        return shares, replace(passes, **{name: self._colours(getattr(passes, name)) for name in Parts.COLOURS})
+
+    def _edged(self, material: Material, lobes: Sequence[_Lobe], phi: Array) -> list[Shape | None]:
+        """Lobes whose integrals have edges between directions; those are lost in the error of few normals."""
+        sharp = self.normals is None and _reflects_all(parts(material))
+        return [shape if sharp and np.min(tensor.roughness(phi)[:2]) < NARROW else None for shape, tensor in lobes]
 
     def spread(self, side: SolvedSide) -> Array:
         """All columns of a side over a renderer's grid, (rows, prod(shape)). The remainder of the forward form has its
         energy there, too, and lobes where integrals have edges; energies have the sum that is interpolated, and shares
         of samples sum up to 1."""
-        light = np.sum([side.rows[k : k + self.colours] for k, _ in side.light], axis=0)
+        declared, proportions = side.declaration, side.declaration.proportions(self.colours)
+        light = np.sum([side.rows[k : k + self.colours] for k, _ in proportions], axis=0)
         rows = self.grid.spread(np.concatenate([side.rows, light, side.columns.chance[None]]), self.shape)
         rows, whole, left = np.split(rows, [-1 - self.colours, -1])
         if any(side.edged):
             self._lobes_between(rows, side)
-        self._scale_energies(rows, side, whole)
-        if side.passage:
-            self._pass_between(rows, side.passage, *side.light[-1])
-        rows[side.chances] /= rows[side.chances].sum(axis=0) + left
+        self._scale_energies(rows, proportions, whole)
+        if side.transmission:
+            self._pass_between(rows, side.transmission, *proportions[-1])
+        chances = declared.chances(self.colours)
+        rows[chances] /= rows[chances].sum(axis=0) + left
         if self.model.form == "forward":
             cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
             polynomial = Remainder(*(x[:, None] for x in vars(side.polynomial).values()))
             whole = polynomial.albedo(cosine) + self.grid.along(side.clipped, self.shape[0])
             whole = np.repeat(whole, math.prod(self.shape[1:]), axis=-1)
-            scale, rest = (slice(k, k + self.colours) for k in side.places)
+            firsts = (declared.first_rows(name, self.colours)[0] for name in ("scale", "rest"))
+            scale, rest = (slice(k, k + self.colours) for k in firsts)
             rows[scale] = _scale(rows[rest], whole)
         return rows
 
-    def _pass_between(self, rows: Array, passage: Passage, energy: int, weights: Sequence[int]) -> None:
+    def _pass_between(self, rows: Array, transmission: Transmission, energy: int, weights: Sequence[int]) -> None:
         """With all light that passes about the critical angles of inner media, where weights jump from one node to the
         next: diffuse light has what the other parts lack."""
-        inner = np.array([float(np.mean(n)) for n in passage.indices[1:-1]])
+        inner = np.array([float(np.mean(n)) for n in transmission.indices[1:-1]])
         nodes = self.grid.cosines - 1
         edges = np.floor((1 - inner[inner < 1] ** 2) ** 0.25 * nodes)
         wi = directional_grid.directions(self.shape, None)
@@ -397,14 +407,14 @@ class Solver:
             return
         x, y, z = (w[there] for w in wi)
         straight, bounces, light = (rows[k : k + self.colours, there] for k in (*weights[:2], energy))
-        left = light - combined.energy(passage, (x, y, z), straight, bounces)
+        left = light - combined.energy(transmission, (x, y, z), straight, bounces)
         rest = slice(weights[-1], weights[-1] + self.colours)
-        rows[rest, there] = combined.rest(passage, (x, y, z), left)
+        rows[rest, there] = combined.rest(transmission, (x, y, z), left)
 
-    def _scale_energies(self, rows: Array, side: SolvedSide, whole: Array) -> None:
+    def _scale_energies(self, rows: Array, proportions: Sequence[tuple[int, Sequence[int]]], whole: Array) -> None:
         """So that energies, and what is in proportion to them, have the sum that is interpolated, `whole`. What is grey
         stays so: other energies make up for the colours of the rest, as far as that is little."""
-        groups = [[slice(k, k + self.colours) for k in (energy, *others)] for energy, others in side.light]
+        groups = [[slice(k, k + self.colours) for k in (energy, *others)] for energy, others in proportions]
         found = np.sum([rows[energy] for energy, *_ in groups], axis=0)
         share = ops.divide(ops.mean(whole), ops.mean(found))
         share = np.where(share > 0, share, 1)
@@ -421,16 +431,15 @@ class Solver:
         interpolated as those at the nodes beside allow. What one lobe has too much of, or lacks, is left to others."""
         wi = directional_grid.directions(self.shape, None)
         found = []
-        for shape, place, weight, roughness in zip(
-            side.edged, side.weights, side.columns.weights, side.columns.roughness
-        ):
+        places = side.declaration.first_rows("weight", self.colours)
+        for shape, place, weight, roughness in zip(side.edged, places, side.columns.weights, side.columns.roughness):
             if shape:
                 at_nodes = self._integral(shape, roughness, self.grid.directions)
                 z = self._integral(shape, [self.grid.spread(x[None], self.shape)[0] for x in roughness], wi)
                 light = self.grid.spread(weight * at_nodes, self.shape)
                 ends = self.grid.beside(weight, self.shape)
                 there = slice(place, place + self.colours)
-                rows[there] = np.clip(np.where(z > FAINT, light / np.maximum(z, FAINT), rows[there]), *ends)
+                rows[there] = np.clip(np.where(z > ENERGY_EPS, light / np.maximum(z, ENERGY_EPS), rows[there]), *ends)
                 found.append((there, z, light, ends))
         lacks = sum(light - rows[there] * z for there, z, light, _ in found)
         rooms = [np.where(lacks > 0, high - rows[there], rows[there] - low) for there, _, _, (low, high) in found]
@@ -467,7 +476,9 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
         # After the values come their differences
         found = replace(solver, finely=bool(packings)).solve(given.replaced(start, numbers), layouts)
         if not packings:
-            packings.extend(Packing.of(side.rows, side.groups, shared=not given.given) for side in found)
+            packings.extend(
+                Packing.of(side.rows, side.declaration.groups(solver.colours), shared=not given.given) for side in found
+            )
         flat = []
         for side, packing in zip(found, packings):
             flat += [x.T.ravel() for x in packing.split(solver.spread(side))]
@@ -504,7 +515,7 @@ def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> 
     rough = widths.stepped(turns, widths.LEAST_TURN)
     above = np.array([[np.mean(facets.above) / np.mean(found[0].above) for facets in found] for found in each])
     denser = np.all(above >= 1, axis=0).tolist()
-    lobes = [Drawn(k, widths.first_step(steps[:k]), veil, denser[k]) for k, veil in both]
+    lobes = [LobeSpec(k, widths.first_step(steps[:k]), veil, denser[k]) for k, veil in both]
     cloudy = sorted(set().union(*map(_cloudy, materials)))
     return Layout(lobes, widths.stepped(steps), rough[-1] if rough else None, cloudy, media_of(materials[0]))
 
@@ -551,19 +562,22 @@ def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
     return (value - unclipped / (np.pi * density)).mean(axis=-1), value.max(axis=-1)
 
 
-def _passing(passage: Passage, solved: Energies, cosines: Array) -> Array:
+def _passing(transmission: Transmission, solved: Energies, cosines: Array) -> Array:
     """Numbers of light from directions wi that passes neither straight nor after bounces, and the largest weight of its
     samples, (6, M)."""
     wi = _of_cosines(INCIDENCES)
     light = np.mean(
-        solved.around - internal_reflections.share(internal_reflections.bounced(passage, wi)) * solved.again, axis=0
+        solved.around - internal_reflections.share(internal_reflections.bounced(transmission, wi)) * solved.again,
+        axis=0,
     )
-    sines = internal_reflections.seen_below(passage, wi)[0]
-    at_incidences = remainder.passing(solved.nodes, light, float(ops.mean(internal_reflections.bound(passage))), sines)
+    sines = internal_reflections.seen_below(transmission, wi)[0]
+    at_incidences = remainder.passing(
+        solved.nodes, light, float(ops.mean(internal_reflections.bound(transmission))), sines
+    )
     numbers = np.array([np.interp(cosines, INCIDENCES, each) for each in at_incidences])
     o = low_discrepancy.fibonacci(EVENLY)
     radius, phi = np.sqrt(o[0]), 2 * np.pi * o[1]
-    i = internal_reflections.seen_below(passage, _of_cosines(cosines[:, None]))
+    i = internal_reflections.seen_below(transmission, _of_cosines(cosines[:, None]))
     evenly = radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - o[0])
     numbers = numbers / internal_reflections.diffuse([*numbers[..., None]], i, evenly).mean(axis=-1)
     value, density = internal_reflections.eval_pdf_rest(Rest(None, 1.0, 1.0, [*numbers[..., None]]), i, evenly)
@@ -593,21 +607,21 @@ def _veiled(material: Material) -> set[int]:
     return veiled
 
 
-def _evened(wanted: Wanted) -> Wanted:
-    """With samples for a share `EVEN` of the energy at least of the last part."""
+def _evened(wanted: Demand) -> Demand:
+    """With samples for a share `MIN_DEFENSIVE_SHARE` of the energy at least of the last part."""
     *lobes, rest = wanted.energy
-    least = np.maximum(EVEN * wanted.energy.sum(axis=0), FAINT)
+    least = np.maximum(MIN_DEFENSIVE_SHARE * wanted.energy.sum(axis=0), ENERGY_EPS)
     return wanted._replace(energy=np.array([*lobes, np.maximum(rest, least)]))
 
 
 def _evenly(of: Parts, least: float) -> Parts:
     """With a share of the samples of what passes at least for its rest."""
-    even = np.maximum(least * of.share - of.of_rest, 0) / np.maximum(of.share - of.of_rest, FAINT)
+    even = np.maximum(least * of.share - of.of_rest, 0) / np.maximum(of.share - of.of_rest, ENERGY_EPS)
     straight, bounced = (1 - even) * of.of_straight, (1 - even) * of.of_bounced
     return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)
 
 
-def shapes_of(found: Sequence[SmoothInterface], drawn: Sequence[Drawn]) -> list[Shape]:
+def shapes_of(found: Sequence[SmoothInterface], drawn: Sequence[LobeSpec]) -> list[Shape]:
     """One for each lobe."""
     indices = [Index.of(1.0)]
     for layer in found:

@@ -17,6 +17,7 @@ from scipy.interpolate import PchipInterpolator
 from velatura import ops
 from velatura.model.base import Body, Model
 from velatura.model.context import Context
+from velatura.model.solved.columns import Declaration
 from velatura.model.solved.energies.adding import Lambert, Part, parts
 from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.lobes.remainder import Remainder
@@ -108,18 +109,18 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
     given, start = Variables.of(material), plain(material)
     solver = Solver.over(len(places), model, variance, context, start)
     layouts = solver.layouts([start])
-    orders: list[Sequence[bool]] = []
+    declared: list[Declaration] = []
 
     def arrays(numbers: list[float]) -> list[Array]:
         # After the values come their differences
-        found = replace(solver, finely=bool(orders)).solve(given.replaced(start, numbers), layouts)
-        orders[:] = [[len(np.atleast_2d(each)) > 1 for each in side.columns.all] for side in found]
+        found = replace(solver, finely=bool(declared)).solve(given.replaced(start, numbers), layouts)
+        declared[:] = [side.declaration for side in found]
         return [flat for side in found for flat in _flat(side, solver, places, nodes)]
 
     flat = iter(differences.differentiable(arrays, given.given, given.around, context.number))
     shapes = solver.shape, (*solver.shape, nodes), (nodes,)
     made = []
-    for order in orders:
+    for order in ([column.colour for column in each.columns] for each in declared):
         curves = (directional_grid.interleaved(next(flat), shape, context.number) for shape in shapes)
         made.append(_Side(order, *curves))
     return Spectra(own, solver, layouts, made)
@@ -142,7 +143,7 @@ def axis(material: Material, places: Array) -> Wavelengths:
 
 def _flat(side: SolvedSide, solver: Solver, places: Array, nodes: int) -> list[Array]:
     """The numbers, the colours and the remainder of a side, at nodes, flat."""
-    counts = [len(np.atleast_2d(each)) for each in side.columns.all]
+    counts = [column.rows(len(places)) for column in side.declaration.columns]
     columns = np.split(solver.spread(side), np.cumsum(counts)[:-1])
     # A table has one column at least; without lobes none is read
     numbers = np.concatenate([each for each in columns if len(each) == 1] or [np.zeros_like(columns[0][:1])])

@@ -20,7 +20,7 @@ from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.lobes import refracted_lobe, widths
 from velatura.model.solved.rotation_frame import Frame
-from velatura.model.solved.sample_allocation import Wanted
+from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.solve import Layout, layout_of, shapes_of
 from velatura.model.solved.transmission import combined, direct
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance, variance_kind
@@ -160,11 +160,11 @@ def _passed(
         return Roughness(0 * phi, 0 * phi, phi)
     if kind is Isotropic:
         wi = np.hypot(wi[0], wi[1]), 0 * wi[1], wi[2]  # alike in all planes
-    passage = direct.passage(material, kind, layout.stepped, layout.rough, layout.cloudy)
+    transmission = direct.transmission(material, kind, layout.stepped, layout.rough, layout.cloudy)
     straight, bounced, all_ = (np.maximum(energy, DARK) for energy in (solved.straight, solved.bounced, solved.passed))
     nothing = np.zeros((0, len(phi)))
-    shares, _ = combined.parts(passage, wi, straight, bounced, all_, Wanted(nothing, nothing, nothing))
-    samples = equivalent_roughness.of_passed(passage, shares, wi)
+    shares, _ = combined.parts(transmission, wi, straight, bounced, all_, Demand(nothing, nothing, nothing))
+    samples = equivalent_roughness.of_passed(transmission, shares, wi)
     if kind is Isotropic:
         u, v, _ = equivalent_roughness.roughness(samples, 0 * phi)
         return Roughness(u, v, phi)

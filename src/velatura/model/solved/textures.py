@@ -24,7 +24,8 @@ from velatura import ops
 from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
 from velatura.model.solved import solve, texture_axes
-from velatura.model.solved.bsdf import FAINT, Columns, Side, Solved
+from velatura.model.solved.bsdf import ENERGY_EPS, Side, Solved
+from velatura.model.solved.columns import Columns
 from velatura.model.solved.lobes import remainder
 from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
@@ -151,7 +152,7 @@ class _Interpolated(Side):
 def _bounded(found: Columns, summed: bool) -> Columns:
     """Without negative weights and chances; chances that are summed up belong to energies."""
     *chances, chance = (ops.maximum(x, 0.0) for x in (*found.chances, found.chance))
-    chance = chance + FAINT
+    chance = chance + ENERGY_EPS
     passes: list[Value] = []
     of = found.passes
     if of:
@@ -257,7 +258,7 @@ def _tabulated(
             sides = [_smoothed(side) for side in sides] if any(material.films) else sides
             solves.append([_of_channels(of_group, side, solver.colours, wavelengths) for side in sides])
             if not reads:
-                reads.extend(side.groups_of(solver.colours) for side in sides)
+                reads.extend(side.declaration.groups(solver.colours) for side in sides)
         context.progress(len(nodes), len(nodes))
         by_side = ([np.array(x) for x in zip(*side)] for side in zip(*solves))
         # Wavelengths are the leading axis of a group
@@ -365,7 +366,7 @@ def _smoothed(side: SolvedSide) -> SolvedSide:
     nodes, where weights are quotients of small numbers, and splines would carry them to others."""
     columns = side.columns
     weights = [
-        w * (energy + DARK) / (energy + DARK * np.maximum(w, FAINT))
+        w * (energy + DARK) / (energy + DARK * np.maximum(w, ENERGY_EPS))
         for w, energy in zip(columns.weights, columns.energies)
     ]
     return replace(side, columns=replace(columns, weights=weights))
@@ -377,7 +378,7 @@ def _of_channels(solver: Solver, side: SolvedSide, colours: int, wavelengths: in
     rows, numbers = solver.spread(side), side.numbers
     if not wavelengths:
         return [rows], [numbers]
-    counts = [len(np.atleast_2d(x)) for x in side.columns.all]
+    counts = [column.rows(solver.colours) for column in side.declaration.columns]
     parts = np.split(rows, np.cumsum(counts)[:-1])
     columns = [np.concatenate([x if len(x) == 1 else x[[k] * colours] for x in parts]) for k in range(wavelengths)]
     return columns, [np.repeat(numbers.reshape(-1, wavelengths)[:, k], colours) for k in range(wavelengths)]

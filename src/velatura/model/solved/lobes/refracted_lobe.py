@@ -60,7 +60,7 @@ class Index:
 
 
 @dataclass(frozen=True)
-class OwnMediumLobe(ops.Named):
+class RefractedLobe(ops.Named):
     """A lobe of `weight` (a colour) times a GGX reflection of `roughness` in a medium of index `n`, a number or an
     `Index`, refracted out.
 
@@ -76,7 +76,7 @@ class OwnMediumLobe(ops.Named):
     leaving: Reflectance | None = None
 
 
-def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+def eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, and the density of `sample`; both 0 unless wi and wo are above the surface."""
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     p = _in_frame(lobe, wo)
@@ -107,7 +107,7 @@ def eval_pdf(lobe: OwnMediumLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     return lobe.weight * light, seen * shown * density
 
 
-def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
+def sample(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
     """A direction wo from uniform numbers, by a normal visible inside.
 
     Momenta outside the cone, a ring of radii 1 to n, are spread over the disc inside: to the fourth root of
@@ -126,13 +126,13 @@ def sample(lobe: OwnMediumLobe, wi: Direction, u1: Value, u2: Value) -> Directio
     return _out_of_frame(lobe, (scale * o[0], scale * o[1], ops.select(o[2] > 0, z, -z)))
 
 
-def either(where: Value, a: OwnMediumLobe, b: OwnMediumLobe) -> OwnMediumLobe:
+def either(where: Value, a: RefractedLobe, b: RefractedLobe) -> RefractedLobe:
     """A lobe to `sample`: that of a where a condition holds, else of b."""
     roughness = Roughness(*(ops.select(where, x, y) for x, y in zip(a.roughness, b.roughness)))
-    return OwnMediumLobe(1.0, roughness, _chosen(where, a.n, b.n))
+    return RefractedLobe(1.0, roughness, _chosen(where, a.n, b.n))
 
 
-def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Value:
+def integral(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> Value:
     """Albedo of a lobe in NumPy, (N,), or (C, N) of a colour, for directions wi and its roughness, (N,) each.
 
     A mean over visible normals on a lattice of a Fibonacci number of them, in single precision; within .3 % on average.
@@ -140,7 +140,7 @@ def integral(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> Valu
     return lobe.weight * integrals(lobe, wi, normals)[0]
 
 
-def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value, Value]:
+def integrals(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value, Value]:
     """Mean of the weights of samples, and of their squares, and the largest one, as `integral`, for a weight of 1."""
     count, size = len(wi[2]), max(BLOCK // normals, 1)
     blocks = [
@@ -153,7 +153,7 @@ def integrals(lobe: OwnMediumLobe, wi: Direction, normals: int = NORMALS) -> tup
     return mean, squares, largest
 
 
-def _integrals(lobe: OwnMediumLobe, wi: Direction, normals: int) -> tuple[Value, Value, Value]:
+def _integrals(lobe: RefractedLobe, wi: Direction, normals: int) -> tuple[Value, Value, Value]:
     """For columns of directions (N, 1)."""
     u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
@@ -192,7 +192,7 @@ def _flat(reflectance: Reflectance, cosine: Value) -> Value:
     return found.reshape(*found.shape[:-1], *cosine.shape) if np.ndim(found) else found
 
 
-def _inside(lobe: OwnMediumLobe, wi: Direction) -> tuple[Value, Value, Index, Direction]:
+def _inside(lobe: RefractedLobe, wi: Direction) -> tuple[Value, Value, Index, Direction]:
     """Roughnesses, the index, and the momentum of light from wi in the medium, in the frame of the lobe."""
     alpha_u, alpha_v = ops.maximum(lobe.roughness.alpha_u, ALPHA_MIN), ops.maximum(lobe.roughness.alpha_v, ALPHA_MIN)
     x, y, z = _in_frame(lobe, wi)
@@ -241,11 +241,11 @@ def _facing(m: Direction, squares: Direction) -> Value:
     return q * q
 
 
-def _in_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
+def _in_frame(lobe: RefractedLobe, w: Direction) -> Direction:
     return w if _is_straight(lobe.roughness) else ggx.rotate(w, lobe.roughness.rotation)
 
 
-def _out_of_frame(lobe: OwnMediumLobe, w: Direction) -> Direction:
+def _out_of_frame(lobe: RefractedLobe, w: Direction) -> Direction:
     return w if _is_straight(lobe.roughness) else ggx.rotate(w, -lobe.roughness.rotation)
 
 

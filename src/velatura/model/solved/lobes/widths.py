@@ -26,7 +26,7 @@ from velatura.model.solved.energies.adding import Part
 from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.optics import fresnel
 
@@ -239,7 +239,7 @@ def features(
     cosine = _cosine(cos_theta, n)
     sin2 = 1 - cos_theta * cos_theta
     wi = np.sqrt(sin2), np.zeros_like(sin2), cos_theta
-    lobe = OwnMediumLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, opener.leaving)
+    lobe = RefractedLobe(1.0, first.roughness(np.zeros_like(sin2)), n, None, opener.leaving)
     let_out = refracted_lobe.integral(lobe, wi, COARSE)
     reflected = part.reflectance(cosine)
     expected = ops.mean(reflected * share) * let_out

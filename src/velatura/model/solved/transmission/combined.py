@@ -2,7 +2,7 @@
 
 Once for a direction, `parts` has the energies over the integrals of the lobes, and the probabilities of sampling them.
 Light that bounces is in a lobe as far as that is narrow. All else is scattered light, and so is the energy that a lobe
-lacks if it would have to be drawn more than `MOST` times as bright.
+lacks if it would have to be drawn more than `MAX_GAIN` times as bright.
 
 A sample of light that goes straight through is that of a rough dielectric: it may be reflected. So nothing else has to
 be sampled of a single interface whose facets are met once; elsewhere reflected lobes are sampled by their energies.
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +21,13 @@ from velatura import ops
 from velatura.model.solved import sample_allocation
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.remainder import EVEN
-from velatura.model.solved.sample_allocation import Wanted
+from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import direct, internal_reflections
-from velatura.model.solved.transmission.direct import Passage
+from velatura.model.solved.transmission.direct import Transmission
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
-MOST = 2.0  # energy over integral
+MAX_GAIN = 2.0  # energy over integral
 LEAST = 0.05  # share of samples of what passes that are scattered, for what all others miss
 UNLIKE = 1.5  # weight over its mean, of samples that go straight through, for which more are drawn
 PASSES_MIN = 0.05  # share of facets that let light pass, where samples are shared
@@ -39,6 +40,9 @@ Array = NDArray[np.floating]
 class Parts(ops.Named):
     """Light from one direction that passes: weights (colours) of what goes straight through, of what bounces, and of
     what is scattered, and the probabilities of sampling them; reflected lobes are sampled else."""
+
+    COLOURS: ClassVar = ("straight", "bounced", "rest")
+    CHANCES: ClassVar = ("of_straight", "of_bounced", "of_rest")
 
     straight: Value
     bounced: Value
@@ -64,14 +68,14 @@ class Parts(ops.Named):
 
 
 def parts(
-    passage: Passage,
+    transmission: Transmission,
     wi: tuple[Array, Array, Array],
     straight: Array,
     bounces: Array,
     passed: Array,
-    reflected: Wanted,
+    reflected: Demand,
     met: Sequence[int | None] = (),
-    facets: Wanted | None = None,
+    facets: Demand | None = None,
     numbers: Sequence[Array] = (),
     peak: Array | float = 1.0,
 ) -> tuple[Parts, Array]:
@@ -84,19 +88,19 @@ def parts(
     to `peak`.
     """
     i, lobe, found = (
-        internal_reflections.seen_below(passage, wi),
-        internal_reflections.bounced(passage, wi),
-        internal_reflections.rest(passage, wi),
+        internal_reflections.seen_below(transmission, wi),
+        internal_reflections.bounced(transmission, wi),
+        internal_reflections.rest(transmission, wi),
     )
     straight = np.clip(straight, 0, passed)  # waves over the azimuth may lie below 0
     bounces = np.clip(internal_reflections.share(lobe) * bounces, 0, passed - straight)
     # Divide energies by integrals, and hand over what they lack
-    of_straight, squares, passes = direct.integrals(passage, wi)
+    of_straight, squares, passes = direct.integrals(transmission, wi)
     of_bounced = refracted_lobe.integral(lobe, i) if lobe else np.zeros_like(of_straight)
-    weight_straight = np.minimum(ops.divide(straight, of_straight), MOST)
+    weight_straight = np.minimum(ops.divide(straight, of_straight), MAX_GAIN)
     bounces = np.maximum(bounces + straight - weight_straight * of_straight, 0)
     # A kind of stack may have a lobe that this one has not
-    weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MOST) * bool(lobe)
+    weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MAX_GAIN) * bool(lobe)
     energies = weight_straight * of_straight, weight_bounced * of_bounced
     rest = np.maximum(passed - energies[0] - energies[1], 0)
     weight_rest = rest / internal_reflections.integral_rest(found, i)
@@ -106,52 +110,55 @@ def parts(
         scattered = np.maximum(scattered, LEAST * (straightly + bouncing))
     mean = ops.divide(straightly, np.clip(passes, PASSES_MIN, 1.0))
     usual = np.minimum(weight_straight * ops.divide(squares, of_straight), UNLIKE * mean)
-    drawn = Wanted.of(mean, usual, usual)
+    drawn = Demand.of(mean, usual, usual)
     if facets is not None:
         # Only samples that do not pass the facets are reflected
         weights = (np.minimum(ops.divide(x, 1 - passes), UNLIKE) for x in facets[1:])
         most = (np.maximum(*each) for each in zip(drawn[1:], weights))
-        drawn = Wanted(ops.mean(straightly) + facets.energy, *most)
+        drawn = Demand(ops.mean(straightly) + facets.energy, *most)
     heaviest = weight_rest * (1 + found.diffuse * (peak - 1))
-    others = Wanted.of(bouncing, bouncing, weight_bounced), Wanted.of(scattered, rest, heaviest)
+    others = Demand.of(bouncing, bouncing, weight_bounced), Demand.of(scattered, rest, heaviest)
     # Samples that do not pass the facets of an interface are among those of its lobe
     total = sum(each.energy for each in (drawn, *others)) + reflected.energy.sum(axis=0)
-    odds = direct.chances(passage, wi)
+    odds = direct.chances(transmission, wi)
     for k, j in enumerate(met):
         if j is not None:
-            reflected = reflected.spared(k, sample_allocation.LIGHT * odds[j] * ops.divide(drawn.energy, total))
-    shares = sample_allocation.shared(Wanted.together([drawn, *others, reflected]))
+            share = odds[j] * ops.divide(drawn.energy, total)
+            reflected = reflected.spared(k, sample_allocation.TARGET_SAMPLE_WEIGHT * share)
+    shares = sample_allocation.shared(Demand.together([drawn, *others, reflected]))
     return Parts(weight_straight, weight_bounced, weight_rest, *shares[:3], *numbers), shares[3:]
 
 
-def energy(passage: Passage, wi: tuple[Array, Array, Array], straight: Array, bounces: Array) -> Array:
+def energy(transmission: Transmission, wi: tuple[Array, Array, Array], straight: Array, bounces: Array) -> Array:
     """Of light that goes straight through and bounces, with such weights (C, N)."""
-    lobe, found = internal_reflections.bounced(passage, wi), straight * direct.integrals(passage, wi)[0]
+    lobe, found = internal_reflections.bounced(transmission, wi), straight * direct.integrals(transmission, wi)[0]
     return (
-        found + bounces * refracted_lobe.integral(lobe, internal_reflections.seen_below(passage, wi)) if lobe else found
+        found + bounces * refracted_lobe.integral(lobe, internal_reflections.seen_below(transmission, wi))
+        if lobe
+        else found
     )
 
 
-def rest(passage: Passage, wi: tuple[Array, Array, Array], light: Array) -> Array:
+def rest(transmission: Transmission, wi: tuple[Array, Array, Array], light: Array) -> Array:
     """The weight of the rest that has an energy (C, N)."""
     whole = internal_reflections.integral_rest(
-        internal_reflections.rest(passage, wi), internal_reflections.seen_below(passage, wi)
+        internal_reflections.rest(transmission, wi), internal_reflections.seen_below(transmission, wi)
     )
     return np.asarray(np.maximum(light, 0) / whole)
 
 
-def eval_pdf(passage: Passage, of: Parts, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+def eval_pdf(transmission: Transmission, of: Parts, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, of light that passes, and the density of `sample` times `Parts.share`, on both
     sides; wi lies above. Radiance is not scaled by the index."""
-    i, o = internal_reflections.seen_below(passage, wi), (wo[0], wo[1], -wo[2])
-    value, density = direct.eval_pdf(passage, wi, wo)
+    i, o = internal_reflections.seen_below(transmission, wi), (wo[0], wo[1], -wo[2])
+    value, density = direct.eval_pdf(transmission, wi, wo)
     value, density = of.straight * value, of.of_straight * density
-    lobe = internal_reflections.bounced(passage, wi)
+    lobe = internal_reflections.bounced(transmission, wi)
     also = [
         (
             of.rest,
             of.of_rest,
-            internal_reflections.eval_pdf_rest(internal_reflections.rest(passage, wi, of.numbers), i, o),
+            internal_reflections.eval_pdf_rest(internal_reflections.rest(transmission, wi, of.numbers), i, o),
         )
     ]
     if lobe:
@@ -163,19 +170,19 @@ def eval_pdf(passage: Passage, of: Parts, wi: Direction, wo: Direction) -> tuple
     return value, density
 
 
-def sample(passage: Passage, of: Parts, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+def sample(transmission: Transmission, of: Parts, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
     """A direction wo on either side, from uniform numbers; where light is lost, `eval_pdf` is 0."""
-    i = internal_reflections.seen_below(passage, wi)
+    i = internal_reflections.seen_below(transmission, wi)
     share = ops.maximum(of.share, ops.TINY)
     probability = of.of_straight / share
     begin = probability + of.of_bounced / share
-    wo = direct.sample(passage, wi, ops.minimum(ops.divide(u, probability), BELOW_ONE), u1, u2)
-    lobe = internal_reflections.bounced(passage, wi)
+    wo = direct.sample(transmission, wi, ops.minimum(ops.divide(u, probability), BELOW_ONE), u1, u2)
+    lobe = internal_reflections.bounced(transmission, wi)
     if lobe:
         wo = _chosen(u < probability, wo, _down(refracted_lobe.sample(lobe, i, u1, u2)))
     again = ops.clip(ops.divide(u - begin, 1 - begin), 0.0, BELOW_ONE)
     scattered = _down(
-        internal_reflections.sample_rest(internal_reflections.rest(passage, wi, of.numbers), i, again, u1, u2)
+        internal_reflections.sample_rest(internal_reflections.rest(transmission, wi, of.numbers), i, again, u1, u2)
     )
     return _chosen(u < begin, wo, scattered)
 

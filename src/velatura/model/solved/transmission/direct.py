@@ -66,7 +66,7 @@ Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
-class Crossing(ops.Named):
+class Refraction(ops.Named):
     """An interface between media of mean indices n_1 and n_2; `eta` is the lower over the upper one, by colour.
 
     `width` is the roughness in the space of `WIDTHS`, `area` its product over the axes, `sign` that of n_1 - n_2: 0
@@ -104,14 +104,14 @@ class Slab(ops.Named):
 
 
 @dataclass(frozen=True)
-class Passage:
+class Transmission:
     """Interfaces from the top, and the slabs 0 to K above, between and below them.
 
     Of interfaces, `faces` are 1 for the last two that make a step of the index, or for the only one, else 0; `under`
     are 1 from the last of them on; `scattered` are 1 below the last medium that scatters, or the last rough interface.
     """
 
-    crossings: tuple[Crossing, ...]
+    refractions: tuple[Refraction, ...]
     slabs: tuple[Slab, ...]
     faces: tuple[Value, ...]
     under: tuple[Value, ...]
@@ -122,35 +122,35 @@ class Passage:
     @property
     def indices(self) -> list[Value]:
         """Those of the slabs."""
-        return [self.crossings[0].n_1, *(crossing.n_2 for crossing in self.crossings)]
+        return [self.refractions[0].n_1, *(refraction.n_2 for refraction in self.refractions)]
 
 
-def passage(
+def transmission(
     material: Material,
     kind: type[Variance],
     stepped: Sequence[int] | None = None,
     rough: int | None = None,
     cloudy: Sequence[int] | None = None,
-) -> Passage:
+) -> Transmission:
     """A material that transmits, ready for light from above; `kind` as of `variance_kind`. `stepped` are the
     interfaces that make a step of the index, `rough` is the last one whose facets turn light, `cloudy` are the
     slabs that scatter; None for all, for the last one, and for those of media whose scattering is not known to be 0.
     """
     n = 1.0
-    crossings: list[Crossing] = []
+    refractions: list[Refraction] = []
     slabs = [Slab()]
     for meeting in chain(material.solid(), coated.of(material)):
         layer = meeting.layer
         if isinstance(layer, MediumValues):
             tau_s = layer.sigma_s * layer.depth
-            clear = is_none(tau_s) if cloudy is None else len(crossings) not in cloudy
+            clear = is_none(tau_s) if cloudy is None else len(refractions) not in cloudy
             slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
-        crossings.append(_crossing(layer, meeting.above, n, kind, meeting.films))
+        refractions.append(_crossing(layer, meeting.above, n, kind, meeting.films))
         slabs.append(Slab())
-        n = crossings[-1].n_2
-    count = len(crossings)
+        n = refractions[-1].n_2
+    count = len(refractions)
     lower, *others = reversed(range(count) if stepped is None else stepped or [count - 1])
     faces = tuple(float(k in (lower, *others[:1])) for k in range(count))
     under = tuple(float(k >= lower) for k in range(count))
@@ -158,14 +158,14 @@ def passage(
     last = min(scattering[-1], count - 1) if scattering else 1 + (count - 1 if rough is None else rough)
     scattered = tuple(float(k >= last) for k in range(count))
     is_cloudy = bool(scattering)
-    return Passage(tuple(crossings), tuple(slabs), faces, under, scattered, bool(others), is_cloudy)
+    return Transmission(tuple(refractions), tuple(slabs), faces, under, scattered, bool(others), is_cloudy)
 
 
 def is_none(x: Value) -> bool:
     return isinstance(x, float | np.ndarray) and not np.any(x)
 
 
-def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance], films: Films) -> Crossing:
+def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance], films: Films) -> Refraction:
     eta = layer.eta / above
     ratio = ops.mean(layer.eta) / ops.mean(above)  # and so its inverse from the other side
     u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
@@ -177,11 +177,11 @@ def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Varia
     least = n_1 * ops.sqrt(ratio) * WIDTH_MIN / ops.sqrt(u * v)
     turns = step > least
     sign, least = ops.select(turns, ops.select(ratio < 1, 1.0, -1.0), 0.0), ops.select(turns, FLAT, least)
-    return Crossing(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least, films)
+    return Refraction(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least, films)
 
 
 @dataclass(frozen=True)
-class Crossed(ops.Named):
+class MomentumInSlabs(ops.Named):
     """A momentum p in all slabs: its cosines there, 0 where it cannot be, and the same bounded; for interfaces, the
     steps w_l, and the shares (colours) of light that they let pass; the latter for slabs, too."""
 
@@ -195,28 +195,28 @@ class Crossed(ops.Named):
     slabs: list[Value]
 
 
-def entered(passage: Passage, wi: Direction) -> Crossed:
+def entered(transmission: Transmission, wi: Direction) -> MomentumInSlabs:
     """The momentum of light from wi, above."""
-    n = passage.indices[0]
-    return _crossed(passage, (-n * wi[0], -n * wi[1]), ops.maximum(wi[2], 0.0), None)
+    n = transmission.indices[0]
+    return _crossed(transmission, (-n * wi[0], -n * wi[1]), ops.maximum(wi[2], 0.0), None)
 
 
-def _crossed(passage: Passage, p: Momentum, above: Value, below: Value | None) -> Crossed:
+def _crossed(transmission: Transmission, p: Momentum, above: Value, below: Value | None) -> MomentumInSlabs:
     """With the cosines above and below all interfaces, where more exact ones are known."""
     p2 = p[0] * p[0] + p[1] * p[1]
-    cosines = [ops.sqrt(1 - p2 / (n * n)) for n in passage.indices]
+    cosines = [ops.sqrt(1 - p2 / (n * n)) for n in transmission.indices]
     bounded = [ops.maximum(c, COS_MIN) for c in cosines]
     for l, known in ((0, above), (-1, below)):
         if known is not None:
             cosines[l], bounded[l] = known, ops.maximum(known, GRAZING)
-    crossings = passage.crossings
-    steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(crossings)]
-    passes = [c.passing(cosines[l], cosines[l + 1]) for l, c in enumerate(crossings)]
-    slabs = [1.0 if slab.is_clear else ops.exp(-slab.depth / c) for slab, c in zip(passage.slabs, bounded)]
-    return Crossed(p, p2, passage.indices, cosines, bounded, steps, passes, slabs)
+    refractions = transmission.refractions
+    steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(refractions)]
+    passes = [c.passing(cosines[l], cosines[l + 1]) for l, c in enumerate(refractions)]
+    slabs = [1.0 if slab.is_clear else ops.exp(-slab.depth / c) for slab, c in zip(transmission.slabs, bounded)]
+    return MomentumInSlabs(p, p2, transmission.indices, cosines, bounded, steps, passes, slabs)
 
 
-def _smooth(crossed: Crossed, interfaces: slice, slabs: slice) -> Value:
+def _smooth(crossed: MomentumInSlabs, interfaces: slice, slabs: slice) -> Value:
     """Share (a colour) of light that passes smooth interfaces and slabs."""
     return reduce(lambda a, b: a * b, [*crossed.passes[interfaces], *crossed.slabs[slabs]], 1.0)
 
@@ -230,45 +230,47 @@ class _Component(ops.Named):
     weight: Value
 
 
-def _component(passage: Passage, j: int, steps: Sequence[Value], d: Momentum | None = None) -> _Component:
+def _component(transmission: Transmission, j: int, steps: Sequence[Value], d: Momentum | None = None) -> _Component:
     """For the steps that light makes at all interfaces, and the sum d of what it moves there; None for little. A single
     interface has its own roughness, and all the weight."""
-    own = passage.crossings[j]
+    own = transmission.refractions[j]
     size = ops.maximum(own.sign * steps[j], own.least)
     if len(steps) == 1:
         return _Component(size, own.roughness, 1.0)
     width = own.width
-    for l, (step, other) in enumerate(zip(steps, passage.crossings)):
+    for l, (step, other) in enumerate(zip(steps, transmission.refractions)):
         if l != j:
             width = width + other.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY) / size, EXPONENT)
-    weights = [_weight(crossing, step) for crossing, step in zip(passage.crossings, steps)]
+    weights = [_weight(refraction, step) for refraction, step in zip(transmission.refractions, steps)]
     if d is not None:
         total = reduce(operator.add, weights)
-        weights = [weight * _tail(crossing, d, total) for weight, crossing in zip(weights, passage.crossings)]
+        weights = [
+            weight * _tail(refraction, d, total) for weight, refraction in zip(weights, transmission.refractions)
+        ]
     return _Component(size, width.roughness(WIDTHS), weights[j] / reduce(operator.add, weights))
 
 
-def _weight(crossing: Crossing, step: Value) -> Value:
+def _weight(refraction: Refraction, step: Value) -> Value:
     """Square of the width of a step."""
-    width2 = ops.select(_turns(crossing.sign), step * step * crossing.area, 0.0)
-    return width2 + WEIGHT_MIN * crossing.n_1 * crossing.n_2
+    width2 = ops.select(_turns(refraction.sign), step * step * refraction.area, 0.0)
+    return width2 + WEIGHT_MIN * refraction.n_1 * refraction.n_2
 
 
-def _tail(crossing: Crossing, d: Momentum, width2: Value) -> Value:
+def _tail(refraction: Refraction, d: Momentum, width2: Value) -> Value:
     """Density of an interface's tail in the direction of d, over that of one that is isotropic; 1 within the width of
     all."""
-    alpha_u, alpha_v, rotation = crossing.roughness
-    if isinstance(crossing.width, Isotropic):
+    alpha_u, alpha_v, rotation = refraction.roughness
+    if isinstance(refraction.width, Isotropic):
         return 1.0
     x, y, _ = _turned((*d, 0.0), rotation)
     near = (x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v) + width2) / (x * x + y * y + width2)
     return 1 / (near * near)
 
 
-def _drawn(passage: Passage, i: Crossed) -> tuple[list[_Component], list[Value]]:
+def _drawn(transmission: Transmission, i: MomentumInSlabs) -> tuple[list[_Component], list[Value]]:
     """The components as they are sampled, as wide as at p_o = p_i, and their probabilities."""
-    count = len(passage.crossings)
-    components = [_component(passage, j, i.steps) for j in range(count)]
+    count = len(transmission.refractions)
+    components = [_component(transmission, j, i.steps) for j in range(count)]
     if count == 1:
         return components, [1.0]
     # Leave out parts that light does not reach; it always reaches the first interface
@@ -278,39 +280,39 @@ def _drawn(passage: Passage, i: Crossed) -> tuple[list[_Component], list[Value]]
     return components, [share / total for share in shares]
 
 
-def chances(passage: Passage, wi: Direction) -> list[Value]:
+def chances(transmission: Transmission, wi: Direction) -> list[Value]:
     """Share of samples of light from wi that meet facets of each interface, from the top."""
-    return _drawn(passage, entered(passage, wi))[1]
+    return _drawn(transmission, entered(transmission, wi))[1]
 
 
-def eval_pdf(passage: Passage, wi: Direction, wo: Direction) -> tuple[Value, Value]:
+def eval_pdf(transmission: Transmission, wi: Direction, wo: Direction) -> tuple[Value, Value]:
     """f(wi, wo) |cos theta_o|, a colour, of light that passes straight through; the density of `sample` on both sides.
 
     wi lies above. Radiance is not scaled by the index. The value is 0 for wo above.
     """
-    return _eval_pdf(passage, wi, wo)
+    return _eval_pdf(transmission, wi, wo)
 
 
-def _eval_pdf(passage: Passage, wi: Direction, wo: Direction, passes: bool = False) -> tuple[Value, Value]:
+def _eval_pdf(transmission: Transmission, wi: Direction, wo: Direction, passes: bool = False) -> tuple[Value, Value]:
     """As `eval_pdf`; `passes` if all wo lie below."""
-    n = passage.indices
+    n = transmission.indices
     below, cos_o = wo[2] < 0, ops.absolute(wo[2])
     n_out = ops.select(below, n[-1], n[0])
-    i = entered(passage, wi)
+    i = entered(transmission, wi)
     o = _crossed(
-        passage, (n_out * wo[0], n_out * wo[1]), cos_o, cos_o
+        transmission, (n_out * wo[0], n_out * wo[1]), cos_o, cos_o
     )  # no part reads the cosine on the side of wi and that beyond
     d = o.p[0] - i.p[0], o.p[1] - i.p[1]
-    drawn, shares = _drawn(passage, i)
+    drawn, shares = _drawn(transmission, i)
     value: Value = 0.0
     density: Value = 0.0
-    for j, (crossing, sampled, share) in enumerate(zip(passage.crossings, drawn, shares)):
+    for j, (refraction, sampled, share) in enumerate(zip(transmission.refractions, drawn, shares)):
         with ops.block(f"Pass by a facet of interface {j}"):
-            own = crossing.n_1 * i.bounded[j] - crossing.n_2 * o.bounded[j + 1]
-            component = _component(passage, j, [*i.steps[:j], own, *o.steps[j + 1 :]], d)
-            facet = _facet(crossing, i, o, j, component.step)
-            alone = _masking(crossing.roughness, i, j) * _masking(crossing.roughness, o, j + 1)
-            turns = _turns(crossing.sign)
+            own = refraction.n_1 * i.bounded[j] - refraction.n_2 * o.bounded[j + 1]
+            component = _component(transmission, j, [*i.steps[:j], own, *o.steps[j + 1 :]], d)
+            facet = _facet(refraction, i, o, j, component.step)
+            alone = _masking(refraction.roughness, i, j) * _masking(refraction.roughness, o, j + 1)
+            turns = _turns(refraction.sign)
             smooth = _smooth(i, slice(j), slice(j + 1)) * _smooth(o, slice(j + 1, None), slice(j + 1, None))
             seen = component.weight * _slopes(component.roughness, facet.slope) * ops.select(turns, alone, 1.0)
             value = value + smooth * facet.passes * seen
@@ -320,25 +322,25 @@ def _eval_pdf(passage: Passage, wi: Direction, wo: Direction, passes: bool = Fal
             through = ops.select(o.p2 < _lowest2(n[j + 1 :]), through, 0.0)
         with ops.block("Or be reflected by it"):
             if not passes:
-                through = ops.select(below, through, _reflected(passage, i, o, j, sampled.roughness))
+                through = ops.select(below, through, _reflected(transmission, i, o, j, sampled.roughness))
             density = density + share * through
     # From momentum to solid angle
     lit, scale = wi[2] > 0, n_out * n_out * cos_o
     return ops.select(lit & below, value * scale, 0.0), ops.select(lit, density * scale, 0.0)
 
 
-def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
+def sample(transmission: Transmission, wi: Direction, u: Value, u1: Value, u2: Value) -> Direction:
     """A direction wo from uniform numbers, on either side of the material.
 
     It lies in the surface where light of the facet drawn would stay inside; `eval_pdf` is 0 there.
     """
-    n = passage.indices
-    i = entered(passage, wi)
-    components, shares = _drawn(passage, i)
+    n = transmission.indices
+    i = entered(transmission, wi)
+    components, shares = _drawn(transmission, i)
     with ops.block("Choose an interface"):
         every, begins = [], []
         u_chosen, begin = u, 0.0
-        for j, (c, component, share) in enumerate(zip(passage.crossings, components, shares)):
+        for j, (c, component, share) in enumerate(zip(transmission.refractions, components, shares)):
             bounds = _lowest2(n[: j + 1]), _lowest2(n[j + 1 :])
             own = c.n_1, c.n_2, c.eta, c.sign, c.least, i.bounded[j], ops.mean(i.passes[j])
             every.append([*own, *component.roughness, *bounds, share, begin])
@@ -353,7 +355,7 @@ def sample(passage: Passage, wi: Direction, u: Value, u1: Value, u2: Value) -> D
         w = i.p[0] / -n_1, i.p[1] / -n_1, cosine
         h = _turned(ggx.sample_visible(_turned(w, rotation), alpha_u, alpha_v, u1, u2), -rotation)
     with ops.block("Refract or reflect"):
-        p, passes = _refracted(n_1, n_2, _chosen(passage.crossings, eta, u_chosen, begins), i.p, w, h, down2)
+        p, passes = _refracted(n_1, n_2, _chosen(transmission.refractions, eta, u_chosen, begins), i.p, w, h, down2)
         r, phi, turns = least * ops.sqrt(ops.divide(u2, 1 - u2)), 2 * pi * u1, _turns(sign)
         x, y, _ = _turned((r * alpha_u * ops.cos(phi), r * alpha_v * ops.sin(phi), 1.0), -rotation)
         p = ops.select(turns, p[0], i.p[0] + x), ops.select(turns, p[1], i.p[1] + y)
@@ -375,18 +377,18 @@ class _Facet(ops.Named):
     passes: Value
 
 
-def _facet(crossing: Crossing, i: Crossed, o: Crossed, j: int, step: Value) -> _Facet:
+def _facet(refraction: Refraction, i: MomentumInSlabs, o: MomentumInSlabs, j: int, step: Value) -> _Facet:
     """Of interface j, for its step as `_component` bounds it."""
-    n_1, n_2, c_1, c_2 = crossing.n_1, crossing.n_2, i.bounded[j], o.bounded[j + 1]
+    n_1, n_2, c_1, c_2 = refraction.n_1, refraction.n_2, i.bounded[j], o.bounded[j + 1]
     slope = (o.p[0] - i.p[0]) / step, (o.p[1] - i.p[1]) / step
-    v_i = 1 - crossing.sign * (i.p[0] * slope[0] + i.p[1] * slope[1]) / (n_1 * c_1)
-    v_o = 1 - crossing.sign * (o.p[0] * slope[0] + o.p[1] * slope[1]) / (n_2 * c_2)
-    turns = _turns(crossing.sign)
+    v_i = 1 - refraction.sign * (i.p[0] * slope[0] + i.p[1] * slope[1]) / (n_1 * c_1)
+    v_o = 1 - refraction.sign * (o.p[0] * slope[0] + o.p[1] * slope[1]) / (n_2 * c_2)
+    turns = _turns(refraction.sign)
     height = ops.select(turns, 1 / ops.sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]), 1.0)
-    forwards = ops.select(turns, crossing.sign * (n_1 * c_1 - n_2 * c_2), 1.0)
+    forwards = ops.select(turns, refraction.sign * (n_1 * c_1 - n_2 * c_2), 1.0)
     faces = (v_i > 0) & (v_o > 0) & (forwards > 0)
     v_i, v_o = ops.maximum(v_i, 0.0), ops.maximum(v_o, 0.0)
-    passing = crossing.passing(v_i * c_1 * height, v_o * c_2 * height)
+    passing = refraction.passing(v_i * c_1 * height, v_o * c_2 * height)
     return _Facet(slope, ops.select(faces, passing * (v_i * v_o / (step * step)), 0.0))
 
 
@@ -404,23 +406,25 @@ def _refracted(
     return (x, y), ops.select(crosses, passes, 0.0)
 
 
-def _chosen(crossings: Sequence[Crossing], eta: Value, u: Value, begins: Sequence[Value]) -> Passing:
+def _chosen(refractions: Sequence[Refraction], eta: Value, u: Value, begins: Sequence[Value]) -> Passing:
     """What the facets of the interface of relative index `eta` let pass that u has chosen, by where each begins."""
-    if not any(crossing.films for crossing in crossings):
+    if not any(refraction.films for refraction in refractions):
         return lambda cos_1, cos_2: 1 - fresnel.dielectric_between(cos_1, cos_2, eta)
 
     def passing(cos_1: Value, cos_2: Value) -> Value:
-        found = crossings[0].passing(cos_1, cos_2)
-        for crossing, begin in zip(crossings[1:], begins[1:]):
-            found = ops.select(u > begin, crossing.passing(cos_1, cos_2), found)
+        found = refractions[0].passing(cos_1, cos_2)
+        for refraction, begin in zip(refractions[1:], begins[1:]):
+            found = ops.select(u > begin, refraction.passing(cos_1, cos_2), found)
         return found
 
     return passing
 
 
-def _reflected(passage: Passage, i: Crossed, o: Crossed, j: int, roughness: Roughness) -> Value:
+def _reflected(
+    transmission: Transmission, i: MomentumInSlabs, o: MomentumInSlabs, j: int, roughness: Roughness
+) -> Value:
     """Density of the momentum o, of light reflected by the facets of interface j that it does not pass."""
-    n, c = passage.indices, passage.crossings[j]
+    n, c = transmission.indices, transmission.refractions[j]
     cos_i, cos_o = i.bounded[j], o.bounded[j]
     w = i.p[0] / -c.n_1, i.p[1] / -c.n_1, cos_i
     h = ggx.normalize((w[0] + o.p[0] / c.n_1, w[1] + o.p[1] / c.n_1, cos_i + cos_o))
@@ -440,7 +444,7 @@ def _slopes(roughness: Roughness, slope: Momentum) -> Value:
     return 1 / (pi * alpha_u * alpha_v * q * q)
 
 
-def _masking(roughness: Roughness, crossed: Crossed, slab: int) -> Value:
+def _masking(roughness: Roughness, crossed: MomentumInSlabs, slab: int) -> Value:
     """Smith's G1 in a slab; the side from which light comes, and its length, make no difference."""
     p, z = crossed.p, crossed.n[slab] * crossed.bounded[slab]
     return ggx.masking(_turned((p[0], p[1], z), roughness.rotation), roughness.alpha_u, roughness.alpha_v)
@@ -464,7 +468,7 @@ def _lowest2(indices: Sequence[Value]) -> Value:
 
 
 def integrals(
-    passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int] = NODES
+    transmission: Transmission, wi: tuple[Array, Array, Array], nodes: tuple[int, int] = NODES
 ) -> tuple[Array, Array, Array]:
     """Energy (3, N) that `eval_pdf` passes from directions wi, (N,) each, the mean square (3, N) of the weights of
     samples, and the share (N,) of them that pass.
@@ -474,19 +478,23 @@ def integrals(
     """
     size = max(BLOCK // (nodes[0] * nodes[1]), 1)
     blocks = [tuple(x[k : k + size] for x in wi) for k in range(0, len(wi[2]), size)]
-    energy, squares, share = zip(*(_integrals(passage, (x, y, z), nodes) for x, y, z in blocks))
+    energy, squares, share = zip(*(_integrals(transmission, (x, y, z), nodes) for x, y, z in blocks))
     return np.concatenate(energy, axis=-1), np.concatenate(squares, axis=-1), np.concatenate(share)
 
 
-def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[int, int]) -> tuple[Array, Array, Array]:
-    n = passage.indices
-    i = entered(passage, wi)
-    widths = [c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(passage.crossings, i.steps)]
+def _integrals(
+    transmission: Transmission, wi: tuple[Array, Array, Array], nodes: tuple[int, int]
+) -> tuple[Array, Array, Array]:
+    n = transmission.indices
+    i = entered(transmission, wi)
+    widths = [
+        c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(transmission.refractions, i.steps)
+    ]
     u, v, rotation = (np.asarray(x)[..., None, None] for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
     # Cast rays from the middle
     share, weight = low_discrepancy.gauss(nodes[0])
     # Both sides of the plane of incidence are alike where interfaces have no axes
-    alike = all(isinstance(crossing.width, Isotropic) for crossing in passage.crossings)
+    alike = all(isinstance(refraction.width, Isotropic) for refraction in transmission.refractions)
     phi = (np.arange(nodes[1]) + 0.5) * ((pi if alike else 2 * pi) / nodes[1])
     rotation = np.arctan2(i.p[1], i.p[0])[:, None, None] if alike else rotation
     n_out = np.asarray(n[-1])
@@ -513,7 +521,7 @@ def _integrals(passage: Passage, wi: tuple[Array, Array, Array], nodes: tuple[in
     flat = len(x), -1
     i_x, i_y, i_z = (w.astype(np.float32)[:, None] for w in wi)
     o_x, o_y, o_z = (w.reshape(flat).astype(np.float32) for w in (x, y, -z))
-    value, density = _eval_pdf(_wider(passage), (i_x, i_y, i_z), (o_x, o_y, o_z), True)
+    value, density = _eval_pdf(_wider(transmission), (i_x, i_y, i_z), (o_x, o_y, o_z), True)
     area = area.reshape(flat)
     value = value if np.ndim(value) > 2 else value[None]
     squares = np.sum(value * area * ops.divide(value, density), axis=-1)

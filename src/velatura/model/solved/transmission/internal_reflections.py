@@ -27,9 +27,17 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model.solved.lobes import refracted_lobe, remainder
-from velatura.model.solved.lobes.refracted_lobe import OwnMediumLobe
+from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.solved.lobes.remainder import EVEN, Samples
-from velatura.model.solved.transmission.direct import EXPONENT, WIDTHS, Crossed, Passage, Slab, entered, is_none
+from velatura.model.solved.transmission.direct import (
+    EXPONENT,
+    WIDTHS,
+    MomentumInSlabs,
+    Slab,
+    Transmission,
+    entered,
+    is_none,
+)
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
@@ -52,7 +60,7 @@ class Rest:
     """Light that is scattered: a lobe, None without one, with a diffuse share of `diffuse` over momenta up to `bound`,
     relative to the index below, by the `numbers` of `remainder.passing`."""
 
-    lobe: OwnMediumLobe | None
+    lobe: RefractedLobe | None
     diffuse: Value
     bound: Value
     numbers: Sequence[Value]
@@ -69,37 +77,39 @@ class Rest:
         return x, y, ops.sqrt(1 - x * x - y * y)
 
 
-def bounced(passage: Passage, wi: Direction) -> OwnMediumLobe | None:
+def bounced(transmission: Transmission, wi: Direction) -> RefractedLobe | None:
     """The lobe of light from wi, above, that bounces between the last two interfaces; None for a single one."""
-    if not passage.bounces:
+    if not transmission.bounces:
         return None
-    faces = _sum(passage.faces, [crossing.width for crossing in passage.crossings])
-    return _lobe(passage, entered(passage, wi), passage.under, faces * BOUNCES)
+    faces = _sum(transmission.faces, [refraction.width for refraction in transmission.refractions])
+    return _lobe(transmission, entered(transmission, wi), transmission.under, faces * BOUNCES)
 
 
-def share(lobe: OwnMediumLobe | None) -> Value:
+def share(lobe: RefractedLobe | None) -> Value:
     """Of the light that bounces, what its lobe holds; the wider that is, the less."""
     if lobe is None:
         return 0.0
     return 1 / (1 + lobe.roughness.alpha_u * lobe.roughness.alpha_v / (WIDE * WIDE))
 
 
-def bound(passage: Passage) -> Value:
+def bound(transmission: Transmission) -> Value:
     """Greatest momentum of scattered light that leaves."""
-    return reduce(ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(passage.indices, (*passage.scattered, 1.0))))
+    return reduce(
+        ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(transmission.indices, (*transmission.scattered, 1.0)))
+    )
 
 
-def rest(passage: Passage, wi: Direction, numbers: Sequence[Value] = EVEN) -> Rest:
+def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = EVEN) -> Rest:
     """The light from wi, above, that is scattered by media, or often by facets; diffuse light has `numbers`."""
-    reached = bound(passage) / passage.indices[-1]
-    if not passage.is_cloudy:
+    reached = bound(transmission) / transmission.indices[-1]
+    if not transmission.is_cloudy:
         return Rest(None, 1.0, reached, numbers)
-    i = entered(passage, wi)
-    scattering = [(slab, cosine) for slab, cosine in zip(passage.slabs, i.bounded) if not is_none(slab.scattering)]
+    i = entered(transmission, wi)
+    scattering = [(slab, cosine) for slab, cosine in zip(transmission.slabs, i.bounded) if not is_none(slab.scattering)]
     alpha = _turned(scattering)
     diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
-    width = type(passage.crossings[0].width).uniform(WIDTHS.variance(alpha))
-    return Rest(_lobe(passage, i, passage.scattered, width), diffuse, reached, numbers)
+    width = type(transmission.refractions[0].width).uniform(WIDTHS.variance(alpha))
+    return Rest(_lobe(transmission, i, transmission.scattered, width), diffuse, reached, numbers)
 
 
 def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
@@ -113,31 +123,31 @@ def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
     return ops.sqrt((1 - cos_theta) / (1 + cos_theta))
 
 
-def _lobe(passage: Passage, i: Crossed, under: Sequence[Value], inside: Variance) -> OwnMediumLobe:
+def _lobe(transmission: Transmission, i: MomentumInSlabs, under: Sequence[Value], inside: Variance) -> RefractedLobe:
     """The lobe in the slab above the interfaces that are `under` it, of the widths of refractions and those that light
     takes on inside."""
-    n = _above(under, passage.indices)
+    n = _above(under, transmission.indices)
     scale = 1 / (2 * n * ops.maximum(_above(under, i.bounded), COS_MIN))
-    for crossing, step in zip(passage.crossings, i.steps):
-        inside = inside + crossing.width * ops.power(ops.maximum(ops.absolute(step) * scale, ops.TINY), EXPONENT)
+    for refraction, step in zip(transmission.refractions, i.steps):
+        inside = inside + refraction.width * ops.power(ops.maximum(ops.absolute(step) * scale, ops.TINY), EXPONENT)
     u, v, rotation = inside.roughness(WIDTHS)
     roughness = Roughness(ops.minimum(u, ALPHA_MAX), ops.minimum(v, ALPHA_MAX), rotation)
-    return OwnMediumLobe(1.0, roughness, n / passage.indices[-1], leaving=_leaving(passage, under))
+    return RefractedLobe(1.0, roughness, n / transmission.indices[-1], leaving=_leaving(transmission, under))
 
 
-def _leaving(passage: Passage, under: Sequence[Value]) -> Callable[[Value], Value]:
+def _leaving(transmission: Transmission, under: Sequence[Value]) -> Callable[[Value], Value]:
     """Share (a colour) that smooth interfaces let pass, by the cosine below all of them."""
-    n, crossings = passage.indices, passage.crossings
+    n, refractions = transmission.indices, transmission.refractions
 
     def leaving(cos_o: Value) -> Value:
         p2 = 1 - cos_o * cos_o
         passes: Value = 1.0
-        for l, (flag, crossing) in enumerate(zip(under, crossings)):
+        for l, (flag, refraction) in enumerate(zip(under, refractions)):
             if isinstance(flag, float) and flag == 0.0:
                 continue
             above, below = (ops.sqrt(1 - p2 * (n[-1] / x) * (n[-1] / x)) for x in n[l : l + 2])
-            below = cos_o if l == len(crossings) - 1 else below
-            passes = passes * (1 - flag + flag * crossing.passing(above, below))
+            below = cos_o if l == len(refractions) - 1 else below
+            passes = passes * (1 - flag + flag * refraction.passing(above, below))
         return passes
 
     return leaving
@@ -155,9 +165,9 @@ def _sum(flags: Sequence[Value], values: Sequence[Any]) -> Any:
     return reduce(operator.add, (x if isinstance(flag, float) else x * flag for flag, x in kept))
 
 
-def seen_below(passage: Passage, wi: Direction) -> Direction:
+def seen_below(transmission: Transmission, wi: Direction) -> Direction:
     """The direction below, turned up, of light that a smooth stack would mirror into it: at most a horizontal one."""
-    n = passage.indices
+    n = transmission.indices
     x, y = (wi[k] * (n[0] / n[-1]) for k in (0, 1))
     scale = 1 / ops.sqrt(ops.maximum(x * x + y * y, 1.0))
     x, y = scale * x, scale * y

@@ -1,0 +1,116 @@
+"""What depends on direction in a solved material, declared once: the order, the kinds and the rows of its columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from itertools import accumulate
+
+from velatura.model.solved.transmission.combined import Parts
+from velatura.ops import Value
+
+
+@dataclass(frozen=True)
+class Column:
+    """A number over direction, or a `colour`. Those of an `energy` are read seldom: albedos, and samples of some parts
+    alone, need them."""
+
+    name: str
+    colour: bool = False
+    energy: bool = False
+
+    def rows(self, colours: int) -> int:
+        """How many rows it has, for so many channels of a colour."""
+        return colours if self.colour else 1
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """The columns of a side with so many lobes, of roughnesses of so many entries, and with what passes or without.
+
+    They are in the order in which they are read, those of densities first. The chance of the remainder is what others
+    leave.
+    """
+
+    lobes: int
+    entries: int
+    passes: bool
+
+    @property
+    def columns(self) -> list[Column]:
+        found = [*[Column("roughness")] * self.entries, Column("chance")] * self.lobes
+        found += [Column("weight", colour=True)] * self.lobes + [Column("scale", colour=True)]
+        found += [Column("energy", colour=True, energy=True)] * self.lobes + [Column("rest", colour=True, energy=True)]
+        if self.passes:
+            found += [Column(f"passed_{part.name}", colour=part.name in Parts.COLOURS) for part in fields(Parts)]
+            found.append(Column("passed", colour=True, energy=True))
+        return found
+
+    def groups(self, colours: int) -> list[int]:
+        """Which rows are read together: 1 for those that are read seldom."""
+        return [int(column.energy) for column in self.columns for _ in range(column.rows(colours))]
+
+    def first_rows(self, name: str, colours: int) -> list[int]:
+        """The first row of each column of a name."""
+        begins = accumulate((column.rows(colours) for column in self.columns), initial=0)
+        return [begin for column, begin in zip(self.columns, begins) if column.name == name]
+
+    def proportions(self, colours: int) -> list[tuple[int, list[int]]]:
+        """The first rows of each energy, and of all else that is in proportion to it."""
+
+        def rows(*names: str) -> list[int]:
+            return [row for name in names for row in self.first_rows(name, colours)]
+
+        found = [(energy, [weight]) for energy, weight in zip(rows("energy"), rows("weight"))]
+        found += [(row, rows("scale")) for row in rows("rest")]
+        return found + [(row, rows(*(f"passed_{part}" for part in Parts.COLOURS))) for row in rows("passed")]
+
+    def chances(self, colours: int) -> list[int]:
+        """Rows of shares of samples, without that of the remainder."""
+        names = "chance", *(f"passed_{part}" for part in Parts.CHANCES)
+        return [row for name in names for row in self.first_rows(name, colours)]
+
+    def read(self, values: Iterable[Value]) -> Columns:
+        """Columns by their values in this order."""
+        by_name: dict[str, list[Value]] = {}
+        for column, value in zip(self.columns, values):
+            by_name.setdefault(column.name, []).append(value)
+        weights, energies, chances = (by_name.get(name, []) for name in ("weight", "energy", "chance"))
+        numbers = by_name.get("roughness", [])
+        roughness = [tuple(numbers[k : k + self.entries]) for k in range(0, len(numbers), self.entries)]
+        chance, passes, passed = 1 - sum(chances), None, None
+        if self.passes:
+            passes = Parts(*(by_name[f"passed_{part.name}"][0] for part in fields(Parts)))
+            passed, chance = by_name["passed"][0], chance - passes.share
+        (scale,), (rest,) = by_name["scale"], by_name["rest"]
+        return Columns(weights, roughness, chances, energies, scale, chance, rest, passes, passed)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One direction's values, or arrays (C, M) and (M,) over directions.
+
+    `weights`, `roughness`, `chances` and `energies` are those of lobes; of the remainder `scale`, `chance` and `rest`.
+    """
+
+    weights: list[Value]
+    roughness: list[tuple[Value, ...]]
+    chances: list[Value]
+    energies: list[Value]
+    scale: Value
+    chance: Value
+    rest: Value
+    passes: Parts | None
+    passed: Value | None
+
+    @property
+    def declaration(self) -> Declaration:
+        entries = len(self.roughness[0]) if self.roughness else 0
+        return Declaration(len(self.weights), entries, self.passes is not None)
+
+    @property
+    def all(self) -> list[Value]:
+        """Values in the order of the declaration."""
+        found = [x for roughness, chance in zip(self.roughness, self.chances) for x in (*roughness, chance)]
+        found += [*self.weights, self.scale, *self.energies, self.rest]
+        return [*found, *vars(self.passes).values(), self.passed] if self.passes else found
