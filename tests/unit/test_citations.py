@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 # One author, two, or several, and a year; lines are joined before they are searched
 CITATION = re.compile(r"\b([A-Z][a-zà-ÿ]+)(?:(?: and | & )[A-Z][a-zà-ÿ]+| et al\.)? \(?((?:19|20)\d\d)\b")
 PARTS = re.compile(CITATION.pattern + r", (Eq|Algorithm)s?\.? (\d+(?:(?:-|, | and )\d+)*)")
+OURS = re.compile(r"model\.md, Eq\. (\d+)")
 UNNAMED = re.compile(r"\bEqs?\. \d")
 
 #: What the papers print under the numbers that are cited, and where: each compared with the print when it was put here.
@@ -80,6 +81,20 @@ PRINTED = {
     },
 }
 
+#: The equations of docs/explanation/model.md, and the files below model/solved that compute them.
+MODEL = {
+    1: ("cosine in a medium", {"transmission/direct"}),
+    2: ("energy of an interface", {"energies/adding"}),
+    3: ("light let out, and thrown back", {"energies/adding"}),
+    4: ("repeated events", {"energies/interfaces"}),
+    5: ("refracted lobe", {"lobes/refracted_lobe"}),
+    6: ("width of a lobe", {"lobes/widths"}),
+    7: ("width of a veil", {"lobes/widths"}),
+    8: ("remainder", {"lobes/remainder"}),
+    9: ("direct transmission", {"transmission/direct"}),
+    10: ("diffuse transmission", {"transmission/internal_reflections"}),
+}
+
 
 def source() -> dict[str, str]:
     """Text by file of the package, every run of white space and comment signs as one space."""
@@ -124,7 +139,19 @@ def test_equations_are_those_that_were_read_in_print() -> None:
 def test_equations_name_their_paper() -> None:
     """No `Eq. 5` alone, for which a reader would have to look further up."""
     for file, text in source().items():
-        assert not UNNAMED.search(PARTS.sub("", text)), file
+        assert not UNNAMED.search(OURS.sub("", PARTS.sub("", text))), file
+
+
+def test_every_equation_of_the_default_model_is_at_its_line() -> None:
+    """The numbers of docs/explanation/model.md, each in the file that computes it."""
+    page = (ROOT / "docs/explanation/model.md").read_text(encoding="utf-8")
+    tags = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)}
+    found: dict[int, set[str]] = {}
+    for file, text in source().items():
+        for number in OURS.findall(text):
+            found.setdefault(int(number), set()).add(file.removesuffix(".py"))
+    rooms = {number: {f"model/solved/{name}" for name in files} for number, (_, files) in MODEL.items()}
+    assert found == rooms and set(found) == tags
 
 
 def test_every_model_has_its_papers_and_every_picture_its_programs() -> None:

@@ -71,6 +71,17 @@ def hemisphere(rings: int, sectors: int, n: float) -> tuple[Direction, Array]:
     return (radius * np.cos(phi), radius * np.sin(phi), z), 2 * np.pi * n * n * c / z
 
 
+@pytest.mark.parametrize("name", LOBES)
+def test_the_value_is_the_printed_formula(name: str) -> None:
+    """Where light of both directions enters the medium: that of momenta below its index."""
+    lobe = replace(LOBES[name], weight=0.7)
+    wi, wo = random_directions(4000, 1), random_directions(4000, 2)
+    inside = np.all([np.hypot(w[0], w[1]) < 0.98 * min(lobe.n, 1) for w in (wi, wo)], axis=0)
+    wi, wo = (tuple(x[inside] for x in w) for w in (wi, wo))
+    value, _ = refracted_lobe.eval_pdf(lobe, wi, wo)
+    np.testing.assert_allclose(value, refracted_lobe.eval_plain(lobe, wi, wo), rtol=1e-9)
+
+
 @pytest.mark.parametrize("cosine", COSINES)
 @pytest.mark.parametrize("name", LOBES)
 def test_samples_fall_where_the_density_says(name: str, cosine: float) -> None:

@@ -48,5 +48,5 @@ class Context:
 
 
 def at_a_point() -> Context:
-    """For values that may differ from point to point, or that are recorded."""
+    """Context of values that may differ from point to point, or that are recorded."""
     return Context(constant=False)

@@ -53,7 +53,7 @@ class SmoothInterface(ops.Named):
         return fresnel.conductor(cos_theta, self.eta, self.kappa)
 
     def reflect_together(self, cos2: Value) -> Value:
-        """As `reflect`, by the square of the cosine, with the one refracted direction: all colours are totally
+        """Like `reflect`, by the square of the cosine, with the one refracted direction: all colours are totally
         reflected from the same angle on."""
         if self.eta is None or self.kappa is not None or self.films:
             return self.reflect(ops.sqrt(cos2))

@@ -46,7 +46,7 @@ class Variance(ops.Named):
     __rmul__ = __mul__
 
     def bounded(self: V) -> V:
-        """With every component below the value that a roughness map treats as infinite, so that no sum overflows."""
+        """The variance with every component below the value that a map treats as infinite, so that no sum overflows."""
         return type(self)(*(ops.clip(a, -VARIANCE_MAX, VARIANCE_MAX) for a in vars(self).values()))
 
     @classmethod

@@ -122,7 +122,7 @@ class Lobed:
         return upright((x, y, z), wi), ops.select(passes, seen.eta, 1.0)
 
     def sample_smooth(self, wi: Direction, u: Value, asked: Query = ALL) -> tuple[Direction, Value, Value, Value]:
-        """As `sample`, for a stack that is smooth throughout: a direction, relative index, probability, and weight."""
+        """Like `sample`, for a smooth stack: a direction, its relative index, its probability, and its weight."""
         seen, i = scattered(self, wi).only(asked), upright(wi, wi)
         share = seen.share()
         reflected = sum(lobe.energy for lobe in seen.reflected)

@@ -259,7 +259,7 @@ class _Films:
         return fresnel.cos_transmitted(cosine, self.n12)
 
     def _means(self, n: Value, share: Callable[[float], Value]) -> Row:
-        """Over facets, at the nodes of a medium of index n."""
+        """Means over facets, at the nodes of a medium of index n."""
         average = tables.over_facets(self.tables, share)
         return [average(cosine, self.alpha) for cosine in diffuse_nodes.node_cosines(n)]
 

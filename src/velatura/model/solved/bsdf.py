@@ -140,17 +140,17 @@ class SideView:
 
     @property
     def numbers(self) -> list[int]:
-        """Of the components that reflected parts belong to."""
+        """Components that reflected parts belong to."""
         return [*(shape.interface for shape in self.shapes), self.interfaces]
 
     @property
     def chances(self) -> list[Value]:
-        """Of the reflected parts."""
+        """Sampling probabilities of the reflected parts."""
         return [*self.columns.chances, self.columns.chance]
 
     @property
     def energies(self) -> list[Value]:
-        """Of the reflected parts."""
+        """Energies of the reflected parts."""
         return [*self.columns.energies, self.columns.rest]
 
     @property
@@ -205,7 +205,7 @@ class Selection:
 
     @property
     def share(self) -> Value:
-        """Of samples that are drawn from what passes."""
+        """Share of samples that are drawn from what passes."""
         return self.passes.share if self.passes else 0.0
 
     @property

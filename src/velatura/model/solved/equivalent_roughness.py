@@ -45,7 +45,7 @@ class Samples:
 
 
 def of_lobe(lobe: RefractedLobe, wi: Direction) -> Samples:
-    """Of a lobe with numbers (N,), and a weight (C, N), for directions wi.
+    """Samples of a lobe with numbers (N,), and a weight (C, N), for directions wi.
 
     Samples are those of a GGX reflection outside that is as wide to first order: there the value of a lobe falls off
     steadily towards the horizon, so that the roughness has no steps, as samples inside that are totally reflected have.
@@ -62,7 +62,7 @@ def of_lobe(lobe: RefractedLobe, wi: Direction) -> Samples:
 
 
 def of_passed(transmission: Transmission, parts: Parts, wi: Direction) -> Samples:
-    """Of light that passes, in the medium beyond, turned up; that of wi is refracted by all interfaces."""
+    """Samples of light that passes, in the medium beyond, turned up; that of wi is refracted by all interfaces."""
     u, u1, u2 = low_discrepancy.at_nodes(len(wi[2]), SAMPLES, None)
     i, each = _direction(wi), Parts(*map(_each, vars(parts).values()))
     x, y, z = combined.sample(transmission, each, i, u, u1, u2)
@@ -133,7 +133,7 @@ def _median(x: Array, weight: Array) -> Array:
 
 
 def _step(x: Array, weight: Array, median: Array) -> Array:
-    """By what Newton's method multiplies a median. A value counts as below m for 1 / (1 + (x/m)^4)."""
+    """Newton update factor of the smoothed median. A value counts as below m for 1 / (1 + (x/m)^4)."""
     square = ops.divide(x, median[..., None]) ** 2
     below = 1 / (1 + square * square)
     excess = np.sum(weight * (below - 0.5), axis=-1)

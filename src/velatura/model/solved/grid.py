@@ -37,7 +37,7 @@ class Grid:
 
     @classmethod
     def of(cls, isotropic: bool, material: Material | None = None) -> Grid:
-        """For a material of numbers, or None for any of those of tables."""
+        """The grid of a material of numbers, or None for any of those of tables."""
         sharp = material is not None and any(map(_is_sharp, material.interfaces))
         return cls(isotropic, COSINES[isotropic], AZIMUTHS[sharp])
 
@@ -118,7 +118,7 @@ class Folded:
 
     @classmethod
     def of(cls, grid: Grid, material: Material) -> Folded:
-        """For a material of numbers, whose axes the azimuths are mirrored in where they lie on one or between two."""
+        """Directions for a material of numbers, mirrored in its axes where azimuths lie on one or between two."""
         turns = grid.turns
         brushed = [layer for layer in material.interfaces if layer.alpha_u != layer.alpha_v]
         axes = [(layer.rotation * turns / 90) % turns for layer in brushed] or [0.0]  # the sum of those mirrored
@@ -157,7 +157,7 @@ class Folded:
         return values.reshape(-1, self.grid.turns)[:, self.kept].ravel()
 
     def shares(self, w: tuple[Array, Array, Array]) -> list[tuple[Array, Array]]:
-        """As those of the grid, of these directions: where what is interpolated looks alike in mirrors."""
+        """Interpolation nodes and weights on the folded grid."""
         places = np.arange(self.grid.cosines)[:, None] * len(self.kept) + self.source
         return [(places.ravel()[index], share) for index, share in self.grid.shares(w)]
 

@@ -54,7 +54,7 @@ def factors(
         return found.reshape(-1, count, count)
 
     def wanted(value: Array, reached: Sequence[tuple[Array, Array]], squares: Array, energy: Array) -> Demand:
-        """Of a part with its factors."""
+        """Demand of a part with its factors."""
         s = np.sqrt(squares)
         weights = value * s[:, nodes] * sum(share * s[:, index] for index, share in reached)
         weights = weights.reshape(len(value), count, samples)
@@ -93,7 +93,7 @@ def factors(
 
 
 def _weight(there: tuple[Value, Value], back: Value, wi: Direction, wo: Direction) -> Array:
-    """Of samples of the geometric mean."""
+    """Weights of samples of the geometric mean."""
     value, density = there
     both = np.maximum(value, 0) * np.maximum(back, 0) * (np.abs(wo[2]) / wi[2])
     return np.where(density > 0, ops.divide(np.sqrt(both), density), 0.0)

@@ -19,7 +19,7 @@ Array = NDArray[np.floating]
 
 
 class Demand(NamedTuple):
-    """Of K parts, for N directions, (K, N) each, or (N,) of one part: their energies, and where a part takes all
+    """What K parts need for N directions, (K, N) each, or (N,) of one part: their energies, and where a part takes all
     samples, the mean weight of these over the light that they carry, and the largest one."""
 
     energy: Array
@@ -28,7 +28,7 @@ class Demand(NamedTuple):
 
     @classmethod
     def of(cls, energy: Array, usual: Array, heaviest: Array) -> Demand:
-        """Of values by colour, (C, N)."""
+        """Demand of values by colour, (C, N)."""
         return cls(ops.mean(energy), np.max(usual, axis=0), np.max(heaviest, axis=0))
 
     @classmethod
@@ -38,7 +38,7 @@ class Demand(NamedTuple):
         return cls(energy, usual, heaviest)
 
     def spared(self, k: int, weight: Array) -> Demand:
-        """With weights (N,) less of part k, which other samples carry."""
+        """The demand less weights (N,) of part k, which other samples carry."""
         less = np.zeros_like(self.energy)
         less[k] = weight
         return Demand(self.energy, *(np.maximum(x - less, 0) for x in self[1:]))

@@ -106,8 +106,8 @@ class SolvedSide:
         return np.concatenate(list(vars(self.polynomial).values()))
 
     def weighed(self, factors: Sequence[Array], wanted: Demand) -> SolvedSide:
-        """With the weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared anew
-        where nothing passes."""
+        """The side with weights of reflected parts, and of what passes, scaled by factors (C, M), and samples shared
+        anew where nothing passes."""
         columns = self.columns
         weights = [factor * weight for factor, weight in zip(factors, columns.weights)]
         columns = replace(columns, weights=weights, scale=factors[len(weights)] * columns.scale)
@@ -133,7 +133,7 @@ class _Light:
 
     @classmethod
     def of(cls, solved: Energies, count: int) -> _Light:
-        """Of the first `count` directions."""
+        """Energies of the first `count` directions."""
         names = "lobes", "veils", "rest", "straight", "bounced", "passed"
         return cls(solved, *(getattr(solved, name)[..., :count] for name in names))
 
@@ -175,7 +175,7 @@ class Solver:
 
     @classmethod
     def of(cls, model: Model, variance: type[Variance], context: Context, material: Material | None = None) -> Solver:
-        """For a material of numbers, or None for those of tables."""
+        """The solver of a material of numbers, or None for those of tables."""
         assert context.colour is not None
         colours = RGB if context.colour is channels else len(context.colour())
         return cls.over(colours, model, variance, context, material)
@@ -189,7 +189,7 @@ class Solver:
         context: Context,
         material: Material | None = None,
     ) -> Solver:
-        """As `of`, in a number of colours that is not that of the renderer's."""
+        """Like `of`, for another channel count than the renderer's."""
         isotropic = variance is Isotropic
         shape = directional_grid.LINE if isotropic else directional_grid.PLANE
         grid = Grid.of(isotropic, material)
@@ -204,11 +204,11 @@ class Solver:
 
     @property
     def kind(self) -> type[Variance]:
-        """Of lobes; those of isotropic interfaces have axes in the plane of incidence."""
+        """Kind of the lobes' variance; lobes of isotropic interfaces have axes in the plane of incidence."""
         return PerAxis if self.isotropic else Covariance
 
     def layouts(self, materials: Sequence[Material]) -> list[Layout]:
-        """Of each side, for materials that differ in values."""
+        """Layouts of each side, valid for all `materials`."""
         veiled: set[int] = set()
         for material in materials:
             veiled = veiled.union(*map(_veiled, sides(material)))
@@ -396,8 +396,8 @@ class Solver:
         return rows
 
     def _pass_between(self, rows: Array, transmission: Transmission, energy: int, weights: Sequence[int]) -> None:
-        """With all light that passes about the critical angles of inner media, where weights jump from one node to the
-        next: diffuse light has what the other parts lack."""
+        """Give diffuse light what the other parts lack of all that passes, about the critical angles of inner media,
+        where weights jump from one node to the next."""
         inner = np.array([float(np.mean(n)) for n in transmission.indices[1:-1]])
         nodes = self.grid.cosines - 1
         edges = np.floor((1 - inner[inner < 1] ** 2) ** 0.25 * nodes)
@@ -427,7 +427,7 @@ class Solver:
                 rows[each] *= share * rest if group in coloured else share
 
     def _lobes_between(self, rows: Array, side: SolvedSide) -> None:
-        """With weights of lobes whose integrals have edges between directions, as near to the light that is
+        """Set weights of lobes whose integrals have edges between directions, as near to the light that is
         interpolated as those at the nodes beside allow. What one lobe has too much of, or lacks, is left to others."""
         wi = directional_grid.directions(self.shape, None)
         found = []
@@ -455,7 +455,7 @@ class Solver:
         return np.broadcast_to(values, (self.colours, np.shape(values)[-1]))
 
     def _roughness(self, tensor: Tensor) -> Iterator[Array]:
-        """Of a lobe with the plane of incidence, as it is interpolated."""
+        """Roughness of a lobe with the plane of incidence, as it is interpolated."""
         roughness = tensor.roughness(np.zeros_like(tensor.xx))
         if self.isotropic:  # axes lie in the plane of incidence, and across it
             u, v = (np.minimum(tensor.width(np.array(axis)), widths.ALPHA_MAX) for axis in widths.AXES)
@@ -507,7 +507,7 @@ def _stacked(*channels: Array) -> Array:
 
 
 def layout_of(materials: Sequence[Material], veiled: Set[int] = frozenset()) -> Layout:
-    """Of materials that differ in values, as light from above sees them; the first one is in the middle."""
+    """Layout valid for all `materials`, seen from above; the first is the central one."""
     each = [interfaces(parts(material)) for material in materials]
     steps = np.max([[facets.step for facets in found] for found in each], axis=0)
     turns = np.max([[facets.step * max(facets.alpha_u, facets.alpha_v) for facets in found] for found in each], axis=0)
@@ -542,7 +542,7 @@ def _reflects_all(found: Sequence[Part]) -> bool:
 
 
 def _slim(material: Material) -> Material:
-    """With colours of one channel where all are alike, in single precision: what integrals need."""
+    """The material in float32, grey colours as one channel: what integrals need."""
 
     def slim(colour: Array) -> Array:
         alike = (colour == colour[0]).all()
@@ -552,8 +552,8 @@ def _slim(material: Material) -> Material:
 
 
 def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:
-    """Of the remainder, by numbers (C, 1): the albedo that it gains by being clipped, and the largest weight of its
-    samples, (C, M)."""
+    """Albedo that a remainder of numbers (C, 1) gains by being clipped, and the largest weight of its samples,
+    (C, M)."""
     numbers = Remainder(*(x[..., None] for x in vars(polynomial).values()))
     x, y, z = (each[:, None] for each in wi)
     wo = numbers.sample((x, y, z), *low_discrepancy.at_nodes(1, EVENLY, None))
@@ -589,7 +589,7 @@ def _of_cosines(cosine: Array) -> Direction:
 
 
 def _scale(energy: Array, albedo: Array) -> Array:
-    """Of a remainder of an albedo, so that it has an energy."""
+    """Factor that brings a remainder of that albedo to that energy."""
     return np.clip(energy / np.maximum(albedo, DIM), 0, BRIGHTEST)
 
 
@@ -608,14 +608,14 @@ def _veiled(material: Material) -> set[int]:
 
 
 def _evened(wanted: Demand) -> Demand:
-    """With samples for a share `MIN_DEFENSIVE_SHARE` of the energy at least of the last part."""
+    """The demand with samples for a share `MIN_DEFENSIVE_SHARE` of the energy at least of the last part."""
     *lobes, rest = wanted.energy
     least = np.maximum(MIN_DEFENSIVE_SHARE * wanted.energy.sum(axis=0), ENERGY_EPS)
     return wanted._replace(energy=np.array([*lobes, np.maximum(rest, least)]))
 
 
 def _evenly(of: Parts, least: float) -> Parts:
-    """With a share of the samples of what passes at least for its rest."""
+    """The parts with a share of the samples of what passes at least for its rest."""
     even = np.maximum(least * of.share - of.of_rest, 0) / np.maximum(of.share - of.of_rest, ENERGY_EPS)
     straight, bounced = (1 - even) * of.of_straight, (1 - even) * of.of_bounced
     return replace(of, of_straight=straight, of_bounced=bounced, of_rest=of.share - straight - bounced)

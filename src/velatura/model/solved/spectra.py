@@ -132,7 +132,7 @@ def nodes_of(material: Material) -> int:
 
 
 def axis(material: Material, places: Array) -> Wavelengths:
-    """As an axis of tables, for a material with channels at places on the spectrum as `solve` takes it."""
+    """The spectrum as an axis of tables, for a material with channels at places on it, as `solve` takes it."""
     start = plain(material.solid())
     chosen = _chosen(start, places)
     spectra = {address.name: np.ravel(x)[chosen].tolist() for address, x in start.values() if np.size(x) == len(places)}

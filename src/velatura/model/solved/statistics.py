@@ -109,7 +109,7 @@ def _without_steps(material: Material) -> list[int]:
 
 
 def _with_dark(found: StackLobes, material: Material, model: Model, places: list[int], phi: Array) -> StackLobes:
-    """With the lobes of interfaces that reflect nothing."""
+    """The lobes, with those of interfaces that reflect nothing."""
     for place in places:
         layer = material.layers[place]
         assert isinstance(layer, InterfaceValues)

@@ -85,7 +85,7 @@ class Axis:
         return self.count // 2
 
     def with_middle(self, most: int) -> Axis:
-        """With as many nodes at most, an odd number of them."""
+        """The axis with as many nodes at most, an odd number of them."""
         if self.waves:
             return replace(self, count=self.count | 1)
         return replace(self, count=min(self.count | 1, most), fine=FINE[2])
@@ -105,7 +105,7 @@ class Axis:
 
     @property
     def values(self) -> list[float]:
-        """At the nodes."""
+        """Values at the nodes."""
         found: list[float] = self._values(np.linspace(self.low, self.high, self.count)).tolist()
         return found
 

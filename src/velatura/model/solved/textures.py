@@ -59,7 +59,7 @@ class Textured(Protocol):
     def balanced(self) -> bool: ...
 
     def at(self, material: Material, place: Value = None) -> Body:
-        """With the values of a point; `place` is that on the spectrum."""
+        """The body with the values of a point; `place` is that on the spectrum."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class _Interpolated(Side):
 
 
 def _bounded(found: Columns, summed: bool) -> Columns:
-    """Without negative weights and chances; chances that are summed up belong to energies."""
+    """Columns without negative weights and chances; chances that are summed up belong to energies."""
     *chances, chance = (ops.maximum(x, 0.0) for x in (*found.chances, found.chance))
     chance = chance + ENERGY_EPS
     passes: list[Value] = []
@@ -324,7 +324,7 @@ def _textures(ranges: Sequence[Range | Wavelengths]) -> list[Range]:
 
 
 def _step(highest: Material, address: Address) -> float | None:
-    """Between nodes of an axis of waves, by the greatest values of textures; None of others."""
+    """Step between nodes of an axis of waves, by the greatest values of textures; None of others."""
     if address.role not in texture_axes.WAVING or address.layer is None:
         return None
     layer = highest.layers[address.layer]

@@ -62,8 +62,10 @@ def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
     reflected, d, straight, out, below = [first.r], first.t, first.t, first.t_below, first.r_below
     for each in others:
         bounces = (below @ each.r).repeated()
+        # model.md, Eq. 2
         reflected.append(out @ each.r @ bounces @ d)
         d, straight = each.t @ bounces @ d, each.t @ straight
+        # model.md, Eq. 3
         out = out @ (each.r @ below).repeated() @ each.t_below
         below = each.r_below + each.t @ bounces @ below @ each.t_below
     return Leaving(tuple(reflected), d, straight, setting)

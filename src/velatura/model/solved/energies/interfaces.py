@@ -80,7 +80,7 @@ class Facets:
 
     @property
     def step(self) -> float:
-        """Of the logarithm of the index, for light that it lets through."""
+        """Step of the logarithm of the index, for light that it lets through."""
         if self.below is None or self.opaque:
             return 0.0
         return float(abs(np.log(ops.mean(self.below) / ops.mean(self.above))))
@@ -237,7 +237,7 @@ class Setting:
 
     @property
     def dark(self) -> Setting:
-        """Without beams."""
+        """The setting without beams."""
         return replace(self, p=self.p[:0], phi=self.phi[:0])
 
 
@@ -325,7 +325,7 @@ class _Met:
 
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
-        """In blocks of sources that a processor's cache holds."""
+        """Meetings in blocks of sources that a processor's cache holds."""
         size = max(BLOCK // setting.samples, 1)
 
         def met(first: int) -> _Met:
@@ -397,7 +397,7 @@ def _again(taken: _Blocked, there: _Blocked, facets: Facets, setting: Setting) -
     """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
     turn it, the more of it goes on as it came."""
     turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (OPAQUE if facets.opaque else facets.step)
-    swing = SWING * float(np.exp(-SWING * turn))
+    swing = SWING * float(np.exp(-SWING * turn))  # model.md, Eq. 4
     nodes, beams = (
         setting.basis.swung(setting.basis.outer(there.emitted, light), swing, there.sines[0], sines)
         for light, sines in zip((taken.nodes, taken.beams), taken.sines)

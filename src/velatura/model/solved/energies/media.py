@@ -54,8 +54,8 @@ def medium(slab: Slab, setting: Setting) -> Layer:
 
 
 def _resolved(slab: Slab) -> Slab:
-    """With light that turns by less than nodes resolve going straight on: (1 - g) tau_s stays (van de Hulst's
-    similarity relation)."""
+    """The slab whose light goes straight on where it turns by less than nodes resolve: (1 - g) tau_s stays (van de
+    Hulst's similarity relation)."""
     g = np.clip(slab.g, -G_MAX, G_MAX)
     return replace(slab, tau_s=slab.tau_s * np.minimum((1 - slab.g) / (1 - g), 1), g=g)
 

@@ -33,7 +33,7 @@ class Nodes:
 
     @classmethod
     def of(cls, indices: Sequence[float], count: int, like: Sequence[float] | None = None) -> Nodes:
-        """About `count` nodes for media of such indices. With those of media `like` these, as many as for them on each
+        """Nodes for media of such indices, about `count`. Given media `like` these, as many as for them on each
         part, so that results do not jump from one to the other, unless that leaves a part too short."""
         if like is None or len(like) != len(indices):
             like = indices

@@ -1,14 +1,13 @@
 """A reflected lobe in its own medium: GGX above the interface that reflects it, refracted out.
 
 Snell's law leaves the tangential momentum p = n sin(theta) of light alone. So light from wi that leaves along wo meets
-interface k, in a medium of index n, with the momentum i = (p_i, c(p_i)) and goes on with o = (p_o, c(p_o)), of length n
-both, c(p) = sqrt(n^2 - p^2), and leaves with
+interface k, in a medium of index n_k, from the direction i = (p_i / n_k, c_k(p_i)) towards o = (p_o / n_k, c_k(p_o)),
+with c_k(p) = sqrt(1 - p^2 / n_k^2), and leaves with
 
-    f |cos_o| = weight D(h) V(i) V(o) / 4 F(i.h / n) (1 - F_1(cos_o)) cos_o,    h halfway between i and o,
+    f |cos_o| = weight D(h) G1(i) G1(o) / (4 c_k(p_i)) F(i.h) (1 - F_0(cos_o)) cos_o / (n_k^2 c_k(p_o))
 
-where V(w) = G1(w) / w_z is finite at grazing directions, and cos_o / (n c(p_o)) is the solid angle inside over that
-outside. The shift of the peak, the cut of the cone, the stretch across the plane and the fall-off at grazing directions
-follow; turning the axes turns the lobe. Indices are relative to the medium outside, where that of the first lobe is 1.
+with h halfway between i and o (model.md, Eq. 5; `eval_plain`). `eval_pdf` works with momenta n_k i and n_k o, squared
+roughnesses, and G1(w) / w_z, which is finite at grazing directions. Indices are relative to the medium outside.
 """
 
 from __future__ import annotations
@@ -107,6 +106,20 @@ def eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, 
     return lobe.weight * light, seen * shown * density
 
 
+def eval_plain(lobe: RefractedLobe, wi: Direction, wo: Direction) -> Value:
+    """The value of `eval_pdf` as it is printed, for directions above whose light is inside; the reference of a test."""
+    n, alpha = Index.of(lobe.n).n, (lobe.roughness.alpha_u, lobe.roughness.alpha_v)
+    i, o = (
+        (x / n, y / n, ops.sqrt(1 - (x * x + y * y) / (n * n))) for x, y, _ in (_in_frame(lobe, w) for w in (wi, wo))
+    )
+    h = ggx.normalize((i[0] + o[0], i[1] + o[1], i[2] + o[2]))
+    facets = lobe.facets(ggx.dot(i, h) * ggx.dot(i, h)) if lobe.facets else 1.0
+    leaving = lobe.leaving(wo[2]) if lobe.leaving else 1.0
+    # model.md, Eq. 5
+    light = ggx.ndf(h, *alpha) * ggx.masking(i, *alpha) * ggx.masking(o, *alpha) / (4 * i[2])
+    return lobe.weight * light * facets * leaving * wo[2] / (n * n * o[2])
+
+
 def sample(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> Direction:
     """A direction wo from uniform numbers, by a normal visible inside.
 
@@ -154,7 +167,7 @@ def integrals(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> tup
 
 
 def _integrals(lobe: RefractedLobe, wi: Direction, normals: int) -> tuple[Value, Value, Value]:
-    """For columns of directions (N, 1)."""
+    """Means of `integrals` for columns of directions (N, 1)."""
     u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     # Azimuths from the plane of incidence: the same normals for any axes of a round lobe
@@ -254,7 +267,7 @@ def _is_straight(roughness: Roughness) -> bool:
 
 
 def _chosen(where: Value, a: Value, b: Value) -> Value:
-    """Of two indices."""
+    """One of two indices."""
     if a is b:
         return a
     a, b = Index.of(a), Index.of(b)

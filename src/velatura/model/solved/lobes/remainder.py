@@ -68,7 +68,7 @@ class Remainder(ops.Named):
         both = self.c_11 * (z_i * z_o) + self.c_12 * (z_i * w_o + w_i * z_o) + self.c_22 * (w_i * w_o)
         mean = self.c_00 + once + both
         ops.names(s=s, twice=twice, once=once, both=both)
-        return mean, mean + self.b * s + self.a * twice
+        return mean, mean + self.b * s + self.a * twice  # model.md, Eq. 8
 
     def albedo(self, cos_theta: Value) -> Value:
         """Energy for light from a cosine, a colour, without clipping."""
@@ -140,7 +140,7 @@ class Samples:
 
 
 def _tilted(tilt: Value, wi: Direction, wo: Direction) -> Value:
-    """By how much more light is sampled than on the opposite side, over both."""
+    """Light sampled beyond that on the opposite side, over both."""
     return ops.clip(-1 * tilt * (wi[0] * wo[0] + wi[1] * wo[1]), -TILT, TILT)
 
 

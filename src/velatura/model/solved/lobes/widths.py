@@ -79,7 +79,7 @@ CORRECTION: tuple[tuple[tuple[str, str], float, float], ...] = (
 
 @dataclass(frozen=True)
 class Tensor:
-    """Of squares of widths: entries in the frame of the plane of incidence."""
+    """Squares of widths: entries in the frame of the plane of incidence."""
 
     xx: Array
     xy: Array
@@ -93,23 +93,23 @@ class Tensor:
 
     @classmethod
     def turned(cls, u: Array, v: Array, angle: Array) -> Tensor:
-        """Of widths along axes, the first at an angle from the plane."""
+        """Tensor of widths along axes, the first at an angle from the plane."""
         c, s = np.cos(angle), np.sin(angle)
         return cls(u * u * c * c + v * v * s * s, (u * u - v * v) * c * s, u * u * s * s + v * v * c * c)
 
     def stretched(self, x: Array, y: Array) -> Tensor:
-        """Of widths that are longer by x in the plane, and by y across it."""
+        """Tensor of widths that are longer by x in the plane, and by y across it."""
         return Tensor(self.xx * x * x, self.xy * x * y, self.yy * y * y)
 
     @property
     def angle(self) -> Array:
-        """Of the first axis from the plane."""
+        """Angle of the first axis from the plane."""
         half = 0.5 * (self.xx - self.yy)
         turned = np.hypot(half, self.xy) > 1e-9 * (self.xx + self.yy)
         return np.asarray(0.5 * np.arctan2(np.where(turned, self.xy, 0.0), np.where(turned, half, 1.0)))
 
     def width(self, angle: Array) -> Array:
-        """In a direction at an angle from the plane."""
+        """Width in a direction at an angle from the plane."""
         c, s = np.cos(angle), np.sin(angle)
         return np.asarray(np.sqrt(np.maximum(self.xx * c * c + 2 * self.xy * c * s + self.yy * s * s, 0)))
 
@@ -119,12 +119,12 @@ class Tensor:
         return np.asarray(np.sqrt(0.5 * (self.xx + self.yy)))
 
     def roughness(self, phi: Array) -> Roughness:
-        """In the frame of the stack; `phi` is the azimuth of the plane."""
+        """Roughness in the frame of the stack; `phi` is the azimuth of the plane."""
         u, v = (np.minimum(self.width(self.angle + turn), ALPHA_MAX) for turn in AXES)
         return Roughness(u, v, self.angle + phi)
 
     def straight(self) -> Roughness:
-        """In the plane and across it, where these are its axes."""
+        """Roughness in the plane and across it, where these are its axes."""
         u, v = (np.minimum(self.width(np.asarray(turn)), ALPHA_MAX) for turn in AXES)
         return Roughness(u, v, 0.0)
 
@@ -192,7 +192,7 @@ def roughnesses(found: Sequence[Part], cos_theta: Array, phi: Array, energies: A
 
 
 def tensors(found: Sequence[Part], cos_theta: Array, phi: Array, energies: Array) -> list[Tensor]:
-    """As `roughnesses`, in the plane of incidence."""
+    """Tensors of `roughnesses`, in the plane of incidence."""
     result: list[Tensor] = []
     coats: list[_Coat] = []
     share = np.ones((1, len(cos_theta)))
@@ -222,7 +222,7 @@ def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -
 
     def total(x: Array, y: Array) -> Tensor:
         both_ways = [each.stretched(0.5 / (n * x), 0.5 / (n * y)) for each in moved] * 2
-        return _sum([own, *both_ways])
+        return _sum([own, *both_ways])  # model.md, Eq. 6
 
     simple = total(cosine, cosine)
     return total(*(np.sqrt(cos2) for cos2 in _steeper(cosine, np.sqrt(simple.xx), OWN_STEEPNESS)))
@@ -279,7 +279,7 @@ def features(
 
 
 def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
-    """With its axes scaled, and then the components in the plane and across it."""
+    """The tensor with its axes scaled, and then the components in the plane and across it."""
     axes, apart = np.zeros((2, *first.xx.shape)), np.zeros_like(first.xx)
     for (a, b), along, to_difference in CORRECTION:
         product = np.broadcast_to(seen[a] * seen[b], axes.shape)
@@ -309,7 +309,7 @@ def veil(found: Sequence[Part], k: int, cos_theta: Array, tensor: Tensor) -> Ten
         events = 2 * nearly_straight(g) * ops.mean(part.tau_s) / cosine
         mean = mean + events
         width = width + events * _of_event(g) * part.n * cosine / (n * _cosine(cos_theta, n))
-    width = width / np.maximum(-np.expm1(-mean), np.finfo(float).tiny)
+    width = width / np.maximum(-np.expm1(-mean), np.finfo(float).tiny)  # model.md, Eq. 7
     scattered = Tensor(width**2, np.zeros_like(width), width**2)
     return _sum([tensor, scattered])
 

@@ -79,7 +79,7 @@ def parts(
     numbers: Sequence[Array] = (),
     peak: Array | float = 1.0,
 ) -> tuple[Parts, Array]:
-    """In NumPy, for directions wi above, (N,) each, and energies (C, N): of light that passes straight through and
+    """Parts in NumPy, for directions wi above, (N,) each, and energies (C, N): of light that passes directly, and
     after bounces, where it meets facets once and is not scattered; of all that passes.
 
     What is `reflected` has the other samples, in shares (K, N). Those that do not pass the facets of an interface are
@@ -130,7 +130,7 @@ def parts(
 
 
 def energy(transmission: Transmission, wi: tuple[Array, Array, Array], straight: Array, bounces: Array) -> Array:
-    """Of light that goes straight through and bounces, with such weights (C, N)."""
+    """Energy of direct transmission and of internal reflections, with such weights (C, N)."""
     lobe, found = internal_reflections.bounced(transmission, wi), straight * direct.integrals(transmission, wi)[0]
     return (
         found + bounces * refracted_lobe.integral(lobe, internal_reflections.seen_below(transmission, wi))

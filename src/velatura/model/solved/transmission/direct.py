@@ -202,9 +202,9 @@ def entered(transmission: Transmission, wi: Direction) -> MomentumInSlabs:
 
 
 def _crossed(transmission: Transmission, p: Momentum, above: Value, below: Value | None) -> MomentumInSlabs:
-    """With the cosines above and below all interfaces, where more exact ones are known."""
+    """The momentum p in all slabs, with the cosines above and below all interfaces where more exact ones are known."""
     p2 = p[0] * p[0] + p[1] * p[1]
-    cosines = [ops.sqrt(1 - p2 / (n * n)) for n in transmission.indices]
+    cosines = [ops.sqrt(1 - p2 / (n * n)) for n in transmission.indices]  # model.md, Eq. 1
     bounded = [ops.maximum(c, COS_MIN) for c in cosines]
     for l, known in ((0, above), (-1, below)):
         if known is not None:
@@ -231,8 +231,8 @@ class _Component(ops.Named):
 
 
 def _component(transmission: Transmission, j: int, steps: Sequence[Value], d: Momentum | None = None) -> _Component:
-    """For the steps that light makes at all interfaces, and the sum d of what it moves there; None for little. A single
-    interface has its own roughness, and all the weight."""
+    """Component j, for the steps that light makes at all interfaces, and the sum d of its moves; None for little. A
+    single interface has its own roughness, and all the weight."""
     own = transmission.refractions[j]
     size = ops.maximum(own.sign * steps[j], own.least)
     if len(steps) == 1:
@@ -294,7 +294,7 @@ def eval_pdf(transmission: Transmission, wi: Direction, wo: Direction) -> tuple[
 
 
 def _eval_pdf(transmission: Transmission, wi: Direction, wo: Direction, passes: bool = False) -> tuple[Value, Value]:
-    """As `eval_pdf`; `passes` if all wo lie below."""
+    """Like `eval_pdf`; `passes` if all wo lie below."""
     n = transmission.indices
     below, cos_o = wo[2] < 0, ops.absolute(wo[2])
     n_out = ops.select(below, n[-1], n[0])
@@ -315,7 +315,7 @@ def _eval_pdf(transmission: Transmission, wi: Direction, wo: Direction, passes: 
             turns = _turns(refraction.sign)
             smooth = _smooth(i, slice(j), slice(j + 1)) * _smooth(o, slice(j + 1, None), slice(j + 1, None))
             seen = component.weight * _slopes(component.roughness, facet.slope) * ops.select(turns, alone, 1.0)
-            value = value + smooth * facet.passes * seen
+            value = value + smooth * facet.passes * seen  # model.md, Eq. 9
             visible = ops.mean(facet.passes) * _masking(sampled.roughness, i, j)
             evenly = ops.mean(i.passes[j]) / (component.step * component.step)
             through = _slopes(sampled.roughness, facet.slope) * ops.select(turns, visible, evenly)
@@ -378,7 +378,7 @@ class _Facet(ops.Named):
 
 
 def _facet(refraction: Refraction, i: MomentumInSlabs, o: MomentumInSlabs, j: int, step: Value) -> _Facet:
-    """Of interface j, for its step as `_component` bounds it."""
+    """Facet of interface j, for its step as `_component` bounds it."""
     n_1, n_2, c_1, c_2 = refraction.n_1, refraction.n_2, i.bounded[j], o.bounded[j + 1]
     slope = (o.p[0] - i.p[0]) / step, (o.p[1] - i.p[1]) / step
     v_i = 1 - refraction.sign * (i.p[0] * slope[0] + i.p[1] * slope[1]) / (n_1 * c_1)

@@ -86,7 +86,7 @@ def bounced(transmission: Transmission, wi: Direction) -> RefractedLobe | None:
 
 
 def share(lobe: RefractedLobe | None) -> Value:
-    """Of the light that bounces, what its lobe holds; the wider that is, the less."""
+    """Share of internal reflections that the lobe carries; falls with its width."""
     if lobe is None:
         return 0.0
     return 1 / (1 + lobe.roughness.alpha_u * lobe.roughness.alpha_v / (WIDE * WIDE))
@@ -154,19 +154,19 @@ def _leaving(transmission: Transmission, under: Sequence[Value]) -> Callable[[Va
 
 
 def _above(under: Sequence[Value], values: Sequence[Value]) -> Value:
-    """Of values of slabs that of the one above some interfaces; without any, that of the last one."""
+    """Value of the slab above the first flagged interface, or of the last slab."""
     first = [flag - before for flag, before in zip((*under, 1.0), (0.0, *under))]
     return _sum(first, values)
 
 
 def _sum(flags: Sequence[Value], values: Sequence[Any]) -> Any:
-    """Of the values whose flags are 1."""
+    """Sum of the values whose flags are 1."""
     kept = [(flag, x) for flag, x in zip(flags, values) if not (isinstance(flag, float) and flag == 0.0)]
     return reduce(operator.add, (x if isinstance(flag, float) else x * flag for flag, x in kept))
 
 
 def seen_below(transmission: Transmission, wi: Direction) -> Direction:
-    """The direction below, turned up, of light that a smooth stack would mirror into it: at most a horizontal one."""
+    """Refracted counterpart of wi below the stack, flipped up, clamped to the horizon."""
     n = transmission.indices
     x, y = (wi[k] * (n[0] / n[-1]) for k in (0, 1))
     scale = 1 / ops.sqrt(ops.maximum(x * x + y * y, 1.0))
@@ -204,7 +204,7 @@ def diffuse(numbers: Sequence[Value], i: Direction, o: Direction) -> Value:
     s = -1 * (i[0] * o[0] + i[1] * o[1])
     both = (i[0] * i[0] + i[1] * i[1]) * (o[0] * o[0] + o[1] * o[1])
     mean = even + cosine * o[2] + grazing * remainder.grazing(o[2])
-    return ops.maximum(mean + once * s + twice * (2 * s * s - both), 0.0)
+    return ops.maximum(mean + once * s + twice * (2 * s * s - both), 0.0)  # model.md, Eq. 10
 
 
 def integral_rest(found: Rest, i: tuple[Array, Array, Array]) -> Array:
