@@ -10,18 +10,17 @@ out, a layer that reflects R and transmits T adds
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.solved.energies.interfaces import Facets, Setting, interface
+from velatura.model.solved.energies.interfaces import Facets, Setting, colours, interface
 from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.sampling import coated
-from velatura.stack import DiffuseValues, Material, MediumValues
+from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.stack.chain import chain
 
 Array = NDArray[np.floating]
@@ -111,23 +110,17 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
     `straight` gives the share of scattered light that goes straight on by the asymmetry g, for light that is in a lobe;
     None follows all light.
     """
-    outside = float(ops.mean(_colours(material.exterior)))
+    outside = float(ops.mean(colours(material.exterior)))
     found: list[Part] = []
     for meeting in chain(material.solid(), coated.of(material)):
-        each, above = meeting.layer, _colours(meeting.above) / outside
-        if isinstance(each, MediumValues):
-            tau_a, tau_s = (_colours(each.depth * sigma) for sigma in (each.sigma_a, each.sigma_s))
-            g = _colours(each.g)
-            kept = None if straight is None else np.array([straight(x) for x in g])
-            found.append(Slab(float(ops.mean(above)), tau_a, tau_s, g, kept))
-        elif isinstance(each, DiffuseValues):
-            found.append(Lambert(float(ops.mean(above)), _colours(each.albedo)))
+        if isinstance(meeting.layer, InterfaceValues):
+            found.append(Facets.of(meeting.layer, meeting.above, outside, meeting.films))
+            continue
+        n = float(ops.mean(colours(meeting.above) / outside))
+        if isinstance(meeting.layer, MediumValues):
+            found.append(Slab.of(meeting.layer, n, straight))
         else:
-            below = None if each.kind == "mirror" else _colours(each.eta) / outside
-            k = _colours(each.k) / outside if each.kind == "conductor" else None
-            angle = float(np.radians(each.rotation))
-            facets = Facets(above, below, k, float(each.alpha_u), float(each.alpha_v), angle)
-            found.append(replace(facets, films=meeting.films) if meeting.films else facets)
+            found.append(Lambert(n, colours(meeting.layer.albedo)))
     return found
 
 
@@ -144,9 +137,3 @@ def indices(found: Sequence[Part]) -> list[float]:
             if part.below is not None and part.k is None:
                 values.append(float(ops.mean(part.below)))
     return values
-
-
-def _colours(value: Any) -> Array:
-    """(3,), or (1,) where all are alike."""
-    flat = np.asarray(value, float).reshape(-1)
-    return flat[:1] if (flat == flat[0]).all() else flat

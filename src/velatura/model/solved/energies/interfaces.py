@@ -22,6 +22,7 @@ from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.optics import fresnel, ggx
 from velatura.sampling.coated import Coated, dielectric_between, dielectric_passing
 from velatura.sampling.low_discrepancy import fibonacci
+from velatura.stack import InterfaceValues
 from velatura.tables import Tables, coordinates
 from velatura.tables.microsurface_walks import shares_in_the_end
 
@@ -42,6 +43,12 @@ PATHS = 2048  # from each
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
 
+def colours(value: Any) -> Array:
+    """A colour of shape (3,), or (1,) where all are alike."""
+    flat = np.asarray(value, float).reshape(-1)
+    return flat[:1] if (flat == flat[0]).all() else flat
+
+
 @dataclass(frozen=True)
 class Facets:
     """An interface between indices `above` and `below`, by colour (C,); `k` is None for a dielectric, and `below` too
@@ -57,6 +64,14 @@ class Facets:
     rotation: float = 0.0
     final: bool = False
     films: Coated | None = None
+
+    @classmethod
+    def of(cls, layer: InterfaceValues, above: Any, outside: float, films: Coated | None) -> Facets:
+        """An interface of NumPy's values below an index `above`, with indices relative to the `outside`."""
+        below = None if layer.kind == "mirror" else colours(layer.eta) / outside
+        k = colours(layer.k) / outside if layer.kind == "conductor" else None
+        alpha, angle = (float(layer.alpha_u), float(layer.alpha_v)), float(np.radians(layer.rotation))
+        return cls(colours(above) / outside, below, k, *alpha, angle, films=films or None)
 
     @property
     def opaque(self) -> bool:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.solved.energies.interfaces import Setting, scaled
+from velatura.model.solved.energies.interfaces import Setting, colours, scaled
 from velatura.model.solved.energies.modes import TINY, Light
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.optics import phase
 from velatura.sampling.low_discrepancy import fibonacci
+from velatura.stack import MediumValues
 
 Array = NDArray[np.floating]
 
@@ -35,6 +37,13 @@ class Slab:
     tau_s: Array
     g: Array
     straight: Array | None = None
+
+    @classmethod
+    def of(cls, layer: MediumValues, n: float, straight: Callable[[float], float] | None) -> Slab:
+        """A medium of NumPy's values; `straight` gives the share that goes straight on by the asymmetry g."""
+        tau_a, tau_s = (colours(layer.depth * sigma) for sigma in (layer.sigma_a, layer.sigma_s))
+        g = colours(layer.g)
+        return cls(n, tau_a, tau_s, g, None if straight is None else np.array([straight(x) for x in g]))
 
 
 def medium(slab: Slab, setting: Setting) -> Layer:
