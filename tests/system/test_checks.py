@@ -566,6 +566,13 @@ def test_what_gains_nothing_declares_none() -> None:
         assert all(finding.status == "kept" for finding in report.findings)
 
 
+def test_sharply_brushed_metal_below_coats_keeps_the_furnace() -> None:
+    """Weights of its lobe bend between few cosines; it gained .0037 of the light between 20."""
+    coats = [vt.Interface(eta=eta, alpha=alpha) for eta, alpha in ((1.53, 1.0), (1.0, 0.22), (1.0, 0.033))]
+    stack = vt.Stack([*coats, vt.Interface(conductor="mirror", alpha=(0.021, 0.0))], exterior=1.33)
+    assert vt.check(stack)["white furnace"].passed
+
+
 def test_a_black_material_breaks_no_law() -> None:
     """Rationale: what rounding leaves of no light at all is not reciprocal, and none of it matters."""
     stack = vt.Stack([vt.Interface(eta=1.0, alpha=0.5), vt.Diffuse(albedo=0.0)])
