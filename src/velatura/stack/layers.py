@@ -6,7 +6,7 @@ it is to its neighbours. Files, flat names, `--set`, plugins, textures, schema a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -118,6 +118,7 @@ class LayerRecord(Record):
     Attributes:
         record: of its values.
         lacks: kinds that it may be of, each with the parameters that it then has not.
+        opaque_kinds: those below which nothing may lie.
         surface: whether light meets it at one depth and may turn back; media lie above surfaces.
         title: its name, in words.
         fresh: values of a new one in the editor, besides the typical values of its parameters.
@@ -125,6 +126,7 @@ class LayerRecord(Record):
 
     record: ClassVar[type[LayerValues]]
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]]
+    opaque_kinds: ClassVar[frozenset[Kind]] = frozenset()
     surface: ClassVar[bool]
     title: ClassVar[str]
     fresh: ClassVar[Mapping[str, Any]] = {}
@@ -137,7 +139,7 @@ class LayerRecord(Record):
     @property
     def opaque(self) -> bool:
         """Whether nothing may lie below it."""
-        return False
+        return self.kind in self.opaque_kinds
 
     @property
     def lossless(self) -> bool:
@@ -169,6 +171,7 @@ class Interface(LayerRecord):
         "conductor": (),
         "mirror": ("eta", "k"),
     }
+    opaque_kinds = frozenset({"conductor", "mirror"})
     surface = True
     title = "interface"
 
@@ -214,16 +217,11 @@ class Interface(LayerRecord):
         return self
 
     @property
-    def opaque(self) -> bool:
-        """Whether nothing passes: `k` or `conductor` is given."""
-        return self.k is not None or self.conductor is not None
-
-    @property
     def kind(self) -> Kind:
         """dielectric, conductor or mirror; a mirror under films is a conductor, whose index they need."""
         if self.conductor == MIRROR and not self.films:
             return "mirror"
-        return "conductor" if self.opaque else "dielectric"
+        return "dielectric" if self.k is None and self.conductor is None else "conductor"
 
     def flat(self) -> dict[str, Value]:
         """Every value under its own key, those of films included."""
@@ -276,16 +274,12 @@ class Diffuse(LayerRecord):
 
     record = DiffuseValues
     lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"diffuse": ()}
+    opaque_kinds = frozenset({"diffuse"})
     surface = True
     title = "diffuse base"
     fresh: ClassVar[Mapping[str, Any]] = {"albedo": (0.5, 0.5, 0.5)}
 
     albedo: Annotated[float | RGB | Spectrum | Texture, Colour("fraction of light reflected", low=0, high=1)] = 0.5
-
-    @property
-    def opaque(self) -> bool:
-        """Always."""
-        return True
 
     @property
     def lossless(self) -> bool:
@@ -304,6 +298,11 @@ EXTERIOR = Scalar(
 
 #: The layers by their possible kinds.
 KINDS: dict[str, type[Layer]] = {kind: layer for layer in LAYERS.values() for kind in layer.lacks}
+
+
+def transmits(kinds: Collection[Kind]) -> bool:
+    """Whether light passes layers of such kinds: one is an interface, and none is opaque."""
+    return "dielectric" in kinds and not any(kind in KINDS[kind].opaque_kinds for kind in kinds)
 
 
 def has(kind: str) -> dict[str, Parameter]:

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any, TypeAlias
 
 from velatura.stack.flat_names import Address, addresses
-from velatura.stack.layers import KINDS, FilmValues, InterfaceValues, Kind, LayerValues
+from velatura.stack.layers import KINDS, FilmValues, InterfaceValues, Kind, LayerValues, transmits
 from velatura.stack.stack import Stack
 
 Value: TypeAlias = Any
@@ -118,8 +118,8 @@ class Material:
 
     @property
     def transmits(self) -> bool:
-        """Whether light passes: all layers are dielectrics and media, as seen from either side."""
-        return "dielectric" in self.kinds and set(self.kinds) <= {"dielectric", "medium"}
+        """Whether light passes, as seen from either side."""
+        return transmits(self.kinds)
 
     @property
     def below(self) -> Value:

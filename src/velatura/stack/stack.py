@@ -10,7 +10,7 @@ from pydantic import model_validator
 from velatura.errors import InvalidInput
 from velatura.stack import coatings, flat_names
 from velatura.stack.flat_names import Address
-from velatura.stack.layers import EXTERIOR, LAYERS, Diffuse, Interface, Kind, Layer, Value, entry_name
+from velatura.stack.layers import EXTERIOR, LAYERS, Diffuse, Interface, Kind, Layer, Value, entry_name, transmits
 from velatura.stack.schema import Record, show, unknown
 from velatura.stack.values import Flag, Text
 
@@ -84,7 +84,7 @@ class Stack(Record):
     @property
     def transmits(self) -> bool:
         """Whether light passes: no layer is opaque."""
-        return not self.layers[-1].opaque
+        return transmits(self.kinds)
 
     def with_layers(self, layers: Iterable[Layer], name: str | None = None) -> Stack:
         """Other layers under the same index, by the same name unless given."""

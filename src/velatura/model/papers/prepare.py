@@ -125,8 +125,14 @@ def _interface(
     roughness = Roughness(layer.alpha_u, layer.alpha_v, layer.rotation * (pi / 180))
     s_r = variance.of(roughness, MAPS[averages.model.map])
     facets = SmoothInterface.of(meeting)
-    known = averages.reflectance(facets), averages.leaving(n_leaving), averages.absorbed(facets)
-    return PreparedInterface(facets.eta, facets.kappa, facets.n12, roughness, s_r, *known, films=facets.films)
+    return PreparedInterface(
+        **vars(facets),
+        roughness=roughness,
+        s_r=s_r,
+        reflectance=averages.reflectance(facets),
+        leaving=averages.leaving(n_leaving),
+        absorbed=averages.absorbed(facets),
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,185 @@
+"""What CONTRIBUTING says of additions, tried: a parameter and an engine are added to a copy of the package.
+
+The files that an addition takes are counted by the rows of CONTRIBUTING; a file too few, and the copy does not read it.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import velatura
+
+PACKAGE = Path(velatura.__file__).parent
+
+# File -> what is replaced there. `dust` is a share by which an interface reflects less.
+OF_DEFAULT = {
+    "stack/layers.py": [
+        ("    films: tuple[FilmValues, ...] = ()\n", "    films: tuple[FilmValues, ...] = ()\n    dust: Any = 0.0\n"),
+        (
+            '    films: Annotated[tuple[Film, ...], Films("thin films on it, from the top")] = ()\n',
+            '    dust: Annotated[float | Texture, Scalar("share of the reflected light", low=0, high=1)] = 0.0\n'
+            '    films: Annotated[tuple[Film, ...], Films("thin films on it, from the top")] = ()\n',
+        ),
+    ],
+    "model/solved/energies/interfaces.py": [
+        ("    films: Coated | None = None\n", "    films: Coated | None = None\n    dust: float = 0.0\n"),
+        ("angle, films=films or None)", "angle, films=films or None, dust=float(layer.dust))"),
+        (
+            "    def reflectance(self, cosine",
+            "    def reflectance(self, cosine: Array) -> Array:\n"
+            "        return (1 - self.dust) * self.clean(cosine)\n\n    def clean(self, cosine",
+        ),
+    ],
+    "model/smooth_interface.py": [
+        (
+            "    films: Films = field(default=None, kw_only=True)\n",
+            "    films: Films = field(default=None, kw_only=True)\n"
+            "    dust: Value = field(default=0.0, kw_only=True)\n",
+        ),
+        ("n12, films=meeting.films)", "n12, films=meeting.films, dust=layer.dust)"),
+        (
+            "    def reflect(self, cos_theta",
+            "    def reflect(self, cos_theta: Value) -> Value:\n"
+            "        return (1 - self.dust) * self.clean(cos_theta)\n\n    def clean(self, cos_theta",
+        ),
+    ],
+}
+OF_OTHERS = {
+    "model/papers/operators.py": [
+        (
+            "        r = ops.clip(reflectance(prepared, layer, cos_theta, lit, wi), 0.0, 1.0)\n",
+            "        r = ops.clip(reflectance(prepared, layer, cos_theta, lit, wi) * (1 - layer.dust), 0.0, 1.0)\n",
+        ),
+    ],
+    "reference/layers.py": [
+        (
+            "    def shares(self, j: Value, cosine: Value, ",
+            "    def shares(self, j, *light):\n        reflected, passing = self.clean(j, *light)\n"
+            "        return reflected * (1 - self.surface(j).dust), passing\n\n"
+            "    def clean(self, j: Value, cosine: Value, ",
+        ),
+        ("    smooth: Value\n", "    smooth: Value\n    dust: Value = 0.0\n"),
+        ("turn, smooth)", "turn, smooth, layer.dust)"),
+    ],
+    "plugins/weidlich_wilkie.py": [
+        (
+            "def _reflectance(layer",
+            "def _reflectance(layer, n, cosine):\n"
+            "    return (1 - layer.dust) * _clean(layer, n, cosine)\n\n\ndef _clean(layer",
+        ),
+    ],
+}
+
+TRIED = """
+import sys
+import numpy as np
+import velatura as vt
+
+def stack(dust):
+    return vt.Stack([vt.Interface(eta=1.5, alpha=0.1, dust=dust), vt.Interface(eta=0.2, k=3.0, alpha=0.2)])
+
+for model in sys.argv[1:]:
+    clean, dusty = (np.array(vt.lobes(stack(d), 0.7, model=model).energy) for d in (0.0, 0.3))
+    assert dusty[0].max() < 0.75 * clean[0].max(), model
+"""
+RENDERED = """
+from velatura import kernel
+mi = kernel.mitsuba()
+si = mi.SurfaceInteraction3f()
+si.wi = mi.Vector3f(0.6, 0, 0.8)
+for model in ("reference", "weidlich_wilkie", "velatura"):
+    light = [float(mi.Float(vt.bsdf(stack(d), model).eval(mi.BSDFContext(), si, mi.Vector3f(-0.6, 0, 0.8))[0])[0])
+             if model != "reference" else vt.reference.statistics(stack(d), 0.8, paths=20_000).energy[0].max()
+             for d in (0.0, 0.3)]
+    assert light[1] < 0.97 * light[0], (model, light)
+"""
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the package, without its page."""
+    root = tmp_path_factory.mktemp("copy")
+    shutil.copytree(PACKAGE, root / "velatura", ignore=shutil.ignore_patterns("page", "static", "__pycache__"))
+    return root
+
+
+def changed(copy: Path, root: Path, *changes: dict[str, list[tuple[str, str]]]) -> Path:
+    """Another copy, with texts replaced."""
+    shutil.copytree(copy, root, dirs_exist_ok=True)
+    for path, pairs in (item for each in changes for item in each.items()):
+        file = root / "velatura" / path
+        text = file.read_text(encoding="utf-8")
+        for old, new in pairs:
+            assert text.count(old) == 1, f"{path}: {old}"
+            text = text.replace(old, new)
+        file.write_text(text, encoding="utf-8")
+    return root
+
+
+def run(root: Path, script: str, *arguments: str) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    done = subprocess.run(
+        [sys.executable, "-c", script, *arguments], env=environment, cwd=root, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_a_parameter_takes_three_files_for_the_default_model(copy: Path, tmp_path: Path) -> None:
+    assert len(OF_DEFAULT) == 3
+    run(changed(copy, tmp_path, OF_DEFAULT), TRIED, "velatura")
+
+
+def test_a_parameter_takes_six_files_in_all(copy: Path, tmp_path: Path) -> None:
+    assert len({**OF_DEFAULT, **OF_OTHERS}) == 6
+    models = [model.name for model in velatura.MODELS]
+    run(changed(copy, tmp_path, OF_DEFAULT, OF_OTHERS), TRIED + RENDERED, *models)
+
+
+ENGINE = '''
+"""One lobe of the first interface alone, as an engine of its own."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from velatura.model.base import SWITCHES
+from velatura.model.papers.model import PaperModel
+
+
+@dataclass(frozen=True)
+class FirstModel(PaperModel):
+    closed_form: ClassVar[bool] = True
+
+    def statistics(self, material, wi):
+        return super().statistics(type(material)(material.layers[:1], material.exterior, material.thin), wi)
+'''
+ENTRY = {
+    "model/registry.py": [
+        (
+            "MODELS: tuple[Model, ...] = (\n",
+            "from velatura.model.first.model import FirstModel\n\n"
+            'MODELS: tuple[Model, ...] = (\n    FirstModel("first", reflectance="fresnel", tir="off"),\n',
+        ),
+    ]
+}
+LISTED = """
+import velatura as vt
+stack = vt.preset("coated-gold")
+assert len(vt.lobes(stack, 1.0, model="first").energy) == 1
+vt.bsdf(stack, model="first")
+vt.export(stack, to="glsl", model="first")
+"""
+
+
+def test_an_engine_takes_a_room_and_an_entry(copy: Path, tmp_path: Path) -> None:
+    root = changed(copy, tmp_path, ENTRY)
+    room = root / "velatura/model/first"
+    room.mkdir()
+    (room / "__init__.py").touch()
+    (room / "model.py").write_text(ENGINE, encoding="utf-8")
+    run(root, LISTED)
