@@ -93,10 +93,19 @@ class Figure(Protocol):
     """The interface of a figure's module."""
 
     def compute(self, *, progress: Progress | None = None) -> dict[str, Any]:
-        """The numbers; `progress` is called with (steps done, all steps)."""
+        """The numbers; `progress` is called with (steps done, all steps).
+
+        Raises:
+            InvalidInput, MissingTool: as `vt.render`, where there are pictures, or as `reference.statistics`.
+        """
 
     def draw(self, numbers: dict[str, Any], path: str | Path) -> None:
-        """A picture of the numbers as a PNG, WebP, PDF or SVG, written whole or not at all."""
+        """A picture of the numbers as a PNG, WebP, PDF or SVG, written whole or not at all.
+
+        Raises:
+            InvalidInput: the file cannot be written.
+            MissingTool: matplotlib is missing.
+        """
 
 
 def figure(name: str) -> Figure:

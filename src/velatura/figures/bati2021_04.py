@@ -7,13 +7,12 @@ conductors in air, eta and k between the bounds of eta; (c) one of these below o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Choice, invert_interface
 from velatura.model import named
 from velatura.optics import fresnel
@@ -28,7 +27,7 @@ def compute(
     conductors: Sequence[float] = CONDUCTORS,
     media: Sequence[float] = MEDIA,
     count: int = 100,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """(a) by reflectance the indices over `eta_0`, null out of bounds; (b, c) by reflectance and eta_0 eta and k."""
     eta_0, tint = np.linspace(1, ETA_MAX, count), np.linspace(0, 1, count)
@@ -56,15 +55,12 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
+@canvas.page(13, 4.4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
     """The three plots: conductors thick within bounds, else dashed from dielectric to dielectric (dots).
 
     Where k < eta it is hatched; crosses are the conductors of figure 5.
-
-    Raises:
-        InvalidInput: the file cannot be written.
     """
-    figure = canvas.canvas(13, 4.4)
     first, *others = figure.subplots(1, 3)
     for n, case in enumerate(numbers["dielectrics"]):
         for root, style in (("denser", "-"), ("rarer", "--")):
@@ -89,7 +85,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             others[1].plot(np.array(case["eta"])[[0, -1]], np.array(case["k"])[[0, -1]], "kx", zorder=3)
     for axes in figure.axes:
         axes.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 def _whole(reflectance: float, eta_0: float) -> tuple[Any, Any]:

@@ -5,13 +5,12 @@ Against Fresnel's reflectance, which is a good approximation for indices above 1
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Above, Layers
 from velatura.model import named
 from velatura.model.variance import Roughness
@@ -21,9 +20,7 @@ ALPHAS = (0.01, 0.1, 0.2, 0.4)
 NEAR_1 = 0.05  # by which an index differs from 1 at least where albedos are compared: there both vanish
 
 
-def compute(
-    alphas: Sequence[float] = ALPHAS, count: int = 200, progress: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
+def compute(alphas: Sequence[float] = ALPHAS, count: int = 200, progress: Progress | None = None) -> dict[str, Any]:
     """Over the relative index `eta` what is smooth reflects, `fresnel`, and by `alpha` what is rough.
 
     `denser` and `rarer` are the largest differences relative to Fresnel on either side of an index of 1.
@@ -42,20 +39,15 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The curves in one plot.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(6, 4.4)
+@canvas.page(6, 4.4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The curves in one plot."""
     axes = figure.subplots()
     for row in numbers["rough"]:
         axes.plot(numbers["eta"], row["albedo"], label=f"alpha {row['alpha']:g}")
     axes.plot(numbers["eta"], numbers["fresnel"], "k:", label="Fresnel")
     axes.set(xlabel="relative index", ylabel="directional albedo head-on", ylim=(0, None))
     axes.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

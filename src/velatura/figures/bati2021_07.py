@@ -7,13 +7,12 @@ what is within bounds is what the model's own recursion finds. The values of (b)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Above, EquivalenceClass, smooth_pair
 from velatura.model import named
 
@@ -28,7 +27,7 @@ def compute(
     energies: Sequence[float] = ENERGIES,
     media: Sequence[float] = MEDIA,
     count: int = 200,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """For every `part`, `energy` and `eta_0` the whole `curve`, the part of it `inside` bounds, and its named `points`.
 
@@ -50,13 +49,9 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The curves in three plots, what is physical drawn thick.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(13, 4.6)
+@canvas.page(13, 4.6)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The curves in three plots, what is physical drawn thick."""
     plots = {"a": "R = 0.15 in air", "b": "other energies", "c": "other media above"}
     for axes, (part, title) in zip(figure.subplots(1, 3), plots.items()):
         cases = [case for case in numbers["cases"] if case["part"] == part]
@@ -77,7 +72,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             figure.axes[0].annotate(letter, point, xytext=(6, -10), textcoords="offset points", fontweight="bold")
     key = "\n".join(f"{letters}: {kind}" for letters, kind in KINDS.items())
     figure.axes[0].text(0.03, 0.97, key, transform=figure.axes[0].transAxes, va="top", fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -6,13 +6,12 @@ interface totally reflects what grazes it, gains most.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import smooth_pair
 from velatura.model.registry import stack_lobes
 from velatura.stack import Interface, Stack
@@ -22,9 +21,7 @@ RATIOS = (1.2, 1.4, 1.6, 1.85, 2.0, 2.2)  # of eta 1, on the branch of the slab 
 MODEL = "bati2021"
 
 
-def compute(
-    ratios: Sequence[float] = RATIOS, count: int = 90, progress: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
+def compute(ratios: Sequence[float] = RATIOS, count: int = 90, progress: Progress | None = None) -> dict[str, Any]:
     """By `point` its indices (eta_1, eta_2), and its energy over `angles` (degrees) less that of one interface.
 
     Points lie in their order along the curve, from one interface to the slab.
@@ -51,13 +48,9 @@ def compute(
     return {"angles": angles.tolist(), "points": rows}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The gain of each point over the angle, and its place.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(11, 4.6)
+@canvas.page(11, 4.6)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The gain of each point over the angle, and its place."""
     gains, places = figure.subplots(1, 2, width_ratios=(2, 1))
     places.plot(*np.transpose(smooth_pair.curve(1.0, ENERGY)), color="0.7")
     for point, colour in zip(numbers["points"], canvas.shades(len(numbers["points"]))):
@@ -71,7 +64,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         (place,) = (point["indices"] for point in numbers["points"] if point["name"] == name)
         places.annotate(letter, place, xytext=(6, -10), textcoords="offset points", fontweight="bold")
     places.set(xlabel="eta 1", ylabel="eta 2", title="places, with letters as in figure 7")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

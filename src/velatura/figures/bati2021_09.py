@@ -7,13 +7,12 @@ Below them the classes of other reflectances, and the first indices that these l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Above, EquivalenceClass
 from velatura.model import named
 from velatura.optics import fresnel
@@ -25,9 +24,7 @@ MODEL = named("bati2021", reflectance="fresnel")
 ETA_MAX = 4.0
 
 
-def compute(
-    energies: Sequence[float] = ENERGIES, count: int = 160, progress: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
+def compute(energies: Sequence[float] = ENERGIES, count: int = 160, progress: Progress | None = None) -> dict[str, Any]:
     """Over `eta`, by energy: the `depth` at (eta_1, eta_2), negative or null out of the class; intervals of `eta_1`.
 
     `deepest` is the largest depth; it has no bound where the lower interface vanishes. `slices` has by energy the
@@ -53,14 +50,10 @@ def _plain(depth: Any) -> list[float | None]:
     return [None if np.isnan(x) else float(x) for x in depth]
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The surface, its lines, and slices; below them the lines of other classes.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
+@canvas.page(14, 8.5)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The surface, its lines, and slices; below them the lines of other classes."""
     first, *others = numbers["classes"]
-    figure = canvas.canvas(14, 8.5)
     _surface(figure.add_subplot(2, 3, 1, projection="3d"), first)
     lines = figure.add_subplot(2, 3, 2)
     _lines(figure, lines, numbers["eta"], first, "(b) ")
@@ -74,7 +67,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     slices.legend(fontsize="small")
     for n, case in enumerate(others):
         _lines(figure, figure.add_subplot(2, 3, 4 + n), numbers["eta"], case, "")
-    canvas.save(figure, path)
 
 
 def _surface(axes: Any, case: dict[str, Any]) -> None:

@@ -5,13 +5,12 @@ The roughnesses are chosen here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Above, EquivalenceClass, smooth_pair
 from velatura.model import named
 from velatura.model.roughness_maps import MAPS
@@ -20,9 +19,7 @@ ENERGY, ALPHAS = 0.2, (0.01, 0.1, 0.2, 0.4)
 MODEL = named("bati2021")
 
 
-def compute(
-    alphas: Sequence[float] = ALPHAS, count: int = 160, progress: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
+def compute(alphas: Sequence[float] = ALPHAS, count: int = 160, progress: Progress | None = None) -> dict[str, Any]:
     """By `alpha` the `curves` without absorption, (eta_1, eta_2), and `ends`, the intervals that bound eta_1."""
     rows = []
     for alpha in canvas.track(alphas, progress):
@@ -33,13 +30,9 @@ def compute(
     return {"energy": ENERGY, "classes": rows}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """All curves in one plot, with the smooth one and the ends.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(6, 5)
+@canvas.page(6, 5)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """All curves in one plot, with the smooth one and the ends."""
     axes = figure.subplots()
     axes.plot(*np.transpose(smooth_pair.curve(1.0, numbers["energy"])), "k:", label="smooth")
     for n, row in enumerate(numbers["classes"]):
@@ -49,7 +42,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         axes.axvline(row["ends"][-1][1], color=f"C{n}", linestyle="--", linewidth=0.8, label=None if n else "ends")
     axes.set(xlabel="eta 1", ylabel="eta 2", xlim=(1, 3), ylim=(1, 4.2))
     axes.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

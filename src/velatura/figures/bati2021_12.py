@@ -5,13 +5,11 @@ Energies of 0.07, 0.12 and 0.15 below a medium of index 1.5, smooth.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Above, EquivalenceClass, plots
 from velatura.model import named
 
@@ -24,7 +22,7 @@ def members() -> EquivalenceClass:
     return EquivalenceClass(Above.nothing(MODEL, ETA_0), np.array(ENERGIES)[:, None], 0.0, 2)
 
 
-def compute(count: int = 128, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def compute(count: int = 128, progress: Progress | None = None) -> dict[str, Any]:
     """Intervals of `eta_1` of all channels together and of each; shares of [1, 4]^2 that they cover, on a grid."""
     found, axis = members(), np.linspace(1, 4, count)
     inside = found.grid(axis, axis) >= 0
@@ -36,13 +34,9 @@ def compute(count: int = 128, progress: Callable[[int, int], None] | None = None
     return {"eta_1": spans, "share": float(inside.all(axis=0).mean()), "channels": channels}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The classes of the channels in their colours, and what they have in common in grey.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(5.5, 5)
+@canvas.page(5.5, 5)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The classes of the channels in their colours, and what they have in common in grey."""
     axes = figure.subplots()
     plots.draw(axes, members())
     for n, span in enumerate(numbers["eta_1"]):
@@ -50,7 +44,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     energies = ", ".join(f"{case['energy']:g}" for case in numbers["channels"])
     axes.set_title(f"R {energies} below index {ETA_0:g}", fontsize="medium")
     axes.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

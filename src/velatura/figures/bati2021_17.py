@@ -7,13 +7,12 @@ paper's are not printed; the sphere, which absorbs what enters it, and its light
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas, looks
+from velatura.figures import Progress, canvas, looks
 from velatura.figures.looks import MODEL
 from velatura.inverse import alternatives, grazing, invert_stack, plots
 from velatura.inverse.figure_targets import FIGURES
@@ -29,14 +28,11 @@ def compute(
     spp: int = looks.SAMPLES,
     seed: int = 0,
     members: int = 29,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """By order: the `stack`, its `energy` over `cosines` (rgb), red over blue at `grazing` angles; and `pictures`.
 
     `least` and `most` are the bounds of that of so many `members` of the class.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     numbers: dict[str, Any] = {"cosines": list(cosines)}
     stacks = {order: invert_stack(FIGURES[order], MODEL).stack for order in ORDERS}
@@ -54,13 +50,9 @@ def _tint(stack: Stack) -> float:
     return float(red / blue)
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """In the middle the sphere, a half of either order, and its energies; beside it the classes of both lobes.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(13, 8)
+@canvas.page(13, 8)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """In the middle the sphere, a half of either order, and its energies; beside it the classes of both lobes."""
     left, (sphere, energy), right = figure.subplots(2, 3).T
     for column, order in zip((left, right), ORDERS):
         solution = invert_stack(FIGURES[order], MODEL)
@@ -73,7 +65,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     angles = np.degrees(np.arccos(numbers["cosines"]))
     looks.curves(energy, angles, [np.array(numbers[order]["energy"]) for order in ORDERS], labels)
     energy.set(title="energy, both lobes", xlabel="angle of incidence (°)", ylim=(0, None))
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -5,13 +5,11 @@ Members of the class of figure 15 (b), with little and with much absorption, mar
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import bati2021_15, canvas, looks
+from velatura.figures import Progress, bati2021_15, canvas, looks
 from velatura.figures.looks import COSINES, MODEL
 from velatura.inverse import plots
 from velatura.model.registry import stack_lobes
@@ -23,13 +21,9 @@ def compute(
     size: int = looks.SIZE,
     spp: int = looks.SAMPLES,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """By name `indices`, over `cosines` energies `reflected` and `transmitted` (rgb); and `pictures` of spheres.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
+    """By name `indices`, over `cosines` energies `reflected` and `transmitted` (rgb); and `pictures` of spheres."""
     numbers: dict[str, Any] = {"cosines": list(COSINES), "pictures": {}}
     stacks = bati2021_15.stacks()
     for found, name in canvas.track(list(NAMES.items()), progress):
@@ -43,13 +37,9 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The class, both spheres, which let light pass, and what they reflect and transmit over the angle.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(17, 3.4)
+@canvas.page(17, 3.4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The class, both spheres, which let light pass, and what they reflect and transmit over the angle."""
     members, *spheres, reflected, transmitted = figure.subplots(1, 5)
     names = tuple(NAMES.values())
     plots.draw(members, bati2021_15.members("15 b"))
@@ -61,7 +51,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     for axes, key in ((reflected, "reflected"), (transmitted, "transmitted")):
         looks.curves(axes, angles, [np.array(numbers[name][key]) for name in names], names)
         axes.set(title=f"energy {key}", xlabel="angle of incidence (°)", ylim=(0, 1))
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -7,15 +7,14 @@ stands beside: what the model itself misses.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import reference
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Target, invert_stack
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model import named
@@ -35,7 +34,7 @@ def compute(
     paths: int = 300_000,
     seed: int = 0,
     model: str = MODEL,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """A row for every lobe of every target: energies (rgb) and alphas `expected`, `obtained`, and of the `walk`.
 
@@ -75,14 +74,10 @@ def compared(
         yield row, np.array([apart, np.abs(variances - MAPS["belcour"].variance(lobe.roughness)).max()])
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Energies above, roughnesses below: expected, obtained, and of the walk.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
+@canvas.page(12, 6.5)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """Energies above, roughnesses below: expected, obtained, and of the walk."""
     rows = numbers["rows"]
-    figure = canvas.canvas(12, 6.5)
     upper, lower = figure.subplots(2, 1)
     at = np.arange(len(rows))
     for n, (who, colour) in enumerate((("expected", "0.7"), ("obtained", "C0"), ("walk", "C3"))):
@@ -96,7 +91,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         axes.set_xticks(at, labels, fontsize="small")
         axes.set_title(title)
     lower.legend()
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -5,13 +5,12 @@ Not a figure of a paper. Facets are met once in all three, as renderers do it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.stack import preset
 
 MODELS = ("belcour2018", "velatura")
@@ -34,13 +33,9 @@ def compute(
     size: int = canvas.SIZE,
     spp: int = canvas.SAMPLES,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For each preset, by `name`, `canvas.errors` of every model and `mean` radiances; and `pictures`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
+    """For each preset, by `name`, `canvas.errors` of every model and `mean` radiances; and `pictures`."""
     rows, pictures = [], []
     for name in canvas.track(presets, progress):
         stack = preset(name)
@@ -53,13 +48,10 @@ def compute(
     return {"presets": rows, "pictures": pictures}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each preset: the models, the reference, and where the models are too bright (red) or too dark (blue).
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(10, 2.1 * len(numbers["presets"]))
+@canvas.page()
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each preset: the models, the reference, and where models are too bright (red) or too dark (blue)."""
+    figure.set_size_inches(10, 2.1 * len(numbers["presets"]))
     axes = figure.subplots(len(numbers["presets"]), 5, squeeze=False)
     for row, modelled, seen in zip(axes, numbers["presets"], numbers["pictures"]):
         truth = np.array(seen["reference"])
@@ -73,7 +65,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             axis.imshow(difference, cmap="RdBu_r", vmin=-SCALE, vmax=SCALE)
             axis.set_title(f"{model} - reference\n{canvas.error_label(modelled, model)}", fontsize=8)
             axis.set_axis_off()
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -6,22 +6,19 @@ parameters are chosen here (alpha 0.3, incidence of 45 degrees), shows the proje
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.figures.bounces import NORMAL, along, bounce, uniform, variance
 
 ALPHAS = (0.01, 0.02, 0.05, *np.linspace(0.1, 1, 19).round(2).tolist())
 LOBE, ANGLE, BINS = 0.3, 45, 80
 
 
-def compute(
-    alphas: Sequence[float] = ALPHAS, count: int = 2**15, progress: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
+def compute(alphas: Sequence[float] = ALPHAS, count: int = 2**15, progress: Progress | None = None) -> dict[str, Any]:
     """Over `alpha` the variance along an axis of the disc after `one` and `two` bounces; `count` is that of directions.
 
     `pictures` hold the energy of the `lobe` on a grid over the disc, from -1 to 1, in rows of x.
@@ -39,13 +36,9 @@ def compute(
     return {**numbers, "pictures": {"lobe": grid.tolist()}}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The lobe on the disc, and the variances over roughness.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(9, 4)
+@canvas.page(9, 4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The lobe on the disc, and the variances over roughness."""
     left, right = figure.subplots(1, 2)
     left.imshow(np.transpose(numbers["pictures"]["lobe"]), origin="lower", extent=(-1, 1, -1, 1), cmap="Blues")
     left.plot(*np.array([np.cos(t := np.linspace(0, 2 * np.pi, 200)), np.sin(t)]), color="0.5", linewidth=1)
@@ -55,7 +48,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         right.plot(numbers["alpha"], numbers[name], color=colour, marker=".", label=label)
     right.set(title="variance on the disc", xlabel="alpha", ylim=(0, None))
     right.legend()
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

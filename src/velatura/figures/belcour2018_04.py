@@ -7,13 +7,12 @@ projected disc, as the papers have it, and by the median of its half-vectors' sl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, along, bounce, equivalent, uniform
 from velatura.model.roughness_maps import ALPHA_MAX, MAPS
 
@@ -28,7 +27,7 @@ def compute(
     first: Sequence[float] = FIRST,
     second: Sequence[float] = SECOND,
     count: int = 2**14,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """For each `first` roughness a list over `second`: by width, the equivalent roughness, and what each map predicts.
 
@@ -70,20 +69,15 @@ def _error(numbers: dict[str, Any], width: str, name: str, low: bool) -> float:
     return float(np.sqrt(np.mean(np.square(misses))))
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The single bounce equivalent to two by variance, the prediction of the map dashed, and the map itself.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(9, 4.2)
+@canvas.page(9, 4.2)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The single bounce equivalent to two by variance, the prediction of the map dashed, and the map itself."""
     left, right = figure.subplots(1, 2)
     draw_curves(left, numbers, "variance", "belcour")
     draw_key(figure, left)
     alpha = np.linspace(0, 0.95, 200)
     right.plot(alpha, MAPS["belcour"].variance(alpha), color="C0")
     right.set(title="the map of Belcour 2018", xlabel="alpha", ylabel="f", ylim=(0, 10))
-    canvas.save(figure, path)
 
 
 def draw_curves(axes: Any, numbers: dict[str, Any], width: str, name: str, top: float = 1.0) -> None:

@@ -6,14 +6,13 @@ nor roughnesses: here they are 1.2, 1.5 and 2, and 1 below 1.5, with alpha .1 an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from velatura import reference
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.stack import Interface, Stack
 
 ALPHAS = (0.1, 0.5)
@@ -26,14 +25,11 @@ def compute(
     sines: Sequence[float] = SINES,
     paths: int = 100_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """A list of `curves` by `alpha`, `above` and `below`: over `sine`, the `mean` of what passes, and Snell's.
 
     None where Snell's law has no solution. `error` is the standard error of the mean.
-
-    Raises:
-        InvalidInput, MissingTool: as `reference.statistics`.
     """
     numbers: dict[str, Any] = {"sine": list(sines), "curves": []}
     sine = np.array(sines)
@@ -55,14 +51,11 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A plot for each roughness, Snell's law dashed.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
+@canvas.page()
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A plot for each roughness, Snell's law dashed."""
     alphas = sorted({curve["alpha"] for curve in numbers["curves"]})
-    figure = canvas.canvas(4.5 * len(alphas), 4.2)
+    figure.set_size_inches(4.5 * len(alphas), 4.2)
     for axes, alpha in zip(figure.subplots(1, len(alphas), squeeze=False)[0], alphas):
         for n, curve in enumerate(curve for curve in numbers["curves"] if curve["alpha"] == alpha):
             label = f"{curve['above']:g} to {curve['below']:g}"
@@ -70,7 +63,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             axes.plot(numbers["sine"], np.array(curve["snell"], float), color=f"C{n}", linestyle="--")
         axes.set(title=f"alpha {alpha:g}", xlabel="sine of incidence", ylabel="mean of what is refracted", ylim=(0, 1))
         axes.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -6,13 +6,11 @@ highest. Incidence is at 30 degrees, as printed; index (1.5) and alpha (0.1) are
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas, disc
+from velatura.figures import Progress, canvas, disc
 from velatura.figures.disc import Array
 
 ETA, ALPHA, ANGLE = 1.5, 0.1, 30.0
@@ -34,7 +32,7 @@ def compute(
     alpha: float = ALPHA,
     angle: float = ANGLE,
     count: int = 1001,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Over `sine`, the outgoing one, both lobes, and the `width` of each at half its height."""
     x, wi = np.linspace(-1, 1, count + 2)[1:-1], disc.incidence(angle, 180)
@@ -52,20 +50,15 @@ def compute(
     }
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Both lobes over the sine of the outgoing angle.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(6, 4)
+@canvas.page(6, 4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """Both lobes over the sine of the outgoing angle."""
     axes = figure.subplots()
     for name, colour in (("reflected", "C3"), ("refracted", "C0")):
         axes.plot(numbers["sine"], numbers[name], color=colour, label=f"{name}, width {numbers['width'][name]:.3f}")
     axes.set(xlabel="sine of the outgoing angle", ylabel="energy per area of the disc, over its highest")
     axes.set_title(f"index {ETA:g}, alpha {ALPHA:g}, incidence {ANGLE:g}°")
     axes.legend()
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -8,14 +8,13 @@ own, is not printed in it and left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from velatura.api import lobes
-from velatura.figures import canvas, disc
+from velatura.figures import Progress, canvas, disc
 from velatura.figures.belcour2018_06 import ALPHA, width
 from velatura.stack import Interface, Stack
 
@@ -29,7 +28,7 @@ def compute(
     alpha: float = ALPHA,
     angles: Sequence[float] = ANGLES,
     count: int = 4001,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """A list of `curves` by `above` and `below`: over `angle` (degrees), the `width` of refraction and of each scale's.
 
@@ -60,13 +59,9 @@ def _lobes(x: Any, above: float, below: float, alpha: float, angle: float) -> di
     return found
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The lobes at one angle, and the widths of the stand-ins over that of refraction.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(10, 4)
+@canvas.page(10, 4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The lobes at one angle, and the widths of the stand-ins over that of refraction."""
     left, right = figure.subplots(1, 2)
     for (name, lobe), colour in zip(numbers["lobes"].items(), ("C0", "C2", "C1")):
         left.plot(numbers["sine"], lobe, color=colour, label=name)
@@ -80,7 +75,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     right.set(title="width over that of refraction", xlabel="angle of incidence (°)", ylim=(0, 2))
     left.legend(fontsize="small")
     right.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -7,14 +7,13 @@ projected disc or the median of the slopes of half-vectors. (b) is what the mode
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from velatura.api import lobes
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, Light, along, bounce, equivalent, uniform
 from velatura.optics import phase
 from velatura.stack import Interface, Medium, Stack
@@ -27,7 +26,7 @@ def compute(
     depths: Sequence[float] = DEPTHS,
     asymmetries: Sequence[float] = ASYMMETRIES,
     count: int = 2**15,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Over `g` the equivalent roughness by `variance` and `median`, a list for each of `depth`, and of the `model`."""
     u = uniform(count)
@@ -55,13 +54,9 @@ def _scattered(g: float, depth: float, u1: Any, u2: Any) -> Light:
     return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.maximum(cosine, 0)]), energy
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """By variance for every depth, from red for none to blue, and by both widths beside the model.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(9, 4)
+@canvas.page(9, 4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """By variance for every depth, from red for none to blue, and by both widths beside the model."""
     left, right = figure.subplots(1, 2, sharey=True)
     for depth, row in zip(numbers["depth"], numbers["variance"]):
         left.plot(numbers["g"], np.array(row, float), color=(1 - depth, 0, depth), label=f"depth {depth:g}")
@@ -72,7 +67,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     right.set(title="(b) scattering", xlabel="g")
     left.legend(fontsize="small")
     right.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

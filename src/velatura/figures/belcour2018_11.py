@@ -8,13 +8,11 @@ symmetric form, which the paper renders; the forward one stands beside it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.stack import Interface, Stack
 
 ETA, METAL, ALPHA = 2.4, "Cu", 0.05
@@ -34,14 +32,11 @@ def compute(
     spp: int = canvas.SAMPLES,
     paths: int = 300_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """For both forms, the reference with `all` bounces and with `single` ones: what is reflected over `cos`.
 
     `albedo` by colour, `saturation` as 1 - blue / red, and `canvas.errors` against all bounces; `pictures`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     stack = Stack([Interface(eta=ETA, alpha=alpha), Interface(conductor=METAL, alpha=alpha)])
     numbers: dict[str, Any] = {"eta": ETA, "conductor": METAL, "alpha": alpha, "cos": list(COSINES)}
@@ -61,13 +56,9 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The spheres, and the saturation of what they reflect over the angle of incidence.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(16, 3.3)
+@canvas.page(16, 3.3)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The spheres, and the saturation of what they reflect over the angle of incidence."""
     *spheres, plot = figure.subplots(1, 5, width_ratios=(1, 1, 1, 1, 1.2))
     titles = {name: f"belcour2018, {name}" for name in canvas.FORMS}
     titles |= {"all": "reference, all bounces", "single": "reference, one reflection a layer"}
@@ -78,7 +69,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         plot.plot(angles, numbers["saturation"][column], marker=".", label=title, **styles[column])
     plot.set(title="saturation, 1 - blue / red", xlabel="angle of incidence (°)", ylim=(0, None))
     plot.legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

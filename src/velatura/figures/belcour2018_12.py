@@ -8,13 +8,12 @@ beside it. The reference lets light meet one facet of an interface at a time, an
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.stack import preset
 
 STACKS = {"smooth": "furnace", "rough": "furnace-rough"}
@@ -27,13 +26,9 @@ def compute(
     spp: int = canvas.SAMPLES,
     paths: int = 200_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For `smooth` and `rough`, by column: the `albedo` over `angles` (degrees), 1 where all is kept; and `pictures`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
+    """For `smooth` and `rough`, by column: the `albedo` over `angles` (degrees), 1 where all is kept; `pictures`."""
     cosines = np.cos(np.radians(angles))
     numbers: dict[str, Any] = {"angles": [float(angle) for angle in angles], "pictures": {}}
     numbers |= {name: {} for name in STACKS}
@@ -46,13 +41,9 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each stack: the spheres in the furnace, and the energy that is kept over the angle.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(16, 6)
+@canvas.page(16, 6)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each stack: the spheres in the furnace, and the energy that is kept over the angle."""
     for row, name in zip(figure.subplots(2, 5, width_ratios=(1, 1, 1, 1, 1.4)), STACKS):
         for plot, (column, style) in zip(row, canvas.STYLES.items()):
             # Half as bright, since white and brighter would look the same
@@ -61,7 +52,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         row[-1].axhline(1, color="0.7", linewidth=1)
         row[-1].set(title=f"energy kept, {name}", xlabel="angle of incidence (°)", ylim=(0, None))
         row[-1].legend(fontsize="small", loc="lower left")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -7,15 +7,13 @@ shows: half of the light leaves within this distance of the mirror direction, on
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura import reference
 from velatura.api import lobes
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.stack import preset
 
 COSINES = (1.0, 0.7, 0.4)
@@ -26,14 +24,11 @@ def compute(
     spp: int = canvas.SAMPLES,
     paths: int = 200_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """By column: `canvas.errors` against the reference, `blur` and `albedo` over `cos`; `pictures`.
 
     Also the roughness of the base's lobe, by the model and by random walks.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     stack = preset("frosted-metal")
     numbers: dict[str, Any] = {"cos": list(COSINES), "blur": {}, "albedo": {}}
@@ -63,13 +58,9 @@ def _blur(wo: Any, grey: Any, cosine: float) -> float:
     return float(away[order][np.searchsorted(below, below[-1] / 2)])
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The spheres in a row, and what each model has too much (red) or too little (blue).
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(12, 6.2)
+@canvas.page(12, 6.2)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The spheres in a row, and what each model has too much (red) or too little (blue)."""
     axes = figure.subplots(2, 4)
     truth = np.array(numbers["pictures"]["reference"])
     for column, name in zip(axes.T, canvas.COLUMNS):
@@ -79,7 +70,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             drawn = canvas.show_difference(column[1], image, truth, 0.1, canvas.error_label(numbers, name))
     axes[1, -1].set_axis_off()
     figure.colorbar(drawn, ax=axes, shrink=0.5, label="minus the reference")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,11 @@ has the symmetric form, which the paper renders; the forward one stands beside i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from velatura.comparison import compare
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.model import named
 from velatura.stack import Interface, Stack
 
@@ -26,16 +25,13 @@ def compute(
     spp: int = canvas.SAMPLES,
     paths: int = 300_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """A list of `cells`, one for each `alpha`, for light along the normal; and `pictures`.
 
     By form, `canvas.errors` and the `total_variation`, of which `noise` is the walk's own part; by form and `walk` the
     `albedo`, all that is reflected (of the model, as it is evaluated), and of the second lobe `base_alpha`
     and `base_energy`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.compare`.
     """
     cells: list[dict[str, Any]] = []
     pictures: list[dict[str, Any]] = []
@@ -61,14 +57,11 @@ def compute(
     return {"paths": paths, "cells": cells, "pictures": pictures}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A column for each roughness: reference, and of both forms what each has too much (red) or too little (blue).
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
+@canvas.page()
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A column for each roughness: reference, and of both forms what each has too much (red) or too little (blue)."""
     count = len(numbers["cells"])
-    figure = canvas.canvas(2.6 * count + 0.6, 12.3)
+    figure.set_size_inches(2.6 * count + 0.6, 12.3)
     axes = figure.subplots(5, count, squeeze=False)
     for column, cell, seen in zip(axes.T, numbers["cells"], numbers["pictures"]):
         canvas.show(column[0], seen["reference"], f"reference, {cell['name']}")
@@ -77,7 +70,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
             error = canvas.error_label(cell, form)
             drawn = canvas.show_difference(column[2 * n + 2], seen[form], seen["reference"], 0.2, error)
     figure.colorbar(drawn, ax=axes, shrink=0.3, label="minus the reference")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

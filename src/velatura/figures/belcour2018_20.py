@@ -5,20 +5,18 @@ The variances are those of figure 3. What is fitted to the outcome is in `linear
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import belcour2018_03, canvas
+from velatura.figures import Progress, belcour2018_03, canvas
 from velatura.figures.bounces import equivalent
 from velatura.model.roughness_maps import MAPS
 
 ALPHAS = np.concatenate([np.geomspace(5e-3, 0.1, 12)[:-1], np.linspace(0.1, 1, 37)])
 
 
-def compute(count: int = 2**15, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def compute(count: int = 2**15, progress: Progress | None = None) -> dict[str, Any]:
     """Figure 3's `alpha`, `one` and `two`, and the `equivalent` roughness of two bounces, None where none is as wide.
 
     `belcour` is what the map of the paper says instead.
@@ -33,13 +31,9 @@ def compute(count: int = 2**15, progress: Callable[[int, int], None] | None = No
     }
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The variances, and the roughness that follows from them.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(9, 4)
+@canvas.page(9, 4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The variances, and the roughness that follows from them."""
     left, right = figure.subplots(1, 2)
     for name, label, colour in (("one", "one bounce", "C0"), ("two", "two bounces", "C3")):
         left.plot(numbers["alpha"], numbers[name], color=colour, label=label)
@@ -49,7 +43,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     right.set(title="equivalent roughness", xlabel="alpha of both surfaces", ylim=(0, 1))
     left.legend()
     right.legend()
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

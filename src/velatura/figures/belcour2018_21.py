@@ -8,15 +8,14 @@ outgoing directions on the projected disc, half its trace, and its mean over lob
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from velatura import reference
 from velatura.comparison.evaluated_lobes import account
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.model import named
 from velatura.stack import Interface, Stack
 
@@ -42,15 +41,12 @@ def compute(
     angles: Sequence[float] = ANGLES,
     paths: int = 300_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """For `two` and `four` over `alpha`, and for `angle` over degrees: model and walk, side by side.
 
     Each side has the mean x and variance of all that is reflected, and energy, variance and alpha of the deepest lobe;
     the walk also the standard error of that variance.
-
-    Raises:
-        InvalidInput, MissingTool: as `reference.statistics`.
     """
     cases = [("two", alpha, two(alpha), 1.0) for alpha in alphas]
     cases += [("four", alpha, four(alpha), 1.0) for alpha in alphas]
@@ -97,13 +93,9 @@ def _summary(energy: Any, mean: Any, covariance: Any, alpha: float) -> dict[str,
     }
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Mean variances over the roughness, then mean and variance over the angle.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(9, 7)
+@canvas.page(9, 7)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """Mean variances over the roughness, then mean and variance over the angle."""
     axes = figure.subplots(2, 2)
     plots = (
         (axes[0, 0], "two", "variance", "two interfaces: mean variance"),
@@ -120,7 +112,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         if quantity == "variance":
             plot.set_ylim(0, None)
     axes[0, 0].legend()
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -7,13 +7,12 @@ symmetric one; the RMSE of the forward one is given as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from velatura import reference
 from velatura.api import lobes
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.stack import Interface, Stack
 
 MODEL = "belcour2018"
@@ -34,15 +33,12 @@ def compute(
     spp: int = canvas.SAMPLES,
     paths: int = 200_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """A list of `cells`, coat by coat: `coat` (its alpha), `metal`, `canvas.errors` of each form; and `pictures`.
 
     For light along the normal, and for `model` and `walk`: the `base_alpha` and `base_energy` (by colour) of the second
     lobe. `mean` is the mean radiance of the pictures.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     cells = []
     pictures: list[dict[str, Any]] = []
@@ -65,20 +61,16 @@ def compute(
     return {"eta": ETA, "cells": cells, "pictures": pictures}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each coat, and for each metal the model beside the reference.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
+@canvas.page()
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each coat, and for each metal the model beside the reference."""
     rows = len({cell["coat"] for cell in numbers["cells"]})
     columns = len(numbers["cells"]) // rows
-    figure = canvas.canvas(4 * columns, 2.5 * rows)
+    figure.set_size_inches(4 * columns, 2.5 * rows)
     pairs = figure.subplots(rows, 2 * columns, squeeze=False).reshape(-1, 2)
     for (left, right), cell, seen in zip(pairs, numbers["cells"], numbers["pictures"]):
         canvas.show(left, seen["model"], cell["name"].replace(", ", "\n"))
         canvas.show(right, seen["reference"], f"reference\n{canvas.error_label(cell, FORMS[0])}")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -14,14 +14,14 @@ not in the paper. So each BSDF is timed alone as well, with a roughness that is 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura import kernel, scenes
-from velatura.figures import canvas, evaluation
+from velatura.figures import Progress, canvas, evaluation
 from velatura.stack import Stack, preset
 
 WITHOUT_TABLES = {"reflectance": "fresnel", "tir": "off"}
@@ -55,15 +55,12 @@ def compute(
     repeats: int = 15,
     lanes: int = evaluation.LANES,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """By scene: `evaluation` of the BSDFs alone over the baseline's (`evaluation.costs`), and the ratio in the `paper`.
 
     Of pictures: `seconds` (the median of `repeats`), their `ratio` to the baseline's with its standard error
     `ratio_error`, and `mean`, the mean radiance of the `pictures`. The paper has no reference in its table.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     numbers: dict[str, Any] = {"scenes": {}, "pictures": {}}
     for name in canvas.track(names, progress):
@@ -111,13 +108,9 @@ def _for(model: str, stack: Stack) -> Stack:
     return stack.replace(**absorbing, **dict.fromkeys(scattering, 0.0))
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each scene: its pictures, and costs in units of the baseline's, with those of the paper.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(15, 9)
+@canvas.page(15, 9)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each scene: its pictures, and costs in units of the baseline's, with those of the paper."""
     widths = (1,) * len(COLUMNS) + (1.8,)
     rows = figure.subplots(len(numbers["scenes"]), len(widths), squeeze=False, width_ratios=widths)
     shown = [column for column in COLUMNS if column != BASELINE]
@@ -130,7 +123,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         row[-1].set(title=f"{name}: cost over the baseline's", yscale="log", ylim=(0.5, 50))
         row[-1].axhline(1, color="black", linewidth=0.5)
     rows[0, -1].legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,10 +15,13 @@ from velatura import api, files, kernel, scenes
 from velatura.checks.probe import Probe, Samples
 from velatura.comparison import check_figure
 from velatura.errors import needs
+from velatura.figures import Progress
 from velatura.stack import Stack, Texture
 
 Array = NDArray[np.floating]
 Item = TypeVar("Item")
+Paint = Callable[[Any, dict[str, Any]], None]
+Draw = Callable[[dict[str, Any], str | Path], None]
 
 SIZE, SAMPLES = 128, 128  # of a picture: pixels along a side, and samples of each
 PASSES = 8  # of a picture, each of its own random numbers: the noise of an error is that between them
@@ -40,7 +44,7 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 
 
-def track(items: Sequence[Item], progress: Callable[[int, int], None] | None) -> Iterator[Item]:
+def track(items: Sequence[Item], progress: Progress | None) -> Iterator[Item]:
     """The items; `progress` is called when each is done."""
     for done, item in enumerate(items, 1):
         yield item
@@ -148,6 +152,21 @@ def canvas(width: float, height: float) -> Any:
         from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def page(width: float = 8.0, height: float = 6.0) -> Callable[[Paint], Draw]:
+    """Decorator that makes the `draw` of a figure's module out of what paints numbers on a page of so many inches."""
+
+    def drawn(paint: Paint) -> Draw:
+        @wraps(paint)
+        def draw(numbers: dict[str, Any], path: str | Path) -> None:
+            figure = canvas(width, height)
+            paint(figure, numbers)
+            save(figure, path)
+
+        return draw
+
+    return drawn
 
 
 def shades(count: int, name: str = "plasma") -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from velatura import reference
 from velatura.api import lobes
 from velatura.comparison.evaluated_lobes import along
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.stack import Stack, Varying
 
 COSINES = (1.0, 0.7, 0.4, 0.2)
@@ -53,7 +53,7 @@ class Cells:
         spp: int | None = None,
         paths: int | None = None,
         seed: int = 0,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Progress | None = None,
     ) -> dict[str, Any]:
         """A cell for each stack, or for those named: see `cells.compute`.
 
@@ -81,7 +81,7 @@ def compute(
     columns: Columns,
     quality: Quality,
     seed: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     scene: str = "sphere",
     env: str = "studio",
 ) -> dict[str, Any]:

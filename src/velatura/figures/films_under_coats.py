@@ -7,16 +7,15 @@ smooth varnish, and under a rough coat. Facets are met once in all. What neighbo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura import scenes
 from velatura.checks.probe import Probe
-from velatura.figures import canvas, neighbours
+from velatura.figures import Progress, canvas, neighbours
 from velatura.figures.neighbours import Coat, Metal
 from velatura.optics import films
 from velatura.optics.coatings import RANGE_NM, Coating, ColouredFilm
@@ -56,7 +55,7 @@ def compute(
     spp: int = canvas.SAMPLES,
     paths: int = 200_000,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """For each metal and coat, by `name`, and each column but the truth:
 
@@ -64,9 +63,6 @@ def compute(
     over `cosines` (CIE 1976), at the `normal` and `mean` over the cosines; and the mean over colours of its `energy`
     less that of the truth, at the `normal` and the `worst`. `albedo` has all colours, those of the truth with noise.
     Of ways to integrate over wavelengths the `integration` errors. And `pictures`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     cells, pictures = [], []
     each = [(f"{metal}, {coat}", METALS[metal], COATS[coat]) for metal in metals for coat in coats]
@@ -134,13 +130,10 @@ def _lab(colour: Array) -> Array:
     return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each material: spheres, and the colours of all reflected light from the normal to grazing angles.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(2.1 * (len(COLUMNS) + 1), 2.2 * len(numbers["cells"]))
+@canvas.page()
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each material: spheres, and the colours of all reflected light from the normal to grazing angles."""
+    figure.set_size_inches(2.1 * (len(COLUMNS) + 1), 2.2 * len(numbers["cells"]))
     axes = figure.subplots(len(numbers["cells"]), len(COLUMNS) + 1, squeeze=False)
     for row, cell, seen in zip(axes, numbers["cells"], numbers["pictures"]):
         for axis, who in zip(row, COLUMNS):
@@ -153,7 +146,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         row[-1].set(xticks=(), yticks=[BANDS * (k + 0.5) for k in range(len(COLUMNS))], yticklabels=COLUMNS)
         row[-1].tick_params(labelsize=6, length=0)
         row[-1].set_title("colour, normal to cos .1", fontsize=8)
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

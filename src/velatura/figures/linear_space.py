@@ -13,13 +13,12 @@ half-vectors, which is what makes one lobe look like another. (`velatura.figures
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import both_axes, canvas
+from velatura.figures import Progress, both_axes, canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, Array, along, bounce, equivalent, uniform
 from velatura.model.roughness_maps import ALPHA_MAX, MAPS
 
@@ -30,7 +29,7 @@ START = 1e-3  # of the iteration, both roughness and variance (Belcour 2018, app
 CHAIN = (0.01, 0.5)  # part of the iterated curve that p is read off
 
 
-def compute(count: int = 2**15, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def compute(count: int = 2**15, progress: Progress | None = None) -> dict[str, Any]:
     """For `variance` and `median` as the width: curves, and what is fitted to them; `count` is that of directions.
 
     `equivalent` of two equal bounces over `alpha`; `iterated` f over roughness; `p` read off it; `fits` for growing
@@ -120,13 +119,9 @@ def _fit(pairs: Array, targets: Array, top: float) -> dict[str, Any]:
     }
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The map that is iterated, and the equivalent roughness of two bounces, beside those of the published maps.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(15, 4.5)
+@canvas.page(15, 4.5)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The map that is iterated, and the equivalent roughness of two bounces, beside those of the published maps."""
     left, right, axes = figure.subplots(1, 3)
     colours = {"variance": "C3", "median": "black"}
     for name, colour in colours.items():
@@ -149,7 +144,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
     axes.set(xlabel="largest alpha, of either axis", ylabel="error of the equivalent alpha, both axes", ylim=(0, None))
     for plot in (left, right, axes):
         plot.legend()
-    canvas.save(figure, path)
 
 
 def _published() -> Sequence[tuple[str, Any]]:

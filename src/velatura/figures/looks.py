@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import scenes
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.inverse import Layers, invert_stack, on_black
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.plots import CHANNELS, FILLS
@@ -96,7 +96,7 @@ class Looks:
         size: int = SIZE,
         spp: int = SAMPLES,
         seed: int = 0,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Progress | None = None,
     ) -> dict[str, Any]:
         """As `looks.compute`."""
         return compute(self.stacks(), size, spp, seed, progress, **self.options)
@@ -163,7 +163,7 @@ def compute(
     size: int = SIZE,
     spp: int = SAMPLES,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     scene: str = "sphere",
     **switches: Any,
 ) -> dict[str, Any]:
@@ -189,7 +189,7 @@ def pictures(
     size: int,
     spp: int,
     seed: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     scene: str = "sphere",
     **switches: Any,
 ) -> dict[str, Any]:

@@ -6,18 +6,16 @@ tangent and half-way to the bitangent. Axes are those of the spot where a lobe i
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from velatura.figures import canvas, disc
+from velatura.figures import Progress, canvas, disc
 
 ALPHAS = ((0.05, 0.2), (0.1, 0.4))
 INCIDENCES = ((45, 0), (45, 45), (70, 0), (70, 45))  # zenith angle and azimuth, degrees
 SHOWN = 100  # points along a side of what is kept of a lobe
 
 
-def compute(count: int = 500, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def compute(count: int = 500, progress: Progress | None = None) -> dict[str, Any]:
     """A list of `cells` by `alpha`, `theta`, `phi`: the `turn` of a lobe's axes, in degrees, and `aspect`.
 
     `pictures` are the lobes on grids over the disc.
@@ -34,19 +32,14 @@ def compute(count: int = 500, progress: Callable[[int, int], None] | None = None
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each roughness, the incidence marked by a cross.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(11, 6)
+@canvas.page(11, 6)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each roughness, the incidence marked by a cross."""
     for axes, cell, lobe in zip(figure.subplots(2, 4).flat, numbers["cells"], numbers["pictures"]):
         u, v = cell["alpha"]
         disc.show(axes, lobe, f"alpha {u:g}, {v:g}: turned by {cell['turn']:.1f}°")
         at = disc.incidence(cell["theta"], cell["phi"])
         axes.plot([at[0]], [at[1]], "kx")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -7,14 +7,12 @@ quadrature over visible normals. The index, 1.5, is chosen here. Beside them sta
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura.api import lobes
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.figures.bounces import Array, uniform
 from velatura.figures.disc import Direction, grid
 from velatura.optics import fresnel, ggx
@@ -29,7 +27,7 @@ COLUMNS: dict[str, tuple[Any, str]] = {
 _SMOOTH = 1e-3  # what 0 is evaluated as
 
 
-def compute(side: int = 41, count: int = 4096, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def compute(side: int = 41, count: int = 4096, progress: Progress | None = None) -> dict[str, Any]:
     """Over incidences on a grid over the disc, the `albedo` of `truth` and by fetch; None outside and grazing.
 
     `error` is by fetch the root mean square and the largest difference from the truth.
@@ -72,13 +70,9 @@ def _spread(values: Array, lit: Any, side: int) -> list[list[float | None]]:
     return [[float(a) if np.isfinite(a) else None for a in row] for row in whole.reshape(side, side)]
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The albedos over the disc of incidences, the rougher axis upwards.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(13, 3.6)
+@canvas.page(13, 3.6)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The albedos over the disc of incidences, the rougher axis upwards."""
     row = figure.subplots(1, len(numbers["albedo"]))
     for axes, (name, albedo) in zip(row, numbers["albedo"].items()):
         image = np.array(albedo, float).T
@@ -87,7 +81,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         axes.set_title(f"{name}: error {error[0]:.3f}" if error else name, fontsize="medium")
         axes.set(xticks=(-1, 0, 1), yticks=(-1, 0, 1), xlabel="x of incidence", ylabel="y, along the rougher axis")
     figure.colorbar(drawn, ax=row, shrink=0.8, label="albedo")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

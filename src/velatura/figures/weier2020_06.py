@@ -7,13 +7,12 @@ to, and what the maps of the paper make of it: the one that treats each axis by 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.figures.bounces import NORMAL, Array, along, bounce, equivalent_along, uniform, variances
 from velatura.model.roughness_maps import MAPS
 
@@ -23,9 +22,7 @@ NAMES = ("weier", "weier-2d")
 SIDE = 40  # of the plot of (b)
 
 
-def compute(
-    alphas: Sequence[float] = ALPHAS, count: int = 2**13, progress: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
+def compute(alphas: Sequence[float] = ALPHAS, count: int = 2**13, progress: Progress | None = None) -> dict[str, Any]:
     """Over `alpha` along x (rows) and y (columns): `variance` along x after one bounce, `equivalent` along x of two.
 
     `inverse` is (b) over `variances` along x and y; None where there is none. `error` is by map the root mean square of
@@ -67,13 +64,9 @@ def _plain(values: Array) -> list[list[float | None]]:
     return [[float(v) if np.isfinite(v) else None for v in row] for row in values]
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Variance, inverse and equivalent roughness, along x, and below what the maps give for the last; grey is unknown.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(13, 7.4)
+@canvas.page(13, 7.4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """Variance, inverse and equivalent roughness, along x, below what the maps give for the last; grey is unknown."""
     rows = figure.subplots(2, 3)
     top = numbers["variances"][-1]
     plots = (
@@ -97,7 +90,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         rows[1, 2].plot(alphas, variance, label=f"alpha {alpha:g} along x")
     rows[1, 2].set(title="variance along x", xlabel="alpha along y", ylim=(0, None))
     rows[1, 2].legend(fontsize="small")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ The curves are those of figure 4 of Belcour 2018.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from velatura.figures import canvas
@@ -16,19 +15,14 @@ __all__ = ["compute", "draw"]
 LOW = 0.5  # of the enlarged part
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each width; by column both maps, and each enlarged where roughness is low.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(15, 8)
+@canvas.page(15, 8)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each width; by column both maps, and each enlarged where roughness is low."""
     rows = figure.subplots(2, 4)
     for row, width in zip(rows, ("variance", "median")):
         for n, (top, name) in enumerate((top, name) for top in (1.0, LOW) for name in NAMES):
             draw_curves(row[n], numbers, width, name, top)
     draw_key(figure, rows)
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

@@ -6,15 +6,13 @@ normal: energies on the projected disc of all but what the first interface refle
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura import reference
 from velatura.api import lobes
-from velatura.figures import canvas
+from velatura.figures import Progress, canvas
 from velatura.figures.bounces import Array, along, bounce, uniform
 from velatura.figures.weier2020_10 import stack
 from velatura.reference import roughness
@@ -26,14 +24,11 @@ EXTENT, BINS = 0.3, 60  # of the disc that is shown
 UP = (0.0, 0.0, 1.0)
 
 
-def compute(paths: int = 10**6, seed: int = 0, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def compute(paths: int = 10**6, seed: int = 0, progress: Progress | None = None) -> dict[str, Any]:
     """For `model` and `walk`: `alpha` along both axes, `diagonal`, and `pictures` of the highlight around the normal.
 
     `diagonal` is the median of slopes of half-vectors along the diagonal, in units in which that along the axes is 1:
     it is 1 for every GGX reflection, or other distribution with elliptic contours.
-
-    Raises:
-        InvalidInput, MissingTool: as `reference.statistics`.
     """
     modelled = lobes(STACK, 1.0, 0.0, "weier2020", **CHOICES).alpha[1][:, 0]
     walked = reference.statistics(STACK, 1.0, 0.0, paths, seed).alpha[1][:, 0]
@@ -59,13 +54,9 @@ def _diagonal(w: Array, energy: Array) -> float:
     return roughness.median(np.abs(u + v) / np.sqrt(2), energy)[0]
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Both highlights, by the logarithm of their energy.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(9, 4.2)
+@canvas.page(9, 4.2)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """Both highlights, by the logarithm of their energy."""
     for axes, side in zip(figure.subplots(1, 2), ("walk", "model")):
         found = numbers[side]
         image = np.log10(np.maximum(np.transpose(numbers["pictures"][side]), 1e-7))
@@ -73,7 +64,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         axes.imshow(image, origin="lower", extent=extent, cmap="magma", vmin=-5, vmax=-2)
         u, v = found["alpha"]
         axes.set(title=f"{side}: alpha {u:.3f}, {v:.3f}; diagonal {found['diagonal']:.2f}", xlabel="x", ylabel="y")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

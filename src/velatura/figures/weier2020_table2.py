@@ -10,14 +10,13 @@ of the coat, and in pictures, without.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura import kernel, scenes
-from velatura.figures import canvas, evaluation
+from velatura.figures import Progress, canvas, evaluation
 from velatura.figures.weier2020_10 import stack
 from velatura.stack import Stack
 
@@ -34,14 +33,11 @@ def compute(
     repeats: int = 15,
     lanes: int = evaluation.LANES,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """By scene: `evaluation` of the BSDFs alone over the isotropic one (`evaluation.costs`), and the `paper`'s ratio.
 
     Of pictures: `seconds` (the median of `repeats`) by model, and their `ratio` with its standard error `ratio_error`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     numbers: dict[str, Any] = {"scenes": {}, "pictures": {}}
     for name in canvas.track(list(SCENES), progress):
@@ -72,13 +68,9 @@ def _bsdfs(stacks: dict[str, Stack]) -> dict[str, Any]:
     return {model: canvas.bsdf(each, model, map=COLUMNS[model], **CHOICES) for model, each in stacks.items()}
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for each scene: both pictures, and the cost of the second over that of the first.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(9, 6.4)
+@canvas.page(9, 6.4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for each scene: both pictures, and the cost of the second over that of the first."""
     rows = figure.subplots(2, 3, width_ratios=(1, 1, 1.2))
     for row, (name, found) in zip(rows, numbers["scenes"].items()):
         for axes, (model, image) in zip(row, numbers["pictures"][name].items()):
@@ -88,7 +80,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         evaluation.bars(row[-1], {"": shown}, list(shown))
         row[-1].set(title="weier2020 over belcour2018", ylim=(0, None))
         row[-1].axhline(1, color="black", linewidth=0.5)
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

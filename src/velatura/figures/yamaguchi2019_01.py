@@ -8,13 +8,13 @@ roughness that is the geometric mean of its two.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas, cells, maps
+from velatura.figures import Progress, canvas, cells, maps
 from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, STACKS, stack
 from velatura.stack import Interface, Stack
 
@@ -45,13 +45,9 @@ def compute(
     size: int = canvas.SIZE,
     spp: int = canvas.SAMPLES,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """A list of `cells` by `name`, with `canvas.errors` of both models; and their `pictures`.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
-    """
+    """A list of `cells` by `name`, with `canvas.errors` of both models; and their `pictures`."""
     numbers: dict[str, Any] = {"cells": [], "pictures": []}
     for name in canvas.track(list(names), progress):
         with tempfile.TemporaryDirectory() as folder:

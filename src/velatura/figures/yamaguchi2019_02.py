@@ -6,18 +6,16 @@ chosen here. Axes are those of the spots that are at least half as high as the p
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from velatura.figures import canvas, disc
+from velatura.figures import Progress, canvas, disc
 
 ALPHA, TURN = (0.05, 0.2), 30.0
 THETA = 45.0
 SHOWN = 100
 
 
-def compute(count: int = 500, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def compute(count: int = 500, progress: Progress | None = None) -> dict[str, Any]:
     """For `normals` and `reflected`: `aspect`, mean `size`, `turn` (degrees, from the bitangent); `pictures`.
 
     `size_by_jacobian` is 2 cos theta, the ratio of their sizes by Yamaguchi et al. 2019, Eq. 4.
@@ -34,17 +32,12 @@ def compute(count: int = 500, progress: Callable[[int, int], None] | None = None
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """Both, side by side, in the frame of the roughness.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(7, 3.8)
+@canvas.page(7, 3.8)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """Both, side by side, in the frame of the roughness."""
     for axes, (name, lobe) in zip(figure.subplots(1, 2), numbers["pictures"].items()):
         spot = numbers[name]
         disc.show(axes, lobe, f"{name}: aspect {spot['aspect']:.2f}, turned by {spot['turn']:.1f}°")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

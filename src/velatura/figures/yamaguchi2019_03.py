@@ -7,13 +7,12 @@ of normals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from velatura.figures import canvas, disc
+from velatura.figures import Progress, canvas, disc
 from velatura.figures.yamaguchi2019_02 import ALPHA, SHOWN, TURN
 from velatura.optics import fresnel
 
@@ -21,9 +20,7 @@ ANGLES = (0, 15, 30, 45, 60, 75)  # degrees
 ETA = 1.5
 
 
-def compute(
-    angles: Sequence[float] = ANGLES, count: int = 1500, progress: Callable[[int, int], None] | None = None
-) -> dict[str, Any]:
+def compute(angles: Sequence[float] = ANGLES, count: int = 1500, progress: Progress | None = None) -> dict[str, Any]:
     """For `reflected` and `refracted` over `angle`: `aspect`, `turn` (degrees), `size` over that of the normals.
 
     `jacobian` is that ratio by Yamaguchi et al. 2019, Eqs. 4-5; `pictures` are the lobes on grids over the disc.
@@ -50,19 +47,15 @@ def compute(
     return numbers
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """A row for reflection and one for refraction, a column for each angle.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(2.4 * len(numbers["angle"]), 5.2)
+@canvas.page()
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """A row for reflection and one for refraction, a column for each angle."""
+    figure.set_size_inches(2.4 * len(numbers["angle"]), 5.2)
     rows = figure.subplots(2, len(numbers["angle"]), squeeze=False)
     for row, name in zip(rows, ("reflected", "refracted")):
         found = numbers[name]
         for axes, angle, lobe, aspect in zip(row, numbers["angle"], numbers["pictures"][name], found["aspect"]):
             disc.show(axes, np.array(lobe), f"{name}, {angle:g}°: {aspect:.2f}")
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":

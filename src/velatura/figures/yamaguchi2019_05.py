@@ -13,14 +13,14 @@ noise, and that of a picture of one sample in light from one direction to one in
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from velatura import kernel, scenes
-from velatura.figures import canvas, evaluation
+from velatura.figures import Progress, canvas, evaluation
 from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, stack
 from velatura.stack import Stack
 
@@ -35,7 +35,7 @@ def compute(
     repeats: int = 15,
     lanes: int = evaluation.LANES,
     seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Over `samples` of a pixel, the `seconds` of a picture (the median of `repeats`) by material.
 
@@ -44,9 +44,6 @@ def compute(
     and its `ratio_error`; `equal_noise` is that of the walk for as much variance of the pixels. `evaluation` has what
     BSDFs cost alone, `uniform` and `textured` ones (`evaluation.costs`): `anisotropic` over the isotropic one, and the
     `walk` over the anisotropic one.
-
-    Raises:
-        InvalidInput, MissingTool: as `vt.render`.
     """
     isotropic, brushed = stack(0.1, 0.0, 0.1, 0.0), stack(SPREAD, 60.0, SPREAD, 0.0)
     with tempfile.TemporaryDirectory() as folder:
@@ -100,13 +97,9 @@ def _scene(bsdf: Any, size: int, **changes: Any) -> Any:
     return kernel.load_dict(scenes.scene_dict("sphere", "studio", bsdf, (size, size)) | changes)
 
 
-def draw(numbers: dict[str, Any], path: str | Path) -> None:
-    """The seconds and the overhead of pictures over the samples, and the overhead of an evaluation.
-
-    Raises:
-        InvalidInput: the file cannot be written.
-    """
-    figure = canvas.canvas(14, 4)
+@canvas.page(14, 4)
+def draw(figure: Any, numbers: dict[str, Any]) -> None:
+    """The seconds and the overhead of pictures over the samples, and the overhead of an evaluation."""
     left, middle, third, last = figure.subplots(1, 4)
     for name, seconds in numbers["seconds"].items():
         left.plot(numbers["samples"], seconds, marker=".", label=name)
@@ -130,7 +123,6 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         axes.legend()
     left.legend()
     middle.legend()
-    canvas.save(figure, path)
 
 
 if __name__ == "__main__":
