@@ -18,11 +18,10 @@ from velatura.checks.probe import Probe
 from velatura.cli.figure import figure as figure_verb
 from velatura.figures import (
     FIGURES,
+    belcour2018,
     belcour2018_11,
     belcour2018_12,
     belcour2018_13,
-    belcour2018_15,
-    belcour2018_16,
     belcour2018_19,
     belcour2018_21,
     belcour2018_22,
@@ -34,11 +33,8 @@ from velatura.figures import (
     linear_space,
     maps,
     store,
-    yamaguchi2019_04,
-    yamaguchi2019_06,
-    yamaguchi2019_07,
-    yamaguchi2019_08,
 )
+from velatura.figures.yamaguchi2019 import STACKS
 from velatura.optics import fresnel
 from velatura.stack import Interface, Stack, Texture, rgb
 
@@ -437,10 +433,10 @@ def test_figures_6_7_and_8_share_a_material() -> None:
     Expected: one stack in all three; on a sphere, whose tangent runs around the axis, the metal is brushed as where its
     field is concentric, and the coat as where that is radial.
     """
-    crossed = yamaguchi2019_06.STACKS["(d)"]
-    assert crossed == yamaguchi2019_07.STACKS["90°"] == yamaguchi2019_08.STACKS["(a)"]
+    crossed = STACKS["yamaguchi2019-06"]["(d)"]
+    assert crossed == STACKS["yamaguchi2019-07"]["90°"] == STACKS["yamaguchi2019-08"]["(a)"]
     around = {"concentric": 0.0, "radial": 90.0}
-    fields = [cast(Any, layer.rotation).brushing for layer in yamaguchi2019_04.STACKS["(d)"].interfaces]
+    fields = [cast(Any, layer.rotation).brushing for layer in STACKS["yamaguchi2019-04"]["(d)"].interfaces]
     assert [layer.rotation for layer in crossed.interfaces] == [around[field] for field in fields]
 
 
@@ -461,11 +457,11 @@ def test_textured_urns(made: Made, name: str) -> None:
     assert all(mean == pytest.approx(truth, rel=0.12) for mean in cell["mean"].values())
 
 
-@pytest.mark.parametrize("module", [belcour2018_15, belcour2018_16])
-def test_textures_are_those_of_the_figure(module: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("stacks", [belcour2018.plates, belcour2018.textured])
+def test_textures_are_those_of_the_figure(stacks: Any, tmp_path: Path) -> None:
     """Belcour 2018, figures 15 and 16. Expected: alpha up to 1 on plates; on the urn to .4, the index 1.2 and 1.8."""
-    images = {path.stem: read_image(path) for path in textures(module.stacks(tmp_path))}
-    if module is belcour2018_15:
+    images = {path.stem: read_image(path) for path in textures(stacks(tmp_path))}
+    if stacks is belcour2018.plates:
         (rings,) = images.values()
         assert (rings.min(), rings.max()) == pytest.approx((0, 1), abs=1e-3)
     else:
@@ -662,7 +658,7 @@ def test_a_fingerprint_covers_the_modules_that_a_figure_imports(
     names = ("weier2020-11", "weier2020-14", "belcour2018-03")
     before = [store.fingerprint(name) for name in names]
     assert len(set(before)) == 3
-    with (tmp_path / "figures" / "weier2020_10.py").open("a") as module:  # which 11 and 14 import
+    with (tmp_path / "figures" / "weier2020.py").open("a") as module:  # where 11 stands, and which 14 imports
         module.write("MORE = 1\n")
     changed = [store.fingerprint(name) != was for name, was in zip(names, before)]
     assert changed == [True, True, False]

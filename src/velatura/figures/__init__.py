@@ -1,10 +1,10 @@
-"""The papers' figures by name, one module each: it computes the numbers, and draws them.
+"""The papers' figures by name: modules and rows that compute the numbers, and draw them.
 
     python -m velatura.figures.belcour2018_12
 
-A figure is a module with `compute`, which takes what makes it quick or exact (paths, picture sizes, a seed, `progress`)
-and returns plain numbers and lists, and `draw`, which makes a picture of them. What belongs to `pictures` among the
-numbers are pixels: linear RGB in rows, or one value each.
+A figure is a module, or a row of `FIGURES` in the module of its paper. It has `compute`, which takes what makes it
+quick or exact (paths, picture sizes, a seed, `progress`) and returns plain numbers and lists, and `draw`, which makes a
+picture of them. What belongs to `pictures` among the numbers are pixels: linear RGB in rows, or one value each.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ FIGURES = (
 
 
 class Figure(Protocol):
-    """The interface of a figure's module."""
+    """The interface of a figure."""
 
     def compute(self, *, progress: Progress | None = None) -> dict[str, Any]:
         """The numbers; `progress` is called with (steps done, all steps).
@@ -112,4 +112,11 @@ def figure(name: str) -> Figure:
     """The figure of that name. Raises InvalidInput for a name that none has."""
     if name not in FIGURES:
         raise InvalidInput(f"unknown figure {show(name)} (known: {', '.join(FIGURES)})")
-    return cast(Figure, import_module(f"velatura.figures.{name.replace('-', '_')}"))
+    module = import_module(f"{__name__}.{module_of(name)}")
+    return cast(Figure, module.FIGURES[name] if name in getattr(module, "FIGURES", ()) else module)
+
+
+def module_of(name: str) -> str:
+    """The module of a figure: its own, or that of its paper, of which it is a row."""
+    own = name.replace("-", "_")
+    return own if (Path(__file__).parent / f"{own}.py").is_file() else own.partition("_")[0]

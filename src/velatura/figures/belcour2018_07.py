@@ -25,10 +25,7 @@ SHOWN = 30  # degrees, of the lobes
 
 
 def compute(
-    alpha: float = ALPHA,
-    angles: Sequence[float] = ANGLES,
-    count: int = 4001,
-    progress: Progress | None = None,
+    alpha: float = ALPHA, angles: Sequence[float] = ANGLES, count: int = 4001, progress: Progress | None = None
 ) -> dict[str, Any]:
     """A list of `curves` by `above` and `below`: over `angle` (degrees), the `width` of refraction and of each scale's.
 

@@ -31,6 +31,7 @@ class Quality(NamedTuple):
 
 
 QUALITY = Quality()
+TEASER = Quality(256, 64)
 
 
 @dataclass(frozen=True)

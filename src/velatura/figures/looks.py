@@ -92,11 +92,7 @@ class Looks:
         return cls(stacks, panels, switches, detail=True, inset=True)
 
     def compute(
-        self,
-        size: int = SIZE,
-        spp: int = SAMPLES,
-        seed: int = 0,
-        progress: Progress | None = None,
+        self, size: int = SIZE, spp: int = SAMPLES, seed: int = 0, progress: Progress | None = None
     ) -> dict[str, Any]:
         """As `looks.compute`."""
         return compute(self.stacks(), size, spp, seed, progress, **self.options)

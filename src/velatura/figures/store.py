@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from velatura import files
-from velatura.figures import Progress, figure
+from velatura.figures import Progress, figure, module_of
 
 PACKAGE = "velatura.figures"
 SOURCES = Path(__file__).parent
@@ -26,7 +26,7 @@ def numbers_of(numbers: dict[str, Any], **more: Any) -> str:
 
 def fingerprint(name: str) -> str:
     """A hash of a figure's module, which holds its parameters, and of the modules of this package that it imports."""
-    found, waiting = set[str](), {name.replace("-", "_")}
+    found, waiting = set[str](), {module_of(name)}
     while waiting:
         found.add(module := waiting.pop())
         waiting |= _imported(module) - found

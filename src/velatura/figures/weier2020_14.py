@@ -14,12 +14,11 @@ from velatura import reference
 from velatura.api import lobes
 from velatura.figures import Progress, canvas
 from velatura.figures.bounces import Array, along, bounce, uniform
-from velatura.figures.weier2020_10 import stack
+from velatura.figures.weier2020 import CHOICES, stack
 from velatura.reference import roughness
 from velatura.reference.batches import ends
 
 STACK = stack((0.1, 0.0), (0.0, 0.05))
-CHOICES = {"reflectance": "fresnel", "tir": "off"}
 EXTENT, BINS = 0.3, 60  # of the disc that is shown
 UP = (0.0, 0.0, 1.0)
 

@@ -17,10 +17,9 @@ import numpy as np
 
 from velatura import kernel, scenes
 from velatura.figures import Progress, canvas, evaluation
-from velatura.figures.weier2020_10 import stack
+from velatura.figures.weier2020 import CHOICES, stack
 from velatura.stack import Stack
 
-CHOICES = {"reflectance": "fresnel", "tir": "off"}
 COLUMNS = {"belcour2018": "belcour", "weier2020": "weier"}  # and the map of each
 SCENES = {"area light": ("sphere", (0.1, 0.1)), "teaser": ("ball", (0.05, 0.2))}  # and the metal in the second column
 COAT, ISOTROPIC = (0.05, 0.05), (0.1, 0.1)

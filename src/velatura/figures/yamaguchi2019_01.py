@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import Progress, canvas, cells, maps
-from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, STACKS, stack
+from velatura.figures.yamaguchi2019 import CHOICES, SPREAD, STACKS, stack
 from velatura.stack import Interface, Stack
 
 NAMES = ("(b)", "(c)", "(d)", "(e)", "urn")
-_, CHOICES = COLUMNS["yamaguchi2019"]
 
 
 def waves(folder: Path) -> Stack:
@@ -51,7 +50,7 @@ def compute(
     numbers: dict[str, Any] = {"cells": [], "pictures": []}
     for name in canvas.track(list(names), progress):
         with tempfile.TemporaryDirectory() as folder:
-            brushed = waves(Path(folder)) if name == "urn" else STACKS[name]
+            brushed = waves(Path(folder)) if name == "urn" else STACKS["yamaguchi2019-04"][name]
             shown: dict[str, tuple[Stack, str, Mapping[str, Any]]] = {
                 "reference": (brushed, "reference", {}),
                 "isotropic": (isotropic(brushed), "belcour2018", CHOICES),

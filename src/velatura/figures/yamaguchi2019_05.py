@@ -21,12 +21,11 @@ import numpy as np
 
 from velatura import kernel, scenes
 from velatura.figures import Progress, canvas, evaluation
-from velatura.figures.yamaguchi2019_04 import COLUMNS, SPREAD, stack
+from velatura.figures.yamaguchi2019 import CHOICES, PLAIN, SPREAD, stack
 from velatura.stack import Stack
 
 COUNTS = (16, 32, 64)
 PAPER = {"anisotropic": 1.025, "walk": 587.8 / 45.1}
-_CHOICES = COLUMNS["yamaguchi2019"][1]
 
 
 def compute(
@@ -45,7 +44,7 @@ def compute(
     BSDFs cost alone, `uniform` and `textured` ones (`evaluation.costs`): `anisotropic` over the isotropic one, and the
     `walk` over the anisotropic one.
     """
-    isotropic, brushed = stack(0.1, 0.0, 0.1, 0.0), stack(SPREAD, 60.0, SPREAD, 0.0)
+    isotropic, brushed = PLAIN, stack(SPREAD, 60.0, SPREAD, 0.0)
     with tempfile.TemporaryDirectory() as folder:
         uniform = _bsdfs(isotropic, brushed)
         textured = _bsdfs(*(evaluation.textured(each, Path(folder)) for each in (isotropic, brushed)))
@@ -77,7 +76,7 @@ def compute(
         numbers[name] = dict(zip(("ratio", "ratio_error"), canvas.ratio(seconds, times["model"])))
     true, modelled = (
         canvas.spheres(brushed, name, "studio", size, counts[-1], seed, **choices).var(axis=0, ddof=1).mean()
-        for name, choices in (("reference", {}), ("yamaguchi2019", _CHOICES))
+        for name, choices in (("reference", {}), ("yamaguchi2019", CHOICES))
     )
     numbers["walk"]["equal_noise"] = float(numbers["walk"]["ratio"] * true / modelled)
     return numbers
@@ -86,8 +85,8 @@ def compute(
 def _bsdfs(isotropic: Stack, brushed: Stack) -> dict[str, Any]:
     """Belcour's model of the isotropic material, Yamaguchi's and the walk of the brushed one."""
     return {
-        "isotropic": canvas.bsdf(isotropic, "belcour2018", **_CHOICES),
-        "anisotropic": canvas.bsdf(brushed, "yamaguchi2019", **_CHOICES),
+        "isotropic": canvas.bsdf(isotropic, "belcour2018", **CHOICES),
+        "anisotropic": canvas.bsdf(brushed, "yamaguchi2019", **CHOICES),
         "walk": canvas.bsdf(brushed, "reference"),
     }
 
