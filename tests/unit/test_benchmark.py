@@ -16,7 +16,7 @@ from scipy.stats import chi2, norm
 import velatura as vt
 from velatura import benchmark
 from velatura.benchmark import candidates, scores, stacks, walks
-from velatura.benchmark.bins import AZIMUTHAL, NODES, RADIAL, Bins
+from velatura.light.polar_bins import AZIMUTHAL, NODES, RADIAL, Bins
 from velatura.stack import Stack
 
 PATHS = 2**17  # of the walks that are made here

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from velatura import files, kernel
-from velatura.benchmark.bins import AZIMUTHAL, NODES, RADIAL, SIDES, Bins
 from velatura.benchmark.stacks import Case
 from velatura.benchmark.walks import Binned, walked
 from velatura.checks.probe import Probe
 from velatura.errors import InvalidInput, VelaturaError
+from velatura.light.polar_bins import AZIMUTHAL, NODES, RADIAL, SIDES, Bins
 from velatura.stack.schema import show
 
 Array = NDArray[np.floating]

@@ -15,12 +15,12 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from velatura import files
 from velatura.benchmark import candidates
-from velatura.benchmark.bins import RADII
 from velatura.benchmark.candidates import Candidate, Factory
 from velatura.benchmark.cost import median_cost
 from velatura.benchmark.stacks import FORMAT, KINDS, Case, chosen
 from velatura.benchmark.walks import Binned, truth
 from velatura.errors import InvalidInput
+from velatura.light.polar_bins import RADII
 
 Array = NDArray[np.floating]
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import files
-from velatura.benchmark.bins import AZIMUTHAL, RADIAL, RADII, SIDES, Bins, mirrored
 from velatura.benchmark.stacks import DATA, FORMAT, OF_EACH, SEED, Case, all_drawn
+from velatura.light.polar_bins import AZIMUTHAL, RADIAL, RADII, SIDES, Bins, mirrored
 from velatura.reference.batches import ends
 from velatura.reference.statistics import moments
 

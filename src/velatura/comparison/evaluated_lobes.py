@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
+from velatura.light.square_bins import grids
 from velatura.model import Model, variance_kind
 from velatura.model.base import Body, Query
 from velatura.model.context import Context
@@ -20,7 +21,6 @@ from velatura.model.registry import stack_lobes
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import WalkedLobe
-from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import at_nodes, square
 from velatura.stack import Material, Stack
 
@@ -61,8 +61,8 @@ def account(stack: Stack, cos_theta: Sequence[float], model: Model) -> Account:
     rows = zip(*(lobes for lobes, _ in columns))
     lobes = tuple(WalkedLobe(**{n: np.stack([getattr(x, n) for x in row], axis=-1) for n in names}) for row in rows)
     reflected, transmitted = (lobes[:-1], lobes[-1]) if stack.transmits else (lobes, None)
-    grids = np.stack([grid for _, grid in columns], axis=1)
-    return Account(reflected, transmitted, grids.sum(axis=(2, 3)), grids, remainder)
+    light = np.stack([grid for _, grid in columns], axis=1)
+    return Account(reflected, transmitted, light.sum(axis=(2, 3)), light, remainder)
 
 
 def _column(body: bsdf.Lobed, incident: Array) -> tuple[list[WalkedLobe], Array]:
@@ -166,9 +166,7 @@ def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: Lig
 
 def distribution(light: Light) -> Array:
     """Energies (3, bins, bins) over the projected disc."""
-    x, y = np.clip((0.5 * (light.points + 1) * BINS).astype(int), 0, BINS - 1)
-    grids = [np.bincount(x * BINS + y, energy, BINS * BINS) for energy in light.energy]
-    return np.array(grids, float).reshape(3, BINS, BINS)
+    return grids(light.points, light.energy)[:, 0]
 
 
 def _colour(energy: Array, count: int = 1) -> Array:

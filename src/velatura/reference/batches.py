@@ -111,6 +111,13 @@ def _plain(address: Address, value: Any) -> float | RGB:
     return address.plain(value, "statistics are those of one point; replace it by a number")
 
 
+def mean_and_error(carried: Array, paths: int) -> tuple[Array, Array]:
+    """Mean over all `paths` of what n of them carry, (..., n), and its standard error."""
+    mean = carried.sum(axis=-1, dtype=float) / paths
+    second = np.sum(carried**2, axis=-1, dtype=float) / paths
+    return mean, np.sqrt(np.maximum(second - mean**2, 0) / paths)
+
+
 def relative_index(stack: Stack) -> float:
     """Index below a stack that transmits over the index above, one for all colours."""
     plain = Material.of(stack, _plain)

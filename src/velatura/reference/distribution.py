@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from velatura.light.square_bins import BINS, grids
 from velatura.optics.directions import directions
 from velatura.reference.batches import trace
 from velatura.stack import MaterialLike, Stack, load
-
-BINS = 40
 
 Array = NDArray[np.floating]
 
@@ -44,16 +43,13 @@ def distribution(
         InvalidInput, MissingTool: as `statistics`.
     """
     stack = load(stack)
-    grids = [_grids(stack, wi, paths, seed, microsurface, bins, polarised) for wi in directions(cos_theta, phi)]
-    reflected, transmitted = (np.stack([pair[side] for pair in grids], axis=1) for side in (0, 1))
+    each = [_walked(stack, wi, paths, seed, microsurface, bins, polarised) for wi in directions(cos_theta, phi)]
+    reflected, transmitted = (np.stack([pair[side] for pair in each], axis=1) for side in (0, 1))
     return Distribution(reflected, transmitted if stack.transmits else None)
 
 
-def _grids(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, bins: int, polarised: bool) -> Array:
+def _walked(stack: Stack, wi: Array, paths: int, seed: int, microsurface: bool, bins: int, polarised: bool) -> Array:
     """Energies (2, 3, bins, bins): reflected, transmitted."""
-    total = np.zeros((3, 2 * bins * bins))
-    for part in trace(stack, wi, paths, seed, microsurface, polarised):
-        x, y = np.clip((0.5 * (part.w[:2] + 1) * bins).astype(int), 0, bins - 1)
-        cell = (np.where(part.w[2] > 0, 0, bins) + x) * bins + y
-        total += [np.bincount(cell, weight, total.shape[1]) for weight in part.weight]
-    return total.reshape(3, 2, bins, bins).swapaxes(0, 1) / paths
+    parts = trace(stack, wi, paths, seed, microsurface, polarised)
+    total = sum(grids(part.w[:2], part.weight, part.w[2] <= 0, 2, bins) for part in parts)
+    return np.swapaxes(total, 0, 1) / paths

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from velatura.optics.directions import directions
-from velatura.reference.batches import Ends, ends
+from velatura.reference.batches import Ends, ends, mean_and_error
 from velatura.stack import MaterialLike, load
 
 Array = NDArray[np.floating]
@@ -60,11 +60,6 @@ def _column(found: Ends, count: int) -> tuple[list[Array], list[Array]]:
     assert found.stokes is not None
     each = np.concatenate([found.weight[None], found.stokes])
     up, paths = found.w[2] > 0, each.shape[-1]
-    values, errors = [], []
-    for where in (*(up & (found.deepest == k) for k in range(count)), ~up):
-        here = each[:, :, where]
-        mean = here.sum(axis=-1, dtype=float) / paths
-        second = np.sum(here * here, axis=-1, dtype=float) / paths
-        values.append(mean)
-        errors.append(np.sqrt(np.maximum(second - mean * mean, 0) / paths))
-    return values, errors
+    lobes = (*(up & (found.deepest == k) for k in range(count)), ~up)
+    values, errors = zip(*(mean_and_error(each[:, :, where], paths) for where in lobes))
+    return list(values), list(errors)

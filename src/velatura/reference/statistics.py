@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from velatura.optics import fresnel, ggx
 from velatura.optics.directions import directions
 from velatura.reference import roughness
-from velatura.reference.batches import ends, relative_index
+from velatura.reference.batches import ends, mean_and_error, relative_index
 from velatura.stack import Interface, Layer, MaterialLike, Stack, load
 
 Array = NDArray[np.floating]
@@ -136,9 +136,7 @@ def _anisotropic(surface: Layer) -> bool:
 def _lobe(wi: Array, wo: Array, weight: Array, paths: int, radial: bool, turned: bool) -> tuple[WalkedLobe, WalkedLobe]:
     """Moments of paths that leave along wo (3, n) with weight (3, n), out of all `paths`; and their errors."""
     # Energy
-    energy = weight.sum(axis=1, dtype=float) / paths
-    second = np.sum(weight**2, axis=1, dtype=float) / paths
-    energy_error = np.sqrt(np.maximum(second - energy**2, 0) / paths)
+    energy, energy_error = mean_and_error(weight, paths)
     # Moments on the disc
     grey = weight.mean(axis=0)
     mean, mean_error, covariance, covariance_error = moments(wo[:2], grey)
