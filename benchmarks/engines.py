@@ -21,8 +21,7 @@ from machines import MACHINES
 from spirv import counted, counts
 
 import velatura
-from velatura.figures import belcour2018_17, weier2020_10
-from velatura.figures.yamaguchi2019_04 import COLUMNS
+from velatura.figures import belcour2018, weier2020, yamaguchi2019
 from velatura.model import MODELS, Model, named
 from velatura.shader import shader
 from velatura.shader.glsl import Vulkan
@@ -46,11 +45,12 @@ void main() { given[4] = ggx(given[0].xyz, given[1].xyz, given[2].xyz, given[3].
 """
 LIGHTS = 128  # as many as Weier & Belcour 2020, section 4.2, take samples of a pixel
 OURS = {"velatura": ("velatura", {})}
+METALS = weier2020.METALS
 #: Stacks of the papers' figures, by title, and the models that they are counted in, by title too.
 QUADS = {
-    "Belcour 17": (belcour2018_17.STACKS["coated metal"], belcour2018_17.COLUMNS | OURS),
-    "Weier 10, metal .1, .1": (weier2020_10.STACKS["metal 0.1, 0.1"], weier2020_10.COLUMNS | OURS),
-    "Weier 10, metal .1, .3": (weier2020_10.STACKS["metal 0.1, 0.3"], weier2020_10.COLUMNS | COLUMNS | OURS),
+    "Belcour 17": (belcour2018.COATED_METAL, {**belcour2018.VARIANTS, **OURS}),
+    "Weier 10, metal .1, .1": (METALS["metal 0.1, 0.1"], {**weier2020.COLUMNS, **OURS}),
+    "Weier 10, metal .1, .3": (METALS["metal 0.1, 0.3"], {**weier2020.COLUMNS, **yamaguchi2019.COLUMNS, **OURS}),
 }
 
 

@@ -10,31 +10,31 @@ import numpy as np
 import pytest
 
 from velatura.figures import (
-    bati2021_01,
+    bati2021,
     bati2021_04,
     bati2021_05,
     bati2021_06,
     bati2021_07,
     bati2021_08,
     bati2021_09,
-    bati2021_10,
     bati2021_11,
     bati2021_12,
     bati2021_14,
     bati2021_15,
     bati2021_16,
     bati2021_17,
-    bati2021_18,
-    bati2021_19,
-    bati2021_20,
-    bati2021_21,
-    bati2021_22,
     bati2021_23,
-    bati2021_24,
     bati2021_25,
     canvas,
     looks,
 )
+
+ROWS = bati2021.FIGURES
+
+
+def names(row: looks.Looks) -> list[str]:
+    """The stacks that the panels of a figure show."""
+    return [panel.names[0] for panel in row.panels]
 
 
 def drawn(module: Any, numbers: dict[str, Any], folder: Path) -> None:
@@ -195,7 +195,7 @@ def test_members_of_a_class_differ_at_grazing_angles(unlit: None, tmp_path: Path
     assert in_coat[41] < 0.65 < in_coat[60]
     drawn(bati2021_05, found, tmp_path)
 
-    found = bati2021_10.compute()
+    found = ROWS["bati2021-10"].compute()
     # The tables know Fresnel, of which the closed forms are, to 1e-5
     assert all(np.allclose(look["energy"][0], 0.15, atol=1e-4) for look in found["looks"])
     assert looks.energy(found, "a slab", at)[0] > 1.2 * looks.energy(found, "a one interface", at)[0]
@@ -236,32 +236,34 @@ def test_a_coat_that_keeps_what_is_below(unlit: None, tmp_path: Path) -> None:
 
 def test_lobes_are_what_was_asked_for(unlit: None, tmp_path: Path) -> None:
     """Figures 18 to 22. Expected: colour, blur and haze as captioned."""
-    found = bati2021_18.compute()
+    found = ROWS["bati2021-18"].compute()
     assert np.allclose(looks.energy(found, "18 a, more saturated"), [0.01, 0.06, 0.11], atol=1e-6)
-    assert [lobe(found, name, 0)[1] for name in bati2021_18.TARGETS] == pytest.approx([0.05] * 3 + [0, 0.15], abs=1e-6)
+    assert [lobe(found, name, 0)[1] for name in names(ROWS["bati2021-18"])] == pytest.approx(
+        [0.05] * 3 + [0, 0.15], abs=1e-6
+    )
 
-    found = bati2021_19.compute()
+    found = ROWS["bati2021-19"].compute()
     bases = [look["stack"]["layers"][-1]["interface"] for look in found["looks"]]
     assert all(np.allclose(base["eta"], bases[0]["eta"], atol=1e-6) for base in bases)
     assert [base["alpha"] for base in bases] == sorted(base["alpha"] for base in bases)
 
-    found = bati2021_20.compute()
-    upper = {name: sum(lobe(found, name, n)[0] for n in (0, 1)) for name in bati2021_20.TARGETS}
-    lower = {name: lobe(found, name, 2)[0] for name in bati2021_20.TARGETS}
+    found = ROWS["bati2021-20"].compute()
+    upper = {name: sum(lobe(found, name, n)[0] for n in (0, 1)) for name in names(ROWS["bati2021-20"])}
+    lower = {name: lobe(found, name, 2)[0] for name in names(ROWS["bati2021-20"])}
     assert np.allclose(upper["20 left"], lower["20 right"], atol=1e-6)
     assert np.allclose(upper["20 right"], lower["20 left"], atol=1e-6)
-    for name in bati2021_20.TARGETS:  # what the upper lobe contributes is that lobe
+    for name in names(ROWS["bati2021-20"]):  # what the upper lobe contributes is that lobe
         for n in (0, 1):
             whole, alone = lobe(found, name, n), lobe(found, f"{name}, upper", n)
             assert np.allclose(whole[0], alone[0], atol=1e-9) and whole[1] == pytest.approx(alone[1], abs=1e-9)
-    drawn(bati2021_20, found, tmp_path)
+    drawn(ROWS["bati2021-20"], found, tmp_path)
 
-    found = bati2021_21.compute()
+    found = ROWS["bati2021-21"].compute()
     for n in (0, 1):
         assert lobe(found, "21 left", n)[1] == pytest.approx(lobe(found, "21 right", 1 - n)[1], abs=1e-6)
 
-    found = bati2021_22.compute()
-    top, middle, bottom = (looks.energy(found, name) for name in bati2021_22.TARGETS)
+    found = ROWS["bati2021-22"].compute()
+    top, middle, bottom = (looks.energy(found, name) for name in names(ROWS["bati2021-22"]))
     assert np.allclose(bottom, top + middle - 0.03, atol=1e-6)
 
 
@@ -276,7 +278,7 @@ def test_what_is_transmitted_is_a_by_product(unlit: None, tmp_path: Path) -> Non
 
 def test_the_gallery_shows_pairs(unlit: None) -> None:
     """Figure 1. Expected: the coat of (c) and the edge of (b) leave the lobes below, and the grey, as they are."""
-    found = bati2021_01.compute()
+    found = ROWS["bati2021-01"].compute()
     assert len(found["looks"]) == 8
     assert np.allclose(lobe(found, "c", 0)[0], lobe(found, "c, coated", 1)[0], atol=1e-4)
     assert np.allclose(looks.energy(found, "b"), looks.energy(found, "b, pink edge"), atol=1e-6)
@@ -284,7 +286,7 @@ def test_the_gallery_shows_pairs(unlit: None) -> None:
 
 def test_a_diffuse_base_shows_through_the_pair(tmp_path: Path) -> None:
     """Figure 24, rendered. Expected: grey is brighter than black; an orange base looks bluer than its albedo."""
-    found = bati2021_24.compute(size=16, spp=4)
+    found = ROWS["bati2021-24"].compute(size=16, spp=4)
     black, grey, orange = (np.mean(picture, axis=(0, 1)) for picture in found["pictures"])
     assert np.all(grey > black)
     plain, *covered = (looks.energy(found, look["name"]) for look in found["looks"])
@@ -292,4 +294,4 @@ def test_a_diffuse_base_shows_through_the_pair(tmp_path: Path) -> None:
     assert np.all(orange < grey + 0.02)
     blue = (orange - black)[2] / (orange - black)[0], 0.1 / 0.5
     assert blue[0] > 2 * blue[1]
-    drawn(bati2021_24, found, tmp_path)
+    drawn(ROWS["bati2021-24"], found, tmp_path)

@@ -28,6 +28,7 @@ VARIANTS: Columns = {
     "realtime": ("realtime", {"reflectance": "split-sum", "tir": "off", "lobes": "two"}),
 }
 DEPTHS = (0.1, 0.5, 1.0)
+COATED_METAL = Stack([Interface(eta=1.4, alpha=0.01), Interface(eta=1.0, k=1.0, alpha=0.1)])
 LACQUER = (0.3, 1.0, 2.5)  # optical depth where it is whole
 
 
@@ -102,9 +103,7 @@ FIGURES = {
     "belcour2018-16": Cells(textured, FORMS, "urn"),
     # The variant for real time, the forward model, and the truth, on a coated metal: index 1.4 and alpha 0.01 over
     # 1 + i of alpha 0.1, as printed, on a sphere in the studio
-    "belcour2018-17": Cells(
-        {"coated metal": Stack([Interface(eta=1.4, alpha=0.01), Interface(eta=1.0, k=1.0, alpha=0.1)])}, VARIANTS
-    ),
+    "belcour2018-17": Cells({"coated metal": COATED_METAL}, VARIANTS),
     # The variant for real time on an asset, a beetle in a commercial engine. Neither the asset nor its paint are
     # printed: here it is a carved urn of worn car paint, a coat of index 1.5 that is scratched (alpha from 0.01 to
     # 0.25) over a metal of index 1 + (0.5, 0.9, 2)i, whose alpha varies from 0.1 to 0.4. Both models are rendered

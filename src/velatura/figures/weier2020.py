@@ -18,6 +18,9 @@ def stack(coat: tuple[float, float], metal: tuple[float, float]) -> Stack:
     return Stack([Interface(eta=1.5, alpha=coat), Interface(eta=0.001, k=1.0, alpha=metal)])
 
 
+METALS = {f"metal {u:g}, {v:g}": stack((0.05, 0.05), (u, v)) for u, v in ALPHAS}
+
+
 def by_map(*names: str) -> Columns:
     """Columns of the model, which differ in the map alone."""
     return {name: ("weier2020", CHOICES | {"map": name}) for name in names}
@@ -56,9 +59,7 @@ FIGURES = {
     # A smooth coat over metals of many roughnesses, isotropic and brushed. The coat has index 1.5 and alpha 0.05, the
     # metal 0 + i, as printed. The roughnesses of the metal are not legible in the paper and chosen here, as are the
     # sphere, brushed around its axis, and the studio.
-    "weier2020-10": Cells(
-        {f"metal {u:g}, {v:g}": stack((0.05, 0.05), (u, v)) for u, v in ALPHAS}, COLUMNS, exposure=0.4
-    ),
+    "weier2020-10": Cells(METALS, COLUMNS, exposure=0.4),
     # Coats of many roughnesses, isotropic and anisotropic, over a smooth metal. Indices are those of figure 10, the
     # metal's alpha is 0.05, as printed; the coats' roughnesses are chosen here.
     "weier2020-11": Cells(
