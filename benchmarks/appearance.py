@@ -10,7 +10,6 @@ Times are of the processor, of one call, without JSON and the way to the page. T
 
 from __future__ import annotations
 
-import argparse
 import copy
 import os
 import sys
@@ -19,7 +18,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from rows import row
+from rows import parser, row
 
 import velatura as vt
 from velatura.editor import appearance, class_maps
@@ -100,10 +99,9 @@ def session(model: str, drags: int) -> dict[str, list[float]]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--model", action="append", help="bati2021, belcour2018 and velatura, unless one is named")
-    parser.add_argument("--drags", type=int, default=60, help="of the lobes of every figure")
-    options = parser.parse_args()
+    program = parser(__doc__, drags=(60, "of the lobes of every figure"))
+    program.add_argument("--model", action="append", help="bati2021, belcour2018 and velatura, unless one is named")
+    options = program.parse_args()
 
     failed = False
     print(f"load: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")

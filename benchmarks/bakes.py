@@ -13,12 +13,12 @@ many of them each parameter changes, and by how much, of numbers above 1 as a sh
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from rows import parsed
 
 import velatura as vt
 from velatura.bakes import TARGETS, Bake, bake
@@ -106,11 +106,12 @@ def round_trips(count: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--presets", nargs="+", default=vt.presets())
-    parser.add_argument("--targets", nargs="+", default=list(TARGETS), choices=list(TARGETS))
-    parser.add_argument("--round-trips", type=int, metavar="N", help="N materials, in place of presets")
-    args = parser.parse_args()
+    args = parsed(
+        __doc__,
+        presets=vt.presets(),
+        targets=(list(TARGETS), "", list(TARGETS)),
+        round_trips=(int, "N materials, in place of presets"),
+    )
     if args.round_trips:
         round_trips(args.round_trips)
         return

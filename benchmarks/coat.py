@@ -14,7 +14,6 @@ the bias. The law is that of docs/explanation/coat.md, whose numbered equations 
 
 from __future__ import annotations
 
-import argparse
 import csv
 import itertools
 import json
@@ -27,6 +26,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rows import parsed
 
 import velatura as vt
 from velatura.optics import fresnel
@@ -410,17 +410,18 @@ def plot(w: Walks, path: Path) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--walk", action="store_true", help="walk, and write the CSV")
-    parser.add_argument("--csv", type=Path, default=CSV)
-    parser.add_argument("--paths", type=int, default=200_000, help="for each direction")
-    parser.add_argument("--sets", default=",".join(SETS))
-    parser.add_argument("--count", type=int, help="of materials of a set; all without")
-    parser.add_argument("--store", type=Path, help="keeps the walks")
-    parser.add_argument("--workers", type=int, help="processes that walk; one for each core without")
-    parser.add_argument("--plot", type=Path, metavar="FILE")
-    parser.add_argument("--json", action="store_true")
-    options = parser.parse_args()
+    options = parsed(
+        __doc__,
+        walk=(False, "walk, and write the CSV"),
+        csv=CSV,
+        paths=(200_000, "for each direction"),
+        sets=",".join(SETS),
+        count=(int, "of materials of a set; all without"),
+        store=(Path, "keeps the walks"),
+        workers=(int, "processes that walk; one for each core without"),
+        plot=Path,
+        json=False,
+    )
     sets = options.sets.split(",")
     if options.walk:
         with tempfile.TemporaryDirectory() as folder:

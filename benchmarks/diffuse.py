@@ -10,10 +10,9 @@ per cent, and the mean standard error of the walks. Stacks that are more than 2 
 
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
 from rich.progress import track
+from rows import parsed
 
 import velatura as vt
 from velatura.model import named
@@ -44,13 +43,7 @@ def albedo(stack: Stack, cos_theta: tuple[float, ...], model: str) -> np.ndarray
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--stacks", type=int, default=60)
-    parser.add_argument("--paths", type=int, default=400_000)
-    parser.add_argument("--seed", type=int, default=2)
-    parser.add_argument("--interfaces", type=int, default=2, help="at most")
-    parser.add_argument("--model", default="belcour2018")
-    options = parser.parse_args()
+    options = parsed(__doc__, stacks=60, paths=400_000, seed=2, interfaces=(2, "at most"), model="belcour2018")
 
     rng = np.random.default_rng(options.seed)
     errors, noises, counts = [], [], np.arange(options.stacks) % options.interfaces + 1

@@ -10,7 +10,6 @@ Adding: from a click to the picture with one more layer, at once in a new page o
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 from pathlib import Path
@@ -20,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
 import editor
 import viewport
-from rows import row
+from rows import parsed, row
 
 import velatura as vt
 from velatura.editor import messages
@@ -234,12 +233,9 @@ def adding(chromium: Any) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--size", type=int, default=96)
-    parser.add_argument("--samples", type=int, default=1024)
-    parser.add_argument("--spp", type=int, default=2560)
-    parser.add_argument("--only", choices=("stills", "times", "dragging", "adding"))
-    arguments = parser.parse_args()
+    arguments = parsed(
+        __doc__, size=96, samples=1024, spp=2560, only=(str, "", ("stills", "times", "dragging", "adding"))
+    )
     if why := viewport.missing():
         print(f"skipped: {why}")
         return

@@ -10,9 +10,10 @@ for a pixel of a full-screen quad, over what one GGX lobe with Schlick's Fresnel
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
+
+from rows import parsed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
@@ -81,10 +82,7 @@ def row(preset: str, model: Model, baking: bool) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--presets", default=PRESETS)
-    parser.add_argument("--quad", action="store_true", help="the table of figures: ratios to one GGX lobe")
-    arguments = parser.parse_args()
+    arguments = parsed(__doc__, presets=PRESETS, quad=(False, "the table of figures: ratios to one GGX lobe"))
     if why := MACHINES["vulkan"].missing():
         print(f"skipped: {why}")
         return

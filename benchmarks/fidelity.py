@@ -286,14 +286,15 @@ def printed(table: dict[str, dict[str, float]], glass: dict[str, dict[str, list[
 
 
 def main() -> None:
-    parser = arguments(__doc__)
-    parser.add_argument("--half", choices=HALVES, default="fit")
-    parser.add_argument("--model", default=DEFAULT)
-    parser.add_argument("--form", help="forward or symmetric; else the model's own")
-    parser.add_argument("--truth", type=Path, default=FOLDER, help="folder that keeps the walks")
-    parser.add_argument("--textured", action="store_true", help="two roughnesses from textures")
-    parser.add_argument("--json", type=Path, help="file for all numbers")
-    options = parser.parse_args()
+    options = arguments(
+        __doc__,
+        half=("fit", "", HALVES),
+        model=DEFAULT,
+        form=(str, "forward or symmetric; else the model's own"),
+        truth=(FOLDER, "folder that keeps the walks"),
+        textured=(False, "two roughnesses from textures"),
+        json=(Path, "file for all numbers"),
+    ).parse_args()
 
     switches = {"form": options.form} if options.form else {}
     kinds = chosen(options.kind)

@@ -13,7 +13,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
 import time
@@ -29,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
 from mixed_films import random_mixed
 from render import picture
-from rows import row
+from rows import parsed, row
 
 import velatura as vt
 from velatura import kernel
@@ -260,15 +259,7 @@ def cost(model: str, rounds: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--smooth", type=int, default=10_000)
-    parser.add_argument("--stacks", type=int, default=12)
-    parser.add_argument("--paths", type=int, default=300_000)
-    parser.add_argument("--queries", type=int, default=100_000)
-    parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--model", default=DEFAULT)
-    options = parser.parse_args()
+    options = parsed(__doc__, smooth=10_000, stacks=12, paths=300_000, queries=100_000, rounds=7, seed=0, model=DEFAULT)
     warnings.filterwarnings("ignore", category=RuntimeWarning)  # of tmm, where nothing passes
     if options.smooth:
         print(f"smooth: {options.smooth} stacks, s and p: error {smooth(options.smooth, options.seed):.1e}", flush=True)

@@ -9,12 +9,12 @@ by the model, and nine in ten of the true values must lie in their intervals of 
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from typing import Any
 
 import numpy as np
+from rows import parsed
 
 import velatura as vt
 from velatura.checks import Probe
@@ -110,14 +110,15 @@ def recovered(
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=10)
-    parser.add_argument("--first", type=int, default=0, help="number of the first case")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--model", default=DEFAULT)
-    parser.add_argument("--noise", type=float, default=0.03)
-    parser.add_argument("--samples", type=int, default=4096, help="walks for each pair of directions")
-    options = parser.parse_args()
+    options = parsed(
+        __doc__,
+        cases=10,
+        first=(0, "number of the first case"),
+        seed=0,
+        model=DEFAULT,
+        noise=0.03,
+        samples=(4096, "walks for each pair of directions"),
+    )
 
     worse, refused, inside = 0, 0, list[tuple[str, bool]]()
     for case in range(options.first, options.first + options.cases):

@@ -21,7 +21,6 @@ this process. Exit status 1 if anything fails, the death of a process included. 
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import sys
 import time
@@ -34,6 +33,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 from rich.progress import Progress
+from rows import parser
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
@@ -115,16 +115,12 @@ def report(name: str, seed: int, found: Found, folder: Path | None) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("programs", nargs="*", metavar="PROGRAM", help=", ".join(PROGRAMS))
-    parser.add_argument("--count", type=int, help="inputs of each program; else the whole count of each")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--failures", type=Path, metavar="FOLDER")
-    parser.add_argument("--index", type=int, metavar="I", help="try one input alone, in this process")
-    arguments = parser.parse_args()
+    count, index = (int, "inputs of each program; else all"), (int, "of one input, tried alone in this process")
+    program = parser(__doc__, count=count, seed=0, processes=2, failures=Path, index=index)
+    program.add_argument("programs", nargs="*", metavar="PROGRAM", help=", ".join(PROGRAMS))
+    arguments = program.parse_args()
     if unknown := [name for name in arguments.programs if name not in PROGRAMS]:
-        parser.error(f"no such program: {', '.join(unknown)}")
+        program.error(f"no such program: {', '.join(unknown)}")
 
     rows, failed = [], 0
     for name in arguments.programs or PROGRAMS:

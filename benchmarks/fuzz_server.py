@@ -10,7 +10,6 @@ manual does not hold, if the page's console complains, its state is not that of 
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import os
 import re
@@ -22,6 +21,8 @@ import threading
 import time
 from pathlib import Path
 from statistics import median
+
+from rows import parsed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
@@ -41,11 +42,7 @@ REACH_S, REACH_MB = 1.0, 60.0  # of `list` beside inversions, and of memory for 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("requests", 500), ("messages", 200), ("clients", 50), ("each", 200), ("seed", 0)):
-        parser.add_argument(f"--{name}", type=int, default=default)
-    parser.add_argument("--minutes", type=float, default=10)
-    options = parser.parse_args()
+    options = parsed(__doc__, requests=500, messages=200, clients=50, each=200, seed=0, minutes=10.0)
 
     failures: list[str] = []
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as log:

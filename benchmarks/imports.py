@@ -7,7 +7,6 @@ Surface are the code that MaterialX generates, its departures undone, in Chromiu
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from rows import parser
 
 import velatura as vt
 from velatura import imports, kernel
@@ -57,10 +57,9 @@ class Source:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, nargs="?", help="of files to import, with those in folders below it")
-    parser.add_argument("--no-check", action="store_true", help="read them only")
-    arguments = parser.parse_args()
+    program = parser(__doc__, no_check=(False, "read them only"))
+    program.add_argument("folder", type=Path, nargs="?", help="of files to import, with those in folders below it")
+    arguments = program.parse_args()
     if arguments.folder:
         files(arguments.folder, not arguments.no_check)
     else:

@@ -8,14 +8,13 @@ the same round. Rows are medians over rounds, with quartiles; times of preparati
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import render
-from rows import row
+from rows import parsed, row
 
 import velatura as vt
 from velatura import kernel
@@ -64,13 +63,7 @@ def preparation(interfaces: int, rounds: int) -> list[float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("--most", type=int, default=10, help="interfaces")
-    parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--count", type=int, default=1 << 20, help="directions")
-    options = parser.parse_args()
+    options = parsed(__doc__, rounds=9, most=(10, "interfaces"), spp=64, size=512, count=(1 << 20, "directions"))
     mi = kernel.mitsuba("llvm_ad_rgb")
     vt.register()
     numbers = range(1, options.most + 1)

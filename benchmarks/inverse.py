@@ -10,7 +10,6 @@ none may be refused; so are those of rough interfaces (`--parts rough`). Times a
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
@@ -19,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from rows import row
+from rows import parsed, row
 
 from velatura.inverse import (
     Above,
@@ -378,13 +377,14 @@ def reach() -> float:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--targets", type=int, default=10_000, help="of the round trip, for each model")
-    parser.add_argument("--physical", type=int, default=300, help="random stacks whose lobes are asked for")
-    parser.add_argument("--models", nargs="+", help="by default all for the round trip, else those that it concerns")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--parts", nargs="+", choices=PARTS, help="all unless named")
-    options = parser.parse_args()
+    options = parsed(
+        __doc__,
+        targets=(10_000, "of the round trip, for each model"),
+        physical=(300, "random stacks whose lobes are asked for"),
+        models=(list, "by default all for the round trip, else those that it concerns"),
+        seed=0,
+        parts=(list, "all unless named", PARTS),
+    )
     parts = options.parts or PARTS
     failed = False
 

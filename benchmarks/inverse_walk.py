@@ -10,11 +10,11 @@ of random wishes of `benchmarks/refusals.py` that have a stack, quantiles of the
 
 from __future__ import annotations
 
-import argparse
 import sys
 
 import numpy as np
 from refusals import wish
+from rows import parsed
 
 from velatura.figures import bati2021_25
 from velatura.inverse import stacks
@@ -81,15 +81,9 @@ def table(models: list[str], paths: int) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--paths", type=int, default=400_000)
-    parser.add_argument("--models", nargs="+", default=["bati2021", "velatura"])
-    parser.add_argument("--wishes", type=int, default=60, help="at random, beside those of figures")
-    parser.add_argument(
-        "--figures", action=argparse.BooleanOptionalAction, default=True, help="with the table of these"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="of the wishes")
-    options = parser.parse_args()
+    wishes, figures = (60, "at random, beside those of figures"), (True, "with the table of these")
+    models, seed = ["bati2021", "velatura"], (0, "of the wishes")
+    options = parsed(__doc__, paths=400_000, models=models, wishes=wishes, figures=figures, seed=seed)
     if options.figures:
         table(options.models, options.paths)
 

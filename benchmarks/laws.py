@@ -12,7 +12,6 @@ again. All models on all presets take five minutes, 500 random stacks in both fo
 
 from __future__ import annotations
 
-import argparse
 import json
 import multiprocessing
 import sys
@@ -23,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rows import parsed
 
 import velatura as vt
 from velatura import kernel
@@ -70,15 +70,16 @@ def every(jobs: list[Job], results: Path | None, processes: int) -> Iterator[Row
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--models", nargs="+", default=[model.name for model in vt.MODELS])
-    parser.add_argument("--forms", nargs="+", default=["forward", "symmetric"])
-    parser.add_argument("--presets", nargs="+", default=vt.presets())
-    parser.add_argument("--random", type=int, metavar="N", help="random stacks instead of presets")
-    parser.add_argument("--seed", type=int, default=0, help="of random stacks")
-    parser.add_argument("--results", type=Path, metavar="FILE")
-    parser.add_argument("--processes", type=int, default=1)
-    arguments = parser.parse_args()
+    arguments = parsed(
+        __doc__,
+        models=[model.name for model in vt.MODELS],
+        forms=["forward", "symmetric"],
+        presets=vt.presets(),
+        random=(int, "random stacks instead of presets"),
+        seed=(0, "of random stacks"),
+        results=Path,
+        processes=1,
+    )
     materials = arguments.presets
     if arguments.random:
         materials = [f"random {arguments.seed} {number}" for number in range(arguments.random)]

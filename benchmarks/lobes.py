@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -116,10 +115,7 @@ def lobe_of(facets: Sequence[Facets], k: int, roughness: Roughness) -> Refracted
 
 
 def main() -> None:
-    parser = arguments(__doc__)
-    parser.add_argument("--half", choices=HALVES, default=HALVES[0])
-    parser.add_argument("--truth", type=Path, default=FOLDER, help="where walks are kept")
-    options = parser.parse_args()
+    options = arguments(__doc__, half=(HALVES[0], "", HALVES), truth=(FOLDER, "keeps the walks")).parse_args()
     kinds = [kind for kind in chosen(options.kind) if not kind.passes]
     rows: dict[str, list[tuple[float, ...]]] = {kind.name: [] for kind in kinds}
     for kind, walks in every(kinds, (options.half,), options.stacks, options.paths, options.seed, options.truth):

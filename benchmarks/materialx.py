@@ -9,11 +9,11 @@ from the specifications undone. Shaders run in headless Chromium.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
+from rows import parsed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
@@ -52,7 +52,7 @@ def differences(browser: chromium.Browser, surface: Surface) -> list[str]:
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    parsed(__doc__)
     with chromium.browser() as browser:
         for surface in (OPENPBR, GLTF):
             print(f"\n| {surface.node} | as generated | departures undone |\n|---|---|---|")

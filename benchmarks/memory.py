@@ -9,12 +9,11 @@ Each number is the peak of the resident set of a process of its own, less that o
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 from pathlib import Path
 
-from rows import row
+from rows import parsed, row
 
 from velatura.tables import FILE
 
@@ -74,14 +73,7 @@ def growth(count: int, seed: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--materials", type=int, metavar="N")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--steps", nargs="+", choices=list(STEPS), default=list(STEPS), metavar="STEP")
-    options = parser.parse_args()
+    options = parsed(__doc__, rounds=3, spp=64, size=512, materials=int, seed=0, steps=(list(STEPS), "", list(STEPS)))
     if options.materials:
         growth(options.materials, options.seed)
         return

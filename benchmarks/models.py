@@ -10,11 +10,10 @@ point (`textured`). Medians over rounds of the ratio of two renders of the same 
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
 import render
-from rows import row
+from rows import parsed, row
 
 import velatura as vt
 from velatura import kernel
@@ -62,13 +61,9 @@ def ratios() -> list[tuple[tuple[str, str, str], tuple[str, str, str]]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--models", nargs="*", default=[model.name for model in MODELS])
-    parser.add_argument("--variant", default="llvm_ad_rgb")
-    arguments = parser.parse_args()
+    arguments = parsed(
+        __doc__, rounds=9, spp=64, size=512, models=[model.name for model in MODELS], variant="llvm_ad_rgb"
+    )
     mi = kernel.mitsuba(arguments.variant)
     vt.register()
     wanted = [pair for pair in ratios() if all(model in arguments.models for _, model, _ in pair)]

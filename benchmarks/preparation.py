@@ -9,13 +9,12 @@ processor, without the first two changes, which compile; then the same for three
 
 from __future__ import annotations
 
-import argparse
 import time
 from statistics import median
 from typing import Any
 
 import numpy as np
-from rows import row
+from rows import parsed, row
 
 import velatura as vt
 from velatura.checks.probe import Probe
@@ -76,11 +75,7 @@ def report(label: str, stack: Stack, choices: dict[str, Any], rounds: int) -> No
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=15)
-    parser.add_argument("--presets", nargs="*", default=list(PRESETS))
-    parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=list(KINDS), metavar="KIND")
-    options = parser.parse_args()
+    options = parsed(__doc__, rounds=15, presets=list(PRESETS), kinds=(list(KINDS), "", list(KINDS)))
     rounds, presets, kinds = options.rounds, options.presets, options.kinds
     for preset in presets:
         for name, choices in MODELS.items():

@@ -12,12 +12,12 @@ that of every named model, and with that of two roughness maps for which all els
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rows import parsed
 
 import velatura as vt
 from velatura.stack import Interface, Stack
@@ -45,12 +45,7 @@ def walked(stack: Stack, seed: int, paths: int, walks: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--stacks", type=int, default=90)
-    parser.add_argument("--paths", type=int, default=300_000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--store", type=Path, help="keeps the walks")
-    options = parser.parse_args()
+    options = parsed(__doc__, stacks=90, paths=300_000, seed=0, store=(Path, "keeps the walks"))
 
     # Walk
     rng = np.random.default_rng(options.seed)

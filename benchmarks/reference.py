@@ -21,7 +21,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from rows import row
+from rows import parsed, row
 
 import velatura as vt
 from velatura import kernel, scenes
@@ -170,13 +170,14 @@ PARTS = {"model": model, "error": error, "efficiency": efficiency, "statistics":
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", nargs="+", choices=PARTS, default=list(PARTS))
-    parser.add_argument("--renders", type=int, default=24, help="of each picture")
-    parser.add_argument("--size", type=int, default=256, help="of the pictures of the parts `model` and `error`")
-    parser.add_argument("--presets", nargs="+", default=list(ERRORS), help="of the part `error`")
-    parser.add_argument("--paths", type=int, default=10**6, help="of the statistics")
-    options = parser.parse_args()
+    options = parsed(
+        __doc__,
+        part=(list(PARTS), "", PARTS),
+        renders=(24, "of each picture"),
+        size=(256, "of the pictures of the parts `model` and `error`"),
+        presets=(list(ERRORS), "of the part `error`"),
+        paths=(10**6, "of the statistics"),
+    )
     for part in options.part:
         PARTS[part](options)
 

@@ -9,13 +9,13 @@ The reason must be the true one: the lobes down to the one that it names have a 
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
+from rows import parsed
 
 from velatura.errors import VelaturaError
 from velatura.inverse import Infeasible, Target, invert_stack, stacks
@@ -108,11 +108,7 @@ def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | No
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--wishes", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--model", default=DEFAULT)
-    options = parser.parse_args()
+    options = parsed(__doc__, wishes=200, seed=0, model=DEFAULT)
 
     faults, reasons, kinds, seconds = 0, Counter[str](), Counter[str](), []
     for target, refusal, took in refused(options.wishes, options.seed, options.model):

@@ -13,12 +13,11 @@ beside `belcour2018`; the light of pictures is another ratio.
 
 from __future__ import annotations
 
-import argparse
 import time
 from typing import Any
 
 import numpy as np
-from rows import row
+from rows import parsed, row
 
 import velatura as vt
 from velatura import kernel
@@ -183,15 +182,16 @@ def solids(mi, model: str) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=9)
-    parser.add_argument("--spp", type=int, default=64)
-    parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--count", type=int, default=1 << 22, help="evaluations")
-    parser.add_argument("--variant", default="llvm_ad_rgb")
-    parser.add_argument("--model", default=DEFAULT)
-    parser.add_argument("--solids", action="store_true", help="solids of rough glass, and noise")
-    arguments = parser.parse_args()
+    arguments = parsed(
+        __doc__,
+        rounds=9,
+        spp=64,
+        size=512,
+        count=(1 << 22, "evaluations"),
+        variant="llvm_ad_rgb",
+        model=DEFAULT,
+        solids=(False, "solids of rough glass, and noise"),
+    )
     mi = kernel.mitsuba(arguments.variant)
     import drjit as dr
 

@@ -1,11 +1,14 @@
-"""Rows of a benchmark: a printed line for each measurement, and the same for the report of `make bench`."""
+"""What programs share: their options, and rows, a printed line for each measurement and the same for `make bench`."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from statistics import quantiles
+from typing import Any
 
 NOTES = "VELATURA_BENCH_ROWS"  # the file that a run of tools/bench.py collects rows in
 
@@ -20,3 +23,28 @@ def row(table: str, name: str, values: float | Sequence[float], unit: str = "s",
         found = {"table": table, "name": name, "unit": unit, "median": median, "low": low, "high": high}
         with open(path, "a", encoding="utf-8") as file:
             file.write(json.dumps({**found, "times": len(measured), "remark": remark}) + "\n")
+
+
+def parser(about: str | None, **options: Any) -> argparse.ArgumentParser:
+    """The parser of a program: an option for each name, given as its default, or as a tuple of that, help and choices.
+
+    A truth value makes a flag, a list takes several values; a type in its place is that of an option without one.
+    """
+    found = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, given in options.items():
+        default, meaning, choices = (*given, None)[:3] if isinstance(given, tuple) else (given, None, None)
+        kind, default = (default, None) if isinstance(default, type) else (type(default), default)
+        more: dict[str, Any] = {"type": kind, "choices": choices}
+        if kind is bool:
+            more = {"action": argparse.BooleanOptionalAction if default else "store_true"}
+        elif issubclass(kind, list):
+            more = {"nargs": "+", "choices": choices}
+        elif issubclass(kind, Path):
+            more["type"] = Path
+        found.add_argument(f"--{name.replace('_', '-')}", default=default, help=meaning, **more)
+    return found
+
+
+def parsed(about: str | None, **options: Any) -> argparse.Namespace:
+    """The options of the command line: see `parser`."""
+    return parser(about, **options).parse_args()

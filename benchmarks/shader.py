@@ -12,7 +12,6 @@ lines, and time to compile and run it. At the end the tables of docs/how-to/shad
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Iterable
@@ -23,6 +22,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from rows import parsed
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
@@ -169,14 +169,15 @@ def uniforms(languages: list[str], seed: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--language", default="glsl", help=f"all, or some of {', '.join(LANGUAGES)}")
-    parser.add_argument("--models", default=MODELS)
-    parser.add_argument("--count", type=int, default=10_000, help="random stacks with directions, for each model")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--uniforms", action="store_true", help="programs whose values change, instead")
-    parser.add_argument("--textured", action="store_true", help="textured materials against uniform ones, instead")
-    arguments = parser.parse_args()
+    arguments = parsed(
+        __doc__,
+        language=("glsl", f"all, or some of {', '.join(LANGUAGES)}"),
+        models=MODELS,
+        count=(10_000, "random stacks with directions, for each model"),
+        seed=0,
+        uniforms=(False, "programs whose values change, instead"),
+        textured=(False, "textured materials against uniform ones, instead"),
+    )
     if arguments.textured:
         closed_form(3, arguments.seed)
         return

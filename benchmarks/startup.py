@@ -5,7 +5,6 @@ python benchmarks/startup.py [--rounds 5]
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
@@ -13,7 +12,7 @@ import time
 import urllib.request
 from pathlib import Path
 
-from rows import row
+from rows import parsed, row
 
 COMMANDS = {
     "velatura --help": ["--help"],
@@ -24,10 +23,7 @@ REACH_S = {"velatura --help": 0.5, "velatura lobes": 1.0, "first picture": 10.0,
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--only", nargs="+", choices=list(REACH_S), default=list(REACH_S), metavar="COMMAND")
-    options = parser.parse_args()
+    options = parsed(__doc__, rounds=5, only=(list(REACH_S), "", list(REACH_S)))
     times: dict[str, list[float]] = {name: [] for name in options.only}
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(options.rounds):

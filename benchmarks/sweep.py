@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rows import parsed
 
 import velatura as vt
 from velatura.sweeps import Plan, work
@@ -221,12 +222,13 @@ PARTS = {part.__name__: part for part in (overhead, small, workers, scheduler, s
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", nargs="+", choices=PARTS, default=list(PARTS))
-    parser.add_argument("--load", choices=POINTS, default="burn", help="what points do")
-    parser.add_argument("--workers-of", help=argparse.SUPPRESS)
-    parser.add_argument("--count", type=int, help=argparse.SUPPRESS)
-    options = parser.parse_args()
+    options = parsed(
+        __doc__,
+        part=(list(PARTS), "", PARTS),
+        load=("burn", "what points do", POINTS),
+        workers_of=(str, argparse.SUPPRESS),
+        count=(int, argparse.SUPPRESS),
+    )
     if options.workers_of:
         asyncio.run(serve(options.workers_of, options.count))
         return

@@ -10,7 +10,6 @@ reference's random walk at a few points.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from math import inf
 from typing import Any
 
 import numpy as np
+from rows import parsed
 
 from velatura import kernel, ops, tables
 from velatura.optics import fresnel, ggx
@@ -191,12 +191,8 @@ def compare_many(count: int, paths: int, seed: int, progress: Callable[[int], No
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Compare the shipped tables with an independent quadrature.")
-    parser.add_argument("--points", type=int, default=100_000)
-    parser.add_argument("--walked", type=int, default=200, help="points that are walked")
-    parser.add_argument("--paths", type=int, default=300_000, help="for each of them")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    walked, paths = (200, "points that are walked"), (300_000, "for each of them")
+    options = parsed(__doc__, points=100_000, walked=walked, paths=paths, seed=0)
 
     broken = False
     for average in AVERAGES:

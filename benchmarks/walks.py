@@ -15,10 +15,12 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.progress import track
+from rows import parser
 
 import velatura as vt
 from velatura import files
@@ -160,21 +162,19 @@ def chosen(names: Sequence[str] | None) -> tuple[Kind, ...]:
     return tuple(kind for kind in KINDS if not names or kind.name in names)
 
 
-def arguments(description: str | None) -> argparse.ArgumentParser:
-    """What both programs take."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kind", action="append", choices=[kind.name for kind in KINDS], help="one or more; else all")
-    parser.add_argument("--stacks", type=int, default=STACKS, help="of each kind")
-    parser.add_argument("--paths", type=int, default=PATHS, help="of each direction")
-    parser.add_argument("--seed", type=int, default=0)
-    return parser
+def arguments(about: str | None, **options: Any) -> argparse.ArgumentParser:
+    """The parser of a program that needs walks."""
+    given = {"stacks": (STACKS, "of each kind"), "paths": (PATHS, "of each direction"), "seed": 0, **options}
+    program = parser(about, **given)
+    program.add_argument("--kind", action="append", choices=[kind.name for kind in KINDS], help="one or more; else all")
+    return program
 
 
 def main() -> None:
-    parser = arguments(__doc__)
-    parser.add_argument("folder", type=Path, nargs="?", default=FOLDER)
-    parser.add_argument("--half", action="append", choices=HALVES, help="one or both; else both")
-    options = parser.parse_args()
+    program = arguments(__doc__)
+    program.add_argument("folder", type=Path, nargs="?", default=FOLDER)
+    program.add_argument("--half", action="append", choices=HALVES, help="one or both; else both")
+    options = program.parse_args()
     halves = options.half or HALVES
     for _ in every(chosen(options.kind), halves, options.stacks, options.paths, options.seed, options.folder):
         pass
