@@ -342,7 +342,7 @@ def _summary(errors: Array) -> str:
 
 
 def errors(w: Walks) -> dict[str, dict[str, Array]]:
-    """By quantity and rule, log(alpha / true) of both axes and energy / true - 1 of the colours, by rows."""
+    """Errors by quantity and rule: log(alpha / true) of both axes and energy / true - 1 of the colours, by rows."""
     return {
         "roughness": {name: np.log(rule(w) / w.alpha) for name, rule in BLURS.items()},
         "energy": {name: rule(w) / w.energy - 1 for name, rule in ENERGIES.items()},

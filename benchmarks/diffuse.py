@@ -34,7 +34,7 @@ def random_stack(rng: np.random.Generator, interfaces: int) -> Stack:
 
 
 def albedo(stack: Stack, cos_theta: tuple[float, ...], model: str) -> np.ndarray:
-    """Of the base in closed form, shape (3, cosines)."""
+    """Albedo of the base in closed form, (3, cosines)."""
     body = bsdf.body(Material.of(stack), named(model))
     cosine = np.array(cos_theta)
     base = body.base((np.sqrt(1 - cosine**2), 0 * cosine, cosine))

@@ -227,7 +227,7 @@ def furnace(bsdf: Any) -> tuple[float, float, float]:
 
 
 def spheres(model: str, switches: dict[str, str]) -> dict[str, dict[str, list[float]]]:
-    """By name of what is in the furnace and alpha: what `furnace` returns."""
+    """Results of `furnace` by what is in it, and alpha."""
     mi = kernel.mitsuba()
     found: dict[str, dict[str, list[float]]] = {}
     for alpha in GLASS:

@@ -92,7 +92,7 @@ def gilt(rng: np.random.Generator) -> Interface:
 
 
 def mirror(rng: np.random.Generator) -> Interface:
-    """As `gilt`, of which nothing passes."""
+    """Metals like `gilt`, through which nothing passes."""
     return Interface(conductor="mirror", alpha=alpha(rng), films=gilt(rng).films)
 
 
@@ -139,7 +139,7 @@ def errors(stack: Stack, model: str, often: bool, paths: int, seed: int) -> list
 
 
 def rough(model: str, stacks: int, paths: int, seed: int) -> Iterator[tuple[str, bool, list[list[float]]]]:
-    """By kind, and whether facets are met often: errors with films, and without."""
+    """Errors with films, and without, by kind and by whether facets are met often."""
     for number, (kind, make) in enumerate(KINDS.items()):
         for often in (False, True):
             rng, found = np.random.default_rng([seed, number]), list[list[float]]([[], []])
@@ -154,7 +154,7 @@ def rough(model: str, stacks: int, paths: int, seed: int) -> Iterator[tuple[str,
 
 
 def queries(model: str, count: int, seed: int) -> None:
-    """Over the cosines: what samples of a metal under a film weigh in the mean, `count` at a wavelength."""
+    """Mean weights of samples of a metal under a film, `count` at a wavelength, over the cosines."""
     import drjit as dr
 
     mi = kernel.mitsuba("llvm_ad_spectral")

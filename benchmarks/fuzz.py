@@ -84,7 +84,7 @@ def blocks(name: str, count: int, seed: int, processes: int) -> Iterator[tuple[i
 
 
 def _in_processes(name: str, seed: int, indices: list[int], processes: int) -> Found:
-    """As `tried`; what ends its process is found by trying again in halves."""
+    """Results of `tried`; what ends its process is found by trying again in halves."""
     parts = [indices[k::processes] for k in range(processes)]
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         running = [pool.submit(tried, name, seed, part) for part in parts]

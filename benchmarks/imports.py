@@ -140,7 +140,7 @@ def by_plugin(materials: Sequence[Values], wi: Any, wo: Any) -> Sequence[Any]:
 
 
 def of_openpbr(given: Values) -> tuple[float, float]:
-    """With what the coat adds (OpenPBR 1.1, "Roughening")."""
+    """The roughness with what the coat adds (OpenPBR 1.1, "Roughening")."""
     base, coat = given.get("specular_roughness", 0.3), given.get("coat_roughness", 0.0)
     weight = given.get("coat_weight", 0.0)
     rough = (1 - weight) * base + weight * min(base**4 + 2 * coat**4, 1) ** 0.25

@@ -180,7 +180,7 @@ class Exactness:
 
 
 def exactness(model: Model, targets: int, seed: int = 0) -> Exactness:
-    """Of as many targets as are asked for, of all kinds alike."""
+    """Errors of as many targets as are asked for, of all kinds alike."""
     rng, result = np.random.default_rng(seed), Exactness()
     for n, kinds in enumerate(KINDS):
         wanted = targets // len(KINDS) + (n < targets % len(KINDS))

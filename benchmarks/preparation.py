@@ -41,7 +41,7 @@ def three(*alphas: Any, turns: tuple[float, float] = (0.0, 0.0), **base: Any) ->
 
 
 def painted(stack: Stack) -> Stack:
-    """With a medium that scatters below the first interface."""
+    """The stack with a medium that scatters below the first interface."""
     return Stack([stack.layers[0], PAINT, *stack.layers[1:]])
 
 

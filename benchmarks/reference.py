@@ -38,7 +38,7 @@ Picture = Callable[[int], Any]  # rendered from a seed
 
 
 class Cost(NamedTuple):
-    """Of one picture: the variance of a pixel (mean), seconds (median), the mean picture, and how many it is of."""
+    """Variance of a pixel (mean), seconds (median), the mean picture, and how many pictures it is of."""
 
     variance: float
     seconds: float

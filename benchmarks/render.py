@@ -50,7 +50,7 @@ def textured(mi, stack: vt.Stack, model: str):
 
 
 def bsdfs(mi, model: str) -> dict:
-    """By name, the yardstick first."""
+    """BSDFs by name, the yardstick first."""
     found = {"principled": mi.load_dict({"type": "principled", "roughness": 0.2, "metallic": 0.8, "clearcoat": 0.5})}
     found |= {name: vt.bsdf(stack, model=model) for name, stack in stacks().items()}
     found["two, textured"] = textured(mi, stacks()["two interfaces"], model)

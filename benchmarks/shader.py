@@ -101,7 +101,7 @@ def measure(model: str, languages: list[str], count: int, seed: int, page: Any) 
 
 
 def table(title: str, rows: dict[str, dict[str, float]]) -> str:
-    """In Markdown."""
+    """The table in Markdown."""
     head = [f"| {title} | {' | '.join(KEYS)} |", "|---" * (1 + len(KEYS)) + "|"]
     return "\n".join([*head, *(f"| `{x}` | {' | '.join(f'{row[k]:.1e}' for k in KEYS)} |" for x, row in rows.items())])
 

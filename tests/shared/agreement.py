@@ -144,7 +144,7 @@ def in_numpy(case: Case, recording: Recording) -> Results:
 
 
 def _solved(stack: Stack, used: Solver, wi: Any, wo: Any, u: Any) -> Results:
-    """On the grid of a solver."""
+    """Results on the grid of a solver."""
     material = solve.plain(Material.of(stack).solid())
     frame = rotation_frame.frame(material)
     upright, solver = frame.back(material), replace(used, variance=frame.kind(variance(stack)))
@@ -178,7 +178,7 @@ class Program:
     energies: int
 
     def results(self, answers: np.ndarray) -> Results:
-        """Of answers (N, answers, 4)."""
+        """Results of answers (N, answers, 4)."""
         found, n = np.moveaxis(answers.astype(float), 0, -1), self.energies
         return Results(found[:n, :3], found[n:-2, :2], found[-2, :3], found[-2, 3], found[-1, :3])
 

@@ -74,7 +74,7 @@ def _material(script: str) -> None:
 
 
 def _along(scene: Any, job: dict[str, Any], cosine: float) -> np.ndarray:
-    """From one direction, in the plane of the tangent."""
+    """Light from one direction, in the plane of the tangent."""
     away = Vector((math.sqrt(1 - cosine * cosine), 0, cosine))
     scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 0.1
     scene.camera.location, scene.camera.rotation_euler = 3 * away, (-away).to_track_quat("-Z", "Y").to_euler()
@@ -82,7 +82,7 @@ def _along(scene: Any, job: dict[str, Any], cosine: float) -> np.ndarray:
 
 
 def _picture(scene: Any, job: dict[str, Any], light: list[float] | None, seed: int) -> np.ndarray:
-    """Under a white world, or a sun in a direction."""
+    """The picture under a white world, or a sun in a direction."""
     scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = [light is None] * 3 + [1]
     sun = bpy.data.objects["sun"]
     sun.data.energy = 0.0 if light is None else 1.0

@@ -6,5 +6,5 @@ import signal
 
 
 def hear() -> None:
-    """Before a process begins: restore interrupts, which background processes ignore."""
+    """Restore interrupts, which background processes ignore, before a process begins."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -60,7 +60,7 @@ class Lab:
 
     @property
     def address(self) -> str:
-        """Of the notebook."""
+        """The address of the notebook."""
         server = json.loads(self._found("jpserver-*.json").read_text())
         return f"{server['url']}lab/tree/{NOTEBOOK}"
 

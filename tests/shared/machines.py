@@ -383,7 +383,7 @@ def _context() -> Any:
 
 
 def _entry(binding: int, resource: Any, kind: str) -> dict[str, Any]:
-    """Of the layout of a group."""
+    """The entry of a group's layout."""
     import wgpu
 
     described = {

@@ -33,7 +33,7 @@ class Row:
     passed: Array | None
 
     def errors(self) -> Array:
-        """Of the default model, absolute."""
+        """Absolute errors of the default model."""
         even = 0.5 * (GAUSS[0] + 1)
         lobes = vt.lobes(self.stack, even if self.cosines is None else self.cosines)
         found = [np.sum([*lobes.energy, lobes.remainder], axis=0)[0], lobes.passed[0]]

@@ -144,7 +144,7 @@ def compare(
 def compared(
     opened: Stage, stack: Stack, scene: str, env: str, samples: int, spp: int, model: str = DEFAULT
 ) -> Comparison:
-    """As `compare`, of what is shown already."""
+    """Compare what is shown already, as `compare` does."""
     half = opened.trace(samples // 2)
     still = opened.trace(samples)
     size = still.shape[1], still.shape[0]

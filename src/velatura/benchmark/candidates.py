@@ -59,7 +59,7 @@ class Pairs:
 
     @classmethod
     def of(cls, case: Case, nodes: int = NODES) -> Pairs:
-        """With so many squared nodes for each bin."""
+        """The pairs of so many squared nodes for each bin."""
         sides = SIDES[: 1 + case.stack.transmits]
         keys = tuple((direction, side) for direction in range(len(case.incident)) for side in sides)
         each = [Bins.of(case.incident[direction], side, case.eta).nodes(nodes) for direction, side in keys]

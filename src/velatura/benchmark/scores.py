@@ -158,7 +158,7 @@ def kept_score(
     timed: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Scores:
-    """As `score`, read from a JSON file if that is there, else kept there; not kept where it is None.
+    """Scores from a JSON file if that is there, else of `score` and kept there; not kept where it is None.
 
     `timed` measures the cost of evaluations, unless the file has it.
 

@@ -84,8 +84,10 @@ def _column(body: bsdf.Lobed, incident: Array) -> tuple[list[WalkedLobe], Array]
 
 
 def _drawn(body: Body, stack: Stack, statistics: StackLobes, j: int, incident: Array) -> tuple[list[WalkedLobe], Array]:
-    """As `_column`, of a body that is solved, by its components. The remainder is the light of a diffuse base, if there
-    is one, and else in no lobe."""
+    """The same as `_column` of a body that is solved, by its components.
+
+    The remainder is the light of a diffuse base, if there is one, and else in no lobe.
+    """
     x, y, z = incident[:, None]
     wi: Direction = (x, y, z)
     u = at_nodes(1, LIT_SAMPLES, None)

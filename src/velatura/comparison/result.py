@@ -101,7 +101,7 @@ class Comparison:
 
     @cached_property
     def total_variation(self) -> Mapping[str, Array]:
-        """By model, (N,): half the light that is in the wrong place, over all light that the truth reflects.
+        """Half the light that is in the wrong place, over all light that the truth reflects, (N,) by model.
 
         Places are the bins of the projected disc and energies are those of all colours together. 0 is perfect; a
         model that reflects nothing has 0.5, one with all light in wrong bins has 1.
@@ -113,7 +113,7 @@ class Comparison:
 
     @cached_property
     def roughness_error(self) -> Mapping[str, float]:
-        """By model: mean `|log(alpha / true alpha)|` over directions, axes, and lobes of an energy above `ENERGY_MIN`.
+        """Mean `|log(alpha / true alpha)|` by model, over directions, axes, and lobes of an energy above `ENERGY_MIN`.
 
         Roughness is clamped to the least one that a model evaluates. NaN if there is no such lobe.
         """

@@ -133,7 +133,7 @@ def _variances(target: Target, model: Model) -> list[float]:
 
 
 def _held_back(target: Target, scatters: bool) -> list[Answer]:
-    """Of every lobe what cannot be asked for, `energy` or `interfaces`, each with the reason."""
+    """The parts of every lobe that cannot be asked for, `energy` or `interfaces`, each with the reason."""
     found: list[Answer] = [
         {"interfaces": "a medium that scatters stays where it is"} if scatters else {} for _ in target.lobes
     ]
@@ -290,7 +290,7 @@ def _under(found: DraggedStack) -> Stack:
 
 
 def _slowly(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound | None]:
-    """As `DraggedStack.towards`, for a model each reading of which takes a while: few lead to the nearest lobes.
+    """Approach the nearest lobes in few readings, each of which takes a while, as `DraggedStack.towards` does in many.
 
     What the wish changes may give, and what the bound is on; where that is far, another stack may have the lobes.
     """
@@ -327,7 +327,7 @@ def _approached(wish: Target, near: DraggedStack) -> tuple[DraggedStack, Bound |
 
 
 def _further(wish: Target, found: DraggedStack) -> DraggedStack:
-    """As far towards the wished blurs as the present energies allow, and then the other way round."""
+    """Go towards the wished blurs as far as the present energies allow, and then the other way round."""
     for key in ("alpha", "energy"):
         part = found.now(wish)
         for k, lobe in enumerate(wish.lobes):

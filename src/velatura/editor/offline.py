@@ -59,7 +59,7 @@ class Order(NamedTuple):
 
     @property
     def name(self) -> str:
-        """In which the page asks for it."""
+        """The name by which the page asks for it."""
         return "-".join([*self.kinds, *(["brushed"] if self.brushed else []), *(["thin"] if self.thin else [])])
 
     @property
@@ -180,7 +180,7 @@ def _tasks(plain: Sequence[Order], models: Sequence[Model]) -> list[Callable[[],
 
 
 def _all_made(tasks: Sequence[Callable[[], Made]]) -> Iterator[Made]:
-    """In as many processes as are worth their start."""
+    """Make all in as many processes as are worth their start."""
     processes = min(os.cpu_count() or 1, len(tasks) // WORTH)
     if processes < 2:
         yield from map(_made, tasks)

@@ -92,7 +92,7 @@ def application(material: str | None, token: str) -> Guard:
         folder.first(material)  # refused now, before anything is served
 
     def session(body: Body) -> Answer:
-        """With the material as its file is now; without, where that has been broken since the start."""
+        """The session, with the material as its file is now; without, where that has been broken since the start."""
         try:
             opened = None if material is None else folder.first(material)
         except InvalidInput:

@@ -73,7 +73,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
 
 
 def in_closed_form(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
-    """As `shading`, for all values, of what the model comes to without a solution."""
+    """The `shading` for all values, of the model's form without a solution."""
     made = shading(stack, model.surrogate, stretched)
     return {**made, "closed_form": bool(stack.interfaces) and model.surrogate is not model}
 
@@ -98,7 +98,7 @@ def _contents(stack: Stack, made: Shader, model: Model, coarse: bool = False) ->
 
 
 def _tabulated(made: Shader) -> Tabulated | None:
-    """Of a material that is solved."""
+    """The lookup of a solved material."""
     return None if isinstance(made.baked, Bake) else made.baked
 
 

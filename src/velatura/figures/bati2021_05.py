@@ -24,7 +24,7 @@ GREEN = 1
 
 
 def stacks() -> dict[str, Stack]:
-    """By name, in pairs."""
+    """Stacks by name, in pairs."""
     found = {}
     for side, name in ((1, "denser"), (-1, "rarer")):
         layers = invert_interface(DARK, exterior=1.8, choice=Choice(side=side), model=MODEL)

@@ -21,7 +21,7 @@ NEAR_1 = 0.05  # by which an index differs from 1 at least where albedos are com
 
 
 def compute(alphas: Sequence[float] = ALPHAS, count: int = 200, progress: Progress | None = None) -> dict[str, Any]:
-    """Over the relative index `eta` what is smooth reflects, `fresnel`, and by `alpha` what is rough.
+    """Reflectances over the relative index `eta`: of a smooth interface, `fresnel`, and of `rough` ones by `alpha`.
 
     `denser` and `rarer` are the largest differences relative to Fresnel on either side of an index of 1.
     """

@@ -29,7 +29,7 @@ def compute(
     count: int = 200,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For every `part`, `energy` and `eta_0` the whole `curve`, the part of it `inside` bounds, and its named `points`.
+    """The whole `curve` by `part`, `energy` and `eta_0`, the part of it `inside` bounds, and its named `points`.
 
     All are points (eta_1, eta_2). `deviation` is the largest distance of what is inside, found by the model, from the
     closed form.

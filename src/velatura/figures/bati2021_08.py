@@ -22,7 +22,7 @@ MODEL = "bati2021"
 
 
 def compute(ratios: Sequence[float] = RATIOS, count: int = 90, progress: Progress | None = None) -> dict[str, Any]:
-    """By `point` its indices (eta_1, eta_2), and its energy over `angles` (degrees) less that of one interface.
+    """Indices (eta_1, eta_2) by `point`, and its energy over `angles` (degrees) less that of one interface.
 
     Points lie in their order along the curve, from one interface to the slab.
     """

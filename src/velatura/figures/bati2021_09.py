@@ -25,7 +25,7 @@ ETA_MAX = 4.0
 
 
 def compute(energies: Sequence[float] = ENERGIES, count: int = 160, progress: Progress | None = None) -> dict[str, Any]:
-    """Over `eta`, by energy: the `depth` at (eta_1, eta_2), negative or null out of the class; intervals of `eta_1`.
+    """The `depth` by energy at (eta_1, eta_2), over `eta`, negative or null out of the class; intervals of `eta_1`.
 
     `deepest` is the largest depth; it has no bound where the lower interface vanishes. `slices` has by energy the
     `depth` over eta_2 below ETA_1, and `deepest`.

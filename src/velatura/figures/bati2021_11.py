@@ -20,7 +20,7 @@ MODEL = named("bati2021")
 
 
 def compute(alphas: Sequence[float] = ALPHAS, count: int = 160, progress: Progress | None = None) -> dict[str, Any]:
-    """By `alpha` the `curves` without absorption, (eta_1, eta_2), and `ends`, the intervals that bound eta_1."""
+    """The `curves` by `alpha` without absorption, (eta_1, eta_2), and `ends`, the intervals that bound eta_1."""
     rows = []
     for alpha in canvas.track(alphas, progress):
         variance = float(MAPS["belcour"].variance(alpha))

@@ -20,7 +20,7 @@ ETA, ALPHA = 1.5, 0.05  # of the coat
 
 
 def stacks() -> dict[str, Stack]:
-    """By name, in threes."""
+    """Stacks by name, in threes."""
     found = {}
     for name, bare in inverted(("14 a", "14 b")).items():
         found[f"{name}, bare"] = bare

@@ -24,7 +24,7 @@ def members(name: str) -> EquivalenceClass:
 
 
 def stacks() -> dict[str, Stack]:
-    """By name, in pairs."""
+    """Stacks by name, in pairs."""
     found = {}
     for name in TITLES:
         found[f"{name}, low"] = of_layers(members(name).member(ETA_1))

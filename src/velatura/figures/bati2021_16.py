@@ -24,7 +24,7 @@ SHOWN = 30.0  # the largest effective index that is drawn: the class has no boun
 
 
 def stacks() -> dict[str, Stack]:
-    """By name."""
+    """Stacks by name."""
     found = {}
     for name, (eta, tau) in CHOICES.items():
         (lobe,) = FIGURES["16"]

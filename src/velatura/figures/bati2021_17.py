@@ -30,7 +30,7 @@ def compute(
     members: int = 29,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """By order: the `stack`, its `energy` over `cosines` (rgb), red over blue at `grazing` angles; and `pictures`.
+    """The `stack` by order, its `energy` over `cosines` (rgb), red over blue at `grazing` angles; and `pictures`.
 
     `least` and `most` are the bounds of that of so many `members` of the class.
     """
@@ -52,7 +52,7 @@ def _tint(stack: Stack) -> float:
 
 @canvas.page(13, 8)
 def draw(figure: Any, numbers: dict[str, Any]) -> None:
-    """In the middle the sphere, a half of either order, and its energies; beside it the classes of both lobes."""
+    """The sphere in the middle, a half of either order, and its energies; beside it the classes of both lobes."""
     left, (sphere, energy), right = figure.subplots(2, 3).T
     for column, order in zip((left, right), ORDERS):
         solution = invert_stack(FIGURES[order], MODEL)

@@ -20,7 +20,7 @@ NAMES = {"15 b, low": "low absorption", "15 b, high": "high absorption"}
 def compute(
     size: int = looks.SIZE, spp: int = looks.SAMPLES, seed: int = 0, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """By name `indices`, over `cosines` energies `reflected` and `transmitted` (rgb); and `pictures` of spheres."""
+    """The `indices` by name, energies `reflected` and `transmitted` (rgb) over `cosines`; and `pictures` of spheres."""
     numbers: dict[str, Any] = {"cosines": list(COSINES), "pictures": {}}
     stacks = bati2021_15.stacks()
     for found, name in canvas.track(list(NAMES.items()), progress):

@@ -55,7 +55,7 @@ def compute(
 def compared(
     target: Target, stack: Stack, model: str, paths: int, seed: int = 0
 ) -> Iterator[tuple[dict[str, Any], Array]]:
-    """Of every lobe of a target the row of `compute`, for a stack with it, and what energy and variance miss, (2,)."""
+    """The row of `compute` of every lobe of a target, for a stack with it, and what energy and variance miss, (2,)."""
     read, first = stack_lobes(stack, 1.0, model=model), 0
     many = named(model).microsurface
     true = reference.statistics(stack, 1.0, paths=paths, seed=seed, microsurface=many)

@@ -35,7 +35,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For each preset, by `name`, `canvas.errors` of every model and `mean` radiances; and `pictures`."""
+    """The `canvas.errors` of every model and `mean` radiances of each preset, by `name`; and `pictures`."""
     rows, pictures = [], []
     for name in canvas.track(presets, progress):
         stack = preset(name)

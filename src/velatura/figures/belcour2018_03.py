@@ -19,7 +19,7 @@ LOBE, ANGLE, BINS = 0.3, 45, 80
 
 
 def compute(alphas: Sequence[float] = ALPHAS, count: int = 2**15, progress: Progress | None = None) -> dict[str, Any]:
-    """Over `alpha` the variance along an axis of the disc after `one` and `two` bounces; `count` is that of directions.
+    """Variances along an axis of the disc, over `alpha`, after `one` and `two` bounces of `count` directions.
 
     `pictures` hold the energy of the `lobe` on a grid over the disc, from -1 to 1, in rows of x.
     """

@@ -29,7 +29,7 @@ def compute(
     count: int = 2**14,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For each `first` roughness a list over `second`: by width, the equivalent roughness, and what each map predicts.
+    """The equivalent roughness by width for each `first` one, in lists over `second`, and what each map predicts.
 
     None where no single bounce is as wide. `error` is the root mean square of what a map misses, by width and map,
     where both roughnesses are at most `LOW`, in `error_above` elsewhere.

@@ -30,7 +30,7 @@ def width(x: Array, lobe: Array) -> float:
 def compute(
     eta: float = ETA, alpha: float = ALPHA, angle: float = ANGLE, count: int = 1001, progress: Progress | None = None
 ) -> dict[str, Any]:
-    """Over `sine`, the outgoing one, both lobes, and the `width` of each at half its height."""
+    """Both lobes over `sine`, the outgoing one, and the `width` of each at half its height."""
     x, wi = np.linspace(-1, 1, count + 2)[1:-1], disc.incidence(angle, 180)
     zero = np.zeros_like(x)
     lobes = {

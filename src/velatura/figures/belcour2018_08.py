@@ -28,7 +28,7 @@ def compute(
     count: int = 2**15,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Over `g` the equivalent roughness by `variance` and `median`, a list for each of `depth`, and of the `model`."""
+    """The equivalent roughness over `g` by `variance` and `median`, a list for each of `depth`, and of the `model`."""
     u = uniform(count)
     known = np.geomspace(1e-3, 1, 80)
     single = [bounce(along(NORMAL, count), a, a, *u[:2]) for a in known]
@@ -56,7 +56,7 @@ def _scattered(g: float, depth: float, u1: Any, u2: Any) -> Light:
 
 @canvas.page(9, 4)
 def draw(figure: Any, numbers: dict[str, Any]) -> None:
-    """By variance for every depth, from red for none to blue, and by both widths beside the model."""
+    """Curves by variance for every depth, from red for none to blue, and by both widths beside the model."""
     left, right = figure.subplots(1, 2, sharey=True)
     for depth, row in zip(numbers["depth"], numbers["variance"]):
         left.plot(numbers["g"], np.array(row, float), color=(1 - depth, 0, depth), label=f"depth {depth:g}")

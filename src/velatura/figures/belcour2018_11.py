@@ -34,7 +34,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For both forms, the reference with `all` bounces and with `single` ones: what is reflected over `cos`.
+    """Reflected light over `cos`, of both forms, and of the reference with `all` bounces and with `single` ones.
 
     `albedo` by colour, `saturation` as 1 - blue / red, and `canvas.errors` against all bounces; `pictures`.
     """

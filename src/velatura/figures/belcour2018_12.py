@@ -28,7 +28,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For `smooth` and `rough`, by column: the `albedo` over `angles` (degrees), 1 where all is kept; `pictures`."""
+    """The albedo of `smooth` and `rough` by column, over `angles` (degrees), 1 where all is kept; `pictures`."""
     cosines = np.cos(np.radians(angles))
     numbers: dict[str, Any] = {"angles": [float(angle) for angle in angles], "pictures": {}}
     numbers |= {name: {} for name in STACKS}

@@ -26,7 +26,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """By column: `canvas.errors` against the reference, `blur` and `albedo` over `cos`; `pictures`.
+    """The `canvas.errors` by column against the reference, `blur` and `albedo` over `cos`; `pictures`.
 
     Also the roughness of the base's lobe, by the model and by random walks.
     """

@@ -43,7 +43,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For `two` and `four` over `alpha`, and for `angle` over degrees: model and walk, side by side.
+    """Model and walk, side by side: `two` and `four` over `alpha`, and `angle` over degrees.
 
     Each side has the mean x and variance of all that is reflected, and energy, variance and alpha of the deepest lobe;
     the walk also the standard error of that variance.

@@ -57,7 +57,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """By scene: `evaluation` of the BSDFs alone over the baseline's (`evaluation.costs`), and the ratio in the `paper`.
+    """The `evaluation` of BSDFs alone by scene, over the baseline's (`evaluation.costs`), and the ratio in the `paper`.
 
     Of pictures: `seconds` (the median of `repeats`), their `ratio` to the baseline's with its standard error
     `ratio_error`, and `mean`, the mean radiance of the `pictures`. The paper has no reference in its table.

@@ -36,7 +36,7 @@ def bounce(light: Light, alpha_u: float, alpha_v: float, u1: Array, u2: Array) -
 
 
 def variances(light: Light) -> Array:
-    """Of light about the normal: along both axes (2,), on the projected disc."""
+    """Variances of light about the normal along both axes (2,) of the projected disc."""
     directions, energy = light
     return np.average(directions[:2] ** 2, weights=energy, axis=1)
 
@@ -47,7 +47,7 @@ def variance(light: Light) -> float:
 
 
 def median(light: Light) -> float:
-    """Of the slopes of half-vectors, of light about the normal: what makes one lobe look like another."""
+    """Median slope of half-vectors of light about the normal: what makes one lobe look like another."""
     directions, energy = light
     x, y = roughness.slopes(np.array(NORMAL), directions)
     return roughness.median(np.hypot(x, y), energy)[0]

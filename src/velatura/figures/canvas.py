@@ -63,12 +63,12 @@ def spheres(stack: Stack, model: str, env: str, size: int, spp: int, seed: int, 
 
 
 def pictures(scene: str, stack: Stack, model: str, env: str, size: int, spp: int, seed: int, **switches: Any) -> Array:
-    """As `spheres`, of any object."""
+    """Pictures of any object, as those of `spheres`."""
     return taken(bsdf(stack, model, **switches), model, scene, env, size, spp, seed)
 
 
 def taken(made: Any, name: str, scene: str, env: str, size: int, spp: int, seed: int) -> Array:
-    """As `pictures`, of a BSDF, whose name chooses its random numbers."""
+    """Pictures of a BSDF, whose name chooses its random numbers, as those of `pictures`."""
     count = min(max(spp // PASS_SAMPLES, 3), PASSES)  # no fewer than a standard error takes
     numbers = np.random.default_rng([seed, *name.encode()]).integers(2**31, size=count)
     passes = [scenes.render(made, scene, env, max(spp // count, 1), (size, size), int(number)) for number in numbers]
@@ -135,7 +135,7 @@ def rmse(passes: Array, others: Array) -> tuple[float, float]:
 
 
 def errors(images: Mapping[str, Array], truth: Array) -> dict[str, dict[str, float]]:
-    """By name the `rmse` of pictures against the truth, freed of noise, and its standard error, `rmse_error`."""
+    """The `rmse` of pictures by name against the truth, freed of noise, and its standard error, `rmse_error`."""
     found = {name: rmse(passes, truth) for name, passes in images.items()}
     return {
         "rmse": {name: value for name, (value, _) in found.items()},

@@ -134,7 +134,7 @@ def alpha(cell: Mapping[str, Any], title: str) -> Any:
 
 
 def draw(numbers: dict[str, Any], path: str | Path, exposure: float = 1.0, bound: float = 0.2) -> None:
-    """For each cell the truth, and for each model its picture, and what it has too much or too little, up to a bound.
+    """The truth of each cell, and for each model its picture, and what it has too much or too little, up to a bound.
 
     Raises:
         InvalidInput: the file cannot be written.

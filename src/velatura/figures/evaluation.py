@@ -35,7 +35,7 @@ def textured(stack: Stack, folder: Path) -> Stack:
 
 @kernel.exclusive
 def timed(bsdfs: Mapping[str, Any], rounds: int, seed: int, lanes: int) -> dict[str, dict[str, Array]]:
-    """By function, then by name of a BSDF, the processor's seconds (rounds,) of evaluating it in as many `lanes`.
+    """The processor's seconds (rounds,) by function and BSDF, of evaluating it in as many `lanes`.
 
     Directions of light and view are uniform over the hemisphere. BSDFs take turns. Recording a function in Python,
     which happens once in a rendering, does not count; nor does a first round, in which it is compiled.
@@ -65,7 +65,7 @@ def timed(bsdfs: Mapping[str, Any], rounds: int, seed: int, lanes: int) -> dict[
 
 
 def costs(bsdfs: Mapping[str, Any], others: Mapping[str, str], rounds: int, seed: int, lanes: int) -> Costs:
-    """By function, then by name of a BSDF, the ratio of its time to that of another one, which `others` names.
+    """The ratio of a BSDF's time to that of another one, which `others` names, by function and name.
 
     Of the ratios of all rounds, `median` and `quartiles`.
     """

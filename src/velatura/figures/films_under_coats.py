@@ -57,7 +57,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """For each metal and coat, by `name`, and each column but the truth:
+    """Numbers of each metal and coat, by `name`, and of each column but the truth:
 
     `rmse` and `rmse_error` of its picture; of the colour of all reflected light the `difference` to that of the truth
     over `cosines` (CIE 1976), at the `normal` and `mean` over the cosines; and the mean over colours of its `energy`

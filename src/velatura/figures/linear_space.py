@@ -30,7 +30,7 @@ CHAIN = (0.01, 0.5)  # part of the iterated curve that p is read off
 
 
 def compute(count: int = 2**15, progress: Progress | None = None) -> dict[str, Any]:
-    """For `variance` and `median` as the width: curves, and what is fitted to them; `count` is that of directions.
+    """Curves for `variance` and `median` as the width, and what is fitted to them; `count` is that of directions.
 
     `equivalent` of two equal bounces over `alpha`; `iterated` f over roughness; `p` read off it; `fits` for growing
     `top`: a and b with standard errors, the error (root mean square) of roughness that they leave, p by the same

@@ -94,11 +94,11 @@ class Looks:
     def compute(
         self, size: int = SIZE, spp: int = SAMPLES, seed: int = 0, progress: Progress | None = None
     ) -> dict[str, Any]:
-        """As `looks.compute`."""
+        """Numbers of `looks.compute`."""
         return compute(self.stacks(), size, spp, seed, progress, **self.options)
 
     def draw(self, numbers: Mapping[str, Any], path: str | Path) -> None:
-        """For each panel its chart, its picture, what each lobe adds to it, and energies and variances over the angle.
+        """The chart of each panel, its picture, what each lobe adds to it, and energies and variances over the angle.
 
         Raises:
             InvalidInput: the file cannot be written.
@@ -163,7 +163,7 @@ def compute(
     scene: str = "sphere",
     **switches: Any,
 ) -> dict[str, Any]:
-    """For every stack a `look` and its `pictures`: on a base that absorbs what passes.
+    """A `look` of every stack and its `pictures`, on a base that absorbs what passes.
 
     Of a look: `name`, the `stack`, over `cosines` the `energy` of all reflected light (rgb), that of the `remainder`,
     which a diffuse base reflects, and, for every interface from the top, its `energies` and its `variances` in the
@@ -189,7 +189,7 @@ def pictures(
     scene: str = "sphere",
     **switches: Any,
 ) -> dict[str, Any]:
-    """By name a picture of each stack, on a base that absorbs what passes, in light from the left and the right alike.
+    """A picture of each stack by name, on a base that absorbs what passes, in light from the left and the right alike.
 
     Then both halves of a sphere of one material look alike, and only what materials differ by shows.
     """

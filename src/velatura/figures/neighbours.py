@@ -78,17 +78,17 @@ class Lobe:
 
 
 def closures(metal: Metal, coat: Coat | None) -> list[Lobe]:
-    """As MaterialX and OSL have it."""
+    """Lobes of MaterialX and OSL."""
     return _coated(coat, metal.alpha, interference(_COSINES, 1.0, metal, fitted))
 
 
 def principled(metal: Metal, coat: Coat | None) -> list[Lobe]:
-    """As Blender has it."""
+    """Lobes of Blender."""
     return _coated(coat, metal.alpha, interference(_COSINES, 1.0, metal, tabled, by_colours=True))
 
 
 def openpbr(metal: Metal, coat: Coat | None) -> list[Lobe]:
-    """As the text of OpenPBR asks for."""
+    """Lobes that the text of OpenPBR asks for."""
     if coat is None:
         return closures(metal, None)
     inside = fresnel.cos_transmitted(_COSINES, coat.eta)
@@ -178,7 +178,7 @@ def _by_edge(cosine: Array, f_0: Array, f_edge: Array) -> Array:
 
 
 def fitted(path_nm: Array) -> Array:
-    """By Gaussians over the wavenumber, fitted to the CIE's observer, in primaries of an equal-energy white.
+    """Gaussians over the wavenumber, fitted to the CIE's observer, in primaries of an equal-energy white.
 
     (Belcour and Barla 2017, released code)
     """
@@ -199,7 +199,7 @@ def fitted(path_nm: Array) -> Array:
 
 
 def tabled(path_nm: Array) -> Array:
-    """By the Fourier transform of the CIE's observer in the primaries of sRGB, scaled to 1 without a film."""
+    """The Fourier transform of the CIE's observer in the primaries of sRGB, scaled to 1 without a film."""
     wavelengths_nm, weights = srgb_weights(d65=False)
     return np.asarray(weights @ np.exp(2j * np.pi * path_nm / wavelengths_nm[:, None]))
 

@@ -28,7 +28,7 @@ _SMOOTH = 1e-3  # what 0 is evaluated as
 
 
 def compute(side: int = 41, count: int = 4096, progress: Progress | None = None) -> dict[str, Any]:
-    """Over incidences on a grid over the disc, the `albedo` of `truth` and by fetch; None outside and grazing.
+    """The `albedo` of `truth` and by fetch, over incidences on a grid over the disc; None outside and grazing.
 
     `error` is by fetch the root mean square and the largest difference from the truth.
     """

@@ -23,7 +23,7 @@ SIDE = 40  # of the plot of (b)
 
 
 def compute(alphas: Sequence[float] = ALPHAS, count: int = 2**13, progress: Progress | None = None) -> dict[str, Any]:
-    """Over `alpha` along x (rows) and y (columns): `variance` along x after one bounce, `equivalent` along x of two.
+    """The `variance` along x after one bounce, and `equivalent` along x of two, over `alpha` along x (rows) and y.
 
     `inverse` is (b) over `variances` along x and y; None where there is none. `error` is by map the root mean square of
     what it misses in the equivalent roughness, where both roughnesses are at most `LOW`, and elsewhere (`error_above`).

@@ -24,7 +24,7 @@ UP = (0.0, 0.0, 1.0)
 
 
 def compute(paths: int = 10**6, seed: int = 0, progress: Progress | None = None) -> dict[str, Any]:
-    """For `model` and `walk`: `alpha` along both axes, `diagonal`, and `pictures` of the highlight around the normal.
+    """The `alpha` of `model` and `walk` along both axes, `diagonal`, and `pictures` of the highlight around the normal.
 
     `diagonal` is the median of slopes of half-vectors along the diagonal, in units in which that along the axes is 1:
     it is 1 for every GGX reflection, or other distribution with elliptic contours.

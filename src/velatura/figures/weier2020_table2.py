@@ -34,7 +34,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """By scene: `evaluation` of the BSDFs alone over the isotropic one (`evaluation.costs`), and the `paper`'s ratio.
+    """The `evaluation` of BSDFs alone by scene, over the isotropic one (`evaluation.costs`), and the `paper`'s ratio.
 
     Of pictures: `seconds` (the median of `repeats`) by model, and their `ratio` with its standard error `ratio_error`.
     """

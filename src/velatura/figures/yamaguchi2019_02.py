@@ -16,7 +16,7 @@ SHOWN = 100
 
 
 def compute(count: int = 500, progress: Progress | None = None) -> dict[str, Any]:
-    """For `normals` and `reflected`: `aspect`, mean `size`, `turn` (degrees, from the bitangent); `pictures`.
+    """The `aspect`, mean `size` and `turn` (degrees, from the bitangent) of `normals` and `reflected`; `pictures`.
 
     `size_by_jacobian` is 2 cos theta, the ratio of their sizes by Yamaguchi et al. 2019, Eq. 4.
     """

@@ -21,7 +21,7 @@ ETA = 1.5
 
 
 def compute(angles: Sequence[float] = ANGLES, count: int = 1500, progress: Progress | None = None) -> dict[str, Any]:
-    """For `reflected` and `refracted` over `angle`: `aspect`, `turn` (degrees), `size` over that of the normals.
+    """The `aspect`, `turn` (degrees), and `size` over that of the normals, of `reflected` and `refracted` over `angle`.
 
     `jacobian` is that ratio by Yamaguchi et al. 2019, Eqs. 4-5; `pictures` are the lobes on grids over the disc.
     """

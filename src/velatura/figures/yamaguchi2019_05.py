@@ -36,7 +36,7 @@ def compute(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Over `samples` of a pixel, the `seconds` of a picture (the median of `repeats`) by material.
+    """The `seconds` of a picture (the median of `repeats`) by material, over `samples` of a pixel.
 
     `overhead` is what `anisotropic` takes more than the other two, as a share of each, `overhead_error` its standard
     error. `walk` and `directional` have the `ratio` of the two other times to that of `anisotropic` at most samples,

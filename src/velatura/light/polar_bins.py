@@ -40,7 +40,7 @@ class Bins:
 
     @classmethod
     def of(cls, wi: Array, side: str, eta: float) -> Bins:
-        """For light from wi (3,), with z < 0 from below, and the index eta below over that above."""
+        """Bins for light from wi (3,), with z < 0 from below, and the index eta below over that above."""
         through, below = side == "transmitted", wi[2] < 0
         index = (eta if below else 1 / eta) if through else 1.0
         centre = min(float(np.hypot(wi[0], wi[1])) * index, FARTHEST if through else 1.0)

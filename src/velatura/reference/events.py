@@ -142,7 +142,7 @@ def _evaluate_interface(meeting: Meeting, wo: Direction, reflected: Value) -> Sc
 
 
 def _densities(surface: Surface, i: Direction, h: Direction, o: Direction, eta: Value) -> tuple[Value, Value]:
-    """Of going from i to o by visible normals, per solid angle, and of going back; Fresnel left out."""
+    """Densities of the way from i to o by visible normals, per solid angle, and of the way back; Fresnel left out."""
     cos_i, cos_o = ggx.dot(i, h), ggx.dot(o, h)
     onward = surface.visible(i, h, ops.absolute(cos_i)) * refraction.jacobian(cos_i, cos_o, eta)
     back = surface.visible(o, h, ops.absolute(cos_o)) * refraction.jacobian(cos_o, cos_i, 1 / eta)

@@ -178,7 +178,7 @@ class Layers:
         return above if self.flipped is False else self.flipped ^ above
 
     def mueller(self, j: Value, cosine: Value, n_in: Value, n_out: Value, above: Value) -> tuple[Mueller, Mueller]:
-        """As `shares`, of polarised light: Mueller matrices of the light that a facet reflects, and refracts."""
+        """Mueller matrices of the light that a facet reflects, and refracts: `shares` of polarised light."""
         eta = relative_index(n_in, n_out)
         cos_t = fresnel.cos_transmitted(cosine, eta)
         passes = cos_t > 0
@@ -212,7 +212,7 @@ class Layers:
         return Mueller(*(self._of_interface(column, j) for column in columns))
 
     def _of_interface(self, items: Sequence[Value], j: Value) -> Value:
-        """Of values of the interfaces, as they are listed, that of surface j."""
+        """The value of surface j, of those of the interfaces as they are listed."""
         return _choose(self.flipped, pick(items[::-1], j), pick(items, j))
 
     def meet(

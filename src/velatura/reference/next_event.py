@@ -146,7 +146,7 @@ def connect_medium(layers: Layers, out: WayOut, path: Path) -> Value:
 
 
 def transmittance(slab: Slab, cosine: Value, depth: Value = 1.0) -> Value:
-    """Of a slab, straight through a part of its depth."""
+    """The share of light that passes straight through a part of a slab's depth."""
     return slab.straight(ops.divide(depth, cosine))
 
 

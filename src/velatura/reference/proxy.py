@@ -29,14 +29,14 @@ class Matrix:
     yy: Value = 0.0
 
     def plus(self, surface: Surface, scale: Value) -> Matrix:
-        """With the roughness of a surface, times `scale`, added."""
+        """The sum with the roughness of a surface, times `scale`."""
         scale2 = ops.select(surface.smooth, 0.0, scale * scale)
         u, v = scale2 * surface.alpha_u * surface.alpha_u, scale2 * surface.alpha_v * surface.alpha_v
         c, s = ops.cos(surface.rotation), ops.sin(surface.rotation)
         return Matrix(self.xx + u * c * c + v * s * s, self.xy + (u - v) * c * s, self.yy + u * s * s + v * c * c)
 
     def density(self, wi: Direction, wo: Direction) -> Value:
-        """Of reflection by GGX normals visible from wi, both directions being above."""
+        """Density of reflection by GGX normals visible from wi, both directions being above."""
         h = normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
         xx, yy = self.xx + _NARROWEST, self.yy + _NARROWEST
         determinant = ops.maximum(xx * yy - self.xy * self.xy, _NARROWEST * _NARROWEST)

@@ -123,7 +123,7 @@ def sky(width: int = 512) -> NDArray[np.float32]:
 
 
 def _directions(width: int, row: int = 0, column: int = 0, finer: int = 0) -> NDArray[np.float64]:
-    """Of all texels (width / 2, width, 3), or within one of them (finer, finer, 3).
+    """Directions of all texels (width / 2, width, 3), or within one of them (finer, finer, 3).
 
     In Mitsuba +y is at the top, +z in the middle, and +x to the left of it.
     """

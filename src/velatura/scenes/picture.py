@@ -1,4 +1,4 @@
-"""From a scene to a picture, and from a picture to a file."""
+"""Pictures of scenes, and their files."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def carry_out(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Dataset:
-    """As `sweep`, of a plan."""
+    """Carry out a plan, as `sweep` does."""
     path = Path(store).absolute()
     found = existing(path, plan)
     done = set[int]() if found is None else _sound(found)

@@ -50,7 +50,7 @@ class Variable:
 
     @property
     def bytes(self) -> int:
-        """Of one point."""
+        """Bytes of one point."""
         return math.prod(self.shape) * np.dtype(self.dtype).itemsize
 
     @classmethod
@@ -60,7 +60,7 @@ class Variable:
 
     @classmethod
     def read(cls, fields: Mapping[str, Any]) -> Variable:
-        """As its fields are written in a file."""
+        """The variable from its fields, as they are written in a file."""
         return cls(tuple(fields["dims"]), tuple(fields["shape"]), fields["dtype"])
 
 

@@ -41,7 +41,7 @@ class Job:
     versions: Mapping[str, str]
 
     def packed(self) -> bytes:
-        """In bytes, functions of scripts and notebooks included.
+        """The work in bytes, functions of scripts and notebooks included.
 
         Raises:
             InvalidInput: it cannot be sent to another process.

@@ -235,7 +235,7 @@ def _contents(folder: Path) -> dict[str, Any]:
 
 
 def _run(line: list[str]) -> tuple[int, str, str]:
-    """In this process; a time limit is an exception like any other."""
+    """Run in this process; a time limit is an exception like any other."""
     out, err = io.StringIO(), io.StringIO()
     status = 0
     with (

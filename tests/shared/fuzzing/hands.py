@@ -197,7 +197,7 @@ class Hands:
 
 
 def vt_json(value: Any) -> Any:
-    """As JSON brings it: tuples are lists."""
+    """The value as JSON brings it: tuples are lists."""
     if isinstance(value, dict):
         return {key: vt_json(entry) for key, entry in value.items()}
     return [vt_json(entry) for entry in value] if isinstance(value, list | tuple) else value

@@ -171,7 +171,7 @@ class _Absurd(_Tame):
     """Values from the whole range; those beyond it are drawn again."""
 
     def positive(self) -> float:
-        """Above 0, of any size."""
+        """A number above 0, of any size."""
         return 10 ** self.any(lambda: self.uniform(-4, 4), lambda: self.uniform(-1, 1), lambda: self.uniform(-40, 40))
 
     def exterior(self) -> float:
