@@ -39,7 +39,7 @@ from velatura import kernel
 from velatura.benchmark.candidates import evenly, probe_of
 from velatura.benchmark.entrants import with_bounces
 from velatura.checks.probe import Probe
-from velatura.comparison.evaluated_lobes import Light, distribution
+from velatura.comparison.evaluated_lobes import LightPoints, distribution
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named
 from velatura.stack import Material, Stack, as_described, dumps
@@ -126,7 +126,7 @@ def seen(probe: Probe, incidence: Incidence) -> tuple[Array, Array]:
         u = evenly(SAMPLES, half)
         drawn = probe.sample(np.broadcast_to(wi, u.shape), u)
         back = (drawn.wo[:, 2] > 0) != incidence.inside
-        lights = [Light(drawn.wo[side, :2].T, drawn.weight[side].T / len(u)) for side in (back, ~back)]
+        lights = [LightPoints(drawn.wo[side, :2].T, drawn.weight[side].T / len(u)) for side in (back, ~back)]
         halves.append([distribution(light) for light in lights])
         weights.append(drawn.weight.mean(axis=1))
     return np.array(halves), np.concatenate(weights)

@@ -35,7 +35,7 @@ import velatura as vt
 from velatura.sweeps import Plan, work
 from velatura.sweeps.plan import versions
 from velatura.sweeps.run import RATE
-from velatura.sweeps.store import Variable, create
+from velatura.sweeps.store import StoredVariable, create
 
 BOUNDS = {"overhead": 1.05, "small": 2.0, "workers": 1.8}
 TASKS, MANY = 5000, 100
@@ -139,7 +139,7 @@ def scheduler(point: Any) -> None:
     from distributed import Client
 
     plan = Plan.from_dict({**space(10**8).to_dict(), "what": point, "options": {"seconds": 0.001}})
-    layout = {"x": Variable((), (), "<f8")}
+    layout = {"x": StoredVariable((), (), "<f8")}
     packed = work.Job(plan, Path("/shared/runs/coats.zarr"), layout, versions()).packed()
     print(f"scheduler: the job of a task has {len(packed)} bytes")
     for count in (2, MANY):
@@ -196,7 +196,7 @@ def store(point: Any) -> None:
 
     print("store: points  a chunk  chunks   files of variables  bytes of a file       data")
     answer = lobes(vt.load("coated-gold"), 0, cos_theta=[1.0, 0.5], model="belcour2018")
-    layout = {name: Variable.of(*array) for name, array in answer.items()}
+    layout = {name: StoredVariable.of(*array) for name, array in answer.items()}
     found = {name: array for name, (_, array) in answer.items()}
     for count in TOTALS:
         fields = {**space(count).to_dict(), "material": vt.load("coated-gold").to_dict(), "vary": {

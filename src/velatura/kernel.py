@@ -339,7 +339,7 @@ EXTRAS = {
 }
 
 
-class Finding(NamedTuple):
+class Component(NamedTuple):
     """One row of `doctor`: the component, what was found, whether that suffices, and the command that installs it."""
 
     what: str
@@ -348,57 +348,59 @@ class Finding(NamedTuple):
     mend: str = ""
 
 
-def doctor() -> tuple[Finding, ...]:
+def doctor() -> tuple[Component, ...]:
     """The installed components, whether they are sufficient, and otherwise the command that installs them."""
     packages = [_find_package(name) for name in ("mitsuba", "drjit")]
     backends = [_find_llvm(), _find_cuda()] if all(row.ok for row in packages) else []
     return (_find_python(), *packages, *backends)
 
 
-def _find_python() -> Finding:
-    return Finding("Python", _dotted(sys.version_info[:3]), sys.version_info >= (3, 10), "install Python 3.10 or newer")
+def _find_python() -> Component:
+    return Component(
+        "Python", _dotted(sys.version_info[:3]), sys.version_info >= (3, 10), "install Python 3.10 or newer"
+    )
 
 
-def _find_package(name: str) -> Finding:
+def _find_package(name: str) -> Component:
     try:
-        return Finding(name, importlib.metadata.version(name), True)
+        return Component(name, importlib.metadata.version(name), True)
     except importlib.metadata.PackageNotFoundError:
-        return Finding(name, "missing", False, f"{sys.executable} -m pip install mitsuba")
+        return Component(name, "missing", False, f"{sys.executable} -m pip install mitsuba")
 
 
-def extras() -> tuple[Finding, ...]:
+def extras() -> tuple[Component, ...]:
     """The optional parts of Velatura, and their installed packages; a missing one is not an error."""
     return tuple(map(_find_extra, EXTRAS))
 
 
-def _find_extra(extra: str) -> Finding:
+def _find_extra(extra: str) -> Component:
     wanted = re.compile(rf"([\w-]+)[^;]*;.*\bextra == ['\"]{extra}['\"]")
     lines = importlib.metadata.requires("velatura") or ()
     names = dict.fromkeys(found[1] for line in lines if (found := wanted.fullmatch(line)))  # once, for all Pythons
     try:
         versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in names)
     except importlib.metadata.PackageNotFoundError:
-        return Finding(f"Extra {extra}", f'none (optional, {EXTRAS[extra]}): pip install "velatura[{extra}]"', True)
-    return Finding(f"Extra {extra}", versions, True)
+        return Component(f"Extra {extra}", f'none (optional, {EXTRAS[extra]}): pip install "velatura[{extra}]"', True)
+    return Component(f"Extra {extra}", versions, True)
 
 
-def _find_llvm() -> Finding:
+def _find_llvm() -> Component:
     version = llvm_version()
     if _llvm_works():
-        return Finding("LLVM", _dotted(version), True)
-    return Finding("LLVM", "missing" if version is None else f"{_dotted(version)}, too old", False, llvm_command())
+        return Component("LLVM", _dotted(version), True)
+    return Component("LLVM", "missing" if version is None else f"{_dotted(version)}, too old", False, llvm_command())
 
 
-def _find_cuda() -> Finding:
+def _find_cuda() -> Component:
     """A GPU is optional, so this row never fails."""
     dr = _drjit()
     if not dr.has_backend(dr.JitBackend.CUDA):
-        return Finding("CUDA", "none (optional)", True)
+        return Component("CUDA", "none (optional)", True)
     try:
         ctypes.CDLL("libnvoptix.so.1")
     except OSError:
-        return Finding("CUDA", f"{_dotted(dr.detail.cuda_version())}, no OptiX: BSDFs run, rendering does not", True)
-    return Finding("CUDA", f"{_dotted(dr.detail.cuda_version())} with OptiX", True)
+        return Component("CUDA", f"{_dotted(dr.detail.cuda_version())}, no OptiX: BSDFs run, rendering does not", True)
+    return Component("CUDA", f"{_dotted(dr.detail.cuda_version())} with OptiX", True)
 
 
 def _dotted(version: tuple[int, ...] | None) -> str:

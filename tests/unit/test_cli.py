@@ -27,7 +27,7 @@ import velatura
 from velatura.cli import options, progress
 from velatura.errors import MissingTool, NoSolution
 from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
-from velatura.kernel import Finding
+from velatura.kernel import Component
 from velatura.scenes.stage import width_and_height
 
 Run = Callable[..., tuple[int, str, str]]
@@ -249,7 +249,7 @@ def test_tables_are_measured(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_text_is_printed_as_it_is(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rationale: commands and names hold what Rich takes for markup. Expected: the same text, in tables and bars."""
-    finding = Finding("Extra sweep", 'pip install "velatura[sweep]" [/] :gold:', True)
+    finding = Component("Extra sweep", 'pip install "velatura[sweep]" [/] :gold:', True)
     monkeypatch.setattr("velatura.kernel.extras", lambda: (finding,))
     assert " ".join(run("doctor")[1].split()).count(finding.found) == 1
     monkeypatch.setenv("FORCE_COLOR", "1")  # as on a terminal

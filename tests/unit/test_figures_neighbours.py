@@ -7,7 +7,7 @@ import pytest
 
 import velatura as vt
 from velatura.figures import films_under_coats, neighbours
-from velatura.figures.neighbours import Metal
+from velatura.figures.neighbours import FilmedMetal
 from velatura.optics import fresnel
 from velatura.optics.films import Film, coherent
 from velatura.stack.spectra import srgb_weights
@@ -16,7 +16,7 @@ COSINES = np.array([1.0, 0.8, 0.5, 0.2])
 TITANIUM = films_under_coats.TITANIUM
 
 
-def summed(metal: Metal, n_1: float) -> np.ndarray:
+def summed(metal: FilmedMetal, n_1: float) -> np.ndarray:
     """The exact reflectance (N, 3), as colours in light of equal energy."""
     wavelengths_nm, weights = srgb_weights(d65=False)
     film = [Film(metal.film_eta, 0.0, metal.thickness_nm)]
@@ -30,7 +30,7 @@ def test_sums_over_orders_are_those_of_all_orders(
     n_1: float, thickness_nm: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Expected: exact with many orders; three miss some at grazing angles, and Gaussians are not the CIE's observer."""
-    metal = Metal(TITANIUM.eta, TITANIUM.k, 0.1, TITANIUM.film_eta, thickness_nm)
+    metal = FilmedMetal(TITANIUM.eta, TITANIUM.k, 0.1, TITANIUM.film_eta, thickness_nm)
     exact = np.clip(summed(metal, n_1), 0, 1)
     for sensitivity, error in ((neighbours.tabled, 0.05), (neighbours.fitted, 0.08)):
         assert neighbours.interference(COSINES, n_1, metal, sensitivity) == pytest.approx(exact, abs=error)
@@ -40,7 +40,7 @@ def test_sums_over_orders_are_those_of_all_orders(
 
 def test_colours_of_a_metal_stand_for_its_index() -> None:
     """Expected: without a film, in a vacuum, they are reflected at the normal and at the edge."""
-    bare = Metal(TITANIUM.eta, TITANIUM.k, 0.1, 1.0, 0.0)
+    bare = FilmedMetal(TITANIUM.eta, TITANIUM.k, 0.1, 1.0, 0.0)
     cosines = np.array([1.0, fresnel.EDGE])
     found = neighbours.interference(cosines, 1.0, bare, neighbours.tabled, by_colours=True)
     expected = [[fresnel.conductor(c, n, k) for n, k in zip(bare.eta, bare.k)] for c in cosines]

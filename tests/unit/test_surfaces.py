@@ -12,31 +12,31 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from velatura.scenes.objects import OBJECTS
-from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, join, lathe, rounded
+from velatura.scenes.surfaces import Array, Mesh, arc, cap, extrude, join, lathe, rounded
 
 
-def corners(surface: Surface, values: Array) -> tuple[Array, Array, Array]:
+def corners(surface: Mesh, values: Array) -> tuple[Array, Array, Array]:
     a, b, c = np.moveaxis(values[surface.triangles], 1, 0)
     return a, b, c
 
 
-def area_vectors(surface: Surface) -> Array:
+def area_vectors(surface: Mesh) -> Array:
     a, b, c = corners(surface, surface.positions)
     return np.cross(b - a, c - a) / 2.0
 
 
-def volume(surface: Surface) -> float:
+def volume(surface: Mesh) -> float:
     """By the divergence theorem, from the corners of the triangles alone."""
     a, _, _ = corners(surface, surface.positions)
     return float(np.sum(a * area_vectors(surface)) / 3.0)
 
 
-def mean_normals(surface: Surface) -> Array:
+def mean_normals(surface: Mesh) -> Array:
     a, b, c = corners(surface, surface.normals)
     return (a + b + c) / 3.0
 
 
-def tangents(surface: Surface) -> tuple[Array, Array, Array]:
+def tangents(surface: Mesh) -> tuple[Array, Array, Array]:
     """dp/du, dp/dv and the mean normal of every triangle, those aside that a pole has shrunk to nothing."""
     a, b, c = corners(surface, surface.positions)
     s, t, r = corners(surface, surface.uv)

@@ -18,7 +18,7 @@ import yaml
 import velatura as vt
 from velatura.errors import Damaged
 from velatura.sweeps import Plan, load_plan
-from velatura.sweeps.store import DONE, FAILED, Variable, create, existing
+from velatura.sweeps.store import DONE, FAILED, StoredVariable, create, existing
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -304,7 +304,7 @@ def test_foreign_files_are_left_alone(intact: Path, tmp_path: Path, recwarn: pyt
 def test_a_store_that_another_sweep_has_begun_meanwhile_is_left_to_it(tmp_path: Path) -> None:
     """Expected: of two sweeps that begin one store at once, the later one ends in one line; then it goes on."""
     store, plan = tmp_path / "a.zarr", Plan.from_dict({**GOLD, "what": number, "options": {}})
-    layout = dict.fromkeys(("alpha", "drawn"), Variable((), (), "<f8"))
+    layout = dict.fromkeys(("alpha", "drawn"), StoredVariable((), (), "<f8"))
     create(store, plan, layout)
     with pytest.raises(vt.InvalidInput) as caught:
         create(store, plan, layout)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from velatura.checks.grid import Grid, integrate
-from velatura.checks.probe import Array, Probe, Samples, Values, Wrong
+from velatura.checks.grid import HemisphereGrid, integrate
+from velatura.checks.probe import Array, Probe, ProbeSamples, Values, Wrong
 
 COSINES = (0.98, 0.8, 0.55, 0.3, 0.1)  # of incidence
 SAMPLES = 2**16  # at each of them
@@ -24,7 +24,7 @@ STEPS = 4
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnSamples:
     """Samples at D directions of incidence, N at each.
 
     Args:
@@ -37,7 +37,7 @@ class Drawn:
     """
 
     wi: Array
-    samples: Samples
+    samples: ProbeSamples
     asked: Values
     both: Values
     arrived: Array
@@ -65,7 +65,7 @@ class Integrals:
 
 
 @dataclass(frozen=True)
-class Pairs:
+class ReciprocalPairs:
     """Pairs of directions, half of them where the BSDF sends light, and f twice each way: noise differs, f does not.
 
     Args:
@@ -88,11 +88,11 @@ class Extremes:
     wo: Array
     values: Values
     sampled: Array
-    samples: Samples
+    samples: ProbeSamples
 
 
 @dataclass(frozen=True)
-class Turned:
+class TurnedLight:
     """Light (n, channels) from directions wi (n, 3), times solid angle, the same asked `again`, which differs by noise,
     and that of the BSDF whose layers are turned, for directions that are turned with them."""
 
@@ -111,12 +111,12 @@ class Evidence:
     transmits: bool
     two_sided: bool
     lossless: bool
-    drawn: Drawn
+    drawn: DrawnSamples
     integrals: Integrals
-    pairs: Pairs
+    pairs: ReciprocalPairs
     extremes: Extremes
-    expected: Drawn | None
-    turned: Turned | None
+    expected: DrawnSamples | None
+    turned: TurnedLight | None
 
 
 def gather(
@@ -168,7 +168,7 @@ def gather(
     )
 
 
-def _draw(probe: Probe, wi: Array, u: Array) -> Drawn:
+def _draw(probe: Probe, wi: Array, u: Array) -> DrawnSamples:
     each = np.repeat(wi, SAMPLES, axis=0)
     samples = probe.sample(each, u)
     asked, both = probe.eval_and_pdf(each, samples.wo), probe.eval_pdf(each, samples.wo)
@@ -179,10 +179,10 @@ def _draw(probe: Probe, wi: Array, u: Array) -> Drawn:
     energy = samples.weight * np.square(samples.eta)[:, None] * lit[:, None]
     shape = (len(wi), SAMPLES)
     delta = (samples.delta & arrived).reshape(shape)
-    return Drawn(wi, samples, asked, both, arrived.reshape(shape), delta, energy.reshape(*shape, -1))
+    return DrawnSamples(wi, samples, asked, both, arrived.reshape(shape), delta, energy.reshape(*shape, -1))
 
 
-def _index(drawn: Drawn) -> float:
+def _index(drawn: DrawnSamples) -> float:
     """Index below over index above, estimated from the samples that pass through."""
     wi = np.repeat(drawn.wi, SAMPLES, axis=0)
     wo, eta = drawn.samples.wo, drawn.samples.eta
@@ -195,12 +195,13 @@ def _squared_index(index: float, wi: Array, wo: Array) -> Array:
     return np.where(wi[..., 2] * wo[..., 2] > 0, 1.0, np.where(wi[..., 2] > 0, index**2, index**-2))
 
 
-def _integrate(probe: Probe, drawn: Drawn, rng: np.random.Generator) -> Integrals:
+def _integrate(probe: Probe, drawn: DrawnSamples, rng: np.random.Generator) -> Integrals:
     # Lay the grids where the pilot's samples fall, on every hemisphere that light may reach
     wo, usable = drawn.samples.wo.reshape(*drawn.arrived.shape, 3), drawn.arrived & ~drawn.delta
     sides = [[1, -1] if probe.transmits else [int(np.sign(wi[2]))] for wi in drawn.wi]
     grids = [
-        [Grid.around(wi, wo[k, :PILOT][usable[k, :PILOT]], side) for side in sides[k]] for k, wi in enumerate(drawn.wi)
+        [HemisphereGrid.around(wi, wo[k, :PILOT][usable[k, :PILOT]], side) for side in sides[k]]
+        for k, wi in enumerate(drawn.wi)
     ]
     counts = [[grid.count(wo[k, PILOT:][usable[k, PILOT:]]) for grid in grids[k]] for k in range(len(grids))]
 
@@ -228,7 +229,7 @@ def _integrate(probe: Probe, drawn: Drawn, rng: np.random.Generator) -> Integral
     )
 
 
-def _pair(probe: Probe, expected: Probe | None, index: float, rng: np.random.Generator) -> Pairs:
+def _pair(probe: Probe, expected: Probe | None, index: float, rng: np.random.Generator) -> ReciprocalPairs:
     # Draw wi by the light that meets the surface, wo by the BSDF or evenly
     u = rng.random((3, PAIRS))
     wi = _directions(np.sqrt(1 - u[0] * (1 - 1e-4)), u[1])  # cosines from 0.01 on
@@ -251,7 +252,7 @@ def _pair(probe: Probe, expected: Probe | None, index: float, rng: np.random.Gen
     theirs = None
     if expected:
         theirs = expected.eval_pdf(wi, wo).value / np.abs(wo[:, 2:]) * _squared_index(index, wi, wo)[:, None]
-    return Pairs(np.abs(wo[:, 2]) / density, there, back, theirs)
+    return ReciprocalPairs(np.abs(wo[:, 2]) / density, there, back, theirs)
 
 
 def _extremes(probe: Probe, rng: np.random.Generator) -> Extremes:
@@ -270,7 +271,7 @@ def _extremes(probe: Probe, rng: np.random.Generator) -> Extremes:
     return Extremes(wi, wo, probe.eval_pdf(wi, wo), sampled, samples)
 
 
-def _turn(probe: Probe, other: Probe, degrees: float, rng: np.random.Generator) -> Turned:
+def _turn(probe: Probe, other: Probe, degrees: float, rng: np.random.Generator) -> TurnedLight:
     each = PAIRS // len(TURNED)
     wi = np.repeat([_direction(cos, 2.4 * k) for k, cos in enumerate(TURNED)], each, axis=0)
     samples = probe.sample(wi, rng.random((len(wi), 3), dtype=np.float32))
@@ -285,7 +286,7 @@ def _turn(probe: Probe, other: Probe, degrees: float, rng: np.random.Generator) 
         other.eval_pdf(wi @ matrix.T, wo @ matrix.T),
     )
     density = (0.5 * here.pdf + 0.25 / np.pi)[:, None] * each
-    return Turned(wi, here.value / density, again.value / density, there.value / density)
+    return TurnedLight(wi, here.value / density, again.value / density, there.value / density)
 
 
 def _direction(cos_theta: float, phi: float) -> Array:

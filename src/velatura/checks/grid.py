@@ -22,7 +22,7 @@ _SCALES = 4.0 ** np.arange(1, 11)  # by which the distance of samples from their
 
 
 @dataclass(frozen=True)
-class Grid:
+class HemisphereGrid:
     """Cells and nodes of one hemisphere, seen from one direction.
 
     Args:
@@ -38,7 +38,7 @@ class Grid:
     rows: Array
 
     @classmethod
-    def around(cls, wi: Array, wo: Array, side: int) -> Grid:
+    def around(cls, wi: Array, wo: Array, side: int) -> HemisphereGrid:
         """The grid for light from wi (3,), fine where the directions wo (n, 3) lie."""
         azimuth = float(np.arctan2(-wi[1], -wi[0]))
         phi, height = _coordinates(wo[wo[:, 2] * side > 0], azimuth)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 from scipy.special import chdtrc, chdtri, ndtri
 
-from velatura.checks.evidence import PILOT, SAMPLES, Drawn, Evidence
+from velatura.checks.evidence import PILOT, SAMPLES, DrawnSamples, Evidence
 from velatura.checks.probe import Array
 from velatura.checks.report import Finding
 
@@ -232,7 +232,7 @@ def spread(evidence: Evidence, alarm: float) -> Finding:
     return Finding("spread", value <= HEAVY, value, HEAVY, detail, data)
 
 
-def _count_off(law: str, drawn: Drawn, off: dict[str, Array]) -> Finding:
+def _count_off(law: str, drawn: DrawnSamples, off: dict[str, Array]) -> Finding:
     looked_at = drawn.arrived & ~(drawn.delta & drawn.samples.declared.reshape(drawn.delta.shape))
     count = looked_at.sum()
     shares = {
@@ -311,7 +311,7 @@ def turning(evidence: Evidence, alarm: float) -> Finding | None:
     return Finding("turning", bool(share[at] <= SHIFT), float(share[at]), SHIFT, detail, data)
 
 
-def _flow(drawn: Drawn) -> Array:
+def _flow(drawn: DrawnSamples) -> Array:
     """Energy of smooth components, and its flow along x, y, z: (D, N, 4 channels)."""
     energy = drawn.energy * drawn.delta[..., None]
     wo = drawn.samples.wo.reshape(*drawn.arrived.shape, 3)

@@ -22,7 +22,7 @@ _BATCH = 2**16  # directions asked about at once
 _WAVELENGTHS = (450.0, 530.0, 600.0, 680.0)  # nm, where the variant is spectral
 
 
-class Samples(NamedTuple):
+class ProbeSamples(NamedTuple):
     """Samples of a BSDF: directions (n, 3), weights (n, channels), densities, indices, and whether they are of a smooth
     component, and of a kind that the flags have (n,)."""
 
@@ -81,7 +81,7 @@ class Probe:
         self.asked = 0
         self.wrong: list[Wrong] = []
 
-    def sample(self, wi: Array, u: Array) -> Samples:
+    def sample(self, wi: Array, u: Array) -> ProbeSamples:
         """Samples for directions (n, 3) and uniform numbers (n, 3); directions that have no length point upwards."""
         wo, weight, pdf, eta, delta, declared = _in_batches(self._sample, wi, u)
         unit = np.abs(np.linalg.norm(wo, axis=1) - 1) < 1e-3
@@ -93,7 +93,7 @@ class Probe:
             "density of a sample", wi, wo, np.where(lit, pdf, np.nan_to_num(pdf, posinf=0, neginf=0)), lit
         )
         self._noted("length of a sample", wi, wo, np.where(unit, 1.0, np.nan), lit)
-        return Samples(wo, weight * unit[:, None], pdf * unit, eta, delta, declared)
+        return ProbeSamples(wo, weight * unit[:, None], pdf * unit, eta, delta, declared)
 
     def eval_pdf(self, wi: Array, wo: Array, offset: float = 0.0) -> Values:
         """Value and density from `eval_pdf`; where these are noisy, points some offset apart have other noise."""

@@ -10,7 +10,7 @@ import typer
 from velatura.cli import options
 
 
-class Format(str, Enum):
+class CitationFormat(str, Enum):
     """How entries are printed."""
 
     bibtex = "bibtex"
@@ -25,7 +25,9 @@ def cite(
             help=f"{options.MODELS}; reference, the walk; weidlich_wilkie, the baseline. Default: velatura.",
         ),
     ] = None,
-    form: Annotated[Format, typer.Option("--format", help="BibTeX, or a line of text for each.")] = Format.bibtex,
+    form: Annotated[
+        CitationFormat, typer.Option("--format", help="BibTeX, or a line of text for each.")
+    ] = CitationFormat.bibtex,
 ) -> None:
     """Print what to cite for a picture.
 
@@ -34,4 +36,4 @@ def cite(
     from velatura import citations
 
     found = citations.entries(models or ()).values()
-    print("\n\n".join(found) if form is Format.bibtex else "\n".join(map(citations.text, found)))
+    print("\n\n".join(found) if form is CitationFormat.bibtex else "\n".join(map(citations.text, found)))

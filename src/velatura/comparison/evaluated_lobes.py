@@ -32,7 +32,7 @@ BASE_SAMPLES = 2**17  # of a diffuse base, which is smooth
 
 
 @dataclasses.dataclass(frozen=True)
-class Light:
+class LightPoints:
     """Light that leaves: points (2, n) on the projected disc and their energies (3, n)."""
 
     points: Array
@@ -92,7 +92,7 @@ def _drawn(body: Body, stack: Stack, statistics: StackLobes, j: int, incident: A
     wi: Direction = (x, y, z)
     u = at_nodes(1, LIT_SAMPLES, None)
 
-    def light(part: int | None) -> Light:
+    def light(part: int | None) -> LightPoints:
         each = [k == part for k in range(count + 1)]
         asked = Query(each if part is not None else False, part is None, radiance=False)
         wo, _ = body.sample(wi, *u, asked)
@@ -112,13 +112,13 @@ def _drawn(body: Body, stack: Stack, statistics: StackLobes, j: int, incident: A
     return lobes, np.sum([distribution(each) for each in lights], axis=0)
 
 
-def _sampled(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> Light:
+def _sampled(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction, place: int | None = None) -> LightPoints:
     """A lobe as it is evaluated; one that is smooth, in its one direction.
 
     `place` is its place among the lobes that the symmetric form evaluates, None for a lobe that it does not.
     """
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
-        return Light(-np.stack(wi[:2]), _colour(lobe.energy))
+        return LightPoints(-np.stack(wi[:2]), _colour(lobe.energy))
     if body.above.model.form == "forward" or place is None:
         wo = mixture.sample([lobe], None, wi, 0.0, *square(SAMPLES))
         return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo))
@@ -127,36 +127,36 @@ def _sampled(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction, place: int | No
     return _light(wo, *mixture.eval_pdf([lobe], None, wi, wo, [lit]))
 
 
-def _sampled_below(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction) -> Light:
+def _sampled_below(body: bsdf.Lobed, lobe: adding.Lobe, wi: Direction) -> LightPoints:
     """The transmitted lobe as it is evaluated, as energy."""
     if np.all(np.maximum(*lobe.roughness[:2]) == 0):
-        return Light(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
+        return LightPoints(-np.stack(wi[:2]) / body.eta, _colour(lobe.energy))
     asked = Query(reflection=False, radiance=False)
     wo, _ = body.sample(wi, 0.0, *square(LIT_SAMPLES), asked)
     return _light(wo, *body.eval_pdf(wi, wo, asked))
 
 
-def _light(wo: Direction, value: Array, density: Array) -> Light:
+def _light(wo: Direction, value: Array, density: Array) -> LightPoints:
     count = len(density)
     energy = np.where(density > 0, value / np.where(density > 0, density, 1), 0) / count
-    return Light(np.stack(wo[:2]), _colour(energy, count))
+    return LightPoints(np.stack(wo[:2]), _colour(energy, count))
 
 
-def _sampled_base(base: Base) -> Light:
+def _sampled_base(base: Base) -> LightPoints:
     """Directions by the cosine law, uniform on the disc."""
     u1, u2 = square(BASE_SAMPLES)
     radius, phi = np.sqrt(u1), 2 * np.pi * u2
     points = np.stack([radius * np.cos(phi), radius * np.sin(phi)])
     value = base.value((points[0], points[1], np.sqrt(1 - u1)))
-    return Light(points, _colour(np.pi * value / BASE_SAMPLES, BASE_SAMPLES))
+    return LightPoints(points, _colour(np.pi * value / BASE_SAMPLES, BASE_SAMPLES))
 
 
-def _described(lobe: adding.Lobe, light: Light) -> WalkedLobe:
+def _described(lobe: adding.Lobe, light: LightPoints) -> WalkedLobe:
     alpha_u, alpha_v, rotation = (np.broadcast_to(x, 1)[0] for x in lobe.roughness)
     return _lobe(lobe.energy, (alpha_u, alpha_v), rotation, light)
 
 
-def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: Light) -> WalkedLobe:
+def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: LightPoints) -> WalkedLobe:
     """Moments on the disc weigh by the mean of the colours, as the truth's do; NaN where there is no light."""
     grey = light.energy.mean(axis=0)
     share = grey / (grey.sum() or np.nan)
@@ -166,7 +166,7 @@ def _lobe(energy: Array, alpha: tuple[float, float], rotation: float, light: Lig
     return WalkedLobe(_colour(energy)[:, 0], np.array(alpha), np.array(rotation), mean, covariance)
 
 
-def distribution(light: Light) -> Array:
+def distribution(light: LightPoints) -> Array:
     """Energies (3, bins, bins) over the projected disc."""
     return grids(light.points, light.energy)[:, 0]
 

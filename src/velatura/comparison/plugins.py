@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from velatura import api, files, kernel
 from velatura.bakes import TARGETS
 from velatura.checks.probe import Probe
-from velatura.comparison.evaluated_lobes import Light, distribution
+from velatura.comparison.evaluated_lobes import LightPoints, distribution
 from velatura.comparison.result import Account
 from velatura.errors import InvalidInput
 from velatura.model import MODELS
@@ -99,7 +99,7 @@ def account(bsdf: Any, stack: Stack, cos_theta: Sequence[float]) -> Account:
     for wi in directions(cos_theta):
         drawn = probe.sample(np.broadcast_to(wi, (SAMPLES, 3)), rng.random((SAMPLES, 3)))
         up = drawn.wo[:, 2] > 0
-        grids.append(distribution(Light(drawn.wo[up, :2].T, drawn.weight[up].T / SAMPLES)))
+        grids.append(distribution(LightPoints(drawn.wo[up, :2].T, drawn.weight[up].T / SAMPLES)))
     return without_lobes(stack, np.stack(grids, axis=1))
 
 

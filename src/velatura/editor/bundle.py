@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from velatura.errors import MissingTool
-from velatura.kernel import Finding
+from velatura.kernel import Component
 
 STATIC = Path(__file__).with_name("static")
 SOURCES = Path(__file__).with_name("page")
@@ -20,10 +20,10 @@ def require() -> Path:
     return STATIC
 
 
-def finding() -> Finding:
+def finding() -> Component:
     """Whether the page is installed, as `velatura doctor` reports it."""
     there = all((STATIC / name).is_file() for name in ("index.html", "editor.js", "widget.js"))
     # An installation has no sources, and gets the page with the package
     what = f"--editable {SOURCES.parents[3]}" if SOURCES.is_dir() else "--force-reinstall --no-deps velatura"
     mend = f"{sys.executable} -m pip install {what}"
-    return Finding("Editor's page", "bundled", True) if there else Finding("Editor's page", "missing", False, mend)
+    return Component("Editor's page", "bundled", True) if there else Component("Editor's page", "missing", False, mend)

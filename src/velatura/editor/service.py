@@ -35,7 +35,7 @@ from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, MODELS, SWITCHES, Model
 from velatura.scenes.environments import PHOTOGRAPHS, sky, studio
 from velatura.scenes.objects import OBJECTS, ground, plinth
-from velatura.scenes.surfaces import Surface
+from velatura.scenes.surfaces import Mesh
 from velatura.stack import Named, Stack, Texture, dumps, loads, names, preset, presets, rgb
 from velatura.stack.layers import LAYERS, LayerRecord, has
 from velatura.stack.schema import Parameter, Record, parameters, unknown
@@ -224,7 +224,7 @@ def object_(body: Body) -> Answer:
     return {"parts": [_part(role, surface) for role, surface in surfaces.items()], "view": OBJECTS[name].view._asdict()}
 
 
-def _part(role: str, surface: Surface) -> Answer:
+def _part(role: str, surface: Mesh) -> Answer:
     return {
         "role": role,
         "positions": array(surface.positions),

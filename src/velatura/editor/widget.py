@@ -27,7 +27,7 @@ LOWEST = 200  # pixels
 THREADS = 4  # that answer one widget
 
 
-class Read(traitlets.TraitType):
+class ReadTrait(traitlets.TraitType):
     """A trait that a function reads, which raises InvalidInput where there is no meaning to a value."""
 
     def __init__(self, read: Callable[[Any], Any]) -> None:
@@ -117,9 +117,9 @@ class Editor(anywidget.AnyWidget):
     _esm = bundle.require() / "widget.js"
     _css = bundle.require() / "widget.css"
 
-    stack = Read(_stack).tag(sync=True, to_json=_written, from_json=_described)
-    model = Read(_model).tag(sync=True, to_json=_chosen, from_json=_named)
-    height = Read(_height).tag(sync=True)
+    stack = ReadTrait(_stack).tag(sync=True, to_json=_written, from_json=_described)
+    model = ReadTrait(_model).tag(sync=True, to_json=_chosen, from_json=_named)
+    height = ReadTrait(_height).tag(sync=True)
 
     def __init__(
         self,

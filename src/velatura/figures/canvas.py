@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from velatura import api, files, kernel, scenes
-from velatura.checks.probe import Probe, Samples
+from velatura.checks.probe import Probe, ProbeSamples
 from velatura.comparison import check_figure
 from velatura.errors import needs
 from velatura.figures import Progress
@@ -109,7 +109,7 @@ def ratio(seconds: Array, others: Array) -> tuple[float, float]:
     return float(median), float(np.sqrt(np.pi / 2 / seconds.size) * (upper - lower) / 1.349)
 
 
-def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **switches: Any) -> Samples:
+def sampled(stack: Stack, model: str, cosine: float, paths: int, seed: int, **switches: Any) -> ProbeSamples:
     """Lobe of a BSDF for light from one direction in the plane of the tangent."""
     wi = np.array([np.sqrt(1 - cosine**2), 0, cosine])
     u = np.random.default_rng(seed).random((paths, 3))

@@ -16,7 +16,7 @@ import numpy as np
 from velatura import scenes
 from velatura.checks.probe import Probe
 from velatura.figures import Progress, canvas, neighbours
-from velatura.figures.neighbours import Coat, Metal
+from velatura.figures.neighbours import ClearCoat, FilmedMetal
 from velatura.optics import films
 from velatura.optics.coatings import RANGE_NM, Coating, ColouredFilm
 from velatura.stack import Film, Interface, Named, Stack, rgb, srgb_sensitivity
@@ -35,13 +35,13 @@ BANDS = 40  # height of a strip of colours, in pixels
 
 # Titanium: Johnson and Christy 1974; its oxide at 550 nm: Siefke et al. 2016. Tantalum: Ta of the files in Mitsuba's
 # wheel; its oxide at 550 nm: Gao et al. 2012.
-TITANIUM = Metal((2.737, 2.507, 2.236), (3.828, 3.397, 3.010), 0.15, 2.435, 50.0)
-MIRROR = Metal(rgb(Named("Ta", "eta")), rgb(Named("Ta", "k")), 0.01, 2.157, 160.0)
+TITANIUM = FilmedMetal((2.737, 2.507, 2.236), (3.828, 3.397, 3.010), 0.15, 2.435, 50.0)
+MIRROR = FilmedMetal(rgb(Named("Ta", "eta")), rgb(Named("Ta", "k")), 0.01, 2.157, 160.0)
 METALS = {"titanium": TITANIUM, "tantalum": MIRROR}
-COATS = {"bare": None, "varnish": Coat(1.5, 0.01), "rough coat": Coat(1.5, 0.3)}
+COATS = {"bare": None, "varnish": ClearCoat(1.5, 0.01), "rough coat": ClearCoat(1.5, 0.3)}
 
 
-def stack_of(metal: Metal, coat: Coat | None) -> Stack:
+def stack_of(metal: FilmedMetal, coat: ClearCoat | None) -> Stack:
     """The same as a stack."""
     film = Film(eta=metal.film_eta, thickness_nm=metal.thickness_nm)
     base = Interface(eta=metal.eta, k=metal.k, alpha=metal.alpha, films=(film,))

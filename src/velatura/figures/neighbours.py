@@ -45,7 +45,7 @@ GRAZING = 1e-3  # least cosine that a model is asked for
 
 
 @dataclass(frozen=True)
-class Metal:
+class FilmedMetal:
     """A metal of index eta + i k (colours) and roughness alpha, with a film."""
 
     eta: tuple[float, float, float]
@@ -56,7 +56,7 @@ class Metal:
 
 
 @dataclass(frozen=True)
-class Coat:
+class ClearCoat:
     """A clear coat."""
 
     eta: float
@@ -69,7 +69,7 @@ class Coat:
 
 
 @dataclass(frozen=True)
-class Lobe:
+class GgxLobe:
     """A lobe of GGX: its Fresnel term (NODES, 3) over the cosine of facets, times a weight over that of the view."""
 
     alpha: float
@@ -77,17 +77,17 @@ class Lobe:
     weight: Array
 
 
-def closures(metal: Metal, coat: Coat | None) -> list[Lobe]:
+def closures(metal: FilmedMetal, coat: ClearCoat | None) -> list[GgxLobe]:
     """Lobes of MaterialX and OSL."""
     return _coated(coat, metal.alpha, interference(_COSINES, 1.0, metal, fitted))
 
 
-def principled(metal: Metal, coat: Coat | None) -> list[Lobe]:
+def principled(metal: FilmedMetal, coat: ClearCoat | None) -> list[GgxLobe]:
     """Lobes of Blender."""
     return _coated(coat, metal.alpha, interference(_COSINES, 1.0, metal, tabled, by_colours=True))
 
 
-def openpbr(metal: Metal, coat: Coat | None) -> list[Lobe]:
+def openpbr(metal: FilmedMetal, coat: ClearCoat | None) -> list[GgxLobe]:
     """Lobes that the text of OpenPBR asks for."""
     if coat is None:
         return closures(metal, None)
@@ -102,7 +102,7 @@ def openpbr(metal: Metal, coat: Coat | None) -> list[Lobe]:
     return _coated(coat, alpha, base, (1 - kept) / (1 - base[-1] * kept))
 
 
-NEIGHBOURS: dict[str, Callable[[Metal, Coat | None], list[Lobe]]] = {
+NEIGHBOURS: dict[str, Callable[[FilmedMetal, ClearCoat | None], list[GgxLobe]]] = {
     "OpenPBR": openpbr,
     "Blender": principled,
     "MaterialX, OSL": closures,
@@ -111,19 +111,21 @@ NEIGHBOURS: dict[str, Callable[[Metal, Coat | None], list[Lobe]]] = {
 _COSINES = np.linspace(0, 1, NODES)
 
 
-def _coated(coat: Coat | None, alpha: float, base: Array, darkening: Array | float = 1.0) -> list[Lobe]:
+def _coated(coat: ClearCoat | None, alpha: float, base: Array, darkening: Array | float = 1.0) -> list[GgxLobe]:
     plain = np.ones((NODES, 3))
     if coat is None:
-        return [Lobe(alpha, base, plain)]
+        return [GgxLobe(alpha, base, plain)]
     above = np.repeat(np.asarray(fresnel.dielectric(_COSINES, coat.eta))[:, None], 3, axis=1)
     left = (1 - coat.albedo(_COSINES))[:, None]
-    return [Lobe(coat.alpha, above, plain), Lobe(alpha, base, darkening * left * plain)]
+    return [GgxLobe(coat.alpha, above, plain), GgxLobe(alpha, base, darkening * left * plain)]
 
 
 # The film
 
 
-def interference(cosines: Array, n_1: float, metal: Metal, sensitivity: Sensitivity, by_colours: bool = False) -> Array:
+def interference(
+    cosines: Array, n_1: float, metal: FilmedMetal, sensitivity: Sensitivity, by_colours: bool = False
+) -> Array:
     """Reflectance (N, 3) of a metal with a film for cosines (N,) in a medium of index n_1, clipped to 0 to 1.
 
     R = C_0 + 2 sum over m of Re(C_m exp(i m phi) S(m D)), C_0 = R_12 + R_s, C_m = (R_s - T_121) (R_12 R_23)^(m/2),
@@ -207,7 +209,7 @@ def tabled(path_nm: Array) -> Array:
 # As a material
 
 
-def bsdf(parts: list[Lobe]) -> Any:
+def bsdf(parts: list[GgxLobe]) -> Any:
     """A `mi.BSDF` of lobes, which are chosen alike often."""
     made = [(max(part.alpha, ALPHA_MIN), Coated(part.fresnel, 1), Coated(part.weight, 1)) for part in parts]
     return _plugin(kernel.mitsuba())(made)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from velatura import kernel
 from velatura.errors import InvalidInput
 from velatura.optics.polarisation import horizontal
-from velatura.reference.layers import Layers, from_material, zeros
+from velatura.reference.layers import WalkedLayers, from_material, zeros
 from velatura.reference.walk import walk
 from velatura.stack import RGB, Address, Material, Stack
 
@@ -67,7 +67,7 @@ def trace(
 
 
 @kernel.exclusive
-def _part(layers: Layers, wi: Array, count: int, seed: int, start: int, polarised: bool) -> Ends:
+def _part(layers: WalkedLayers, wi: Array, count: int, seed: int, start: int, polarised: bool) -> Ends:
     import drjit as dr
     import drjit.llvm as types
 
@@ -89,7 +89,7 @@ def _part(layers: Layers, wi: Array, count: int, seed: int, start: int, polarise
 
 
 @kernel.exclusive
-def _layers(stack: Stack, microsurface: bool) -> Layers:
+def _layers(stack: Stack, microsurface: bool) -> WalkedLayers:
     """The stack in Dr.Jit numbers, opaque to its compiler, so that stacks of one make share a kernel."""
     import drjit as dr
     import drjit.llvm as types

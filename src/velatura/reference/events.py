@@ -16,20 +16,20 @@ from velatura.ops import Value
 from velatura.optics import ggx, refraction
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Polarisation, unpolarised
-from velatura.reference.layers import Layers, Surface, relative_index
+from velatura.reference.layers import WalkedLayers, WalkedSurface, relative_index
 
 HUGE = 1e15  # products of densities stay finite
 
 
 @dataclass(frozen=True)
-class Meeting:
+class SurfaceMeeting:
     """A path that meets surface `j` from `wi`, out of a slab of index `n_in`; beyond lies index `n_out`.
 
     That is in the stack where the light comes from `above`, or else below the surface. `light` is its polarisation,
     along -wi; None where that is left out.
     """
 
-    layers: Layers
+    layers: WalkedLayers
     j: Value
     n_in: Value
     n_out: Value
@@ -51,7 +51,7 @@ class Meeting:
 
 
 @dataclass(frozen=True)
-class Scattered:
+class ScatteringEvent:
     """A direction with its weight: value over density where it was drawn, else the value f |cos theta_o|.
 
     The densities weigh strategies against each other: that of scattering on (`sample`), and that of coming back the
@@ -68,7 +68,7 @@ class Scattered:
     light: Polarisation | None = None
 
 
-def sample(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3: Value) -> Scattered:
+def sample(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Value, u3: Value) -> ScatteringEvent:
     """Scatter once; reflection or refraction is chosen by the mean of the colours that the path carries."""
     return _with_diffuse_base(
         meeting,
@@ -77,7 +77,7 @@ def sample(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3: Value) ->
     )
 
 
-def evaluate(meeting: Meeting, wo: Direction, reflected: Value) -> Scattered:
+def evaluate(meeting: SurfaceMeeting, wo: Direction, reflected: Value) -> ScatteringEvent:
     """Scattering into `wo`, on the upper side where `reflected`; 0 at a smooth surface."""
     return _with_diffuse_base(
         meeting,
@@ -86,7 +86,7 @@ def evaluate(meeting: Meeting, wo: Direction, reflected: Value) -> Scattered:
     )
 
 
-def sample_refraction(meeting: Meeting, u1: Value, u2: Value) -> Scattered:
+def sample_refraction(meeting: SurfaceMeeting, u1: Value, u2: Value) -> ScatteringEvent:
     """Refract at a dielectric without a choice; `density` is that of this, `density_back` of `sample` coming back."""
     # Refract about a visible normal
     surface, eta = meeting.layers.surface(meeting.j), meeting.eta
@@ -100,10 +100,10 @@ def sample_refraction(meeting: Meeting, u1: Value, u2: Value) -> Scattered:
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(surface.smooth, 1.0, density)
     back = ops.select(surface.smooth, _spread(o, i, 1 / eta), back) * ops.mean(transmittance)
-    return Scattered(surface.out_of(o), weight, False, density, back)
+    return ScatteringEvent(surface.out_of(o), weight, False, density, back)
 
 
-def _sample_interface(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3: Value) -> Scattered:
+def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Value, u3: Value) -> ScatteringEvent:
     # Meet a visible normal
     surface, eta = meeting.layers.surface(meeting.j), meeting.eta
     i = surface.into(meeting.wi)
@@ -124,10 +124,10 @@ def _sample_interface(meeting: Meeting, carried: Value, u1: Value, u2: Value, u3
     density = ops.select(surface.smooth, _spread(i, o, eta), density) * ops.mean(share)
     light = select(reflected, mirrored, refracted)
     light = light and light.seen_by(surface.out_of)
-    return Scattered(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back), light)
+    return ScatteringEvent(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back), light)
 
 
-def _evaluate_interface(meeting: Meeting, wo: Direction, reflected: Value) -> Scattered:
+def _evaluate_interface(meeting: SurfaceMeeting, wo: Direction, reflected: Value) -> ScatteringEvent:
     # Find the normal that serves
     surface, eta = meeting.layers.surface(meeting.j), ops.select(reflected, 1.0, meeting.eta)
     i, o = surface.into(meeting.wi), surface.into(wo)
@@ -138,10 +138,10 @@ def _evaluate_interface(meeting: Meeting, wo: Direction, reflected: Value) -> Sc
     share = ops.select(reflected, *meeting.shares(ops.maximum(cos_i, 0.0)))
     density, back = _densities(surface, i, h, o, eta)
     density = ops.select(serves, density, 0.0)
-    return Scattered(wo, share * density * surface.masking(o), reflected, density * ops.mean(share), back)
+    return ScatteringEvent(wo, share * density * surface.masking(o), reflected, density * ops.mean(share), back)
 
 
-def _densities(surface: Surface, i: Direction, h: Direction, o: Direction, eta: Value) -> tuple[Value, Value]:
+def _densities(surface: WalkedSurface, i: Direction, h: Direction, o: Direction, eta: Value) -> tuple[Value, Value]:
     """Densities of the way from i to o by visible normals, per solid angle, and of the way back; Fresnel left out."""
     cos_i, cos_o = ggx.dot(i, h), ggx.dot(o, h)
     onward = surface.visible(i, h, ops.absolute(cos_i)) * refraction.jacobian(cos_i, cos_o, eta)
@@ -154,27 +154,27 @@ def _spread(i: Direction, o: Direction, eta: Value) -> Value:
     return ops.divide(eta * eta * ops.absolute(o[2]), ops.absolute(i[2]))
 
 
-def _sample_diffuse(meeting: Meeting, u1: Value, u2: Value) -> Scattered:
+def _sample_diffuse(meeting: SurfaceMeeting, u1: Value, u2: Value) -> ScatteringEvent:
     radius, phi, z = ops.sqrt(u1), 2 * pi * u2, ops.sqrt(1 - u1)
     wo = radius * ops.cos(phi), radius * ops.sin(phi), z
     light = meeting.light and unpolarised(wo, meeting.light.q)
-    return Scattered(wo, meeting.layers.albedo, True, z / pi, 0.0, light)
+    return ScatteringEvent(wo, meeting.layers.albedo, True, z / pi, 0.0, light)
 
 
-def _evaluate_diffuse(albedo: Value, wo: Direction) -> Scattered:
+def _evaluate_diffuse(albedo: Value, wo: Direction) -> ScatteringEvent:
     density = ops.maximum(wo[2], 0.0) / pi
-    return Scattered(wo, albedo * density, True, density, 0.0)
+    return ScatteringEvent(wo, albedo * density, True, density, 0.0)
 
 
 def _with_diffuse_base(
-    meeting: Meeting, interface: Callable[[], Scattered], diffuse: Callable[[], Scattered]
-) -> Scattered:
+    meeting: SurfaceMeeting, interface: Callable[[], ScatteringEvent], diffuse: Callable[[], ScatteringEvent]
+) -> ScatteringEvent:
     if meeting.layers.base != "diffuse":
         return interface()
     if meeting.layers.count == 1:
         return diffuse()
     pairs = zip(vars(diffuse()).values(), vars(interface()).values())
-    return Scattered(*(select(meeting.opaque, a, b) for a, b in pairs))
+    return ScatteringEvent(*(select(meeting.opaque, a, b) for a, b in pairs))
 
 
 def select(where: Value, a: Value, b: Value) -> Value:

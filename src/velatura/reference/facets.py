@@ -15,7 +15,7 @@ from velatura.optics import ggx, microsurface, refraction
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Polarisation
 from velatura.reference import events
-from velatura.reference.events import Meeting, Scattered, select
+from velatura.reference.events import ScatteringEvent, SurfaceMeeting, select
 
 _MOST_EVENTS = 1000
 _FLOOR = 0.02  # density, per steradian
@@ -43,8 +43,8 @@ class Flight:
 
 
 def scatter(
-    types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, target: Direction, reflected: Value
-) -> tuple[Scattered, Scattered, Any]:
+    types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, target: Direction, reflected: Value
+) -> tuple[ScatteringEvent, ScatteringEvent, Any]:
     """Scatter until the light leaves the interface; also the value for the direction `target`."""
     # Scatter as if smooth or diffuse, where it is
     once = events.sample(meeting, carried, *(rng.next_float32() for _ in range(3)))
@@ -63,7 +63,7 @@ def scatter(
     return _choose(rough, many, once), _choose(rough, value, towards), flight.rng
 
 
-def sample_refraction(types: Any, meeting: Meeting, rng: Any) -> tuple[Scattered, Any]:
+def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[ScatteringEvent, Any]:
     """Scatter until the light leaves the interface; its weight is 0 where that is by reflection."""
     # Refract once where the interface is smooth
     once = events.sample_refraction(meeting, rng.next_float32(), rng.next_float32())
@@ -77,14 +77,14 @@ def sample_refraction(types: Any, meeting: Meeting, rng: Any) -> tuple[Scattered
     # Weigh by what single events would do, here and back
     i = meeting.wi
     below = meeting.above ^ True
-    back = Meeting(meeting.layers, meeting.j, meeting.n_out, meeting.n_in, (wo[0], wo[1], -wo[2]), below)
+    back = SurfaceMeeting(meeting.layers, meeting.j, meeting.n_out, meeting.n_in, (wo[0], wo[1], -wo[2]), below)
     densities = events.evaluate(back, (i[0], i[1], -i[2]), False)
     turned = replace(densities, wo=wo, density=densities.density_back, density_back=densities.density)
     many = _weighed(turned, ops.select(through, flight.weight, 0.0))
     return _choose(rough, many, once), flight.rng
 
 
-def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, target: Direction) -> Flight:
+def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, target: Direction) -> Flight:
     """Follow light from facet to facet; `target` is a direction away from the surface, up or down."""
     import drjit as dr
 
@@ -132,7 +132,7 @@ def _fly(types: Any, meeting: Meeting, carried: Value, rng: Any, active: Value, 
     return flight
 
 
-def _value(meeting: Meeting, flight: Flight, i: Direction, goal: Direction) -> Value:
+def _value(meeting: SurfaceMeeting, flight: Flight, i: Direction, goal: Direction) -> Value:
     """Light that a facet met from i scatters along `goal` and out of the interface, f |cos theta_o|."""
     # Find the facet that serves
     same_side = goal[2] > 0
@@ -151,23 +151,23 @@ def _value(meeting: Meeting, flight: Flight, i: Direction, goal: Direction) -> V
     return share * ops.select(serves, density * leaves, 0.0)
 
 
-def _eta(meeting: Meeting, outside: Value) -> Value:
+def _eta(meeting: SurfaceMeeting, outside: Value) -> Value:
     return ops.select(outside, meeting.eta, 1 / meeting.eta)
 
 
-def _sides(meeting: Meeting, outside: Value) -> tuple[Value, Value, Value]:
+def _sides(meeting: SurfaceMeeting, outside: Value) -> tuple[Value, Value, Value]:
     """Indices of the medium that the light is in, and of that beyond; and whether the first is the one above."""
     here = ops.select(outside, meeting.n_in, meeting.n_out)
     there = ops.select(outside, meeting.n_out, meeting.n_in)
     return here, there, outside ^ meeting.above ^ True
 
 
-def _weighed(event: Scattered, weight: Value) -> Scattered:
+def _weighed(event: ScatteringEvent, weight: Value) -> ScatteringEvent:
     return replace(event, weight=weight, density=event.density + _FLOOR, density_back=event.density_back + _FLOOR)
 
 
-def _choose(where: Value, a: Scattered, b: Scattered) -> Scattered:
-    return Scattered(*(select(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
+def _choose(where: Value, a: ScatteringEvent, b: ScatteringEvent) -> ScatteringEvent:
+    return ScatteringEvent(*(select(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
 
 
 def _reverse(w: Direction) -> Direction:

@@ -28,7 +28,7 @@ _MATCHED = 1e-3  # and so is one between indices this close, which bends no ligh
 
 
 @dataclass(frozen=True)
-class Surface:
+class WalkedSurface:
     """The roughness of one surface, positive, and its frame, turned by `rotation` (radians)."""
 
     alpha_u: Value
@@ -62,7 +62,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Slab:
+class WalkedSlab:
     """A medium by its optical depths along the normal, and its asymmetry; `scatters` decides which code is compiled."""
 
     absorption: Value = 0.0
@@ -82,11 +82,11 @@ class Slab:
         return ops.exp(-(self.absorption + self.scattering) * length)
 
 
-Part = TypeVar("Part", Surface, Slab)
+Part = TypeVar("Part", WalkedSurface, WalkedSlab)
 
 
 @dataclass(frozen=True)
-class Layers:
+class WalkedLayers:
     """Surfaces and slabs from the top, slab n included; `base` is the kind of the last surface.
 
     With `microsurface`, light scatters many times between the facets of a surface. `films` are those on each surface,
@@ -94,8 +94,8 @@ class Layers:
     """
 
     base: str
-    surfaces: tuple[Surface, ...]
-    slabs: tuple[Slab, ...]
+    surfaces: tuple[WalkedSurface, ...]
+    slabs: tuple[WalkedSlab, ...]
     index: tuple[Value, ...]
     extinction: Value = 0.0
     albedo: Value = 0.0
@@ -116,7 +116,7 @@ class Layers:
         """Whether any medium scatters."""
         return any(slab.scatters for slab in self.slabs)
 
-    def reversed(self, where: Value) -> Layers:
+    def reversed(self, where: Value) -> WalkedLayers:
         """The stack seen from below where the condition holds; only for one that transmits."""
 
         def swap(items: Sequence[Value]) -> tuple[Value, ...]:
@@ -131,10 +131,10 @@ class Layers:
 
     # Surfaces and slabs -----------------------------------------------------------------------------------------------
 
-    def surface(self, j: Value) -> Surface:
+    def surface(self, j: Value) -> WalkedSurface:
         return _picked(self.surfaces, j)
 
-    def slab(self, k: Value) -> Slab:
+    def slab(self, k: Value) -> WalkedSlab:
         return _picked(self.slabs, k)
 
     def is_base(self, j: Value) -> Value:
@@ -236,32 +236,32 @@ class Layers:
         return shares, reflection.applied(light), refraction.applied(light)
 
 
-def from_material(material: Material, microsurface: bool) -> Layers:
+def from_material(material: Material, microsurface: bool) -> WalkedLayers:
     """The layers of a material, in numbers and colours of any dialect."""
-    surfaces: list[Surface] = []
-    slabs: list[Slab] = []
+    surfaces: list[WalkedSurface] = []
+    slabs: list[WalkedSlab] = []
     index: list[Value] = [material.exterior]
     films: list[OfInterface | None] = []
-    medium, last = Slab(), material.layers[-1]
+    medium, last = WalkedSlab(), material.layers[-1]
     for layer, on_it in zip(material.solid().layers, coated.of(material)):
         if isinstance(layer, MediumValues):
-            medium = Slab(_product(layer.sigma_a, layer.depth), _product(layer.sigma_s, layer.depth), layer.g)
+            medium = WalkedSlab(_product(layer.sigma_a, layer.depth), _product(layer.sigma_s, layer.depth), layer.g)
             continue
         slabs.append(medium)
         films.append(on_it)
-        medium = Slab()
+        medium = WalkedSlab()
         if isinstance(layer, DiffuseValues):
             index.append(1.0)
-            surfaces.append(Surface(1.0, 1.0, 0.0, False))
+            surfaces.append(WalkedSurface(1.0, 1.0, 0.0, False))
         else:
             index.append(1.0 if layer.eta is None else layer.eta)
             matched = layer.kind == "dielectric" and ops.absolute(relative_index(*index[-2:]) - 1) < _MATCHED
             surfaces.append(_surface(layer, matched))
     extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
-    return Layers(
+    return WalkedLayers(
         material.kinds[-1],
         tuple(surfaces),
-        (*slabs, Slab()),
+        (*slabs, WalkedSlab()),
         tuple(index),
         extinction,
         last.albedo if isinstance(last, DiffuseValues) else 0.0,
@@ -301,11 +301,11 @@ def relative_index(n_in: Value, n_out: Value) -> Value:
     return ops.mean(n_out) / ops.mean(n_in)
 
 
-def _surface(layer: InterfaceValues, matched: Value) -> Surface:
+def _surface(layer: InterfaceValues, matched: Value) -> WalkedSurface:
     u, v, rotation = layer.alpha_u, layer.alpha_v, layer.rotation
     smooth = (ops.maximum(u, v) < ALPHA_MIN) | matched
     turn = 0.0 if _is_zero(rotation) else rotation * (pi / 180)
-    return Surface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)
+    return WalkedSurface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)
 
 
 def _choose(where: Value, a: Value, b: Value) -> Value:

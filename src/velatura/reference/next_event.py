@@ -20,8 +20,8 @@ from velatura.ops import Value
 from velatura.optics import ggx, phase
 from velatura.optics.ggx import Direction
 from velatura.reference import events, facets
-from velatura.reference.events import Meeting, Scattered
-from velatura.reference.layers import Layers, Slab, pick
+from velatura.reference.events import ScatteringEvent, SurfaceMeeting
+from velatura.reference.layers import WalkedLayers, WalkedSlab, pick
 
 if TYPE_CHECKING:
     from velatura.reference.walk import Path
@@ -60,14 +60,14 @@ class _Crossing:
     below: Value
 
 
-def way_out(types: Any, layers: Layers, wo: Direction, rng: Any) -> tuple[WayOut, Any]:
+def way_out(types: Any, layers: WalkedLayers, wo: Direction, rng: Any) -> tuple[WayOut, Any]:
     """Draw a way in from `wo`, which lies above the surface; also the random numbers, advanced."""
     w, density, others = [wo], [1.0], [0.0]
     spread, smooth = [1.0], 1.0
     crossings: list[_Crossing] = []
     for k, surface in enumerate(layers.surfaces):
         indices = layers.index[k], layers.index[k + 1]
-        meeting = Meeting(layers, k, *indices, w[k], True)
+        meeting = SurfaceMeeting(layers, k, *indices, w[k], True)
         # Reflect between smooth surfaces
         smooth = ops.select(surface.smooth, smooth, 0.0)
         mirrored = smooth * meeting.shares(w[k][2])[0]
@@ -124,7 +124,7 @@ def way_up(out: WayOut, j: Value, down: Value) -> Direction:
     return x, y, ops.select(down, z, -z)
 
 
-def connect_surface(meeting: Meeting, event: Scattered, out: WayOut, path: Path, down: Value) -> Value:
+def connect_surface(meeting: SurfaceMeeting, event: ScatteringEvent, out: WayOut, path: Path, down: Value) -> Value:
     """Contribution of a path that meets a surface, per unit of its weight, `event` being into `way_up`."""
     layers, j = meeting.layers, meeting.j
     w = _direction(out, j)
@@ -134,7 +134,7 @@ def connect_surface(meeting: Meeting, event: Scattered, out: WayOut, path: Path,
     return event.weight * passed / (1 + fewer + more)
 
 
-def connect_medium(layers: Layers, out: WayOut, path: Path) -> Value:
+def connect_medium(layers: WalkedLayers, out: WayOut, path: Path) -> Value:
     """Contribution of a path that scatters in a medium along the way, per unit of its weight."""
     k, slab = path.slab, layers.slab(path.slab)
     w = _direction(out, k)
@@ -145,7 +145,7 @@ def connect_medium(layers: Layers, out: WayOut, path: Path) -> Value:
     return upwards + density * pick(out.down, k) * transmittance(slab, w[2], 1 - path.height)
 
 
-def transmittance(slab: Slab, cosine: Value, depth: Value = 1.0) -> Value:
+def transmittance(slab: WalkedSlab, cosine: Value, depth: Value = 1.0) -> Value:
     """The share of light that passes straight through a part of a slab's depth."""
     return slab.straight(ops.divide(depth, cosine))
 

@@ -11,7 +11,7 @@ from velatura import kernel
 from velatura.binding import Binding, plugin_class
 from velatura.errors import InvalidInput
 from velatura.reference import proxy
-from velatura.reference.layers import ALPHA_MIN, Layers, from_material, relative_index, zeros
+from velatura.reference.layers import ALPHA_MIN, WalkedLayers, from_material, relative_index, zeros
 from velatura.reference.next_event import way_out
 from velatura.reference.walk import Path, walk
 from velatura.stack import InterfaceValues, LayerValues
@@ -101,7 +101,7 @@ def make(mi: Any) -> type:
             options = {"microsurface": str(self.microsurface).lower(), "max_depth": str(self.max_depth)}
             self.facts = {**options, "seed": str(self.seed), "kinds": ", ".join(binding.stack.kinds)}
 
-        def _layers(self, si: Any, active: Any, flipped: Any) -> Layers:
+        def _layers(self, si: Any, active: Any, flipped: Any) -> WalkedLayers:
             """The layers at a point, seen from below where `flipped`."""
             material = self.binding.at(si, active)
             material = material.each(lambda address, value: 0.0 if address in self.zeros else value)

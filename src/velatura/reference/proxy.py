@@ -14,7 +14,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.ggx import Direction, normalize
-from velatura.reference.layers import Layers, Surface
+from velatura.reference.layers import WalkedLayers, WalkedSurface
 
 _FAINTEST = 0.05  # share of light that may go anywhere
 _NARROWEST = 1e-6  # alpha^2
@@ -28,7 +28,7 @@ class Matrix:
     xy: Value = 0.0
     yy: Value = 0.0
 
-    def plus(self, surface: Surface, scale: Value) -> Matrix:
+    def plus(self, surface: WalkedSurface, scale: Value) -> Matrix:
         """The sum with the roughness of a surface, times `scale`."""
         scale2 = ops.select(surface.smooth, 0.0, scale * scale)
         u, v = scale2 * surface.alpha_u * surface.alpha_u, scale2 * surface.alpha_v * surface.alpha_v
@@ -47,7 +47,7 @@ class Matrix:
         return ops.divide(ndf, 2 * (wi[2] + ops.sqrt(wi[2] * wi[2] + slope2)))
 
 
-def density(layers: Layers, wi: Direction, wo: Direction) -> Value:
+def density(layers: WalkedLayers, wi: Direction, wo: Direction) -> Value:
     """Density of wo, per solid angle and on both sides, for a stack seen from wi, which lies above."""
     index = [ops.mean(n) for n in layers.index]
     above, upright = wo[2] > 0, (wo[0], wo[1], ops.absolute(wo[2]))

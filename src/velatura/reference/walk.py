@@ -16,9 +16,9 @@ from velatura.optics import ggx, phase
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Polarisation, unpolarised
 from velatura.reference import events, facets
-from velatura.reference.events import Meeting
+from velatura.reference.events import SurfaceMeeting
 from velatura.reference.facets import UP
-from velatura.reference.layers import Layers, pick
+from velatura.reference.layers import WalkedLayers, pick
 from velatura.reference.next_event import WayOut, connect_medium, connect_surface, way_up
 
 ROULETTE = 0.25  # a path that carries less than this survives by chance, and carries this then
@@ -53,7 +53,7 @@ class Path:
 
 def walk(
     types: Any,
-    layers: Layers,
+    layers: WalkedLayers,
     wi: Direction,
     rng: Any,
     colour: Value,
@@ -116,7 +116,7 @@ def walk(
     return path
 
 
-def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None, painted: bool | None) -> None:
+def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, painted: bool | None) -> None:
     """One event, at a surface or in a medium."""
     # Meet the surface ahead, as if from above
     down = path.w[2] < 0
@@ -124,7 +124,7 @@ def _scatter(types: Any, layers: Layers, path: Path, out: WayOut | None, painted
     beyond = ops.select(down, path.slab + 1, path.slab - 1)
     wi = (-path.w[0], -path.w[1], ops.absolute(path.w[2]))
     light = path.light and path.light.mirrored(down ^ True)
-    meeting = Meeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi, down, light)
+    meeting = SurfaceMeeting(layers, j, pick(layers.index, path.slab), pick(layers.index, beyond), wi, down, light)
     u1, u2, u3 = (path.rng.next_float32() for _ in range(3))
     target = way_up(out, j, down) if out is not None else UP
     if layers.microsurface:
@@ -181,7 +181,7 @@ def _roulette(path: Path) -> None:
     path.alive &= survives
 
 
-def _travel(layers: Layers, path: Path) -> None:
+def _travel(layers: WalkedLayers, path: Path) -> None:
     """Go on to the next event in the slab, or leave the stack."""
     # Fly freely, or to the surface ahead
     down, cosine = path.w[2] < 0, ops.maximum(ops.absolute(path.w[2]), 1e-7)

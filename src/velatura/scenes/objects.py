@@ -11,7 +11,7 @@ import numpy as np
 
 from velatura.scenes import teapot as newell
 from velatura.scenes import urn as carved
-from velatura.scenes.surfaces import Array, Surface, arc, cap, extrude, flattened, join, lathe, rounded
+from velatura.scenes.surfaces import Array, Mesh, arc, cap, extrude, flattened, join, lathe, rounded
 
 
 class View(NamedTuple):
@@ -25,12 +25,12 @@ class View(NamedTuple):
 class Object(NamedTuple):
     """A surface, made on demand, and a view of it."""
 
-    surface: Callable[[], Surface]
+    surface: Callable[[], Mesh]
     view: View
 
 
 @functools.cache
-def ball() -> Surface:
+def ball() -> Mesh:
     """A thick shell with an opening towards the camera, a groove around it and a ball inside, on a ring.
 
     Turned around the opening's axis. Shows a plain curved face, grazing angles, a rounded edge, a groove and a cavity.
@@ -43,19 +43,19 @@ def ball() -> Surface:
 
 
 @functools.cache
-def sphere() -> Surface:
+def sphere() -> Mesh:
     """A ball of radius 1 with longitude and latitude as texture coordinates."""
     return lathe(arc((0.0, 0.0), 1.0, -90.0, 90.0)).moved((0.0, 1.0, 0.0))
 
 
 @functools.cache
-def wedges() -> Surface:
+def wedges() -> Mesh:
     """Five wedges in a row, their slopes at 15, 30, 45, 60 and 75 degrees: the same light under five angles."""
     return join(*(_wedge(slope).moved((0.58 * i - 1.16, 0.0, 0.0)) for i, slope in enumerate((15, 30, 45, 60, 75))))
 
 
 @functools.cache
-def lid() -> Surface:
+def lid() -> Mesh:
     """A low round dome that lies flat, with texture coordinates as seen from above: for brushing of all kinds."""
     slope, edge, curvature = 20.0, 0.06, 3.0
     dome = arc((0.0, 0.0), curvature, 90.0 - slope, 90.0, step=1.0)
@@ -66,7 +66,7 @@ def lid() -> Surface:
 
 
 @functools.cache
-def plane() -> Surface:
+def plane() -> Mesh:
     """A square slab that lies flat, an image on its top, upright when seen from the front."""
     half, height = 1.15, 0.06
     corners = np.array([[half, height], [-half, height], [-half, 0.0], [half, 0.0], [half, height]])
@@ -75,7 +75,7 @@ def plane() -> Surface:
 
 
 @functools.cache
-def teapot() -> Surface:
+def teapot() -> Mesh:
     """Newell's teapot, its spout to the right and a little towards the camera."""
     turn = np.radians(20.0)
     about_y = np.array([[np.cos(turn), 0.0, -np.sin(turn)], [0.0, 1.0, 0.0], [np.sin(turn), 0.0, np.cos(turn)]])
@@ -83,19 +83,19 @@ def teapot() -> Surface:
 
 
 @functools.cache
-def urn() -> Surface:
+def urn() -> Mesh:
     """A carved urn: relief, ribs, beads, edges and a hollow."""
     return carved.urn()
 
 
 @functools.cache
-def plinth() -> Surface:
+def plinth() -> Mesh:
     """The plinth under an object: a low round table, its top at y = 0."""
     return lathe(np.concatenate([arc((1.65, -0.06), 0.06, -90.0, 90.0, step=15.0), [[0.0, 0.0]]]))
 
 
 @functools.cache
-def ground() -> Surface:
+def ground() -> Mesh:
     """An unbounded floor below the plinth."""
     return extrude(np.array([[1e3, -0.12], [0.0, -0.12], [-1e3, -0.12]]), width=2e3)
 
@@ -130,7 +130,7 @@ def _smoothstep(x: Array) -> Array:
     return t * t * (3.0 - 2.0 * t)
 
 
-def _wedge(slope: float, width: float = 0.5, length: float = 1.0, bulge: float = 0.06, edge: float = 0.03) -> Surface:
+def _wedge(slope: float, width: float = 0.5, length: float = 1.0, bulge: float = 0.06, edge: float = 0.03) -> Mesh:
     foot, top = np.array([0.5, 0.0]), np.array([0.5, 0.0]) + length * _direction(180.0 - slope)
     along = np.linspace(0.0, 1.0, 9)[:, None]
     face = foot + along * (top - foot) + 4.0 * bulge * along * (1.0 - along) * _direction(90.0 - slope)

@@ -15,7 +15,7 @@ from velatura import kernel
 from velatura.errors import InvalidInput
 from velatura.scenes.environments import emitter
 from velatura.scenes.objects import OBJECTS, View, ground, plinth
-from velatura.scenes.surfaces import Surface
+from velatura.scenes.surfaces import Mesh
 
 Name = str | os.PathLike[str]
 Size = int | str | Sequence[int]
@@ -101,7 +101,7 @@ def blamed(scene: Name) -> Iterator[None]:
         raise InvalidInput(f"{scene}: {kernel.reason(error)}") from error
 
 
-def mesh(mi: Any, surface: Surface, bsdf: Any) -> Any:
+def mesh(mi: Any, surface: Mesh, bsdf: Any) -> Any:
     """A surface of a material, as a `mi.Mesh` of the current variant."""
     properties = mi.Properties()
     properties["mesh_bsdf"] = bsdf

@@ -19,7 +19,7 @@ _X, _Y, _Z = np.eye(3)
 
 
 @dataclass(frozen=True)
-class Surface:
+class Mesh:
     """A triangle mesh: positions and unit normals (n, 3), texture coordinates (n, 2), corners of triangles (m, 3)."""
 
     positions: Array
@@ -27,16 +27,16 @@ class Surface:
     uv: Array
     triangles: NDArray[np.uint32]
 
-    def moved(self, shift: ArrayLike = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Surface:
+    def moved(self, shift: ArrayLike = (0.0, 0.0, 0.0), rotation: Array | None = None) -> Mesh:
         """The surface turned by a rotation matrix (3, 3) and then shifted."""
         turn = np.eye(3) if rotation is None else rotation
-        return Surface(self.positions @ turn.T + np.asarray(shift), self.normals @ turn.T, self.uv, self.triangles)
+        return Mesh(self.positions @ turn.T + np.asarray(shift), self.normals @ turn.T, self.uv, self.triangles)
 
 
-def join(*surfaces: Surface) -> Surface:
+def join(*surfaces: Mesh) -> Mesh:
     """Several surfaces as one."""
     starts = np.cumsum([0, *(len(s.positions) for s in surfaces[:-1])])
-    return Surface(
+    return Mesh(
         np.concatenate([s.positions for s in surfaces]),
         np.concatenate([s.normals for s in surfaces]),
         np.concatenate([s.uv for s in surfaces]),
@@ -44,27 +44,27 @@ def join(*surfaces: Surface) -> Surface:
     )
 
 
-def lathe(profile: Array, segments: int = 96) -> Surface:
+def lathe(profile: Array, segments: int = 96) -> Mesh:
     """Turn a profile around the y axis; u is the azimuth, 1/2 at +z, and v the length left on the profile."""
     azimuth = np.linspace(-np.pi, np.pi, segments + 1)[:, None]
     outwards = np.sin(azimuth) * _X + np.cos(azimuth) * _Z
     return _sweep(profile, outwards, np.zeros_like(outwards))
 
 
-def flattened(surface: Surface) -> Surface:
+def flattened(surface: Mesh) -> Mesh:
     """The surface with texture coordinates as seen from above, u along x and v along z, over its width and depth."""
     low, high = surface.positions.min(axis=0), surface.positions.max(axis=0)
     plan = (surface.positions - low) / (high - low)
     return replace(surface, uv=plan[:, [0, 2]])
 
 
-def extrude(profile: Array, width: float) -> Surface:
+def extrude(profile: Array, width: float) -> Mesh:
     """Press a profile of (z, height) along x; u runs along x, and v is the length left on the profile."""
     ends = np.array([[-0.5 * width], [0.5 * width]]) * _X
     return _sweep(profile, np.stack([_Z, _Z]), ends)
 
 
-def cap(profile: Array, x: float) -> Surface:
+def cap(profile: Array, x: float) -> Mesh:
     """The flat end, at x and facing away from 0, of a bar pressed through a closed convex profile."""
     rim, side = profile[:-1], np.sign(x)
     flat = np.concatenate([rim.mean(axis=0, keepdims=True), rim])
@@ -72,7 +72,7 @@ def cap(profile: Array, x: float) -> Surface:
     fan = np.stack([np.zeros_like(following), np.roll(following, -1), following], axis=-1)[:, :: int(side)]
     uv = 0.5 - ((flat - flat.min(axis=0)) / np.ptp(flat, axis=0) - 0.5) * [side, 1.0]
     positions = x * _X + flat[:, :1] * _Z + flat[:, 1:] * _Y
-    return Surface(positions, np.broadcast_to(side * _X, positions.shape), uv, fan.astype(np.uint32))
+    return Mesh(positions, np.broadcast_to(side * _X, positions.shape), uv, fan.astype(np.uint32))
 
 
 def arc(centre: ArrayLike, radius: float, start: float, stop: float, step: float = 4.0) -> Array:
@@ -92,7 +92,7 @@ def rounded(corners: ArrayLike, radius: float) -> Array:
     return np.concatenate([start, *arcs, start])
 
 
-def _sweep(profile: Array, outwards: Array, offsets: Array) -> Surface:
+def _sweep(profile: Array, outwards: Array, offsets: Array) -> Mesh:
     """A grid of points profile[:, 0] * outwards + profile[:, 1] * y + offsets: u across, v back along the profile."""
     # Measure the profile's length, and its normals from its tangents
     steps = np.linalg.norm(np.diff(profile, axis=0), axis=1)
@@ -107,7 +107,7 @@ def _sweep(profile: Array, outwards: Array, offsets: Array) -> Surface:
     return grid(positions, normals, 1.0 - length / length[-1])
 
 
-def grid(positions: Array, normals: Array, v: Array | None = None) -> Surface:
+def grid(positions: Array, normals: Array, v: Array | None = None) -> Mesh:
     """Rows of points (rows, columns, 3): seen from outside, columns run anticlockwise around the way that rows go.
 
     u runs from 0 to 1 with the columns, and v back along the rows, evenly where it is not given.
@@ -119,4 +119,4 @@ def grid(positions: Array, normals: Array, v: Array | None = None) -> Surface:
     index = np.arange(u.size, dtype=np.uint32).reshape(u.shape)
     a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     triangles = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    return Surface(positions.reshape(-1, 3), normals.reshape(-1, 3), np.stack([u, v], -1).reshape(-1, 2), triangles)
+    return Mesh(positions.reshape(-1, 3), normals.reshape(-1, 3), np.stack([u, v], -1).reshape(-1, 2), triangles)

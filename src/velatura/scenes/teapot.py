@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from velatura.scenes.surfaces import Array, Surface, grid, join, lathe
+from velatura.scenes.surfaces import Array, Mesh, grid, join, lathe
 
 SCALE = 0.4
 
@@ -42,7 +42,7 @@ _SPOUT = [
 ]
 
 
-def teapot() -> Surface:
+def teapot() -> Mesh:
     """The whole teapot, its spout along +x."""
     turned = (lathe(curve(SCALE * np.array(profile))[0]) for profile in (_POT, _LID))
     groove = lathe(SCALE * np.array(_GROOVE))
@@ -66,7 +66,7 @@ def curve(points: Array, steps: int = 24) -> tuple[Array, Array]:
     return on, along
 
 
-def _tube(rings: list[tuple[tuple[float, float], tuple[float, float], float]]) -> Surface:
+def _tube(rings: list[tuple[tuple[float, float], tuple[float, float], float]]) -> Mesh:
     """A tube through rings, the two halves of it mirrored at z = 0, and closed at both ends."""
     # Lay out the control points of the half with z > 0, (along, around, 3)
     control = [[(*begin, 0.0), (*begin, half), (*end, half), (*end, 0.0)] for begin, end, half in rings]
@@ -87,7 +87,7 @@ def _around(control: Array) -> tuple[Array, Array]:
     return values @ control, slopes @ control
 
 
-def _end(ring: Array) -> Surface:
+def _end(ring: Array) -> Mesh:
     """The disc in a flat ring that closes on itself, anticlockwise seen from outside."""
     centre = ring[:-1].mean(axis=0)
     spokes = ring - centre
@@ -99,4 +99,4 @@ def _end(ring: Array) -> Surface:
     k = np.arange(1, len(ring))
     fan = np.stack([np.zeros_like(k), k, k + 1], axis=-1).astype(np.uint32)
     points = np.concatenate([centre[None], ring])
-    return Surface(points, np.broadcast_to(normal, points.shape), uv, fan)
+    return Mesh(points, np.broadcast_to(normal, points.shape), uv, fan)

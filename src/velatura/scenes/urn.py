@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from velatura.scenes.surfaces import Array, Surface, arc, grid, join, lathe
+from velatura.scenes.surfaces import Array, Mesh, arc, grid, join, lathe
 from velatura.scenes.teapot import curve
 
 COLUMNS = 384  # of points around
@@ -29,13 +29,13 @@ _INSIDE = [(0.58, 1.9), (0.49, 1.76), (0.46, 1.66), (0.47, 1.56), (0.51, 1.42), 
 _INSIDE += [(0.74, 0.85), (0.5, 0.62), (0, 0.62)]
 
 
-def urn() -> Surface:
+def urn() -> Mesh:
     """The whole urn."""
     rings = (_beads(height) for height in (LOW - 0.005, HIGH + 0.005))
     return join(_body(), *rings)
 
 
-def _body() -> Surface:
+def _body() -> Mesh:
     """The turned body with its relief, its normals those of the relief."""
     outside = _even(_OUTSIDE, STEP)
     profile = np.concatenate([outside, _even(_INSIDE, 3 * STEP)[1:]])
@@ -74,7 +74,7 @@ def _frieze(height: Array, azimuth: Array) -> Array:
     return 0.022 * _between(height, LOW + 0.01, HIGH - 0.01, 0.02) * raised
 
 
-def _beads(height: float) -> Surface:
+def _beads(height: float) -> Mesh:
     """A ring of beads around the body, half sunk."""
     outside = _even(_OUTSIDE, STEP)
     radius = np.interp(height, *outside[np.abs(outside[:, 1] - height) < 0.1].T[::-1])

@@ -24,7 +24,7 @@ from velatura.sweeps.space import Space, Whole
 PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
 
 
-class Query(Parameter):
+class QuestionName(Parameter):
     """The name of a question, or a function."""
 
     what = f"one of {', '.join(QUESTIONS)}, or in Python a function (stack, seed)"
@@ -65,7 +65,7 @@ class Plan(Space):
             root of the number of points.
     """
 
-    what: Annotated[str | Callable[..., Any], Query("what is asked of each point")] = "lobes"
+    what: Annotated[str | Callable[..., Any], QuestionName("what is asked of each point")] = "lobes"
     options: Annotated[dict[str, Any], Options("keyword arguments of the question")] = Field(default_factory=dict)
     chunk: Annotated[int | None, Whole("points that are computed and written at once", low=1)] = None
 

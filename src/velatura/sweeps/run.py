@@ -18,7 +18,7 @@ from velatura.sweeps import work
 from velatura.sweeps.engines import BREAKDOWNS, Engine, engine
 from velatura.sweeps.plan import Plan, versions
 from velatura.sweeps.space import Space
-from velatura.sweeps.store import OWN, Layout, Store, Variable, create, existing
+from velatura.sweeps.store import OWN, Layout, Store, StoredVariable, create, existing
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -132,7 +132,7 @@ def _looked(runs: Engine, packed: bytes, plan: Plan) -> Layout:
     for number in range(tried):
         answer = _alone(runs, packed, number)
         if not isinstance(answer, str):
-            return _checked({name: Variable.of(*array) for name, array in answer.items()}, plan)
+            return _checked({name: StoredVariable.of(*array) for name, array in answer.items()}, plan)
         why = why or answer
     points = "the only point has no answer" if tried == 1 else f"none of the first {tried} points has an answer"
     raise InvalidInput(f"{points}: {why}")

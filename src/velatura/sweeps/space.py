@@ -63,7 +63,7 @@ class Listed(Parameter):
         return {"type": "array", "minItems": 1}
 
 
-class Ends(Parameter):
+class RangeEnds(Parameter):
     """Both ends of a range."""
 
     what = "[low, high], two numbers, the lower one first"
@@ -79,7 +79,7 @@ class Ends(Parameter):
         return {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 
 
-class Base(Parameter):
+class MaterialSource(Parameter):
     """A material: a file, the name of a preset, or what a file would hold."""
 
     what = "a material"
@@ -113,7 +113,7 @@ class Axis(Record):
     """
 
     values: Annotated[tuple[Any, ...] | None, Listed("the values")] = None
-    range: Annotated[tuple[float, float] | None, Ends("both ends")] = None
+    range: Annotated[tuple[float, float] | None, RangeEnds("both ends")] = None
     steps: Annotated[int | None, Whole("values in the range, on a grid", low=2, high=10**6)] = None
     distribution: Annotated[str, Choice("how likely values are", options=("uniform", "log-uniform", "normal"))] = (
         "uniform"
@@ -183,7 +183,7 @@ class Axis(Record):
 
 
 @dataclass(frozen=True)
-class Coordinate:
+class StoredAxis:
     """How the values of an axis are stored.
 
     Args:
@@ -226,7 +226,7 @@ class Axes(Parameter):
                 return axis
             if axis.values is None:
                 raise InvalidInput("needs values")
-            return Axis(values=tuple(Base("a material").check(each) for each in axis.values))
+            return Axis(values=tuple(MaterialSource("a material").check(each) for each in axis.values))
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
@@ -250,7 +250,7 @@ class Space(Record):
         InvalidInput: in one line that names the key and what is allowed.
     """
 
-    material: Annotated[Stack, Base("a material: a file, a preset, or its layers")]
+    material: Annotated[Stack, MaterialSource("a material: a file, a preset, or its layers")]
     vary: Annotated[dict[str, Axis], Axes("flat names, and how each varies")]
     sampling: Annotated[str, Choice("how points are chosen", options=("grid", "random", "sobol"))] = "grid"
     count: Annotated[int | None, Whole("points, of random and sobol", low=1)] = None
@@ -304,16 +304,16 @@ class Space(Record):
         return tuple(f"{name}_index" if each.dims else name for name, each in self.coordinates.items())
 
     @property
-    def coordinates(self) -> dict[str, Coordinate]:
+    def coordinates(self) -> dict[str, StoredAxis]:
         """How the values of every axis are stored."""
         return {name: self._coordinate(name, axis) for name, axis in self.vary.items()}
 
-    def _coordinate(self, name: str, axis: Axis) -> Coordinate:
+    def _coordinate(self, name: str, axis: Axis) -> StoredAxis:
         forms = {_form(value) for value in axis.values or ()} or {"colour" if axis.per_channel else "number"}
         form = max(forms, key=("number", "pair", "colour", "text").index)
         form = "text" if {"pair", "colour"} <= forms else form
         address = next(iter(addressed(name)), None)
-        return Coordinate(form, address.declared.unit if address else "", address.declared.doc if address else "")
+        return StoredAxis(form, address.declared.unit if address else "", address.declared.doc if address else "")
 
     def points(self, numbers: Sequence[int]) -> list[dict[str, Any]]:
         """Values by flat name of points by their numbers, which ascend; those of a grid in C order."""

@@ -41,7 +41,7 @@ LEVEL = 0  # of compression, the least
 
 
 @dataclass(frozen=True)
-class Variable:
+class StoredVariable:
     """An array that is found at every point: names and sizes of its dimensions, and its type."""
 
     dims: tuple[str, ...]
@@ -54,17 +54,17 @@ class Variable:
         return math.prod(self.shape) * np.dtype(self.dtype).itemsize
 
     @classmethod
-    def of(cls, dims: tuple[str, ...], array: Array) -> Variable:
+    def of(cls, dims: tuple[str, ...], array: Array) -> StoredVariable:
         """What one point gave."""
         return cls(dims, array.shape, array.dtype.str)
 
     @classmethod
-    def read(cls, fields: Mapping[str, Any]) -> Variable:
+    def read(cls, fields: Mapping[str, Any]) -> StoredVariable:
         """The variable from its fields, as they are written in a file."""
         return cls(tuple(fields["dims"]), tuple(fields["shape"]), fields["dtype"])
 
 
-Layout = Mapping[str, Variable]
+Layout = Mapping[str, StoredVariable]
 
 
 class Store:
@@ -209,7 +209,7 @@ def existing(path: Path, plan: Plan) -> Store | None:
     try:
         attributes = json.loads((path / ".zattrs").read_bytes())
         before, made = dict(io.parsed(attributes["plan"], "yaml", path)), dict(attributes["versions"])
-        layout = {name: Variable.read(fields) for name, fields in attributes["layout"].items()}
+        layout = {name: StoredVariable.read(fields) for name, fields in attributes["layout"].items()}
     except Exception:  # of any kind, by what is there
         raise InvalidInput(f"{path}: is there already, and holds no sweep") from None
     now = plan.to_dict()

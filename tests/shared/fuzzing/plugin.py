@@ -12,7 +12,7 @@ import velatura as vt
 from fuzzing import Failure, pictures
 from fuzzing.models import described, random_model
 from fuzzing.stacks import random_stack, textured
-from velatura.checks.grid import Grid, integrate
+from velatura.checks.grid import HemisphereGrid, integrate
 from velatura.checks.probe import Array, Probe
 from velatura.model.base import Model
 
@@ -115,7 +115,7 @@ def _integral(probe: Probe, cosine: float, rng: np.random.Generator) -> tuple[fl
     usable = drawn.weight.any(axis=1) & ~drawn.delta
     total, variance = 0.0, 0.0
     for side in (1, -1):
-        wo, areas = Grid.around(wi, drawn.wo[usable], side).nodes(rng)
+        wo, areas = HemisphereGrid.around(wi, drawn.wo[usable], side).nodes(rng)
         cells, errors = integrate(probe.eval_pdf(np.repeat(wi[None], len(wo), axis=0), wo).pdf * areas)
         total, variance = total + float(cells.sum()), variance + float(errors.sum())
     return total, float(np.sqrt(variance))
