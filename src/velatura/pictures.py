@@ -48,7 +48,7 @@ def check_size(file: BinaryIO, subject: str) -> None:
 
 
 def check(path: Path, subject: str = "") -> None:
-    """As `check_size`, of a file; also raises InvalidInput where that cannot be read, or is no regular file."""
+    """Check the size of a file as `check_size`; also raises InvalidInput for one that is unreadable or not regular."""
     files.check_regular(path)
     try:
         with path.open("rb") as file:

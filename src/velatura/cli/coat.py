@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -93,24 +93,12 @@ def _say_how_kept(stack: Stack, coated: Coated) -> None:
 
 def _table(coated: Coated) -> Table:
     """A row for the coat, one per interface of the bare material, and one for a diffuse base."""
-    from rich.table import Table
-
     title = f"At normal incidence, without and with the coat ({coated.model.name})"
-    table = Table("lobe", title=title, title_justify="left")
-    for column in ("energy", "with coat", "alpha", "with coat"):
-        table.add_column(column, justify="right")
+    table = options.table(title, ["lobe"], ["energy", "with coat", "alpha", "with coat"])
     own = coated.own()
-    table.add_row("coat", "", _cell(own["energy"]), "", _cell(own["alpha"]))
+    table.add_row("coat", "", options.cell(own["energy"]), "", options.cell(own["alpha"]))
     for n, row in enumerate(coated.change(), 1):
-        table.add_row(str(n), *(_cell(row[key]) for key in row))
+        table.add_row(str(n), *(options.cell(row[key]) for key in row))
     for name, diffuse in _diffuse(coated).items():
-        table.add_row(name, *(_cell(diffuse[key]) for key in diffuse), "", "")
+        table.add_row(name, *(options.cell(diffuse[key]) for key in diffuse), "", "")
     return table
-
-
-def _cell(values: Any) -> str:
-    """Numbers in a line, one where they are all alike."""
-    import numpy as np
-
-    numbers = [f"{x:.4f}" for x in np.ravel(values)]
-    return numbers[0] if len(set(numbers)) == 1 else " ".join(numbers)

@@ -138,14 +138,8 @@ def _summary(found: Comparison) -> Table:
 
 
 def _table(title: str, *columns: str) -> Table:
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=Text(title) if title else None, title_justify="left")
-    words = ("cos", "lobe", "", "model")
-    for column in columns:
-        table.add_column(column, justify="left" if column in words else "right")
-    return table
+    words = [column for column in columns if column in ("cos", "lobe", "", "model")]
+    return options.table(title, words, columns[len(words) :])
 
 
 def _cell(values: Any, i: int, digits: int = 3) -> str:

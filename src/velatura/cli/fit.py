@@ -127,11 +127,7 @@ def draw(rows: ReflectanceTable, found: Fit, title: str, path: Path) -> None:
 
 def _table(found: Fit) -> Any:
     """A row per angle of incidence."""
-    from rich.table import Table
-
-    table = Table()
-    for column in ("angle of incidence", "f cos, rms", "error, rms", "relative"):
-        table.add_column(column, justify="right")
+    table = options.table("", [], ["angle of incidence", "f cos, rms", "error, rms", "relative"])
     for row in found.by_angle:
         cells = (f"{row['theta_i']:g}°", f"{row['wanted']:.4g}", f"{row['error']:.2g}", f"{row['relative']:.2%}")
         table.add_row(*cells)
@@ -140,11 +136,7 @@ def _table(found: Fit) -> Any:
 
 def _energies(found: Fit) -> Any:
     """A row per angle of incidence, of the energy of each colour before and after."""
-    from rich.table import Table
-
-    table = Table("angle of incidence", title="Energy that is reflected", title_justify="left")
-    for column in ("before", "after"):
-        table.add_column(column, justify="right")
+    table = options.table("Energy that is reflected", ["angle of incidence"], ["before", "after"])
     for row in found.energies:
         cells = (" ".join(f"{x:.4f}" for x in row[key]) for key in ("before", "after"))
         table.add_row(f"{row['theta_i']:g}°", *cells)
@@ -153,11 +145,7 @@ def _energies(found: Fit) -> Any:
 
 def _parameters(found: Fit) -> Any:
     """A row per parameter, with its interval."""
-    from rich.table import Table
-
-    table = Table("parameter", title="What the table says of each (95 %)", title_justify="left")
-    for column in ("value", "from", "to"):
-        table.add_column(column, justify="right")
+    table = options.table("What the table says of each (95 %)", ["parameter"], ["value", "from", "to"])
     for one in found.estimates:
         table.add_row(one.name, *(f"{x:.4g}" for x in (one.value, one.low, one.high)))
     return table

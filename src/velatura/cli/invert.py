@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -202,22 +202,17 @@ def _write(found: list[Solution], output: Path | None, folder: Path | None, stem
 
 def _table(solution: Solution) -> Table:
     """A row per interface: the medium above it, and its parameters."""
-    from rich.table import Table
-    from rich.text import Text
-
     title = f"{solution.target.name or 'stack'} ({solution.model.name})"
-    table = Table("lobe", title=Text(title), title_justify="left")
-    table.add_column("", no_wrap=True)
     brushed = any(lobe.brushed for lobe in solution.target.lobes)
-    for column in ("tau above", "eta", "k", "alpha", *(["rotation"] if brushed else [])):
-        table.add_column(column, justify="right")
+    table = options.table(title, ["lobe", ""], ["tau above", "eta", "k", "alpha", *(["rotation"] if brushed else [])])
+    table.columns[1].no_wrap = True
     layers = iter(zip(solution.layers, solution.stack.interfaces))
     for n, lobe in enumerate(solution.target.lobes, 1):
         for k in range(lobe.interfaces):
             part, written = next(layers)
             eta = None if part.kind == "mirror" else part.eta
             values = part.tau, eta, part.kappa, written.alpha, *([written.rotation] if brushed else [])
-            cells = (_cell(x) for x in values)
+            cells = (options.cell(x) for x in values)
             table.add_row(str(n) if k == 0 else "", part.kind, *cells)
         table.add_section()
     return table
@@ -234,14 +229,5 @@ def _missed(solution: Solution) -> list[str]:
         asked, has = ((*lobe.colour, *lobe.axes[:2]) for lobe in lobes)
         if max(abs(a - b) for a, b in zip(asked, has)) > SHOWN:
             why = "what is fixed allows no more" if lobes[0].fixed != Fixed() else "none was found that is nearer"
-            lines.append(f"lobe {n}: has energy {_cell(has[:3])} and alpha {_cell(has[3:])}; {why}")
+            lines.append(f"lobe {n}: has energy {options.cell(has[:3])} and alpha {options.cell(has[3:])}; {why}")
     return lines
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return "-"
-    import numpy as np
-
-    numbers = [f"{x:.4f}" for x in np.ravel(value)]
-    return numbers[0] if len(set(numbers)) == 1 else " ".join(numbers)

@@ -65,12 +65,7 @@ def _plain(lobe: dict[str, Any]) -> dict[str, Any]:
 def _table(title: str, cosines: list[float], lobes: dict[str, dict[str, Any]], others: dict[str, Any]) -> Table:
     """A row per direction and lobe: R1 is the first interface from the top, T what leaves below; then all other light
     by name."""
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table("cos", "lobe", title=Text(title), title_justify="left")
-    for column in ("energy", "alpha", "rotation"):
-        table.add_column(column, justify="right")
+    table = options.table(title, ["cos", "lobe"], ["energy", "alpha", "rotation"])
     for i, cosine in enumerate(cosines):
         for name, lobe in lobes.items():
             energy, alpha, rotation = (lobe[field][..., i] for field in ("energy", "alpha", "rotation"))

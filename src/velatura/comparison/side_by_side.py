@@ -69,13 +69,7 @@ def compare(
         raise InvalidInput(f"paths: must be at least 2, got {paths}")
     if polarised and pictures:
         raise InvalidInput("pictures: not with polarised, since they are rendered without polarisation")
-    names = [m.name if isinstance(m, Model) else plugins.name_of(m) for m in asked]
-    if not names:
-        raise InvalidInput("models: name at least one")
-    if polarised and UNPOLARISED in names:
-        raise InvalidInput(f"models: with polarised, {UNPOLARISED} is the name of the truth without polarisation")
-    if len(set(names)) < len(names):
-        raise InvalidInput(f"models: {max(names, key=names.count)} is given twice")
+    names = _names(asked, polarised)
     if switches and not any(isinstance(m, Model) for m in asked):
         raise InvalidInput(f"{', '.join(switches)}: for named models only, and there is none among these")
     if pictures:
@@ -102,6 +96,18 @@ def compare(
         models={name: _beside(model, truth) for name, model in modelled.items()},
         pictures=spheres(described, rendered, seed, microsurface, advance) if pictures else None,
     )
+
+
+def _names(asked: Sequence[Model | Plugin], polarised: bool) -> list[str]:
+    """The name of each model. Raises InvalidInput unless they are distinct, and there is one."""
+    names = [m.name if isinstance(m, Model) else plugins.name_of(m) for m in asked]
+    if not names:
+        raise InvalidInput("models: name at least one")
+    if polarised and UNPOLARISED in names:
+        raise InvalidInput(f"models: with polarised, {UNPOLARISED} is the name of the truth without polarisation")
+    if len(set(names)) < len(names):
+        raise InvalidInput(f"models: {max(names, key=names.count)} is given twice")
+    return names
 
 
 def _made(model: Model | Plugin, stack: Stack, microsurface: bool) -> Any:
