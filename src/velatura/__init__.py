@@ -8,6 +8,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from velatura.readers import READERS
+from velatura.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from velatura import bakes as bakes
     from velatura import benchmark as benchmark
@@ -32,8 +35,6 @@ if TYPE_CHECKING:
     from velatura.model import MODELS, Model
     from velatura.stack import Diffuse, Film, Interface, Medium, Spectrum, Stack, Texture, load, preset, presets, save
     from velatura.sweeps import Axis, Space, sweep
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "velatura.api": ("bsdf", "check", "lobes", "register", "render"),
@@ -113,6 +114,15 @@ _PARTS = (
     "stack",
     "tables",
 )
+
+
+def _imported(path: str) -> Any:
+    from velatura.imports import load
+
+    return load(path)
+
+
+READERS.update(dict.fromkeys((".mtlx", ".gltf", ".glb", ".xml"), _imported))
 
 
 def __getattr__(name: str) -> Any:

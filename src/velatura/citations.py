@@ -7,10 +7,10 @@ import unicodedata
 from collections.abc import Sequence
 from importlib.resources import files
 
-from velatura import __version__
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, MODELS
 from velatura.stack.schema import unknown
+from velatura.version import __version__
 
 #: Keys of the papers behind a model, where that is not the one paper of its name.
 PAPERS: dict[str, tuple[str, ...]] = {

@@ -56,10 +56,10 @@ class Made(mi.BSDF):
         return (wi.z > 0) & (wo.z > 0)
 
     def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-        return dr.select(self.at_direction(si.wi, wo) & active, mi.Color3f(self.f(si.wi, wo)) * dr.abs(wo.z), 0)
+        return dr.select(self.lit(si.wi, wo) & active, mi.Color3f(self.f(si.wi, wo)) * dr.abs(wo.z), 0)
 
     def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-        return dr.select(self.at_direction(si.wi, wo) & active, self.density(si.wi, wo), 0)
+        return dr.select(self.lit(si.wi, wo) & active, self.density(si.wi, wo), 0)
 
     def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
         return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
@@ -68,7 +68,7 @@ class Made(mi.BSDF):
         bs = mi.BSDFSample3f()
         bs.wo, bs.eta, bs.sampled_type = self.drawn(si.wi, sample2), 1.0, mi.UInt32(+self.m_flags)
         bs.pdf = self.pdf(ctx, si, bs.wo, active)
-        lit = self.at_direction(si.wi, bs.wo) & active
+        lit = self.lit(si.wi, bs.wo) & active
         return bs, dr.select(lit, mi.Color3f(self.weight(si.wi, bs.wo)), 0)
 
 

@@ -19,7 +19,6 @@ from typing import Annotated, Any
 
 import typer
 
-from velatura import __version__
 from velatura.cli import (
     benchmark,
     check,
@@ -44,6 +43,7 @@ from velatura.cli import (
 )
 from velatura.errors import VelaturaError, VelaturaWarning, one_line
 from velatura.files import reason, source_date
+from velatura.version import __version__
 
 INTERRUPTED = 130  # as a shell reports a process that ended by Ctrl-C
 

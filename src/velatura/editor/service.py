@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic.fields import FieldInfo
 
-from velatura import __version__, exports, kernel
+from velatura import exports, kernel
 from velatura.editor import appearance, class_maps, films, truth, validations
 from velatura.editor.messages import (
     Answer,
@@ -55,6 +55,7 @@ from velatura.stack.values import (
     Text,
 )
 from velatura.tables import load as load_tables
+from velatura.version import __version__
 
 #: The control of the page for each type of parameter.
 KINDS: dict[type[Parameter], str] = {

@@ -8,7 +8,6 @@ from typing import Any
 from urllib.parse import quote
 from xml.sax.saxutils import quoteattr
 
-from velatura import __version__
 from velatura.bakes import TARGETS, Bake, Carried, bake
 from velatura.exports.formats import Export, Request, relative, xml_comment
 from velatura.shader.material import remark
@@ -16,6 +15,7 @@ from velatura.stack import dumps
 from velatura.targets import embedded
 from velatura.targets.openpbr import TURNS
 from velatura.targets.parameters import RGB, Parameter
+from velatura.version import __version__
 
 
 def write(request: Request) -> Export:

@@ -12,8 +12,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from velatura import __version__, files
+from velatura import files
 from velatura.errors import InvalidInput
+from velatura.version import __version__
 
 if TYPE_CHECKING:
     from velatura.model import Model

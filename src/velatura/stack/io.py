@@ -8,7 +8,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping
-from importlib import import_module, resources
+from importlib import resources
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -16,6 +16,7 @@ import yaml
 
 from velatura.errors import InvalidInput
 from velatura.files import budget, text_of, whole
+from velatura.readers import READERS
 from velatura.stack.paths import beside, rewritten
 from velatura.stack.schema import show, unknown
 from velatura.stack.stack import Stack
@@ -25,8 +26,7 @@ _FORMATS = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 LARGEST = 2**22  # bytes of a file
 _MOST = 100_000  # values in a file
 _DIGITS = 300  # of a number that may be an integer
-FOREIGN = (".mtlx", ".gltf", ".glb", ".xml")  # of other programs, which `velatura.imports` reads
-ENDINGS = (*_FORMATS, *FOREIGN)  # of all files that hold a material
+ENDINGS = (*_FORMATS, *READERS)  # of all files that hold a material
 
 #: What names a material wherever one is asked for: a stack, a file, the name of a preset, or what a file would hold.
 #: The mapping is without its types, so that `isinstance` takes it.
@@ -63,8 +63,8 @@ def load(material: MaterialLike) -> Stack:
         return preset(str(material))
     if os.path.isdir(path):
         raise InvalidInput(f"{path}: is a folder, not a material file")
-    if foreign(str(material)):
-        imported: Stack = import_module("velatura.imports").load(str(material))  # by name, as it stands below
+    if file := foreign(str(material)):
+        imported: Stack = READERS[Path(file).suffix.lower()](str(material))
         return imported
     _format(path, "a material file", ENDINGS)
     return loads(text_of(path, LARGEST), name=str(path), folder=path.parent)
@@ -73,7 +73,7 @@ def load(material: MaterialLike) -> Stack:
 def foreign(material: str) -> str:
     """The file of another program in FILE or FILE#NAME; empty for what is none."""
     file = material if os.path.exists(material) else material.rpartition("#")[0] or material
-    return file if Path(file).suffix.lower() in FOREIGN else ""
+    return file if Path(file).suffix.lower() in READERS else ""
 
 
 def loads(

@@ -13,12 +13,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from velatura import __version__
 from velatura.errors import InvalidInput
 from velatura.stack import io
 from velatura.stack.schema import Parameter, show, unknown
 from velatura.sweeps.questions import QUESTIONS, Question
 from velatura.sweeps.space import Space, Whole
+from velatura.version import __version__
 
 #: Packages whose versions may change the numbers.
 PACKAGES = ("mitsuba", "drjit", "numpy", "scipy")
