@@ -21,7 +21,7 @@ import velatura as vt
 from velatura import kernel
 from velatura.bakes import TARGETS
 from velatura.exports import FORMATS
-from velatura.exports.formats import headed
+from velatura.exports.request import headed
 from velatura.shader import atlas, shader
 
 Run = Callable[..., tuple[int, str, str]]

@@ -27,7 +27,7 @@ from velatura.editor.messages import Answer, array, document
 from velatura.editor.service import ENVIRONMENTS, VERBS
 from velatura.editor.shading import in_closed_form, pattern
 from velatura.errors import InvalidInput
-from velatura.exports.formats import headed
+from velatura.exports.request import headed
 from velatura.model import MODELS, Model, named
 from velatura.scenes.objects import OBJECTS
 from velatura.shader import atlas, shader

@@ -9,7 +9,7 @@ from urllib.parse import quote
 from xml.sax.saxutils import quoteattr
 
 from velatura.bakes import TARGETS, Bake, Carried, bake
-from velatura.exports.formats import Export, Request, relative, xml_comment
+from velatura.exports.request import Export, Request, relative, xml_comment
 from velatura.shader.material import remark
 from velatura.stack import dumps
 from velatura.targets import embedded

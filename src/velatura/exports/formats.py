@@ -1,24 +1,19 @@
-"""The formats, and their common part; each is a module with `write(Request) -> Export`."""
+"""The formats; each is a module with `write(Request) -> Export`."""
 
 from __future__ import annotations
 
-import os
-import re
-import time
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
-from datetime import datetime, timezone
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from velatura import files
 from velatura.errors import InvalidInput
-from velatura.version import __version__
+from velatura.exports.request import Export, Request
 
 if TYPE_CHECKING:
     from velatura.model import Model
-    from velatura.stack import MaterialLike, Stack
+    from velatura.stack import MaterialLike
 
 
 class Format(NamedTuple):
@@ -47,7 +42,6 @@ _BAKES = {
     "blender-principled": (".py",),
     "mitsuba-principled": (".xml",),
 }
-LICENCE = "BSD-3-Clause"  # of code that is written
 _OF_SHADERS = frozenset({"constant", "prefix", "half", "tables", "baked"})
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
 
@@ -67,62 +61,6 @@ FORMATS: dict[str, Format] = {
     "python": Format((".py",), "velatura.exports.python"),
     **{name: Format(endings, "velatura.exports.baked") for name, endings in _BAKES.items()},
 }
-
-
-@dataclass(frozen=True)
-class Request:
-    """A request for an export: a format, a stack, the model with its changed switches, and the format's options.
-
-    Paths of textures are relative to `folder`, where the format allows that; absolute without one.
-    """
-
-    to: str
-    stack: Stack
-    model: Model
-    switches: Mapping[str, str]
-    folder: Path | None
-    options: Mapping[str, Any]
-
-    @property
-    def constants(self) -> Collection[str]:
-        """Names of the values that are worked in; of all that do not vary for ["all"]."""
-        from velatura.stack import Varying
-
-        asked: Collection[str] = self.options.get("constant", ())
-        if list(asked) != ["all"]:
-            return asked
-        return [name for name, value in self.stack.flat().items() if not isinstance(value, Varying)]
-
-
-@dataclass(frozen=True)
-class Export:
-    """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
-
-    costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in
-    sentences; of code, shared tables that it does not read.
-    apart: files that several exports share, by path.
-    """
-
-    text: str
-    beside: Mapping[str, bytes] = field(default_factory=dict)
-    costs: Mapping[str, str] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
-    apart: Mapping[Path, bytes] = field(default_factory=dict)
-
-    def save(self, path: str | Path) -> list[Path]:
-        """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.
-
-        Raises:
-            InvalidInput: a file cannot be written; an existing file stays.
-        """
-        path = Path(path)
-        others = {**{path.with_suffix(ending): data for ending, data in self.beside.items()}, **self.apart}
-        for other, data in others.items():
-            with files.whole(other) as unfinished:
-                unfinished.write_bytes(data)
-        with files.whole(path) as unfinished:
-            unfinished.write_text(self.text, encoding="utf-8")
-        return [path, *others]
 
 
 def export(
@@ -195,32 +133,3 @@ def check_writable(path: Path, to: str) -> None:
 def taking(option: str) -> list[str]:
     """The formats that take an option."""
     return [name for name, each in FORMATS.items() if option in each.options]
-
-
-def relative(path: Path, folder: Path | None) -> str:
-    """A path as it stands in a file of a folder, if there is one."""
-    return path.resolve().as_posix() if folder is None else Path(os.path.relpath(path, folder.resolve())).as_posix()
-
-
-def xml_comment(lines: Iterable[str]) -> list[str]:
-    """The lines of a comment, which holds no two hyphens in a row."""
-    return ["  <!--", *(f"    {re.sub('-(?=-)', '- ', line)}" for line in lines), "  -->"]
-
-
-def origin() -> str:
-    """The version that writes code, the date, and the licence under which the code may be used.
-
-    The date is today, or that of the environment's SOURCE_DATE_EPOCH.
-
-    Raises:
-        InvalidInput: SOURCE_DATE_EPOCH is no date.
-    """
-    given = files.source_date()
-    day = datetime.fromtimestamp(time.time() if given is None else given, timezone.utc)
-    return f"Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}"
-
-
-def headed(text: str) -> str:
-    """Code of a shader with its origin, in a comment below the first line."""
-    first, _, rest = text.partition("\n")
-    return f"{first}\n// {origin()}\n{rest}"

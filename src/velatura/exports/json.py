@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from velatura.exports.formats import Export, Request
+from velatura.exports.request import Export, Request
 from velatura.model import SWITCHES
 from velatura.shader import constant
 from velatura.stack import Varying, dumps

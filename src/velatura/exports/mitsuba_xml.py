@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from xml.sax.saxutils import quoteattr
 
-from velatura.exports.formats import Export, Request
+from velatura.exports.request import Export, Request
 from velatura.stack import dumps
 
 

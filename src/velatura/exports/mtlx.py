@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from velatura.exports.formats import Export, Request, origin, relative, xml_comment
+from velatura.exports.request import Export, Request, origin, relative, xml_comment
 from velatura.shader import closures, mtlx, recording
 from velatura.shader.material import constant as as_constant
 from velatura.shader.material import identifier, title

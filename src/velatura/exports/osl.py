@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from velatura.exports.formats import Export, Request, headed
+from velatura.exports.request import Export, Request, headed
 from velatura.shader.osl import osl
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from velatura.exports.formats import Export, Request
+from velatura.exports.request import Export, Request
 from velatura.stack import dumps
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from velatura.exports.formats import Export, Request, headed
+from velatura.exports.request import Export, Request, headed
 from velatura.shader import shader
 from velatura.shader.c_like import CLike
 from velatura.shader.glsl import Desktop, Glsl, Vulkan

@@ -1,0 +1,106 @@
+"""Requests for exports, what is written, and what several formats write alike."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from velatura import files
+from velatura.version import __version__
+
+if TYPE_CHECKING:
+    from velatura.model import Model
+    from velatura.stack import Stack
+
+LICENCE = "BSD-3-Clause"  # of code that is written
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request for an export: a format, a stack, the model with its changed switches, and the format's options.
+
+    Paths of textures are relative to `folder`, where the format allows that; absolute without one.
+    """
+
+    to: str
+    stack: Stack
+    model: Model
+    switches: Mapping[str, str]
+    folder: Path | None
+    options: Mapping[str, Any]
+
+    @property
+    def constants(self) -> Collection[str]:
+        """Names of the values that are worked in; of all that do not vary for ["all"]."""
+        from velatura.stack import Varying
+
+        asked: Collection[str] = self.options.get("constant", ())
+        if list(asked) != ["all"]:
+            return asked
+        return [name for name, value in self.stack.flat().items() if not isinstance(value, Varying)]
+
+
+@dataclass(frozen=True)
+class Export:
+    """A text, and the files that belong beside it, by ending: `.tables.bin` is `gold.tables.bin` beside `gold.glsl`.
+
+    costs: of code, what a call of each function costs, in words; notes: of parameters, what is lost, in
+    sentences; of code, shared tables that it does not read.
+    apart: files that several exports share, by path.
+    """
+
+    text: str
+    beside: Mapping[str, bytes] = field(default_factory=dict)
+    costs: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    apart: Mapping[Path, bytes] = field(default_factory=dict)
+
+    def save(self, path: str | Path) -> list[Path]:
+        """Write the text to a file, and what belongs beside it; the files that were written, that of the text first.
+
+        Raises:
+            InvalidInput: a file cannot be written; an existing file stays.
+        """
+        path = Path(path)
+        others = {**{path.with_suffix(ending): data for ending, data in self.beside.items()}, **self.apart}
+        for other, data in others.items():
+            with files.whole(other) as unfinished:
+                unfinished.write_bytes(data)
+        with files.whole(path) as unfinished:
+            unfinished.write_text(self.text, encoding="utf-8")
+        return [path, *others]
+
+
+def relative(path: Path, folder: Path | None) -> str:
+    """A path as it stands in a file of a folder, if there is one."""
+    return path.resolve().as_posix() if folder is None else Path(os.path.relpath(path, folder.resolve())).as_posix()
+
+
+def xml_comment(lines: Iterable[str]) -> list[str]:
+    """The lines of a comment, which holds no two hyphens in a row."""
+    return ["  <!--", *(f"    {re.sub('-(?=-)', '- ', line)}" for line in lines), "  -->"]
+
+
+def origin() -> str:
+    """The version that writes code, the date, and the licence under which the code may be used.
+
+    The date is today, or that of the environment's SOURCE_DATE_EPOCH.
+
+    Raises:
+        InvalidInput: SOURCE_DATE_EPOCH is no date.
+    """
+    given = files.source_date()
+    day = datetime.fromtimestamp(time.time() if given is None else given, timezone.utc)
+    return f"Velatura {__version__}, {day:%Y-%m-%d}; SPDX-License-Identifier: {LICENCE}"
+
+
+def headed(text: str) -> str:
+    """Code of a shader with its origin, in a comment below the first line."""
+    first, _, rest = text.partition("\n")
+    return f"{first}\n// {origin()}\n{rest}"
