@@ -22,9 +22,9 @@ from rows import parsed
 
 import velatura as vt
 from velatura.bakes import TARGETS, Bake, bake
-from velatura.imports import gltf as imported
-from velatura.targets import gltf
-from velatura.targets.parameters import complete
+from velatura.programs.gltf import formulas as gltf
+from velatura.programs.gltf import read as imported
+from velatura.programs.parameters import complete
 
 SAME = 0.02  # a smaller change counts as none
 #: Parameters that have an effect only beside a weight.

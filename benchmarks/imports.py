@@ -21,10 +21,13 @@ from rows import parser
 
 import velatura as vt
 from velatura import imports, kernel
-from velatura.imports import gltf, openpbr, principled, standard_surface
 from velatura.optics import ggx
+from velatura.programs.closures import Pair
+from velatura.programs.gltf import read as gltf
+from velatura.programs.openpbr import read as openpbr
+from velatura.programs.principled import read as principled
+from velatura.programs.standard_surface import read as standard_surface
 from velatura.sampling.low_discrepancy import square
-from velatura.targets.closures import Pair
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 
@@ -110,7 +113,7 @@ def rows(path: Path, counts: dict[str, int], checked: bool) -> list[tuple[str, s
 
 
 def by_formulas(module: str) -> Callable[[Sequence[Values], Any, Any], Sequence[Any]]:
-    value = import_module(f"velatura.targets.{module}").value
+    value = import_module(f"velatura.programs.{module}.formulas").value
     return lambda materials, wi, wo: [value(each, Pair(wi, wo)) for each in materials]
 
 

@@ -21,8 +21,8 @@ import chromium
 from generated_surfaces import GLTF, OPENPBR, Surface, values
 
 from velatura.optics.directions import directions
+from velatura.programs.closures import Pair
 from velatura.sampling.low_discrepancy import square
-from velatura.targets.closures import Pair
 
 COSINES = (1.0, 0.7, 0.35)
 NODES = 2048  # directions of reflection, drawn by the cosine

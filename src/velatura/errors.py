@@ -6,6 +6,7 @@ Every message is one line that a user can act on: it names the file, the layer, 
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 from collections.abc import Iterator
 
@@ -26,6 +27,14 @@ def one_line(text: str) -> str:
     text = short(text)
     kept = (c if c.isprintable() or "\udc80" <= c <= "\udcff" else c.encode("unicode_escape").decode() for c in text)
     return "".join(kept)
+
+
+def remark(text: str) -> str:
+    """A text as a comment of code holds it, up to the end of its line.
+
+    A backslash or a trigraph at the end of a line would continue it, and other programs know more ends of lines.
+    """
+    return one_line(re.sub(r"\\|(?<=\?)\?", lambda found: f"\\u{ord(found[0]):04x}", text))
 
 
 class VelaturaError(Exception):

@@ -8,7 +8,7 @@ import pytest
 from generated_surfaces import GLTF, OPENPBR, Surface, values
 
 from velatura.optics.directions import directions
-from velatura.targets.closures import Pair
+from velatura.programs.closures import Pair
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 

@@ -13,7 +13,8 @@ import numpy as np
 from chromium import Browser
 from materialx import document, generated
 
-from velatura.targets import gltf, openpbr
+from velatura.programs.gltf import formulas as gltf
+from velatura.programs.openpbr import formulas as openpbr
 
 
 @dataclass(frozen=True)

@@ -18,16 +18,16 @@ from materialx import document, generated
 import velatura as vt
 from velatura import kernel
 from velatura.bakes import TARGETS, Bake, bake
-from velatura.bakes.look import Described
-from velatura.bakes.lost import lost
-from velatura.bakes.sampled import Sampled
 from velatura.checks.probe import Probe
-from velatura.imports.gltf import read as imported_gltf
 from velatura.model import named
 from velatura.optics.directions import directions
+from velatura.programs.from_stack import Described
+from velatura.programs.gltf import formulas as gltf
+from velatura.programs.gltf.read import read as imported_gltf
+from velatura.programs.lost import lost
+from velatura.programs.parameters import complete
+from velatura.programs.sampled import Sampled
 from velatura.stack import Material
-from velatura.targets import gltf
-from velatura.targets.parameters import complete
 
 Run = Callable[..., tuple[int, str, str]]
 

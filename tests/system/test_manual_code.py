@@ -28,12 +28,12 @@ import yaml
 
 import velatura as vt
 from velatura import api, comparison, figures, inverse, sweeps
-from velatura.bakes import fit
 from velatura.benchmark import scores, stacks
 from velatura.cli import app
 from velatura.comparison import evaluated_lobes, pictures, plugins
 from velatura.editor import server
 from velatura.errors import Incomplete
+from velatura.programs import fit
 from velatura.shader import closures
 from velatura.sweeps import run as sweeping
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from velatura import kernel
-from velatura.targets import principled
-from velatura.targets.closures import Pair
+from velatura.programs.closures import Pair
+from velatura.programs.principled import formulas as principled
 
 
 @pytest.mark.parametrize("seed", range(4))

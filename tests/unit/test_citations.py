@@ -62,7 +62,7 @@ PRINTED = {
         "Eq 6": ("variances of one interface", {"model/papers/operators"}),
         "Eq 7": ("index of a dielectric", {"inverse/interface"}),
         "Eq 8": ("k of a conductor", {"inverse/interface"}),
-        "Eq 9": ("largest eta of a conductor", {"inverse/interface", "imports/metals"}),
+        "Eq 9": ("largest eta of a conductor", {"inverse/interface", "programs/metals"}),
         "Eq 10": ("smallest eta of a conductor", {"inverse/interface"}),
         "Eq 11": ("attenuated reflectance below one interface", {"inverse/interface", "figures/bati2021_09"}),
         "Eq 12": ("N1, first indices of a pair", {"inverse/equivalence"}),

@@ -10,7 +10,10 @@ import pytest
 
 import velatura as vt
 from velatura import imports, kernel
-from velatura.imports import gltf, openpbr, principled, standard_surface
+from velatura.programs.gltf import read as gltf
+from velatura.programs.openpbr import read as openpbr
+from velatura.programs.principled import read as principled
+from velatura.programs.standard_surface import read as standard_surface
 from velatura.sampling.low_discrepancy import square
 
 

@@ -10,10 +10,14 @@ import pytest
 
 from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.fresnel import normal_incidence
+from velatura.programs import closures
+from velatura.programs.blender import formulas as blender
+from velatura.programs.closures import Pair
+from velatura.programs.gltf import formulas as gltf
+from velatura.programs.openpbr import formulas as openpbr
+from velatura.programs.principled import formulas as principled
 from velatura.sampling.low_discrepancy import square
 from velatura.stack import srgb_sensitivity
-from velatura.targets import blender, closures, gltf, openpbr, principled
-from velatura.targets.closures import Pair
 
 U1, U2 = square(20_000)
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)

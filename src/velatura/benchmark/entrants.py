@@ -15,9 +15,9 @@ from velatura.benchmark.stacks import Case
 from velatura.comparison.baked import bsdf as principled
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, MODELS, Model, named
+from velatura.programs.closures import Pair
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.stack.schema import unknown
-from velatura.targets.closures import Pair
 
 Array = NDArray[np.floating]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from velatura import files
 from velatura.errors import InvalidInput
 from velatura.exports.request import Export, Request
+from velatura.programs import BAKED
 
 if TYPE_CHECKING:
     from velatura.model import Model
@@ -36,12 +37,6 @@ _SHADERS = {
     "slang": (".slang",),
     "wgsl": (".wgsl",),
 }
-_BAKES = {
-    "openpbr": (".mtlx",),
-    "gltf": (".gltf",),
-    "blender-principled": (".py",),
-    "mitsuba-principled": (".xml",),
-}
 _OF_SHADERS = frozenset({"constant", "prefix", "half", "tables", "baked"})
 _BOUND = _OF_SHADERS | {"group", "binding"}  # of languages that say where textures are bound
 
@@ -59,7 +54,7 @@ FORMATS: dict[str, Format] = {
     "json": Format((".json",), "velatura.exports.json"),
     "mitsuba-xml": Format((".xml",), "velatura.exports.mitsuba_xml"),
     "python": Format((".py",), "velatura.exports.python"),
-    **{name: Format(endings, "velatura.exports.baked") for name, endings in _BAKES.items()},
+    **{name: Format(baked.endings, "velatura.exports.baked") for name, baked in BAKED.items()},
 }
 
 

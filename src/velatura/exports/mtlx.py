@@ -8,7 +8,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from velatura.exports.request import Export, Request, origin, relative, xml_comment
+from velatura.exports.request import Export, Request, origin, relative
+from velatura.programs import xml
 from velatura.shader import closures, mtlx, recording
 from velatura.shader.material import constant as as_constant
 from velatura.shader.material import identifier, title
@@ -36,7 +37,7 @@ def write(request: Request) -> Export:
     lines = [
         '<?xml version="1.0"?>',
         '<materialx version="1.39" colorspace="lin_rec709">',
-        *xml_comment([*about, *(f"  {loss}" for loss in losses)]),
+        *xml.comment([*about, *(f"  {loss}" for loss in losses)]),
         f'  <nodedef name="ND_{node}" node="{node}" nodegroup="pbr" doc={quoteattr(about[0])}>',
         *(_input(stack, *each) for each in values),
         '    <input name="normal" type="vector3" defaultgeomprop="Nworld" />',

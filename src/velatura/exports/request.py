@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import re
 import time
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
@@ -80,11 +79,6 @@ class Export:
 def relative(path: Path, folder: Path | None) -> str:
     """A path as it stands in a file of a folder, if there is one."""
     return path.resolve().as_posix() if folder is None else Path(os.path.relpath(path, folder.resolve())).as_posix()
-
-
-def xml_comment(lines: Iterable[str]) -> list[str]:
-    """The lines of a comment, which holds no two hyphens in a row."""
-    return ["  <!--", *(f"    {re.sub('-(?=-)', '- ', line)}" for line in lines), "  -->"]
 
 
 def origin() -> str:

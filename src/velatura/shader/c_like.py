@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from velatura.errors import remark
 from velatura.shader.atlas import WIDTH, Layout
 from velatura.shader.bake import Bake, Group
 from velatura.shader.cost import Cost
 from velatura.shader.films import WIDTH as LINE_OF_FILMS
-from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped, remark
+from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printer import FUNCTIONS, Field, Output, Printer, Struct
 from velatura.shader.statements import assignments, statements
 from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol

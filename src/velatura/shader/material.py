@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from velatura.errors import one_line
 from velatura.shader.printer import Field, Struct
 from velatura.shader.symbol import Operand, operand
 from velatura.stack import Address, Brushing, Stack, Texture, Varying
@@ -55,14 +54,6 @@ class Filled(NamedTuple):
 def title(stack: Stack) -> str:
     """The name of a material; that it is one, without a name."""
     return stack.name.strip() or "A material"
-
-
-def remark(text: str) -> str:
-    """A name as a comment of code holds it, up to the end of its line.
-
-    A backslash or a trigraph at the end of a line would continue it, and other programs know more ends of lines.
-    """
-    return one_line(re.sub(r"\\|(?<=\?)\?", lambda found: f"\\u{ord(found[0]):04x}", text))
 
 
 def identifier(stack: Stack) -> str:

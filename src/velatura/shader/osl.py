@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops, tables
+from velatura.errors import remark
 from velatura.model import DEFAULT, Model, named
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
@@ -22,7 +23,7 @@ from velatura.shader import atlas, closures, films, recording
 from velatura.shader.bake import Group, together
 from velatura.shader.closures import Closure, Closures, Columns, Loss, Tabulated
 from velatura.shader.graph import Graph
-from velatura.shader.material import brushed, identifier, place, remark, title
+from velatura.shader.material import brushed, identifier, place, title
 from velatura.shader.material import constant as as_constant
 from velatura.shader.printer import ATOM, Language
 from velatura.shader.program import described

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, remark
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.papers.lobe_merging import merging
 from velatura.shader import atlas, films, material
@@ -122,7 +122,7 @@ def shader(
         material.filled(stack, read, bool(shown)),
     )
     placed = films.layouts(recording.films)
-    name = "A material" if shown else material.remark(material.title(stack))
+    name = "A material" if shown else remark(material.title(stack))
     costs = _costs(recording)
     parts = [
         printer.header(name, described(recording.model), not recording.read, costs),

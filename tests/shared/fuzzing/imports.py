@@ -27,10 +27,10 @@ from fuzzing import Failure
 from fuzzing.files import WORDS, bytes_changed, changed
 from velatura import binding, kernel
 from velatura.errors import InvalidInput
-from velatura.imports.materialx import RENAMED, SHADERS
 from velatura.inverse import load_table
+from velatura.programs import embedded
+from velatura.programs.materialx.read import RENAMED, SHADERS
 from velatura.stack import dumps, loads
-from velatura.targets import embedded
 
 SLOW_S = 20.0  # of the processor
 LARGE_KIB = 2**21  # by which the memory of the process may grow
@@ -112,7 +112,7 @@ def tried(kind: str, files: Files, read: Callable[[Path], Wrong]) -> list[Failur
 
 def _material(path: Path) -> Wrong:
     """The material is the same once it is written."""
-    from velatura.imports.formats import FORMATS
+    from velatura.programs.formats import FORMATS
 
     names, _ = import_module(FORMATS[path.suffix]).materials(path)
     found = vt.imports.read(path, next(iter(names), None))

@@ -1,0 +1,219 @@
+"""Files of glTF, .gltf and .glb: their materials, with images that lie beside or inside them."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from velatura import files
+from velatura.errors import InvalidInput
+from velatura.programs import embedded
+from velatura.programs.given import is_number
+from velatura.programs.gltf import read as gltf
+from velatura.programs.gltf.formulas import PARAMETERS as FACTORS
+from velatura.programs.gltf.images import Images
+from velatura.programs.imported import Imported, Notes, shown
+from velatura.programs.surface import INDICES
+from velatura.programs.values import changed
+from velatura.stack import Texture, loads
+from velatura.stack.io import parsed
+from velatura.stack.schema import show
+
+LARGEST = 2**26  # characters of JSON
+_MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
+
+#: Images of a factor: where they stand, the factor, their channel, and whether they hold colours.
+_TEXTURES = (
+    ("pbrMetallicRoughness", "baseColorTexture", "baseColorFactor", "rgb"),
+    ("pbrMetallicRoughness", "metallicRoughnessTexture", "metallicFactor", "b"),
+    ("pbrMetallicRoughness", "metallicRoughnessTexture", "roughnessFactor", "g"),
+    ("KHR_materials_clearcoat", "clearcoatTexture", "clearcoatFactor", "r"),
+    ("KHR_materials_clearcoat", "clearcoatRoughnessTexture", "clearcoatRoughnessFactor", "g"),
+    ("KHR_materials_specular", "specularTexture", "specularFactor", "a"),
+    ("KHR_materials_specular", "specularColorTexture", "specularColorFactor", "rgb"),
+    ("KHR_materials_transmission", "transmissionTexture", "transmissionFactor", "r"),
+    ("KHR_materials_volume", "thicknessTexture", "thicknessFactor", "g"),
+    ("KHR_materials_iridescence", "iridescenceTexture", "iridescenceFactor", "r"),
+)
+_THICKNESS = ("KHR_materials_iridescence", "iridescenceThicknessTexture", "iridescenceThicknessMaximum", "g")
+_OTHERS = {
+    "KHR_materials_sheen": "sheenColorFactor",
+    "KHR_materials_dispersion": "dispersion",
+    "KHR_materials_diffuse_transmission": "diffuseTransmissionFactor",
+}
+
+
+def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]:
+    """The materials of a file by name, those without one by their number, each as a function that reads it; the
+    file chooses none.
+
+    Raises:
+        InvalidInput: it cannot be read, or is no glTF.
+    """
+    text, chunk = _parts(path, files.content(path))
+    document = _document(path, text)
+    images = Images(path, document, chunk)
+    found: dict[str, Callable[[Notes], Imported]] = {}
+    entries = document.get("materials", [])
+    if not isinstance(entries, list):
+        raise InvalidInput(f"{path}: materials: must be a list, got {show(entries)}")
+    for number, entry in enumerate(entries):
+        if not isinstance(entry, Mapping):
+            raise InvalidInput(f"{path}: material {number}: must hold keys and values, got {show(entry)}")
+        name = str(entry.get("name") or f"material {number}")
+        name = name if name not in found else f"{name} ({number})"
+        found[name] = _reader(entry, name, path, document, images)
+    return found, None
+
+
+def _reader(
+    entry: Mapping[str, Any], name: str, path: Path, document: Mapping[str, Any], images: Images
+) -> Callable[[Notes], Imported]:
+    def read(notes: Notes) -> Imported:
+        try:
+            ours = str(document["asset"].get("generator", "")).startswith("Velatura ")
+            held = entry if ours else {key: value for key, value in entry.items() if key != "extras"}
+            return of_material(held, name, notes, images, path.parent)
+        except InvalidInput as error:
+            raise InvalidInput(f"{path}: {name}: {error}") from None
+        except (AttributeError, KeyError, IndexError, RecursionError, TypeError, ValueError) as error:
+            raise InvalidInput(f"{path}: {name}: is no material of glTF: {error}") from None
+
+    return read
+
+
+def of_material(
+    material: Mapping[str, Any],
+    name: str,
+    notes: Notes,
+    find: Callable[[Mapping[str, Any]], Path | str],
+    folder: Path = Path(),
+) -> Imported:
+    """The stack of an entry of `materials`: the one that it was baked from, or the nearest one.
+
+    `find` gives the file of an image, or the reason why it has none; `folder` is that of the file.
+    """
+    held = embedded.of_gltf(material)
+    if held is not None:
+        notes.add("extras", embedded.KEY, embedded.READ)
+        return Imported(loads(json.dumps(held), "the stack in extras.json", folder), tuple(notes.left))
+    extensions = _holding(material.get("extensions", {}), "extensions")
+    core = "pbrMetallicRoughness"
+    parts = {name: _holding(part, name) for name, part in {core: material.get(core, {}), **extensions}.items()}
+    values: dict[str, Any] = {}
+
+    # Factors, by the parts that they stand in
+    for factor in FACTORS:
+        if factor.name in parts.get(factor.within, {}):
+            given = parts[factor.within][factor.name]
+            values[factor.name] = given[:3] if factor.is_colour and isinstance(given, list | tuple) else given
+    for part, factor_name in _OTHERS.items():
+        if factor_name in parts.get(part, {}):
+            values[factor_name] = parts[part][factor_name]
+    if values.get("ior") == 0:
+        notes.add("ior", 0.0, f"an infinite index: {INDICES[1]:g} stands for it")
+        values["ior"] = INDICES[1]
+    strength = _number(parts.get("KHR_materials_emissive_strength", {}), "emissiveStrength", 1.0)
+    if any(material.get("emissiveFactor", ())):
+        emitted = material["emissiveFactor"]
+        values["emissiveFactor"] = [strength * part if is_number(part) else part for part in emitted]
+
+    # Images, times their factors
+    defaults = {each.name: each.default for each in gltf.PARAMETERS}
+    for part, key, factor_name, channel in (*_TEXTURES, _THICKNESS):
+        reference = parts.get(part, {}).get(key)
+        if reference is None:
+            continue
+        factor = values.get(factor_name, defaults[factor_name])
+        least = _number(values, "iridescenceThicknessMinimum", 100.0) if key == _THICKNESS[1] else 0.0
+        texture = _texture(_holding(reference, key), channel, key, notes, find)
+        if texture is not None:
+            values[factor_name] = _scaled(texture, factor, least, factor_name, notes)
+    for key in gltf.IGNORED:
+        if key in material or key in parts.get("KHR_materials_clearcoat", {}):
+            values[key] = "an image"
+    if "anisotropyTexture" in parts.get("KHR_materials_anisotropy", {}):
+        notes.add("anisotropyTexture", "an image", "the strength and the rotation beside it stand for it")
+
+    # Cover, and extensions that are not read
+    if material.get("alphaMode", "OPAQUE") != "OPAQUE":
+        base = parts["pbrMetallicRoughness"].get("baseColorFactor", (1, 1, 1, 1))
+        values["alpha"] = base[3] if len(base) > 3 and base[3] < 1 else 0.5
+    known = {each.within for each in FACTORS} | set(_OTHERS) | {"KHR_materials_emissive_strength"}
+    for part in sorted(set(extensions) - known):
+        notes.add(part, "", "not read")
+    return gltf.read(values, name, notes)
+
+
+def _holding(part: object, name: str) -> Mapping[str, Any]:
+    """A part of a material, or its extensions, if it holds keys and values."""
+    if not isinstance(part, Mapping):
+        raise InvalidInput(f"{name}: must hold keys and values, got {show(part)}")
+    return part
+
+
+def _number(part: Mapping[str, Any], name: str, default: float) -> float:
+    value = part.get(name, default)
+    if not is_number(value):
+        raise InvalidInput(f"{name}: must be a number, got {show(value)}")
+    return float(value)
+
+
+def _texture(
+    reference: Mapping[str, Any],
+    channel: str,
+    key: str,
+    notes: Notes,
+    find: Callable[[Mapping[str, Any]], Path | str],
+) -> Texture | None:
+    file = find(reference)
+    if isinstance(file, str):
+        notes.add(key, "an image", f"{file}: left out")
+        return None
+    if reference.get("texCoord", 0) or "KHR_texture_transform" in reference.get("extensions", {}):
+        notes.add(f"{key}: coordinates", file.name, "the image lies on the texture coordinates as they are")
+    return Texture(texture=file, channel=channel, encoding="srgb" if channel == "rgb" else "linear")
+
+
+def _scaled(texture: Texture, factor: Any, least: float, name: str, notes: Notes) -> Any:
+    """An image times its factor; what is no factor stays, to be refused with the others."""
+    if np.shape(factor) not in ((), (3,)) or np.asarray(factor).dtype.kind not in "iuf":
+        return factor
+    if isinstance(factor, list | tuple) and len(set(factor)) > 1:
+        notes.add(name, shown(tuple(factor)), "its mean is a factor on the image")
+    most = float(np.mean(factor))
+    return changed(texture, lambda x: least + (most - least) * x)
+
+
+def _parts(path: Path, data: bytes) -> tuple[str, bytes | None]:
+    """The JSON of a file, and its binary chunk if it is a .glb that has one."""
+    if data[:4] != _MAGIC:
+        return files.decoded(data, path), None
+    if len(data) < 20 or data[16:20] != _JSON:
+        raise InvalidInput(f"{path}: is no glTF: its first chunk is not JSON")
+    version, whole, length = struct.unpack("<III", data[4:16])
+    if version != 2:
+        raise InvalidInput(f"{path}: is glTF in version {version}, and 2 is read")
+    if whole != len(data) or 20 + length > whole:
+        raise InvalidInput(f"{path}: is not whole: its head says {whole} bytes, and it has {len(data)}")
+    chunk = data[20 + length :]
+    if len(chunk) < 8 or chunk[4:8] != _BINARY:
+        return files.decoded(data[20 : 20 + length], path), None
+    (size,) = struct.unpack("<I", chunk[:4])
+    if 8 + size > len(chunk):
+        raise InvalidInput(f"{path}: is not whole: its binary chunk says {size} bytes, and it has {len(chunk) - 8}")
+    return files.decoded(data[20 : 20 + length], path), chunk[8 : 8 + size]
+
+
+def _document(path: Path, text: str) -> Mapping[str, Any]:
+    if len(text) > LARGEST:
+        raise InvalidInput(f"{path}: holds more than {LARGEST >> 20} MiB of JSON")
+    document = parsed(text, "json", path)
+    if not isinstance(document, Mapping) or "asset" not in document:
+        raise InvalidInput(f"{path}: is no glTF: has no asset")
+    return document

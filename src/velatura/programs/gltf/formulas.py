@@ -1,0 +1,48 @@
+"""Materials of glTF 2.0 and their extensions (https://registry.khronos.org/glTF, appendix B and KHR_materials_*)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from velatura.optics import fresnel
+from velatura.programs import closures
+from velatura.programs.closures import Array, Number, Pair
+from velatura.programs.gltf.parameters import PARAMETERS
+from velatura.programs.parameters import Values, complete
+
+COAT_F_0 = 0.04  # of an index of 1.5
+
+
+def alphas(roughness: Number, strength: float) -> tuple[Number, Number]:
+    """GGX roughness along the direction of anisotropy and across it (KHR_materials_anisotropy)."""
+    return roughness**2 * (1 - strength**2) + strength**2, roughness**2
+
+
+def value(given: Values, pair: Pair, thin: bool = True) -> Array:
+    """f |cos theta_o| (3, N) of appendix B and the extensions; `thin`: no refraction, as without a volume."""
+    v = complete(PARAMETERS, given)
+    base, tint = (np.reshape(v[name], (3, 1)) for name in ("baseColorFactor", "specularColorFactor"))
+    au, av = closures.anisotropic(*alphas(v["roughnessFactor"], v["anisotropyStrength"]))
+    turn = v["anisotropyRotation"]
+    lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
+
+    # Fresnel reflectance of both bases, with the film's
+    f_0 = np.minimum(fresnel.normal_incidence(v["ior"]) * tint, 1.0) * v["specularFactor"]
+    f_dielectric = closures.schlick(pair.cos_d, f_0, v["specularFactor"])
+    f_metal = closures.schlick(pair.cos_d, base)
+    if v["iridescenceFactor"] > 0 and v["iridescenceThicknessMaximum"] > 0:
+        share, n, nm = v["iridescenceFactor"], v["iridescenceIor"], v["iridescenceThicknessMaximum"]
+        f_dielectric = (1 - share) * f_dielectric + share * closures.film_by_schlick(pair.cos_d, n, nm, f_0)
+        f_metal = (1 - share) * f_metal + share * closures.film_by_schlick(pair.cos_d, n, nm, base)
+
+    # Diffuse or transmitting base below the dielectric, mixed with metal
+    clear = v["transmissionFactor"]
+    through = base * closures.refracted(pair, 1.0 if thin else v["ior"], au, av, turn)
+    below = (1 - clear) * base * closures.lambert(pair) + clear * through
+    dielectric = f_dielectric * lobe + (1 - np.clip(f_dielectric.max(axis=0), 0, 1)) * below
+    material = (1 - v["metallicFactor"]) * dielectric + v["metallicFactor"] * f_metal * lobe
+
+    # Clearcoat, by the Fresnel reflectance of the normal
+    alpha = max(v["clearcoatRoughnessFactor"] ** 2, closures.ALPHA_MIN)
+    share = v["clearcoatFactor"] * closures.schlick(pair.cos_i, COAT_F_0)
+    return np.asarray((1 - share) * material + share * pair.reflected * closures.microfacets(pair, alpha, alpha))

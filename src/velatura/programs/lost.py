@@ -1,0 +1,61 @@
+"""What a target cannot hold of a stack, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from velatura.programs.from_stack import Described
+from velatura.programs.program import Program
+from velatura.stack import InterfaceValues, MediumValues
+
+TURNED = 0.5  # degrees
+
+
+def lost(stack: Described, target: Program) -> Iterator[str]:
+    """One line for each property that is left out or replaced; layers are counted from the top, from 0."""
+    layers = stack.material.layers
+    interfaces = [(n, each) for n, each in enumerate(layers) if isinstance(each, InterfaceValues)]
+    surfaces = [n for n, layer in enumerate(layers) if not isinstance(layer, MediumValues)]
+    if np.max(np.abs(np.asarray(stack.material.exterior) - 1)) > 1e-6:
+        yield "exterior: indices are taken relative to it, so that the material stands in air"
+    coated = len(interfaces) > 1 and interfaces[0][1].kind == "dielectric"
+    if len(surfaces) > 2:
+        yield f"layers {', '.join(map(str, surfaces[coated:]))}: merged into one base"
+    for n, each in interfaces:
+        coat = coated and n == interfaces[0][0]
+        yield from (f"layer {n}: {what}" for what in _of_interface(each, coat, target))
+    for n, layer in enumerate(layers):
+        if isinstance(layer, MediumValues):
+            yield from (f"layer {n}: {what}" for what in _of_medium(layer, target))
+    if stack.thin and not target.pane:
+        yield "transmission: light is refracted as into a solid, and does not leave a pane"
+
+
+def _of_interface(each: InterfaceValues, coat: bool, target: Program) -> Iterator[str]:
+    brushed = abs(each.alpha_u - each.alpha_v) > 1e-6
+    if coat and brushed and not target.coat_brushed:
+        yield "the coat's brushing is left out"
+    if not coat and brushed and not target.turned:
+        along = each.rotation if each.alpha_u > each.alpha_v else each.rotation + 90
+        if abs((along + 90) % 180 - 90) > TURNED:
+            yield "brushing is held along the tangent only"
+    if coat and not target.coat_eta:
+        yield "the coat's index is 1.5; its reflectance is the coat's weight"
+    if each.kind == "dielectric" and np.ptp(np.broadcast_to(each.eta, (3, 1))) > 1e-6:
+        yield "one index for all colours"
+    if each.films and not target.film:
+        yield "thin films are replaced by a colour"
+    elif each.films and (coat or len(each.films) > 1):
+        yield "thin films are replaced by one film on the base"
+
+
+def _of_medium(each: MediumValues, target: Program) -> Iterator[str]:
+    if np.any(np.asarray(each.sigma_s) * each.depth > 0):
+        yield "scattering is part of the base's colour"
+    if np.any(np.asarray(each.sigma_a) * each.depth > 0):
+        if not target.coat_colour:
+            yield "absorption is part of the base's colour, at all angles alike"
+        elif not target.coat_depth:
+            yield "absorption does not deepen with the angle"

@@ -1,0 +1,96 @@
+"""OpenPBR Surface 1.1 (https://academysoftwarefoundation.github.io/OpenPBR, and its reference graph in MaterialX)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from velatura.optics import fresnel
+from velatura.programs import closures
+from velatura.programs.closures import Array, Number, Pair
+from velatura.programs.openpbr.parameters import PARAMETERS, TURNS
+from velatura.programs.parameters import Values, complete
+
+
+def alphas(roughness: Number, anisotropy: float) -> tuple[Number, Number]:
+    """GGX roughness along the tangent and across it (section Microfacet model)."""
+    along = roughness**2 * np.sqrt(2 / (1 + (1 - anisotropy) ** 2))
+    return along, along * (1 - anisotropy)
+
+
+def value(given: Values, pair: Pair, thin: bool = True) -> Array:
+    """f |cos theta_o| (3, N) of the reference graph: no fuzz, subsurface, dispersion or emission.
+
+    `thin`: transmission passes a thin wall, without refraction.
+    """
+    v = complete((*PARAMETERS, *TURNS), given)
+    base, specular, transmitted, coat_tint = (
+        np.reshape(v[name], (3, 1)) for name in ("base_color", "specular_color", "transmission_color", "coat_color")
+    )
+    coat, cos_i = v["coat_weight"], pair.cos_i
+    turn, coat_turn = np.radians(v["geometry_tangent"]), np.radians(v["geometry_coat_tangent"])
+
+    # Roughen the base below the coat
+    rough = min(1.0, v["specular_roughness"] ** 4 + 2 * v["coat_roughness"] ** 4) ** 0.25
+    rough = (1 - coat) * v["specular_roughness"] + coat * rough
+    au, av = closures.anisotropic(*alphas(rough, v["specular_roughness_anisotropy"]))
+    mean = float(np.sqrt(au * av))
+    lobe = pair.reflected * closures.microfacets(pair, au, av, turn)
+
+    # Index of the dielectric base under the coat, scaled by its weight
+    ratio = v["specular_ior"] / v["coat_ior"]
+    eta = (1 - coat) * v["specular_ior"] + coat * max(ratio, 1 / ratio)
+    epsilon = np.sign(eta - 1) * np.sqrt(np.clip(v["specular_weight"] * fresnel.normal_incidence(eta), 0, 0.99999))
+    eta = float((1 + epsilon) / (1 - epsilon))
+
+    # Metal, and dielectric over a diffuse or transparent base
+    reflectance = v["base_weight"] * base
+    f_metal = closures.tinted(pair.cos_d, reflectance, specular)
+    f_dielectric = np.broadcast_to(fresnel.dielectric(pair.cos_d, eta), (3, len(cos_i)))
+    if v["thin_film_weight"] > 0 and v["thin_film_thickness"] > 0:
+        n, nm, share = v["thin_film_ior"], 1000 * v["thin_film_thickness"], v["thin_film_weight"]
+        root = np.sqrt(np.clip(reflectance, 0.01, 0.99))
+
+        def metal(cosine: Array) -> tuple[Array, Array]:
+            f = closures.tinted(cosine, reflectance, specular)
+            return f, f
+
+        films = [
+            closures.film(pair.cos_d, n, nm, closures.below_film(reflectances, index, n))
+            for reflectances, index in (
+                (metal, (1 + root) / (1 - root)),
+                (closures.dielectric_below(eta / n), np.full((3, 1), eta)),
+            )
+        ]
+        f_metal, f_dielectric = ((1 - share) * f + share * g for f, g in zip((f_metal, f_dielectric), films))
+    metal_part = v["specular_weight"] * f_metal * closures.compensation(cos_i, mean, f_metal) * lobe
+    shown = closures.compensation(cos_i, mean, f_dielectric)
+    over = specular * f_dielectric * shown * lobe
+    f_0 = fresnel.normal_incidence(eta)
+    kept = 1 - closures.dielectric_albedo(cos_i, mean, eta) * closures.compensation(cos_i, mean, f_0)
+    diffuse = v["base_weight"] * closures.oren_nayar(pair, base, v["base_diffuse_roughness"])
+    through = transmitted * closures.refracted(pair, 1.0 if thin else eta, au, av, turn)
+    clear = v["transmission_weight"]
+    dielectric = over + kept * ((1 - clear) * diffuse + clear * through)
+    substrate = (1 - v["base_metalness"]) * dielectric + v["base_metalness"] * metal_part
+
+    # Coat: darkening, absorption, and its own reflection on top
+    eta_c = v["coat_ior"]
+    f_0 = fresnel.normal_incidence(eta_c)
+    inside = 1 - (1 - f_0) / eta_c**2
+    metal_albedo = base * v["specular_weight"]
+    estimate = (1 - v["base_metalness"]) * base + v["base_metalness"] * metal_albedo
+    share = coat * v["coat_darkening"]
+    darkening = (1 - share) + share * (1 - inside) / (1 - estimate * inside)
+    au, av = closures.anisotropic(*alphas(v["coat_roughness"], v["coat_roughness_anisotropy"]))
+    mean = float(np.sqrt(au * av))
+    f_coat = fresnel.dielectric(pair.cos_d, eta_c) if eta_c != 1 else 0 * pair.cos_d
+    top = (
+        pair.reflected
+        * f_coat
+        * closures.compensation(cos_i, mean, f_coat)
+        * closures.microfacets(pair, au, av, coat_turn)
+    )
+    kept = 1 - coat * closures.dielectric_albedo(cos_i, mean, eta_c) * closures.compensation(
+        cos_i, mean, np.full(1, f_0)
+    )
+    return np.asarray(coat * top + kept * darkening * ((1 - coat) + coat * coat_tint) * substrate)

@@ -1,0 +1,131 @@
+"""Stacks of surfaces of OpenPBR 1.1."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from velatura.optics import fresnel
+from velatura.programs import parts
+from velatura.programs.given import Given
+from velatura.programs.imported import Imported, Notes
+from velatura.programs.metals import of_f82_tint
+from velatura.programs.openpbr import formulas, parameters
+from velatura.programs.parameters import GREATEST, Parameter
+from velatura.programs.surface import WHITE, Alpha, Coat, Surface
+from velatura.programs.to_stack import imported
+from velatura.programs.values import Value, changed, colour
+
+PARAMETERS = (
+    *parameters.PARAMETERS,
+    *parameters.TURNS,
+    Parameter("emission_luminance", 0.0, high=GREATEST),
+    Parameter("emission_color", WHITE),
+    Parameter("geometry_opacity", 1.0),
+    Parameter("geometry_thin_walled", False),
+    # Of version 1.2
+    Parameter("specular_haze", 0.0),
+    Parameter("specular_haze_spread", 0.3),
+    Parameter("specular_retroreflectivity", 0.0),
+)
+IGNORED = {"geometry_normal": parts.FLAT, "geometry_coat_normal": parts.FLAT}
+MISSED = 0.02  # of the reflectance towards the edge, that is listed
+
+
+def read(values: Mapping[str, Any], name: str = "", notes: Notes | None = None) -> Imported:
+    """The stack nearest to a surface of OpenPBR.
+
+    Raises:
+        InvalidInput: an unknown parameter, or a value of another kind.
+    """
+    notes = Notes() if notes is None else notes
+    given = Given(values, PARAMETERS, IGNORED, notes)
+    thin = given.number("geometry_thin_walled") > 0
+    base: dict[str, Any]
+    if given.whole("base_metalness"):
+        base = {"metalness": 1.0, **_metal(given)}
+    else:
+        weight, tint = given.number("specular_weight"), given.colour("specular_color")
+        base = {"specular": given.tinted("specular_color", weight, tint)}
+        if given.whole("transmission_weight"):
+            base |= {"clear": 1.0, "tint": _tint(given, thin), "pane": thin}
+        else:
+            base["colour"] = _albedo(given)
+            given.leave("geometry_thin_walled", parts.OPAQUE)
+    weight, eta = given.number("coat_weight"), given.index("coat_ior")
+    surface = Surface(
+        alpha=_alpha(given, "specular_roughness"),
+        rotation=given.number("geometry_tangent"),
+        eta=given.index("specular_ior"),
+        film=_film(given),
+        coat=parts.coated(
+            notes,
+            "coat_weight",
+            weight,
+            Coat(
+                eta,
+                _alpha(given, "coat_roughness") if weight else (0.0, 0.0),
+                given.number("geometry_coat_tangent"),
+                colour=given["coat_color"] if weight else WHITE,
+                darkening=given.number("coat_darkening"),
+            ),
+        ),
+        **base,
+    )
+    given.leave("specular_haze", "an interface has one lobe: left out")
+    if given.number("specular_haze"):
+        given.leave("specular_haze_spread", "left out with the haze")
+    given.leave("specular_retroreflectivity", "facets send no light back: left out")
+    given.leave("fuzz_weight", parts.FIBRES)
+    given.leave("emission_luminance", parts.LIGHT)
+    given.leave("geometry_opacity", parts.COVERS)
+    return imported(surface, notes, name, "imported from OpenPBR")
+
+
+def _alpha(given: Given, roughness: str) -> Alpha:
+    anisotropy = given.number(f"{roughness}_anisotropy")
+    return parts.alphas(given[roughness], lambda r: formulas.alphas(r, anisotropy))
+
+
+def _metal(given: Given) -> dict[str, Any]:
+    weight = given.number("base_weight") * given.number("specular_weight")
+    reflectance, tint = changed(given["base_color"], lambda c: weight * c), given.colour("specular_color")
+    if isinstance(reflectance, tuple):
+        shown = np.array(tint) * fresnel.schlick(fresnel.EDGE, np.array(reflectance))
+        nearest = of_f82_tint(np.array(reflectance), np.array(tint))
+        missed = np.asarray(fresnel.conductor(fresnel.EDGE, *nearest)) - shown
+        if np.max(missed) > MISSED:
+            given.notes.add(
+                "specular_color", tint, "no metal reflects so little towards the edge: the nearest is taken"
+            )
+    return {"colour": reflectance, "edge": tint}
+
+
+def _tint(given: Given, pane: bool) -> Value:
+    """The transmittance of each crossing; what is absorbed over a length belongs to the inside of a shape."""
+    given.leave("transmission_dispersion_scale", parts.UNDISPERSED)
+    length = given.number("transmission_depth")
+    if pane or not length:
+        given.leave("transmission_scatter", "without a depth it has no effect")
+        return given["transmission_color"]
+    scattered = np.array(given.colour("transmission_scatter")) / length
+    sigma_a = parts.absorbed(given.colour("transmission_color"), length) - scattered
+    sigma_a -= min(sigma_a.min(), 0.0)
+    g = given.number("transmission_scatter_anisotropy")
+    given.inside("transmission_color", sigma_a, colour(scattered), g)  # type: ignore[arg-type]
+    return WHITE
+
+
+def _albedo(given: Given) -> Value:
+    given.leave("base_diffuse_roughness", parts.LAMBERTIAN)
+    given.leave("subsurface_weight", parts.BELOW)
+    share = given.number("subsurface_weight")
+    return given.blended("base_color", given.number("base_weight"), "subsurface_color", share)
+
+
+def _film(given: Given) -> tuple[float, Value] | None:
+    if not given.whole("thin_film_weight"):
+        return None
+    return given.index("thin_film_ior"), changed(given["thin_film_thickness"], lambda um: 1000 * um)

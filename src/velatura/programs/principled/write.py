@@ -1,0 +1,63 @@
+"""A scene of Mitsuba that holds a `principled` alone, to be included in others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from velatura.optics import fresnel
+from velatura.programs import embedded, xml
+from velatura.programs.principled import formulas
+from velatura.programs.principled.parameters import PARAMETERS
+from velatura.programs.program import ROUGH, UNIT, Bake, Fitted, Program, burley, mean_alpha, product
+from velatura.programs.surface import Surface
+
+
+def start(surface: Surface) -> Fitted:
+    """Parameters of a surface, whose coat's colour goes into the base."""
+    colours = (surface.tint, surface.tint) if surface.clear else (surface.colour, surface.coat.colour)
+    values: Fitted = {
+        "base_color": product(*colours),
+        "metallic": surface.metalness,
+        **burley(surface.alpha, "roughness", "anisotropic"),
+        "eta": surface.eta,
+        "spec_trans": surface.clear,
+    }
+    # It cannot be turned: across the tangent it is brushed less, never more
+    if abs(np.cos(np.radians(surface.rotation))) <= 0.5:
+        values["anisotropic"] = 0.0
+    if surface.coated:
+        rough, smooth = formulas.COAT_ALPHA
+        values |= {
+            "clearcoat": min(fresnel.normal_incidence(surface.coat.eta) / formulas.COAT_F_0, 1.0),
+            "clearcoat_gloss": float(np.clip((rough - mean_alpha(surface.coat.alpha)) / (rough - smooth), 0, 1)),
+        }
+    return values
+
+
+def text(made: Bake, material: Any, files: dict[str, str]) -> str:
+    """The scene, with the loss in a comment and the stack in another."""
+    values = [
+        f'        <{"rgb" if each.is_colour else "float"} name="{each.name}" value="{xml.numbers(value)}"/>'
+        for each, value in made.differing(PARAMETERS)
+    ]
+    body = ['    <bsdf type="principled" id="material">', *values, "    </bsdf>", "</scene>", ""]
+    return embedded.document(['<scene version="3.0.0">'], made.comment, material, body)
+
+
+PROGRAM = Program(
+    "Mitsuba's principled",
+    PARAMETERS,
+    formulas.value,
+    start,
+    text,
+    metal="metallic",
+    clear="spec_trans",
+    base={"base_color": UNIT, "eta": (1.001, 4.0), "flatness": UNIT},
+    coat={"clearcoat": UNIT, "clearcoat_gloss": UNIT},
+    tint={"spec_tint": UNIT},
+    rough={"roughness": ROUGH},
+    brushed={"anisotropic": UNIT},
+    film={},
+)

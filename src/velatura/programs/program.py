@@ -1,0 +1,168 @@
+"""Programs that parameters are fitted for, the parameters that are found, and what their writers share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from velatura.programs.closures import ALPHA_MIN, Array, Pair
+from velatura.programs.parameters import RGB, Parameter, Values
+from velatura.programs.surface import Alpha, Surface
+from velatura.programs.values import Value
+from velatura.stack import Texture
+from velatura.version import __version__
+
+Range: TypeAlias = tuple[float, float]
+Fitted: TypeAlias = dict[str, float | RGB]
+
+UNIT = (0.0, 1.0)
+ROUGH = (ALPHA_MIN**0.5, 1.0)  # smoother is evaluated alike
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program's material: its formulas, the parameters of a surface, the ranges of those that are fitted, its file.
+
+    base: fitted for every stack; others only where it has what they stand for.
+    metal, clear: shares of the base, fitted where media scatter light. rough, brushed: of a base that is seen through
+        others, or passes light. tint: where reflectances at the normal are not those of one index.
+    coat_eta, coat_brushed, coat_colour, coat_depth: whether the coat has an index, a brushing, a colour, and one that
+        deepens where light crosses it at an angle.
+    turned, pane: whether brushing can be turned, and light pass without refraction.
+    colour, roughness: the parameter that takes an image of a diffuse base's colour, where `metal` is less than .5, and
+        of the root of the one interface's alpha; none if empty.
+    images: endings of the files that it reads, which are then in sRGB; any where there are none.
+    text: the text of a file, by the bake, the stack in JSON, and names of image files by parameter; these names are
+        absolute if it may lie `anywhere`.
+    """
+
+    title: str
+    parameters: tuple[Parameter, ...]
+    value: Callable[[Values, Pair, bool], Array]
+    start: Callable[[Surface], Fitted]
+    text: Callable[[Bake, Any, dict[str, str]], str]
+    metal: str
+    clear: str
+    base: dict[str, Range]
+    coat: dict[str, Range]
+    tint: dict[str, Range]
+    rough: dict[str, Range]
+    brushed: dict[str, Range]
+    film: dict[str, Range]
+    coat_eta: bool = False
+    coat_brushed: bool = False
+    coat_colour: bool = False
+    coat_depth: bool = False
+    turned: bool = False
+    pane: bool = False
+    colour: str = ""
+    roughness: str = ""
+    images: tuple[str, ...] = ()
+    anywhere: bool = False
+
+
+@dataclass(frozen=True)
+class Carried:
+    """An image in place of a parameter: a factor times its linear texels, colours or roots of a channel."""
+
+    texture: Texture
+    factor: float | RGB
+
+    @property
+    def channel(self) -> int:
+        """The number of the channel of roots."""
+        return "rgba".index(self.texture.channel or "r")
+
+
+@dataclass(frozen=True)
+class Bake:
+    """Parameters of a target, which has a title, that come closest to a stack, and what is lost.
+
+    For the N cosines of incidence `cos_theta`, in the target's own formulas against the model: total_variation (N,),
+    the share of the reflected light in wrong places, as `compare` measures it; albedo, baked_albedo (3, N); passed,
+    baked_passed (3, N), what leaves below. lost: what the target does not hold. images: in place of numbers, by
+    parameter. thin: light passes without refraction.
+    """
+
+    target: str
+    title: str
+    name: str
+    model: str
+    values: Fitted
+    cos_theta: tuple[float, ...]
+    total_variation: Array
+    albedo: Array
+    baked_albedo: Array
+    passed: Array
+    baked_passed: Array
+    lost: tuple[str, ...]
+    images: dict[str, Carried]
+    thin: bool
+
+    def differing(self, parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, float | RGB]]:
+        """Parameters that differ from their defaults."""
+        each = [(parameter, self.values[parameter.name]) for parameter in parameters]
+        return [(parameter, value) for parameter, value in each if value != parameter.default]
+
+    @property
+    def comment(self) -> list[str]:
+        """The lines at the head of a file."""
+        return [f"Written by Velatura {__version__}.", *self.summary]
+
+    @property
+    def summary(self) -> list[str]:
+        """The loss in sentences, then what is not held."""
+        cosines, shares = (
+            ", ".join(f"{x:{form}}" for x in each)
+            for each, form in ((self.cos_theta, "g"), (100 * self.total_variation, ".1f"))
+        )
+        lines = [
+            f"Parameters of {self.title} that come closest to {self.name or 'a material'} by the model {self.model}.",
+            f"Loss in the formulas of {self.title}, at cosines of incidence {cosines}:",
+            f"total variation: {shares} % of the reflected light is in wrong places",
+            f"albedo: {_off(self.albedo, self.baked_albedo, self.cos_theta)}",
+        ]
+        if self.passed.any():
+            lines.append(f"light that passes: {_off(self.passed, self.baked_passed, self.cos_theta)}")
+        return lines + [f"not held: {each}" for each in self.lost]
+
+
+def _off(true: Array, found: Array, cosines: tuple[float, ...]) -> str:
+    """The mean and the greatest error of an energy, and where that is."""
+    error = found - true
+    channel, n = np.unravel_index(np.argmax(np.abs(error)), error.shape)
+    where = f"{('red', 'green', 'blue')[channel]}, cosine {cosines[n]:g}"
+    return f"{np.abs(error).mean():.3f} off in the mean, {error[channel, n]:+.3f} at most ({where})"
+
+
+# Parameters of surfaces -----------------------------------------------------------------------------------------------
+
+
+def rgb(value: Value) -> RGB:
+    """A colour of a surface of a stack."""
+    red, green, blue = np.asarray(value, float).tolist()
+    return red, green, blue
+
+
+def product(a: Value, b: Value) -> RGB:
+    """The product of two colours."""
+    return rgb(tuple(np.multiply(rgb(a), rgb(b))))
+
+
+def mean_alpha(alpha: Alpha) -> float:
+    """One roughness for those along two axes."""
+    return float(np.sqrt(np.mean(np.square(np.asarray(alpha, float)))))
+
+
+def roughness(alpha: float) -> float:
+    """The root of a roughness, as most programs have it."""
+    return float(np.sqrt(np.clip(alpha, 0, 1)))
+
+
+def burley(alpha: Alpha, name: str, anisotropic: str) -> Fitted:
+    """Both parameters by whose `closures.burley` a surface has its roughness."""
+    u, v = np.maximum(np.asarray(alpha, float), 1e-6)
+    return {name: roughness(np.sqrt(u * v)), anisotropic: float(np.clip((1 - v / u) / 0.9, 0, 1))}

@@ -1,0 +1,76 @@
+"""Materials with textures: the means, which are fitted, and the images that a target takes in place of a number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+import numpy as np
+
+from velatura import binding, kernel
+from velatura.programs.parameters import RGB, Values
+from velatura.programs.program import Carried, Program
+from velatura.stack import Address, Brushing, Stack, Texture, Varying
+
+Means: TypeAlias = dict[str, "float | RGB"]
+
+
+def means(stack: Stack) -> Means:
+    """Means of all textures by flat name, and the offset of fields of directions; none of a material without.
+
+    Raises:
+        InvalidInput: an image that cannot be read. MissingTool: LLVM is missing or too old.
+    """
+    varying = [(address, value) for address, value in stack.values() if isinstance(value, Varying)]
+    return {address.name: _mean(address, value) for address, value in varying}
+
+
+def _mean(address: Address, value: Varying) -> float | RGB:
+    if isinstance(value, Brushing):
+        return value.offset
+    assert isinstance(value, Texture)
+    colour = address.colour and value.channel in (None, "rgb")
+    texels = binding.texels(kernel.mitsuba(), address.name, value, colour)
+    mean = np.clip(value.scale * texels + value.offset, *address.declared.within).mean(axis=(0, 1))
+    if len(mean) == 1:
+        return float(mean[0])
+    r, g, b = (float(x) for x in mean)
+    return r, g, b
+
+
+def carried(stack: Stack, found: Means, target: Program, values: Values) -> Iterator[tuple[str, Carried | str]]:
+    """Each varying value: its parameter and the image, or its flat name and what stands for it."""
+    flat = stack.flat()
+    for address, value in stack.values():
+        again = address.key == "alpha_v" and flat[address.name[:-1] + "u"] == value
+        if not isinstance(value, Varying) or again:
+            continue
+        taken = _taken(stack, address, value, found, target, values) if isinstance(value, Texture) else None
+        stands = (
+            "the field is replaced by its offset"
+            if isinstance(value, Brushing)
+            else "the image is replaced by its mean"
+        )
+        yield taken or (address.name.removesuffix("_u") if address.key == "alpha_u" else address.name, stands)
+
+
+def _taken(
+    stack: Stack, address: Address, image: Texture, found: Means, target: Program, values: Values
+) -> tuple[str, Carried] | None:
+    """The parameter of the target that is one to one with a value, and the image for it."""
+    if image.offset or image.curve or image.scale <= 0:
+        return None
+    mean = np.maximum(found[address.name], 1e-6)
+    if stack.base and address.key == "albedo" and target.colour and values[target.metal] < 0.5:  # type: ignore[operator]
+        factor = np.broadcast_to(image.scale * np.asarray(values[target.colour]) / mean, 3)
+        plain = image.encoding == "srgb" and image.texture.suffix.lower() in target.images and factor.max() <= 1.001
+        if target.images and not plain:
+            return None
+        r, g, b = (float(f"{x:.6g}") for x in factor)
+        return target.colour, Carried(image, (r, g, b))
+    flat = stack.flat()
+    isotropic = address.key == "alpha_u" and flat[address.name[:-1] + "v"] == image
+    if target.roughness and len(stack.interfaces) == 1 and isotropic:
+        root = float(np.sqrt(image.scale / mean) * values[target.roughness])
+        return target.roughness, Carried(image, float(f"{root:.6g}"))
+    return None

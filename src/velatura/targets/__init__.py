@@ -1,1 +1,0 @@
-"""Materials of other programs: their parameters, and their formulas in NumPy."""
