@@ -12,7 +12,7 @@ class Baked(NamedTuple):
     endings: tuple[str, ...]
 
 
-#: By the name of the format.
+#: Programs that are written, by the name of the format.
 BAKED = {
     "openpbr": Baked("velatura.programs.openpbr.write", (".mtlx",)),
     "gltf": Baked("velatura.programs.gltf.write", (".gltf",)),

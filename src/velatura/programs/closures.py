@@ -15,17 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.optics import fresnel, ggx, refraction
+from velatura.programs.parameters import ALPHA_MIN as ALPHA_MIN
 from velatura.sampling.low_discrepancy import square
 from velatura.stack import srgb_weights
 
 Array: TypeAlias = NDArray[np.floating]
 Number: TypeAlias = Any  # a float or an array
 
-ALPHA_MIN = 1e-3  # as the models evaluate smooth lobes
-
 
 @dataclass(frozen=True)
-class Pair:
+class Directions:
     """Directions wi above, and wo; `straight` is wo turned up where it lies below."""
 
     wi: Array
@@ -71,7 +70,9 @@ def anisotropic(alpha_u: Number, alpha_v: Number) -> tuple[Number, Number]:
     return np.clip(alpha_u, ALPHA_MIN, 1), np.clip(alpha_v, ALPHA_MIN, 1)
 
 
-def microfacets(pair: Pair, alpha_u: Number, alpha_v: Number, turn: float = 0.0, correlated: bool = True) -> Array:
+def microfacets(
+    pair: Directions, alpha_u: Number, alpha_v: Number, turn: float = 0.0, correlated: bool = True
+) -> Array:
     """D G / (4 cos theta_i), on the side of wi and, as in a mirror, on the other (Walter 2007, Eq. 20).
 
     `turn`: of the first axis from the tangent, radians; `correlated`: in height (Heitz 2014, Eq. 99), or separable.
@@ -80,7 +81,7 @@ def microfacets(pair: Pair, alpha_u: Number, alpha_v: Number, turn: float = 0.0,
 
 
 def refracted(
-    pair: Pair,
+    pair: Directions,
     eta: float,
     alpha_u: Number,
     alpha_v: Number,
@@ -104,7 +105,7 @@ def refracted(
     return np.asarray(scale * _facets(pair, np.stack(h), alpha_u, alpha_v, turn, correlated))
 
 
-def _facets(pair: Pair, h: Array, alpha_u: Number, alpha_v: Number, turn: float, correlated: bool) -> Array:
+def _facets(pair: Directions, h: Array, alpha_u: Number, alpha_v: Number, turn: float, correlated: bool) -> Array:
     """D G / cos theta_i of the normals h, that are seen from wi and from `straight`."""
     wi, wo, normal = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, h))
     visible_i, visible_o = ggx.masking(wi, alpha_u, alpha_v), ggx.masking(wo, alpha_u, alpha_v)
@@ -114,11 +115,11 @@ def _facets(pair: Pair, h: Array, alpha_u: Number, alpha_v: Number, turn: float,
     return np.asarray(ggx.ndf(normal, alpha_u, alpha_v) * both / pair.cos_i)
 
 
-def lambert(pair: Pair) -> Array:
+def lambert(pair: Directions) -> Array:
     return np.asarray(pair.reflected * pair.cos_o / pi)
 
 
-def oren_nayar(pair: Pair, colour: Array, roughness: float, again: Number = 1.0) -> Array:
+def oren_nayar(pair: Directions, colour: Array, roughness: float, again: Number = 1.0) -> Array:
     """Energy-preserving Oren-Nayar (Portsmouth et al. 2024, EON); `again` is a factor on light scattered many times."""
     if roughness < 1e-6:
         return np.asarray(colour * lambert(pair))
@@ -227,6 +228,17 @@ def compensation(cosine: Array, alpha: float, reflectance: Number) -> Array:
     return np.asarray(1 + reflectance * (1 - once) / once)
 
 
+def coat(
+    pair: Directions, weight: float, eta: float, alpha_u: float, alpha_v: float, turn: float = 0.0
+) -> tuple[Array, Array]:
+    """Value of the facets of a dielectric coat of some weight, and the share of light that it does not reflect."""
+    mean = float(np.sqrt(alpha_u * alpha_v))
+    f = fresnel.dielectric(pair.cos_d, eta) if eta != 1 else 0 * pair.cos_d
+    facets = pair.reflected * f * compensation(pair.cos_i, mean, f) * microfacets(pair, alpha_u, alpha_v, turn)
+    again = compensation(pair.cos_i, mean, np.full(1, fresnel.normal_incidence(eta)))
+    return np.asarray(weight * facets), np.asarray(1 - weight * dielectric_albedo(pair.cos_i, mean, eta) * again)
+
+
 # Thin films (Belcour & Barla 2017) ------------------------------------------------------------------------------------
 
 LONGEST_NM = 10_000.0  # of path differences that interfere in colours
@@ -244,7 +256,7 @@ Seen: TypeAlias = Callable[[Array, Array], Array]
 
 
 def _by_gaussians(path_nm: Array, shift: Array, to_rgb: Array = _TO_RGB_E) -> Array:
-    """By Fourier transforms of the sensitivities of the eye, as Gaussians."""
+    """Interference by Fourier transforms of the sensitivities of the eye, as Gaussians."""
     phase = 2 * pi * path_nm * 1e-9
     val, pos, var = np.array(
         [[5.4856e-13, 4.4201e-13, 5.2481e-13], [1.681e6, 1.7953e6, 2.2084e6], [4.3278e9, 9.3046e9, 6.6121e9]]
@@ -264,7 +276,7 @@ def _transforms() -> tuple[Array, NDArray[np.complexfloating]]:
 
 
 def by_observer(path_nm: Array, shift: Array) -> Array:
-    """By the CIE 1931 observer, in light of equal energy."""
+    """Interference as the CIE 1931 observer sees it, in light of equal energy."""
     at, transforms = _transforms()
     found = np.stack([np.interp(path_nm, at, each, right=0.0) for each in transforms])
     return np.asarray((found * np.exp(1j * shift)).real)

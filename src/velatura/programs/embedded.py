@@ -36,7 +36,7 @@ def of_xml(text: str) -> Any | None:
 
 
 def in_gltf(material: Any, entry: Mapping[str, Any]) -> dict[str, Any]:
-    """What `extras` hold of a material, for an entry of `materials` without them."""
+    """Keys of `extras` that hold a material, for an entry of `materials` without them."""
     return {"digest": _digest(_values(entry)), "material": material}
 
 

@@ -14,10 +14,10 @@ from velatura.optics.directions import directions
 from velatura.programs import BAKED
 from velatura.programs.from_stack import Array, Described
 from velatura.programs.lost import lost
-from velatura.programs.parameters import Values, complete
-from velatura.programs.program import UNIT, Bake, Carried, Fitted, Program, Range
+from velatura.programs.parameters import UNIT, Values, complete
+from velatura.programs.program import Bake, Carried, Fitted, Program, Range
 from velatura.programs.sampled import Sampled
-from velatura.programs.textured import carried, means
+from velatura.programs.textures import carried, means
 from velatura.stack import Material, MaterialLike, load
 from velatura.stack.schema import unknown
 
@@ -32,7 +32,7 @@ SLACK, SLIGHT = 0.1, 1e-3  # of the cost, by which it may grow for values that t
 OTHER = 0.2  # of the cost, by which a base of another kind, or no coat, has to be nearer
 STEP = 1e-4  # of finite differences, of a range
 
-#: By the name of the format.
+#: Programs by the name of the format.
 TARGETS: dict[str, Program] = {name: import_module(baked.module).PROGRAM for name, baked in BAKED.items()}
 
 
@@ -135,23 +135,23 @@ def _fitted(target: Program, described: Described, sampled: Sampled) -> Fitted:
     coat, or with a base of another kind, has to be much nearer. All but colours and roughness stay as a surface has
     them where that costs little.
     """
-    groups = (
-        (True, target.base),
-        (described.mixed, {target.clear if described.below is not None else target.metal: UNIT}),
-        (described.coated, target.coat),
-        (described.tinted, target.tint),
-        (described.blurred, target.rough),
-        (described.blurred and bool(described.brushed), target.brushed),
-        (described.film, target.film),
-    )
-    ranges = {name: pair for has, group in groups if has for name, pair in group.items()}
+    has = {
+        **dict.fromkeys(("colour", "index", "diffuse"), True),
+        "clear" if described.below is not None else "metal": described.mixed,
+        "coat": described.coated,
+        "tint": described.tinted,
+        "rough": described.blurred,
+        "brushed": described.blurred and bool(described.brushed),
+        **dict.fromkeys(("film", "thickness"), described.film),
+    }
+    ranges = {name: pair for kind, there in has.items() if there for name, pair in target.fitted(kind).items()}
     starts = [complete(target.parameters, target.start(surface)) for surface in described.surfaces]
     kinds = [(surface.metalness, surface.coated) for surface in described.surfaces]
     other = [OTHER * (kind != kinds[0] and not described.mixed) for kind in kinds]
     few = {
         name: pair
         for name, pair in ranges.items()
-        if isinstance(starts[0][name], tuple) or (name in target.rough and starts[0][name])
+        if isinstance(starts[0][name], tuple) or (name in target.fitted("rough") and starts[0][name])
     }
 
     def descended(ranges: dict[str, Range], first: Fitted, start: Fitted, steps: int) -> tuple[float, Fitted]:

@@ -17,7 +17,7 @@ from velatura.programs.surface import Coat, Surface
 from velatura.stack import RGB, InterfaceValues, Material, MediumValues
 
 Array: TypeAlias = NDArray[np.floating]
-Alphas: TypeAlias = tuple[float, float]
+Facets: TypeAlias = tuple[float, float, float]  # alpha along two axes, and the radians from the tangent to the first
 
 SAME = 1e-6  # of roughnesses
 NO_FACETS = (0.25, 0.25)  # alpha where nothing reflects by it
@@ -30,7 +30,7 @@ class Described:
     """
 
     material: Material
-    brushed: tuple[tuple[float, float, float], ...]
+    brushed: tuple[Facets, ...]
     below: float | None
     surfaces: tuple[Surface, ...]
 
@@ -40,9 +40,9 @@ class Described:
         below = float(np.mean(solid.interfaces[-1].eta / solid.exterior)) if solid.transmits else None
         x, y, z = (np.array([w]) for w in (0.0, 0.0, 1.0))
         seen = model.statistics(solid, (x, y, z))
-        lobes = [(*alpha, float(np.radians(turn))) for alpha, turn in (_along(seen, k) for k in range(len(seen.alpha)))]
-        brushed = () if variance_kind(solid) is Isotropic else tuple(lobes)
-        return cls(solid, brushed, below, tuple(_surfaces(solid, seen)))
+        brushed = variance_kind(solid) is not Isotropic
+        lobes = tuple(_facets(seen, k) for k in range(len(seen.alpha) * brushed))
+        return cls(solid, lobes, below, tuple(_surfaces(solid, seen)))
 
     @property
     def mixed(self) -> bool:
@@ -149,10 +149,16 @@ def _scatters(material: Material) -> bool:
     return any(isinstance(layer, MediumValues) and layer.spreads for layer in material.layers)
 
 
-def _along(seen: StackLobes, k: int) -> tuple[Alphas, float]:
-    """Roughness of a lobe with the greater one first, which programs have along the tangent, and degrees to it."""
-    (u, v), turn = seen.alpha[k][:, 0], float(np.degrees(seen.rotation[k][0]))
-    return ((float(u), float(v)), turn) if u > v * (1 - SAME) else ((float(v), float(u)), turn + 90)
+def _facets(seen: StackLobes, k: int) -> Facets:
+    """Roughness of a lobe with the greater one first, which programs have along the tangent."""
+    (u, v), turn = seen.alpha[k][:, 0], float(seen.rotation[k][0])
+    return (float(u), float(v), turn) if u > v * (1 - SAME) else (float(v), float(u), turn + np.pi / 2)
+
+
+def _along(seen: StackLobes, k: int) -> tuple[tuple[float, float], float]:
+    """Roughness of a lobe, and the degrees from the tangent to its first axis."""
+    u, v, turn = _facets(seen, k)
+    return (u, v), float(np.degrees(turn))
 
 
 def _rgb(colour: Array) -> RGB:
@@ -171,7 +177,7 @@ def _film(interfaces: list[InterfaceValues]) -> tuple[float, float] | None:
 
 
 def _absorbed(material: Material) -> Array:
-    """What is left of light that passes all media twice, straight."""
+    """Transmittance of all media, for light that crosses them twice without scattering."""
     depth = sum((m.sigma_a * m.depth for m in material.layers if isinstance(m, MediumValues)), np.zeros((3, 1)))
     return np.asarray(np.exp(-2 * np.broadcast_to(depth, (3, 1))[:, 0]))
 

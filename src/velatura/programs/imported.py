@@ -1,4 +1,4 @@
-"""What an import gives: a stack, and a list of what the stack cannot carry."""
+"""Results of imports: a stack, and a list of what the stack cannot carry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a target cannot hold of a stack, in words."""
+"""Properties of a stack that a program does not hold, in words."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TURNED = 0.5  # degrees
 
 
 def lost(stack: Described, target: Program) -> Iterator[str]:
-    """One line for each property that is left out or replaced; layers are counted from the top, from 0."""
+    """A line for each property that is left out or replaced; layers are counted from the top, from 0."""
     layers = stack.material.layers
     interfaces = [(n, each) for n, each in enumerate(layers) if isinstance(each, InterfaceValues)]
     surfaces = [n for n, layer in enumerate(layers) if not isinstance(layer, MediumValues)]
@@ -45,7 +45,7 @@ def _of_interface(each: InterfaceValues, coat: bool, target: Program) -> Iterato
         yield "the coat's index is 1.5; its reflectance is the coat's weight"
     if each.kind == "dielectric" and np.ptp(np.broadcast_to(each.eta, (3, 1))) > 1e-6:
         yield "one index for all colours"
-    if each.films and not target.film:
+    if each.films and not target.fitted("film"):
         yield "thin films are replaced by a colour"
     elif each.films and (coat or len(each.films) > 1):
         yield "thin films are replaced by one film on the base"

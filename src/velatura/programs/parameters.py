@@ -10,6 +10,10 @@ RGB: TypeAlias = tuple[float, float, float]
 Values: TypeAlias = Mapping[str, "float | RGB"]
 
 GREATEST = float("inf")
+ALPHA_MIN = 1e-3  # of lobes that are evaluated: smoother ones as this
+
+#: Ranges of fits.
+UNIT, ROUGH = (0.0, 1.0), (ALPHA_MIN**0.5, 1.0)
 
 
 @dataclass(frozen=True)
@@ -17,6 +21,10 @@ class Parameter:
     """A number or a colour (linear RGB) with its default and its range, each colour's components in the same.
 
     within: the part of the file that it stands in, where that has several: an extension's name.
+    fit: what a fitted parameter is of a surface, and its range. "colour", "index" and "diffuse" are fitted to
+        every stack; "metal" and "clear", shares of the base, where media scatter light; "rough" and "brushed" where the
+        base is seen through others, or passes light; "tint" where reflectances at the normal are not those of one
+        index; "coat", "film" and "thickness", of the film, where there is one.
     """
 
     name: str
@@ -24,6 +32,7 @@ class Parameter:
     low: float = 0.0
     high: float = 1.0
     within: str = ""
+    fit: tuple[str, float, float] | None = None
 
     @property
     def is_colour(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from velatura.programs.closures import ALPHA_MIN, Array, Pair
+from velatura.programs.closures import Array, Directions
 from velatura.programs.parameters import RGB, Parameter, Values
 from velatura.programs.surface import Alpha, Surface
 from velatura.programs.values import Value
@@ -18,17 +18,11 @@ from velatura.version import __version__
 Range: TypeAlias = tuple[float, float]
 Fitted: TypeAlias = dict[str, float | RGB]
 
-UNIT = (0.0, 1.0)
-ROUGH = (ALPHA_MIN**0.5, 1.0)  # smoother is evaluated alike
-
 
 @dataclass(frozen=True)
 class Program:
-    """A program's material: its formulas, the parameters of a surface, the ranges of those that are fitted, its file.
+    """A program's material: its formulas, the parameters of a surface, its file.
 
-    base: fitted for every stack; others only where it has what they stand for.
-    metal, clear: shares of the base, fitted where media scatter light. rough, brushed: of a base that is seen through
-        others, or passes light. tint: where reflectances at the normal are not those of one index.
     coat_eta, coat_brushed, coat_colour, coat_depth: whether the coat has an index, a brushing, a colour, and one that
         deepens where light crosses it at an angle.
     turned, pane: whether brushing can be turned, and light pass without refraction.
@@ -41,17 +35,9 @@ class Program:
 
     title: str
     parameters: tuple[Parameter, ...]
-    value: Callable[[Values, Pair, bool], Array]
+    value: Callable[[Values, Directions, bool], Array]
     start: Callable[[Surface], Fitted]
     text: Callable[[Bake, Any, dict[str, str]], str]
-    metal: str
-    clear: str
-    base: dict[str, Range]
-    coat: dict[str, Range]
-    tint: dict[str, Range]
-    rough: dict[str, Range]
-    brushed: dict[str, Range]
-    film: dict[str, Range]
     coat_eta: bool = False
     coat_brushed: bool = False
     coat_colour: bool = False
@@ -62,6 +48,15 @@ class Program:
     roughness: str = ""
     images: tuple[str, ...] = ()
     anywhere: bool = False
+
+    def fitted(self, kind: str) -> dict[str, Range]:
+        """The ranges of fitted parameters, by what they are of a surface."""
+        return {each.name: each.fit[1:] for each in self.parameters if each.fit and each.fit[0] == kind}
+
+    @property
+    def metal(self) -> str:
+        """The parameter that is the share of metal."""
+        return next(iter(self.fitted("metal")))
 
 
 @dataclass(frozen=True)

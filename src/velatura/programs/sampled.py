@@ -15,16 +15,14 @@ from velatura.model import Model, variance_kind
 from velatura.model.base import Query
 from velatura.model.context import Context
 from velatura.optics import fresnel, ggx, refraction
-from velatura.programs.closures import ALPHA_MIN, Pair
-from velatura.programs.from_stack import Described
+from velatura.programs.closures import ALPHA_MIN, Directions
+from velatura.programs.from_stack import Described, Facets
 from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import square
 
 Array: TypeAlias = NDArray[np.floating]
 
-Facets: TypeAlias = tuple[float, float, float]  # alpha along two axes, and the angle from the tangent to the first
-
-#: Of the lobes that nodes are drawn from, beside the cosine and those of the stack.
+#: Lobes that nodes are drawn from, beside the cosine and those of the stack.
 WIDTHS: tuple[Facets, ...] = tuple((alpha, alpha, 0.0) for alpha in (0.0015, 0.006, 0.02, 0.07, 0.25, 0.7))
 
 
@@ -36,7 +34,7 @@ class Sampled:
     which add up to 1: the areas of a sphere that are seen so.
     """
 
-    pair: Pair
+    pair: Directions
     weight: Array
     which: NDArray[np.intp]
     count: int
@@ -45,13 +43,13 @@ class Sampled:
 
     @classmethod
     def of(cls, stack: Described, model: Model, wi: Array, nodes: int) -> Sampled:
-        """For wi (M, 3), and about so many nodes for each."""
+        """The light of a stack for wi (M, 3), at about so many nodes for each."""
         material = stack.material
         body = model.body(material, variance_kind(material), Context())
         drawn = (*WIDTHS, *((max(u, ALPHA_MIN), max(v, ALPHA_MIN), turn) for u, v, turn in stack.brushed))
         each = [_nodes(w, stack.below or 0.0, nodes, drawn) for w in wi]
         which = np.repeat(np.arange(len(wi)), [wo.shape[1] for wo, _ in each])
-        pair = Pair(wi[which].T, np.concatenate([wo for wo, _ in each], axis=1))
+        pair = Directions(wi[which].T, np.concatenate([wo for wo, _ in each], axis=1))
         value, _ = body.eval_pdf(tuple(pair.wi), tuple(pair.wo), Query(radiance=False))
         value = np.maximum(np.broadcast_to(value, pair.wi.shape), 0.0)
         weight = np.concatenate([weight for _, weight in each])

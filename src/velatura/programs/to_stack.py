@@ -176,8 +176,8 @@ def _inside(left: Array, kept: float) -> Array:
 
 
 def _above_diffuse(layers: list[Interface], outside: float = 1.0) -> tuple[float, float]:
-    """What interfaces below a medium reflect at the normal, over a black base, and the share K of light from a diffuse
-    one that they send back down."""
+    """Reflectance at the normal of interfaces below a medium, over a black base, and the share K of light from a
+    diffuse one that they send back down."""
     if not layers:
         return 0.0, 0.0
 

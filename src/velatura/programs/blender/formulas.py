@@ -10,14 +10,14 @@ import numpy as np
 from velatura.optics import fresnel
 from velatura.programs import closures
 from velatura.programs.blender.parameters import PARAMETERS
-from velatura.programs.closures import Array, Pair
+from velatura.programs.closures import Array, Directions
 from velatura.programs.parameters import Values, complete
 
 ORDERS = 3  # of interference
 THINNEST_NM = 0.1  # a thinner film is none
 
 
-def value(given: Values, pair: Pair, thin: bool = False) -> Array:
+def value(given: Values, pair: Directions, thin: bool = False) -> Array:
     """f |cos theta_o| (3, N) of the node with multiple scattering: no subsurface, sheen or emission.
 
     `thin` changes nothing, since the node always refracts.
@@ -59,15 +59,8 @@ def value(given: Values, pair: Pair, thin: bool = False) -> Array:
     coat, eta_c = v["Coat Weight"], v["Coat IOR"]
     tinted = coat_tint ** (1 / np.maximum(fresnel.cos_transmitted(cos_i, eta_c), 1e-3))
     alpha = max(v["Coat Roughness"] ** 2, closures.ALPHA_MIN)
-    f_0 = fresnel.normal_incidence(eta_c)
-    f_coat = fresnel.dielectric(pair.cos_d, eta_c) if eta_c != 1 else 0 * pair.cos_d
-    top = (
-        f_coat * closures.compensation(cos_i, alpha, f_coat) * pair.reflected * closures.microfacets(pair, alpha, alpha)
-    )
-    kept = 1 - coat * closures.dielectric_albedo(cos_i, alpha, eta_c) * closures.compensation(
-        cos_i, alpha, np.full(1, f_0)
-    )
-    return np.asarray(coat * top + kept * ((1 - coat) + coat * tinted) * substrate)
+    top, passed = closures.coat(pair, coat, eta_c, alpha, alpha)
+    return np.asarray(top + passed * ((1 - coat) + coat * tinted) * substrate)
 
 
 def _coated(cosine: Array, film: float, thickness_nm: float, eta: float, f_0: float, tint: Array) -> Array:
@@ -109,7 +102,7 @@ def _often(f_0: Array, f_82: Array, alpha: float) -> Array:
     return closures.often(f_0 + (1 - f_0) / 21 - lowered / 126, lambda cosine: closures.albedo(cosine, alpha, 1.0))
 
 
-def _glass(pair: Pair, v: Mapping[str, Any], f: Array) -> Array:
+def _glass(pair: Directions, v: Mapping[str, Any], f: Array) -> Array:
     """Facets that reflect and refract, which are never brushed."""
     eta, colour = v["IOR"], np.sqrt(np.reshape(v["Base Color"], (3, 1)))
     # An index of 1 is no surface, regardless of its roughness

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from velatura.errors import remark
 from velatura.programs.blender import formulas
 from velatura.programs.blender.parameters import PARAMETERS
-from velatura.programs.program import ROUGH, UNIT, Bake, Carried, Fitted, Program, burley, mean_alpha, product, rgb
+from velatura.programs.program import Bake, Carried, Fitted, Program, burley, mean_alpha, product, rgb
 from velatura.programs.program import roughness as rough
 from velatura.programs.surface import Surface
 
@@ -18,7 +20,7 @@ def start(surface: Surface) -> Fitted:
         "Base Color": product(surface.tint, surface.tint) if surface.clear else rgb(surface.colour),
         "Metallic": surface.metalness,
         **burley(surface.alpha, "Roughness", "Anisotropic"),
-        "Anisotropic Rotation": surface.rotation / 360 % 1,
+        "Anisotropic Rotation": float(np.radians(surface.rotation) / (2 * np.pi) % 1),
         "IOR": surface.eta,
         "Transmission Weight": surface.clear,
     }
@@ -103,14 +105,6 @@ PROGRAM = Program(
     formulas.value,
     start,
     text,
-    metal="Metallic",
-    clear="Transmission Weight",
-    base={"Base Color": UNIT, "IOR": (1.001, 4.0), "Diffuse Roughness": UNIT},
-    coat={"Coat IOR": (1.001, 4.0), "Coat Tint": UNIT},
-    tint={"Specular Tint": UNIT},
-    rough={"Roughness": ROUGH},
-    brushed={"Anisotropic": UNIT, "Anisotropic Rotation": (-1.0, 2.0)},
-    film={"Thin Film IOR": (1.001, 3.0), "Thin Film Thickness": (10.0, 2000.0)},
     coat_eta=True,
     coat_colour=True,
     coat_depth=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -15,8 +16,8 @@ from velatura.errors import InvalidInput
 from velatura.programs import embedded
 from velatura.programs.given import is_number
 from velatura.programs.gltf import read as gltf
-from velatura.programs.gltf.formulas import PARAMETERS as FACTORS
 from velatura.programs.gltf.images import Images
+from velatura.programs.gltf.parameters import CHANNELS, CLEARCOAT, CORE
 from velatura.programs.imported import Imported, Notes, shown
 from velatura.programs.surface import INDICES
 from velatura.programs.values import changed
@@ -26,26 +27,6 @@ from velatura.stack.schema import show
 
 LARGEST = 2**26  # characters of JSON
 _MAGIC, _JSON, _BINARY = b"glTF", b"JSON", b"BIN\0"
-
-#: Images of a factor: where they stand, the factor, their channel, and whether they hold colours.
-_TEXTURES = (
-    ("pbrMetallicRoughness", "baseColorTexture", "baseColorFactor", "rgb"),
-    ("pbrMetallicRoughness", "metallicRoughnessTexture", "metallicFactor", "b"),
-    ("pbrMetallicRoughness", "metallicRoughnessTexture", "roughnessFactor", "g"),
-    ("KHR_materials_clearcoat", "clearcoatTexture", "clearcoatFactor", "r"),
-    ("KHR_materials_clearcoat", "clearcoatRoughnessTexture", "clearcoatRoughnessFactor", "g"),
-    ("KHR_materials_specular", "specularTexture", "specularFactor", "a"),
-    ("KHR_materials_specular", "specularColorTexture", "specularColorFactor", "rgb"),
-    ("KHR_materials_transmission", "transmissionTexture", "transmissionFactor", "r"),
-    ("KHR_materials_volume", "thicknessTexture", "thicknessFactor", "g"),
-    ("KHR_materials_iridescence", "iridescenceTexture", "iridescenceFactor", "r"),
-)
-_THICKNESS = ("KHR_materials_iridescence", "iridescenceThicknessTexture", "iridescenceThicknessMaximum", "g")
-_OTHERS = {
-    "KHR_materials_sheen": "sheenColorFactor",
-    "KHR_materials_dispersion": "dispersion",
-    "KHR_materials_diffuse_transmission": "diffuseTransmissionFactor",
-}
 
 
 def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]:
@@ -103,18 +84,14 @@ def of_material(
         notes.add("extras", embedded.KEY, embedded.READ)
         return Imported(loads(json.dumps(held), "the stack in extras.json", folder), tuple(notes.left))
     extensions = _holding(material.get("extensions", {}), "extensions")
-    core = "pbrMetallicRoughness"
-    parts = {name: _holding(part, name) for name, part in {core: material.get(core, {}), **extensions}.items()}
+    parts = {name: _holding(part, name) for name, part in {CORE: material.get(CORE, {}), **extensions}.items()}
     values: dict[str, Any] = {}
 
     # Factors, by the parts that they stand in
-    for factor in FACTORS:
-        if factor.name in parts.get(factor.within, {}):
+    for factor in gltf.PARAMETERS:
+        if factor.within and factor.name in parts.get(factor.within, {}):
             given = parts[factor.within][factor.name]
             values[factor.name] = given[:3] if factor.is_colour and isinstance(given, list | tuple) else given
-    for part, factor_name in _OTHERS.items():
-        if factor_name in parts.get(part, {}):
-            values[factor_name] = parts[part][factor_name]
     if values.get("ior") == 0:
         notes.add("ior", 0.0, f"an infinite index: {INDICES[1]:g} stands for it")
         values["ior"] = INDICES[1]
@@ -124,27 +101,28 @@ def of_material(
         values["emissiveFactor"] = [strength * part if is_number(part) else part for part in emitted]
 
     # Images, times their factors
-    defaults = {each.name: each.default for each in gltf.PARAMETERS}
-    for part, key, factor_name, channel in (*_TEXTURES, _THICKNESS):
-        reference = parts.get(part, {}).get(key)
+    for factor in gltf.PARAMETERS:
+        key = re.sub("(metallic|roughness)Factor", "metallicRoughnessTexture", factor.name)
+        key = re.sub("Factor|Maximum", "Texture", key)
+        reference = parts.get(factor.within, {}).get(key) if factor.name in CHANNELS else None
         if reference is None:
             continue
-        factor = values.get(factor_name, defaults[factor_name])
-        least = _number(values, "iridescenceThicknessMinimum", 100.0) if key == _THICKNESS[1] else 0.0
-        texture = _texture(_holding(reference, key), channel, key, notes, find)
+        most = values.get(factor.name, factor.default)
+        least = _number(values, "iridescenceThicknessMinimum", 100.0) if key == "iridescenceThicknessTexture" else 0.0
+        texture = _texture(_holding(reference, key), CHANNELS[factor.name], key, notes, find)
         if texture is not None:
-            values[factor_name] = _scaled(texture, factor, least, factor_name, notes)
+            values[factor.name] = _scaled(texture, most, least, factor.name, notes)
     for key in gltf.IGNORED:
-        if key in material or key in parts.get("KHR_materials_clearcoat", {}):
+        if key in material or key in parts.get(CLEARCOAT, {}):
             values[key] = "an image"
     if "anisotropyTexture" in parts.get("KHR_materials_anisotropy", {}):
         notes.add("anisotropyTexture", "an image", "the strength and the rotation beside it stand for it")
 
     # Cover, and extensions that are not read
     if material.get("alphaMode", "OPAQUE") != "OPAQUE":
-        base = parts["pbrMetallicRoughness"].get("baseColorFactor", (1, 1, 1, 1))
+        base = parts[CORE].get("baseColorFactor", (1, 1, 1, 1))
         values["alpha"] = base[3] if len(base) > 3 and base[3] < 1 else 0.5
-    known = {each.within for each in FACTORS} | set(_OTHERS) | {"KHR_materials_emissive_strength"}
+    known = {each.within for each in gltf.PARAMETERS if each.within} | {"KHR_materials_emissive_strength"}
     for part in sorted(set(extensions) - known):
         notes.add(part, "", "not read")
     return gltf.read(values, name, notes)

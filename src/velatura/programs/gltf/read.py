@@ -18,10 +18,10 @@ from velatura.programs.to_stack import imported
 PARAMETERS = (
     *parameters.PARAMETERS,
     Parameter("emissiveFactor", (0.0, 0.0, 0.0), high=GREATEST),
-    Parameter("sheenColorFactor", (0.0, 0.0, 0.0)),
+    Parameter("sheenColorFactor", (0.0, 0.0, 0.0), within="KHR_materials_sheen"),
     Parameter("alpha", 1.0),
-    Parameter("dispersion", 0.0, high=GREATEST),
-    Parameter("diffuseTransmissionFactor", 0.0),
+    Parameter("dispersion", 0.0, high=GREATEST, within="KHR_materials_dispersion"),
+    Parameter("diffuseTransmissionFactor", 0.0, within="KHR_materials_diffuse_transmission"),
 )
 IGNORED = {
     "normalTexture": parts.FLAT,

@@ -12,7 +12,7 @@ from velatura.optics import fresnel
 from velatura.programs import embedded
 from velatura.programs.gltf import formulas
 from velatura.programs.gltf.parameters import CORE, PARAMETERS, VOLUME
-from velatura.programs.program import ROUGH, UNIT, Bake, Fitted, Program, mean_alpha, product, rgb, roughness
+from velatura.programs.program import Bake, Fitted, Program, mean_alpha, product, rgb, roughness
 from velatura.programs.surface import Surface
 from velatura.version import __version__
 
@@ -81,14 +81,6 @@ PROGRAM = Program(
     formulas.value,
     start,
     text,
-    metal="metallicFactor",
-    clear="transmissionFactor",
-    base={"baseColorFactor": UNIT, "ior": (1.001, 4.0)},
-    coat={},
-    tint={"specularColorFactor": UNIT},
-    rough={"roughnessFactor": ROUGH},
-    brushed={"anisotropyStrength": UNIT, "anisotropyRotation": (-np.pi, np.pi)},
-    film={"iridescenceIor": (1.001, 3.0), "iridescenceThicknessMaximum": (10.0, 2000.0)},
     turned=True,
     pane=True,
     colour="baseColorFactor",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -29,34 +30,21 @@ SHADERS = {
     "gltf_pbr": gltf,
     "disney_principled": principled,
 }
-#: Inputs of nodes that have other names than in the source, where a name does not just say it in another case.
+
+
+def _input_of(factor: str) -> str:
+    """The input of `gltf_pbr` for a factor or an image of glTF."""
+    plain = re.sub("(Factor|Texture|Maximum)$", "", factor)
+    return re.sub("[A-Z]", lambda found: f"_{found[0].lower()}", plain)
+
+
+_NO_INPUTS = ("iridescenceThicknessMinimum", "diffuseTransmissionFactor")
+_FACTORS = [name for name in (*(each.name for each in gltf.PARAMETERS), *gltf.IGNORED) if name not in _NO_INPUTS]
+#: Inputs of nodes that have other names than in the source.
 RENAMED: Mapping[str, Mapping[str, str | None]] = {
     "gltf_pbr": {
-        "base_color": "baseColorFactor",
-        "metallic": "metallicFactor",
-        "roughness": "roughnessFactor",
-        "normal": "normalTexture",
-        "tangent": None,
-        "occlusion": "occlusionTexture",
-        "transmission": "transmissionFactor",
-        "specular": "specularFactor",
-        "specular_color": "specularColorFactor",
-        "alpha_cutoff": None,
-        "iridescence": "iridescenceFactor",
-        "iridescence_ior": "iridescenceIor",
-        "iridescence_thickness": "iridescenceThicknessMaximum",
-        "sheen_color": "sheenColorFactor",
-        "sheen_roughness": None,
-        "clearcoat": "clearcoatFactor",
-        "clearcoat_roughness": "clearcoatRoughnessFactor",
-        "clearcoat_normal": "clearcoatNormalTexture",
-        "emissive": "emissiveFactor",
-        "emissive_strength": None,
-        "thickness": "thicknessFactor",
-        "attenuation_distance": "attenuationDistance",
-        "attenuation_color": "attenuationColor",
-        "anisotropy_strength": "anisotropyStrength",
-        "anisotropy_rotation": "anisotropyRotation",
+        **{_input_of(name): name for name in _FACTORS},
+        **dict.fromkeys(("tangent", "alpha_cutoff", "sheen_roughness", "emissive_strength")),
     },
     "disney_principled": {
         "baseColor": "base_color",
@@ -82,7 +70,7 @@ LINEAR_FROM_ACESCG = np.array(  # primaries AP1 and white of ACES to those of sR
 
 
 class _Unread(Exception):
-    """What an input is connected to is neither a number nor a plain image."""
+    """Raised where an input is connected to neither a number nor a plain image."""
 
 
 def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], str | None]:

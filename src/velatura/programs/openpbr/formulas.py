@@ -6,7 +6,7 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.programs import closures
-from velatura.programs.closures import Array, Number, Pair
+from velatura.programs.closures import Array, Directions, Number
 from velatura.programs.openpbr.parameters import PARAMETERS, TURNS
 from velatura.programs.parameters import Values, complete
 
@@ -17,7 +17,7 @@ def alphas(roughness: Number, anisotropy: float) -> tuple[Number, Number]:
     return along, along * (1 - anisotropy)
 
 
-def value(given: Values, pair: Pair, thin: bool = True) -> Array:
+def value(given: Values, pair: Directions, thin: bool = True) -> Array:
     """f |cos theta_o| (3, N) of the reference graph: no fuzz, subsurface, dispersion or emission.
 
     `thin`: transmission passes a thin wall, without refraction.
@@ -82,15 +82,5 @@ def value(given: Values, pair: Pair, thin: bool = True) -> Array:
     share = coat * v["coat_darkening"]
     darkening = (1 - share) + share * (1 - inside) / (1 - estimate * inside)
     au, av = closures.anisotropic(*alphas(v["coat_roughness"], v["coat_roughness_anisotropy"]))
-    mean = float(np.sqrt(au * av))
-    f_coat = fresnel.dielectric(pair.cos_d, eta_c) if eta_c != 1 else 0 * pair.cos_d
-    top = (
-        pair.reflected
-        * f_coat
-        * closures.compensation(cos_i, mean, f_coat)
-        * closures.microfacets(pair, au, av, coat_turn)
-    )
-    kept = 1 - coat * closures.dielectric_albedo(cos_i, mean, eta_c) * closures.compensation(
-        cos_i, mean, np.full(1, f_0)
-    )
-    return np.asarray(coat * top + kept * darkening * ((1 - coat) + coat * coat_tint) * substrate)
+    top, passed = closures.coat(pair, coat, eta_c, au, av, coat_turn)
+    return np.asarray(top + passed * darkening * ((1 - coat) + coat * coat_tint) * substrate)

@@ -11,7 +11,7 @@ import numpy as np
 from velatura.programs import embedded, xml
 from velatura.programs.openpbr import formulas
 from velatura.programs.openpbr.parameters import PARAMETERS, TURNS
-from velatura.programs.program import ROUGH, UNIT, Bake, Carried, Fitted, Program, rgb, roughness
+from velatura.programs.program import Bake, Carried, Fitted, Program, rgb, roughness
 from velatura.programs.surface import Surface
 
 
@@ -124,18 +124,6 @@ PROGRAM = Program(
     formulas.value,
     start,
     text,
-    metal="base_metalness",
-    clear="transmission_weight",
-    base={"base_color": UNIT, "transmission_color": UNIT, "specular_ior": (1.001, 4.0), "base_diffuse_roughness": UNIT},
-    coat={"coat_color": UNIT, "coat_ior": (1.001, 3.0), "coat_darkening": UNIT},
-    tint={"specular_color": UNIT},
-    rough={"specular_roughness": ROUGH},
-    brushed={
-        "specular_roughness_anisotropy": UNIT,
-        "coat_roughness_anisotropy": UNIT,
-        "geometry_tangent": (-180.0, 180.0),
-    },
-    film={"thin_film_ior": (1.001, 3.0), "thin_film_thickness": (0.01, 2.0)},
     coat_eta=True,
     coat_brushed=True,
     coat_colour=True,

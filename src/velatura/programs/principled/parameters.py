@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from velatura.programs.parameters import GREATEST, Parameter
+from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Parameter
 
-#: Of the plugin; its index is `eta` here, for which `specular` is another name.
+#: Parameters of the plugin; its index is `eta` here, for which `specular` is another name.
 PARAMETERS = (
-    Parameter("base_color", (0.5, 0.5, 0.5)),
-    Parameter("roughness", 0.5),
-    Parameter("anisotropic", 0.0),
-    Parameter("metallic", 0.0),
-    Parameter("spec_trans", 0.0),
-    Parameter("eta", 1.5, low=1.0, high=GREATEST),
-    Parameter("spec_tint", 0.0),
+    Parameter("base_color", (0.5, 0.5, 0.5), fit=("colour", *UNIT)),
+    Parameter("roughness", 0.5, fit=("rough", *ROUGH)),
+    Parameter("anisotropic", 0.0, fit=("brushed", *UNIT)),
+    Parameter("metallic", 0.0, fit=("metal", *UNIT)),
+    Parameter("spec_trans", 0.0, fit=("clear", *UNIT)),
+    Parameter("eta", 1.5, low=1.0, high=GREATEST, fit=("index", 1.001, 4.0)),
+    Parameter("spec_tint", 0.0, fit=("tint", *UNIT)),
     Parameter("sheen", 0.0),
     Parameter("sheen_tint", 0.0),
-    Parameter("flatness", 0.0),
-    Parameter("clearcoat", 0.0),
-    Parameter("clearcoat_gloss", 0.0),
+    Parameter("flatness", 0.0, fit=("diffuse", *UNIT)),
+    Parameter("clearcoat", 0.0, fit=("coat", *UNIT)),
+    Parameter("clearcoat_gloss", 0.0, fit=("coat", *UNIT)),
 )

@@ -10,7 +10,7 @@ from velatura.optics import fresnel
 from velatura.programs import embedded, xml
 from velatura.programs.principled import formulas
 from velatura.programs.principled.parameters import PARAMETERS
-from velatura.programs.program import ROUGH, UNIT, Bake, Fitted, Program, burley, mean_alpha, product
+from velatura.programs.program import Bake, Fitted, Program, burley, mean_alpha, product
 from velatura.programs.surface import Surface
 
 
@@ -52,12 +52,4 @@ PROGRAM = Program(
     formulas.value,
     start,
     text,
-    metal="metallic",
-    clear="spec_trans",
-    base={"base_color": UNIT, "eta": (1.001, 4.0), "flatness": UNIT},
-    coat={"clearcoat": UNIT, "clearcoat_gloss": UNIT},
-    tint={"spec_tint": UNIT},
-    rough={"roughness": ROUGH},
-    brushed={"anisotropic": UNIT},
-    film={},
 )
