@@ -8,6 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from velatura.programs import FORMATS
 from velatura.readers import READERS
 from velatura.version import __version__ as __version__
 
@@ -122,7 +123,7 @@ def _imported(path: str) -> Any:
     return load(path)
 
 
-READERS.update(dict.fromkeys((".mtlx", ".gltf", ".glb", ".xml"), _imported))
+READERS.update(dict.fromkeys(FORMATS, _imported))
 
 
 def __getattr__(name: str) -> Any:

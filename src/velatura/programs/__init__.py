@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from velatura.programs.program import Program
 
 
 class Baked(NamedTuple):
@@ -10,6 +14,11 @@ class Baked(NamedTuple):
 
     module: str
     endings: tuple[str, ...]
+
+    def program(self) -> Program:
+        """The program itself."""
+        found: Program = import_module(self.module).PROGRAM
+        return found
 
 
 #: Programs that are written, by the name of the format.
@@ -19,3 +28,16 @@ BAKED = {
     "blender-principled": Baked("velatura.programs.blender.write", (".py",)),
     "mitsuba-principled": Baked("velatura.programs.principled.write", (".xml",)),
 }
+
+#: Modules that read files, by their endings: `materials(path)` gives a file's materials by name, and the chosen name.
+FORMATS = {
+    ".mtlx": "velatura.programs.materialx.read",
+    ".gltf": "velatura.programs.gltf.file",
+    ".glb": "velatura.programs.gltf.file",
+    ".xml": "velatura.programs.mitsuba_xml.read",
+}
+
+
+def reader(ending: str) -> Any:
+    """The module that reads files of an ending."""
+    return import_module(FORMATS[ending])

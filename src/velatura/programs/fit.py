@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
@@ -33,7 +32,7 @@ OTHER = 0.2  # of the cost, by which a base of another kind, or no coat, has to 
 STEP = 1e-4  # of finite differences, of a range
 
 #: Programs by the name of the format.
-TARGETS: dict[str, Program] = {name: import_module(baked.module).PROGRAM for name, baked in BAKED.items()}
+TARGETS: dict[str, Program] = {name: baked.program() for name, baked in BAKED.items()}
 
 
 def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **switches: str) -> Bake:

@@ -1,31 +1,20 @@
-"""Files of other programs, by their endings.
-
-Each format is a module with `materials(path)`: its materials by name, and the name of the one that the file chooses.
-"""
+"""Files of other programs, by their endings, and materials by their parameters."""
 
 from __future__ import annotations
 
 import json
 import warnings
 from collections.abc import Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from velatura import files
 from velatura.errors import Incomplete, InvalidInput, short
-from velatura.programs import embedded
+from velatura.programs import FORMATS, embedded, reader
 from velatura.programs.imported import Imported, Left, Notes
 from velatura.stack import Stack, loads
 from velatura.stack.io import foreign
 from velatura.stack.schema import show, unknown
-
-FORMATS = {
-    ".mtlx": "velatura.programs.materialx.read",
-    ".gltf": "velatura.programs.gltf.file",
-    ".glb": "velatura.programs.gltf.file",
-    ".xml": "velatura.programs.mitsuba_xml.read",
-}
 
 LONGEST = 5000  # characters of a warning
 BAKED = (".mtlx", ".xml")  # files whose bakes hold their stack in a comment
@@ -48,7 +37,7 @@ def read(path: str | Path, material: str | None = None) -> Imported:
     if ending not in FORMATS:
         raise InvalidInput(f"{file}: a file to import ends in {', '.join(FORMATS)}")
     found: Mapping[str, Any]
-    found, chosen = import_module(FORMATS[ending]).materials(Path(file))
+    found, chosen = reader(ending).materials(Path(file))
     if not found:
         raise InvalidInput(f"{file}: has no material that is read here")
     material = chosen if material is None and chosen in found else material
