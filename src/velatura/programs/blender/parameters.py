@@ -1,7 +1,5 @@
 """Inputs of Blender's Principled BSDF."""
 
-from __future__ import annotations
-
 from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Parameter
 
 #: Inputs of the node by their names; colours have a fourth component there, which is 1.

@@ -1,7 +1,5 @@
 """Parameters of materials of glTF 2.0 and its extensions (https://registry.khronos.org/glTF)."""
 
-from __future__ import annotations
-
 from math import pi
 
 from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Parameter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -122,8 +122,8 @@ def _material(element: Element, path: Path, notes: Notes) -> Imported:
     surface, name = element, element.name
     if element.tag == "surfacematerial":
         for each in element.of("input"):
-            if each.name == "displacementshader" and (each.get("nodename") or each.get("nodegraph")):
-                notes.add(each.name, each.get("nodename") or each.get("nodegraph"), "a stack has no height")
+            if each.name == "displacementshader" and (height := each.get("nodename") or each.get("nodegraph")):
+                notes.add(each.name, height, "a stack has no height")
         entry = element.child("input", "surfaceshader")
         if entry is None:
             raise InvalidInput(f"{path}: material {name}: has no surface")
@@ -197,10 +197,7 @@ def _node(entry: Element, through: tuple[Element, ...] = ()) -> Element:
             raise _Unread(f"the graph {name} has no such output")
         return _node(outputs[0], through)
     if entry.get("interfacename"):
-        outer = graph.child("input", entry.get("interfacename") or "")
-        if outer is None or graph.tag != "nodegraph":
-            raise _Unread(f"there is no input {entry.get('interfacename')}")
-        return _node(outer, through)
+        return _node(_outer(entry, graph.tag == "nodegraph"), through)
     name = entry.get("nodename")
     node = next((each for each in graph.named.get(name or "", ()) if each.tag not in _NO_NODES), None)
     if not name or node is None:
@@ -209,6 +206,14 @@ def _node(entry: Element, through: tuple[Element, ...] = ()) -> Element:
 
 
 _NO_NODES = ("input", "output", "nodegraph")
+
+
+def _outer(entry: Element, within: bool = True) -> Element:
+    """The input of the graph around that an input stands for; `within`: there may be one."""
+    outer = _graph(entry).child("input", entry.get("interfacename") or "") if within else None
+    if outer is None:
+        raise _Unread(f"there is no input {entry.get('interfacename')}")
+    return outer
 
 
 def _graph(element: Element) -> Element:
@@ -247,10 +252,7 @@ class _Reader:
 
     def _worked_out(self, entry: Element, parameter: str) -> Value:
         if entry.get("interfacename") and not entry.get("nodename"):
-            outer = _graph(entry).child("input", entry.get("interfacename") or "")
-            if outer is None:
-                raise _Unread(f"there is no input {entry.get('interfacename')}")
-            return self.value(outer, parameter)
+            return self.value(_outer(entry), parameter)
         if not (entry.get("nodename") or entry.get("nodegraph")):
             return _literal(entry)
         node = _node(entry)
@@ -333,12 +335,8 @@ def _channel(node: Element, value: Value, inputs: Mapping[str, Element], output:
 
 
 def _image(node: Element, inputs: Mapping[str, Element], parameter: str, notes: Notes) -> Value:
-    file = inputs.get("file")
-    for _ in range(DEEPEST):
-        if file is not None and file.get("interfacename"):
-            file = _graph(file).child("input", file.get("interfacename") or "")
-    if file is None or file.get("interfacename") or not file.get("value"):
-        raise _Unread(f"the node {node.name} ({node.tag}) names no file")
+    """A node's image, times its factor."""
+    file = _file(node, inputs)
     prefix = "".join(reversed([each.get("fileprefix") or "" for each in file.outwards()]))
     name = (prefix + (file.get("value") or "")).replace("\\", "/")
     if "<" in name:
@@ -348,12 +346,8 @@ def _image(node: Element, inputs: Mapping[str, Element], parameter: str, notes: 
     space = _space(file) if is_colour else ""
     if space not in ("", "srgb_texture", *_SPACES):
         notes.add(f"{parameter}: colorspace", space, "the image is read as linear sRGB")
-    for key, plain in (("texcoord", None), ("uvtiling", (1.0, 1.0)), ("uvoffset", (0.0, 0.0)), ("scale", (1.0, 1.0))):
-        entry = inputs.get(key)
-        if entry is not None and (plain is None or listed(entry.get("value") or "") != list(plain)):
-            value = entry.get("value") or entry.get("nodename") or entry.get("nodegraph")
-            if not (key == "texcoord" and entry.get("nodename") and _plain_coordinates(entry)):
-                notes.add(f"{parameter}: {key}", value, "the image lies on the texture coordinates as they are")
+    for key, value in _placed(inputs):
+        notes.add(f"{parameter}: {key}", value, "the image lies on the texture coordinates as they are")
     try:
         texture = Texture(
             texture=Path(document or "").parent / name,
@@ -363,6 +357,27 @@ def _image(node: Element, inputs: Mapping[str, Element], parameter: str, notes: 
     except InvalidInput as error:
         raise InvalidInput(f"{document}: node {node.name}: {error}") from None
     return _together(node, texture, _literal(inputs["factor"])) if "factor" in inputs else texture
+
+
+def _file(node: Element, inputs: Mapping[str, Element]) -> Element:
+    """The input that names the file of an image."""
+    file = inputs.get("file")
+    for _ in range(DEEPEST):
+        if file is not None and file.get("interfacename"):
+            file = _graph(file).child("input", file.get("interfacename") or "")
+    if file is None or file.get("interfacename") or not file.get("value"):
+        raise _Unread(f"the node {node.name} ({node.tag}) names no file")
+    return file
+
+
+def _placed(inputs: Mapping[str, Element]) -> Iterator[tuple[str, str | None]]:
+    """Inputs of an image, with their values, that put it elsewhere than on the texture coordinates."""
+    for key, plain in (("texcoord", None), ("uvtiling", [1.0, 1.0]), ("uvoffset", [0.0, 0.0]), ("scale", [1.0, 1.0])):
+        entry = inputs.get(key)
+        if entry is None or (plain is not None and listed(entry.get("value") or "") == plain):
+            continue
+        if not (key == "texcoord" and entry.get("nodename") and _plain_coordinates(entry)):
+            yield key, entry.get("value") or entry.get("nodename") or entry.get("nodegraph")
 
 
 def _plain_coordinates(entry: Element) -> bool:

@@ -1,7 +1,5 @@
 """Parameters of OpenPBR Surface 1.1, as its node in MaterialX has them."""
 
-from __future__ import annotations
-
 from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Parameter
 
 #: Inputs of the node `open_pbr_surface`; emission, opacity, normals and thin walls are no numbers of the interface.

@@ -1,7 +1,5 @@
 """Parameters of Mitsuba's `principled`."""
 
-from __future__ import annotations
-
 from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Parameter
 
 #: Parameters of the plugin; its index is `eta` here, for which `specular` is another name.

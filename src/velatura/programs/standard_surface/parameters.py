@@ -1,7 +1,5 @@
 """Parameters of Autodesk Standard Surface 1.0, as MaterialX has it."""
 
-from __future__ import annotations
-
 from velatura.programs.parameters import GREATEST, Parameter
 
 PARAMETERS = (
