@@ -1,4 +1,4 @@
-"""Fit of a target's parameters to a stack, and the loss that remains."""
+"""Fit of a program's parameters to a stack, and the loss that remains."""
 
 from __future__ import annotations
 
@@ -46,26 +46,26 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
 
     if target not in TARGETS:
         raise InvalidInput(unknown("target", target, TARGETS))
-    chosen, stack, kind = named(model, **switches), load(material), TARGETS[target]
+    chosen, stack, program = named(model, **switches), load(material), TARGETS[target]
     found = means(stack)
     described = Described.of(Material.of(stack.replace(**found)), chosen)
     azimuths = np.radians(AZIMUTHS if described.brushed else AZIMUTHS[:1])
     cosines, turns = (x.ravel() for x in np.meshgrid(FITTED, azimuths))
     sampled = Sampled.of(described, chosen, directions(cosines, turns), NODES)
     with threadpool_limits(1, "blas"):  # matrices are so small that threads wait for each other
-        values = _fitted(kind, described, sampled)
+        values = _fitted(program, described, sampled)
 
-    varying = dict(carried(stack, found, kind, values))
+    varying = dict(carried(stack, found, program, values))
     left = [f"{name}: {what}" for name, what in varying.items() if isinstance(what, str)]
     images = {name: image for name, image in varying.items() if isinstance(image, Carried)}
 
     shown = Sampled.of(described, chosen, directions(COSINES), REPORTED)
-    light = kind.value(values, shown.pair, described.thin)
+    light = program.value(values, shown.pair, described.thin)
     apart = np.abs((shown.distribution(light) - shown.distribution(shown.value)).mean(axis=0)).sum(axis=(1, 2))
     total = np.maximum(shown.energy(shown.value).mean(axis=0), 1e-12)
     return Bake(
         target=target,
-        title=kind.title,
+        title=program.title,
         name=stack.name,
         model=chosen.name,
         values=values,
@@ -75,7 +75,7 @@ def bake(material: MaterialLike, target: str, model: str | Model = DEFAULT, **sw
         baked_albedo=shown.energy(light),
         passed=shown.energy(shown.value, up=False),
         baked_passed=shown.energy(light, up=False),
-        lost=(*lost(described, kind), *left),
+        lost=(*lost(described, program), *left),
         images=images,
         thin=described.thin,
     )
@@ -127,7 +127,7 @@ class _Space:
         return {name: tuple(value.tolist()) if len(value) > 1 else float(value[0]) for name, value in plain.items()}
 
 
-def _fitted(target: Program, described: Described, sampled: Sampled) -> Fitted:
+def _fitted(program: Program, described: Described, sampled: Sampled) -> Fitted:
     """The closest values of descents from every surface that the stack may be seen as.
 
     Parts stay those of the stack: coat, film, metal and clear base have the weights of a surface, and one without the
@@ -143,14 +143,14 @@ def _fitted(target: Program, described: Described, sampled: Sampled) -> Fitted:
         "brushed": described.blurred and bool(described.brushed),
         **dict.fromkeys(("film", "thickness"), described.film),
     }
-    ranges = {name: pair for kind, there in has.items() if there for name, pair in target.fitted(kind).items()}
-    starts = [complete(target.parameters, target.start(surface)) for surface in described.surfaces]
+    ranges = {name: pair for kind, there in has.items() if there for name, pair in program.fitted(kind).items()}
+    starts = [complete(program.parameters, program.start(surface)) for surface in described.surfaces]
     kinds = [(surface.metalness, surface.coated) for surface in described.surfaces]
     other = [OTHER * (kind != kinds[0] and not described.mixed) for kind in kinds]
     few = {
         name: pair
         for name, pair in ranges.items()
-        if isinstance(starts[0][name], tuple) or (name in target.fitted("rough") and starts[0][name])
+        if isinstance(starts[0][name], tuple) or (name in program.fitted("rough") and starts[0][name])
     }
 
     def descended(ranges: dict[str, Range], first: Fitted, start: Fitted, steps: int) -> tuple[float, Fitted]:
@@ -161,7 +161,7 @@ def _fitted(target: Program, described: Described, sampled: Sampled) -> Fitted:
         origin = space.numbers(first)
 
         def residuals(numbers: Array) -> Array:
-            light = target.value(space.values(numbers), sampled.pair, described.thin)
+            light = program.value(space.values(numbers), sampled.pair, described.thin)
             return np.concatenate([sampled.residuals(light), PRIOR * (numbers - origin)])
 
         inside = np.clip(space.numbers(start), 1e-3, 1 - 1e-3)

@@ -74,11 +74,11 @@ class Carried:
 
 @dataclass(frozen=True)
 class Bake:
-    """Parameters of a target, which has a title, that come closest to a stack, and what is lost.
+    """Parameters of a program, the target, that come closest to a stack, and what is lost.
 
     For the N cosines of incidence `cos_theta`, in the target's own formulas against the model: total_variation (N,),
     the share of the reflected light in wrong places, as `compare` measures it; albedo, baked_albedo (3, N); passed,
-    baked_passed (3, N), what leaves below. lost: what the target does not hold. images: in place of numbers, by
+    baked_passed (3, N), what leaves below. lost: what the program does not hold. images: in place of numbers, by
     parameter. thin: light passes without refraction.
     """
 

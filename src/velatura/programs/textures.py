@@ -1,4 +1,4 @@
-"""Materials with textures: the means, which are fitted, and the images that a target takes in place of a number."""
+"""Materials with textures: the means, which are fitted, and the images that a program takes in place of a number."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def _mean(address: Address, value: Varying) -> float | RGB:
     return r, g, b
 
 
-def carried(stack: Stack, found: Means, target: Program, values: Values) -> Iterator[tuple[str, Carried | str]]:
+def carried(stack: Stack, found: Means, program: Program, values: Values) -> Iterator[tuple[str, Carried | str]]:
     """Each varying value: its parameter and the image, or its flat name and what stands for it."""
     flat = stack.flat()
     for address, value in stack.values():
         again = address.key == "alpha_v" and flat[address.name[:-1] + "u"] == value
         if not isinstance(value, Varying) or again:
             continue
-        taken = _taken(stack, address, value, found, target, values) if isinstance(value, Texture) else None
+        taken = _taken(stack, address, value, found, program, values) if isinstance(value, Texture) else None
         stands = (
             "the field is replaced by its offset"
             if isinstance(value, Brushing)
@@ -55,22 +55,22 @@ def carried(stack: Stack, found: Means, target: Program, values: Values) -> Iter
 
 
 def _taken(
-    stack: Stack, address: Address, image: Texture, found: Means, target: Program, values: Values
+    stack: Stack, address: Address, image: Texture, found: Means, program: Program, values: Values
 ) -> tuple[str, Carried] | None:
-    """The parameter of the target that is one to one with a value, and the image for it."""
+    """The parameter of the program that is one to one with a value, and the image for it."""
     if image.offset or image.curve or image.scale <= 0:
         return None
     mean = np.maximum(found[address.name], 1e-6)
-    if stack.base and address.key == "albedo" and target.colour and values[target.metal] < 0.5:  # type: ignore[operator]
-        factor = np.broadcast_to(image.scale * np.asarray(values[target.colour]) / mean, 3)
-        plain = image.encoding == "srgb" and image.texture.suffix.lower() in target.images and factor.max() <= 1.001
-        if target.images and not plain:
+    if stack.base and address.key == "albedo" and program.colour and values[program.metal] < 0.5:  # type: ignore[operator]
+        factor = np.broadcast_to(image.scale * np.asarray(values[program.colour]) / mean, 3)
+        plain = image.encoding == "srgb" and image.texture.suffix.lower() in program.images and factor.max() <= 1.001
+        if program.images and not plain:
             return None
         r, g, b = (float(f"{x:.6g}") for x in factor)
-        return target.colour, Carried(image, (r, g, b))
+        return program.colour, Carried(image, (r, g, b))
     flat = stack.flat()
     isotropic = address.key == "alpha_u" and flat[address.name[:-1] + "v"] == image
-    if target.roughness and len(stack.interfaces) == 1 and isotropic:
-        root = float(np.sqrt(image.scale / mean) * values[target.roughness])
-        return target.roughness, Carried(image, float(f"{root:.6g}"))
+    if program.roughness and len(stack.interfaces) == 1 and isotropic:
+        root = float(np.sqrt(image.scale / mean) * values[program.roughness])
+        return program.roughness, Carried(image, float(f"{root:.6g}"))
     return None
