@@ -8,7 +8,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
 
 SOURCE = Path(__file__).parents[2] / "src" / "velatura"
 
@@ -87,25 +89,32 @@ LOADS_NO = {
 
 FILES = sorted(SOURCE.rglob("*.py"))
 PARTS = {path.relative_to(SOURCE).parts[0].removesuffix(".py") for path in FILES}
-MODULES = {
-    ".".join(("velatura", *path.relative_to(SOURCE).with_suffix("").parts)).removesuffix(".__init__") for path in FILES
-}
+
+
+def module_of(path: Path) -> str:
+    return ".".join(("velatura", *path.relative_to(SOURCE).with_suffix("").parts)).removesuffix(".__init__")
+
+
+MODULES = {module_of(path) for path in FILES}
 
 
 def part_of(path: Path) -> str:
     return path.relative_to(SOURCE).parts[0].removesuffix(".py")
 
 
-def imports(path: Path, text: str = "") -> Iterator[tuple[str, bool]]:
+def imports(path: Path, text: str = "", types: bool = True) -> Iterator[tuple[str, bool]]:
     """Every module that a file imports, by its full name, and whether that happens when the file is imported.
 
-    A file that calls `import_module` imports every module that it names in a text.
+    A file that calls `import_module` imports every module that it names in a text. `types`: also what only checkers of
+    types import.
     """
 
     tree = ast.parse(text or path.read_text(encoding="utf-8"))
     by_name = any(isinstance(node, ast.Name) and node.id == "import_module" for node in ast.walk(tree))
 
     def visit(node: ast.AST, at_import: bool) -> Iterator[tuple[str, bool]]:
+        if for_type_checkers(node) and not types:
+            return
         if isinstance(node, ast.Import):
             yield from ((alias.name, at_import) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -147,6 +156,20 @@ def test_a_part_imports_what_stands_above_it(part: str) -> None:
 def test_nothing_imports_the_ends_of_the_stream(part: str) -> None:
     importers = {part_of(path) for path in FILES if part in siblings(path)}
     assert importers <= set(IMPORTED_BY[part].split())
+
+
+def test_no_more_than_two_files_import_each_other_in_a_circle() -> None:
+    """Imports inside functions count, and so do the names that the public surface imports at their first use."""
+    paths = dict(zip(map(module_of, FILES), FILES))
+    number = {name: n for n, name in enumerate(paths)}
+    arrows = np.zeros((len(paths), len(paths)), bool)
+    for name, path in paths.items():
+        for imported, _ in imports(path, types=name == "velatura"):
+            above = [imported.rsplit(".", n)[0] for n in range(imported.count(".") + 1)]
+            arrows[number[name], [number[each] for each in above if each in number][:1]] = True
+    count, circle = connected_components(arrows, connection="strong")
+    circles = [[name for name in paths if circle[number[name]] == n] for n in range(count)]
+    assert not [names for names in circles if len(names) > 2]
 
 
 @pytest.mark.parametrize("library", RENDERER)
