@@ -11,13 +11,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.light.square_bins import grids
 from velatura.model import Model, variance_kind
 from velatura.model.base import Query
 from velatura.model.context import Context
 from velatura.optics import fresnel, ggx, refraction
 from velatura.programs.closures import ALPHA_MIN, Directions
 from velatura.programs.from_stack import Described, Facets
-from velatura.reference.distribution import BINS
 from velatura.sampling.low_discrepancy import square
 
 Array: TypeAlias = NDArray[np.floating]
@@ -64,10 +64,7 @@ class Sampled:
         """Energies of reflected light (3, M, bins, bins), over the projected disc."""
         up = self.pair.wo[2] > 0
         light = (value * self.weight)[:, up]
-        x, y = np.clip((0.5 * (self.pair.wo[:2, up] + 1) * BINS).astype(int), 0, BINS - 1)
-        cell = (self.which[up] * BINS + x) * BINS + y
-        grids = [np.bincount(cell, channel, self.count * BINS * BINS) for channel in light]
-        return np.array(grids, float).reshape(3, self.count, BINS, BINS)
+        return grids(self.pair.wo[:2, up], light, self.which[up], self.count)
 
     @cached_property
     def _scale(self) -> Array:
