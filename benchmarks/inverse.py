@@ -27,9 +27,9 @@ from velatura.inverse import (
     Target,
     equivalence,
     interface,
+    invert,
     invert_stack,
     pair,
-    stacks,
 )
 from velatura.inverse.drag import seen
 from velatura.inverse.partial_stack import Array, Layers, join, take
@@ -145,7 +145,7 @@ def met(found: Inverted, model: Model) -> Inverted:
     """The same targets, inverted for a model without a closed form, those that have a stack."""
     index, layers = [], []
     for n in range(len(found)):
-        solution = stacks.search(asked(found, n, model), model)
+        solution = invert.search(asked(found, n, model), model)
         if solution and not solution.reached:
             index.append(n)
             layers.append(solution.layers)
@@ -267,7 +267,7 @@ def of_stacks(targets: Iterator[Target], model: Model) -> tuple[list[Target], li
     refused, missed, seconds = list[Target](), list[Array](), list[float]()
     for target in targets:
         start = time.process_time()
-        found = stacks.search(target, model)
+        found = invert.search(target, model)
         seconds.append(time.process_time() - start)
         if found is None:
             refused.append(target)

@@ -17,7 +17,7 @@ from refusals import wish
 from rows import parsed
 
 from velatura.figures import bati2021_25
-from velatura.inverse import stacks
+from velatura.inverse import invert
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model import DEFAULT, named
 
@@ -43,7 +43,7 @@ def wished(count: int, seed: int, model: str, paths: int) -> tuple[list[float], 
     rng, energies, alphas = np.random.default_rng(seed), list[float](), list[float]()
     while count:
         target = wish(rng)
-        solution = stacks.search(target, named(model))
+        solution = invert.search(target, named(model))
         if solution is None or solution.reached:
             continue
         count -= 1

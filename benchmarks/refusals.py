@@ -18,7 +18,7 @@ import numpy as np
 from rows import parsed
 
 from velatura.errors import VelaturaError
-from velatura.inverse import Infeasible, Target, invert_stack, stacks
+from velatura.inverse import Infeasible, Target, invert, invert_stack, solution
 from velatura.inverse.explain import infeasible
 from velatura.inverse.target import BLUR
 from velatura.model import DEFAULT, named
@@ -59,7 +59,7 @@ def refused(
     rng = np.random.default_rng(seed)
     while count:
         target, start = wish(rng, most), time.process_time()
-        if stacks.search(target, named(model)):
+        if invert.search(target, named(model)):
             continue
         count, begin = count - 1, time.process_time()
         refusal = infeasible(target, named(model))
@@ -87,7 +87,7 @@ def lifted(target: Target, n: int, reason: str) -> Iterator[Target]:
 def possible(target: Target, n: int, reason: str, model: str) -> bool:
     """Whether the first lobes have a stack, by the nearest model in closed form, once what a reason names is lifted."""
     adder = named(model).surrogate
-    return any(stacks.in_closed_form(other, adder) for other in lifted(target, n, reason))
+    return any(solution.in_closed_form(other, adder) for other in lifted(target, n, reason))
 
 
 def wrong(target: Target, refusal: Infeasible, model: str = DEFAULT) -> str | None:

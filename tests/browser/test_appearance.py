@@ -22,7 +22,7 @@ from editor import Server, Visit, unexpected
 
 import velatura as vt
 from velatura.editor import appearance
-from velatura.inverse import stacks
+from velatura.inverse import invert
 from velatura.scenes.objects import OBJECTS
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
@@ -451,7 +451,7 @@ def test_the_coat_of_a_metal_is_dragged_to_a_pink_edge(visit: Open) -> None:
     assert 0.25 < tau[1] < 0.3 and max(tau[0], tau[2]) < 1e-6
     assert float(np.max(np.abs(np.sum(lobes(page).energy, axis=0) - wanted))) < 1e-6
     check_physical(page)
-    red, green, blue = stacks.grazing(
+    red, green, blue = invert.grazing(
         vt.Stack.from_dict({"layers": [{layer["kind"]: layer["keys"]} for layer in page.state("layers")]}),
         page.state("model"),
     ).mean(axis=1)

@@ -13,7 +13,7 @@ import pytest
 import velatura as vt
 from velatura.editor import appearance, class_maps
 from velatura.errors import InvalidInput
-from velatura.inverse import Target, stacks
+from velatura.inverse import Target, invert
 from velatura.inverse.coats import scattered
 from velatura.inverse.drag import DraggedStack
 from velatura.inverse.drag.coordinates import Space
@@ -391,7 +391,7 @@ def test_an_infeasible_wish_snaps_to_the_edge() -> None:
     assert deviation(answer["material"], answer["target"], "bati2021") < EXACT
     assert energy[0] == pytest.approx(9 / 17, abs=0.01)  # 1 - 2 / C_max of a smooth pair up to 4
     more = Target([{"energy": energy[0] + 0.02, "alpha": 0.0, "interfaces": 2}])
-    assert stacks.search(more, named("bati2021")) is None
+    assert invert.search(more, named("bati2021")) is None
 
 
 @pytest.mark.filterwarnings("error")
@@ -699,7 +699,7 @@ def test_the_coat_of_a_metal_absorbs_what_is_asked_and_the_lobe_stays(model: str
     for one in (state, found, lower):
         assert deviation(one["material"], state["target"], model) < EXACT
         check_physical(one["material"])
-        red, green, blue = stacks.grazing(Stack.from_dict(one["material"]), model).mean(axis=1)
+        red, green, blue = invert.grazing(Stack.from_dict(one["material"]), model).mean(axis=1)
         edges.append((red + blue) / (2 * green))
     assert edges[0] < edges[1] < edges[2]
     # Deeper than any metal can make up for, it ends where the brightest one does

@@ -12,12 +12,12 @@ from benchmarks import benchmark
 
 import velatura as vt
 from velatura.errors import InvalidInput
-from velatura.inverse import Infeasible, Target, alternatives, invert_stack, requests, stacks
+from velatura.inverse import Infeasible, Target, alternatives, invert, invert_stack, requests
 from velatura.inverse.drag import DraggedStack, coordinates
 from velatura.inverse.drag.newton import Nearest, Problem
-from velatura.inverse.explain import REASONS
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.partial_stack import read_whole
+from velatura.inverse.reasons import REASONS
 from velatura.model import named
 from velatura.stack import Medium, Stack
 
@@ -197,7 +197,7 @@ def test_a_way_out_is_near_and_brings_the_stack_that_has_it(
 )
 def test_a_refusal_by_the_model_itself_has_its_own_reason_and_way_out(lobes: list[Any], reasons: set[str]) -> None:
     """Of lobes that the nearest model in closed form has a stack for. Expected: a little less energy, and no more."""
-    assert stacks.search(Target(lobes), MODEL.surrogate) is not None
+    assert invert.search(Target(lobes), MODEL.surrogate) is not None
     with pytest.raises(Infeasible) as error:
         invert_stack(lobes, MODEL)
     assert error.value.constraint in reasons and error.value.lobe == len(lobes)

@@ -23,11 +23,11 @@ from velatura.inverse import (
     alternatives,
     coat,
     grazing,
+    invert,
     invert_stack,
     load_target,
     pair,
     plots,
-    stacks,
 )
 from velatura.inverse.figure_targets import FIGURES
 from velatura.model import MODELS, Model, named
@@ -703,7 +703,7 @@ def test_pairs_with_fixed_indices_are_found_or_refused() -> None:
     """Expected: stacks with the lobes and the indices that were asked for, or none; never an error of arrays."""
     found = 0
     for target in [CROWDED, *pinned_pairs(12, seed=3)]:
-        solution = stacks.search(target, AVERAGED)
+        solution = invert.search(target, AVERAGED)
         if solution is None:
             continue
         found += 1

@@ -14,12 +14,12 @@ import numpy as np
 
 from velatura.editor.messages import LOBES, Answer, Body, Verb, document, material_of, model_of
 from velatura.errors import InvalidInput, NoSolution
-from velatura.inverse import Infeasible, Target, coat, invert_stack, stacks
+from velatura.inverse import Infeasible, Target, coat, invert_stack, solution
 from velatura.inverse.coats import with_albedo
 from velatura.inverse.drag import Bound, DraggedStack, plain, seen
-from velatura.inverse.explain import REASONS, UNMET
 from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.interface import conductor_tint
+from velatura.inverse.reasons import REASONS, UNMET
 from velatura.model import Model, named
 from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS
@@ -28,7 +28,7 @@ from velatura.stack import Diffuse, Interface, Stack, Varying
 
 ALIKE = 1e-5  # difference of variances of neighbours that are one lobe
 UNLIKE = 1e-3  # energy or variance by which a stack differs from the nearest that can be dragged, and is shown itself
-EFFORT = stacks.EFFORTS[:1]  # to find a stack that is not near
+EFFORT = solution.EFFORTS[:1]  # to find a stack that is not near
 ROUNDED = 1e-3  # share of an energy by which a wish may be off, that is not worth a word
 OF_BLUR = ("blur", "fixed", UNMET[1])  # reasons that are not about energy
 READINGS = 6  # by a slow model, on the way to a wish that cannot be met
@@ -307,7 +307,7 @@ def _elsewhere(wish: Target, near: DraggedStack) -> DraggedStack | None:
     """A stack with the lobes, found independently of the present one; a medium that scatters would be lost."""
     if near.scatters:
         return None
-    found = stacks.in_closed_form(wish, near.model.without_tir, EFFORT)
+    found = solution.in_closed_form(wish, near.model.without_tir, EFFORT)
     fresh = DraggedStack.of(found.stack, wish, near.model) if found else None
     if fresh is None:
         return None
@@ -338,7 +338,7 @@ def _further(wish: Target, found: DraggedStack) -> DraggedStack:
 
 def _fresh(wish: Target, model: Model) -> Answer:
     """A stack for a target by itself."""
-    found = stacks.in_closed_form(wish, model.without_tir)
+    found = solution.in_closed_form(wish, model.without_tir)
     fresh = DraggedStack.of(found.stack, wish, model) if found else None
     if fresh is not None:
         moved, bound = fresh.towards(wish)

@@ -9,12 +9,13 @@ from velatura.inverse.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.coats import Coated, coat
 from velatura.inverse.descent import Estimate, Fit, Other, fit
 from velatura.inverse.equivalence import Coordinate, EquivalenceClass
-from velatura.inverse.explain import Direction, Infeasible
 from velatura.inverse.fitting import fit_target, simplify
 from velatura.inverse.interface import Choice, invert_interface
+from velatura.inverse.invert import alternatives, grazing, invert_stack, on_black
 from velatura.inverse.pair import Pair, invert_pair
 from velatura.inverse.partial_stack import Above, Layers
-from velatura.inverse.stacks import Solution, alternatives, grazing, invert_stack, on_black
+from velatura.inverse.reasons import Direction, Infeasible
+from velatura.inverse.solution import Solution
 from velatura.inverse.table_files import load_table
 from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
 

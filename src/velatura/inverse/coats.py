@@ -12,9 +12,9 @@ from velatura.errors import InvalidInput, NoSolution
 from velatura.inverse import interface, requests
 from velatura.inverse.descent import written
 from velatura.inverse.equivalence import dislike
-from velatura.inverse.explain import REASONS
 from velatura.inverse.interface import DENSER, RARER, Choice, conductor_tint
 from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, Mask, join
+from velatura.inverse.reasons import REASONS
 from velatura.inverse.roots import bisect
 from velatura.inverse.stacks import Partial, pruned
 from velatura.model import DEFAULT, Model, named, variance_kind

@@ -8,48 +8,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from velatura.errors import NoSolution
-from velatura.inverse import stacks
-from velatura.inverse.interface import CONDUCTOR_MIN
-from velatura.inverse.target import BLUR, Fixed, Target, TargetLobe
+from velatura.inverse import refined, stacks
+from velatura.inverse.reasons import TOO_LITTLE, TOO_MUCH, UNMET, Direction, Infeasible, because, digits
+from velatura.inverse.solution import exact
+from velatura.inverse.target import BLUR, LEAST, Fixed, Target, TargetLobe, distance
 from velatura.model import Model
 
 EFFORT = ((12, 32), (24, 128))
 SHOWN = 3  # ways out, the nearest ones
-FAR, LEAST = 4.0, 1e-4  # the logarithm by which quantities change at most; less energy or variance than that has none
+FAR = 4.0  # the logarithm by which quantities change at most
 PAIRED, OTHER, FREED, REMADE = 0.5, 1.0, 0.5, 3.0  # what another form costs, or a change of another lobe
 SURE = (0.02, 0.002, 2e-4)  # energies of lobes that are almost always possible
 ROUNDING = 1e-9  # by which lobes stay below what there is
-TOO_MUCH = "energies sum to {total:.4g}, above 1"
-REASONS = {
-    "energy": "no index up to {eta_max:g} reflects as much",
-    "bright": "not even the brightest metal reflects as much, of what its facets lose and what lies above lets through",
-    "upper": "its upper interface alone reflects more",
-    "absorption": "the fixed index reflects too little",
-    "excess": "the fixed index reflects more, and what lies above it absorbs nothing, or what is fixed",
-    "colour": "what lies above it absorbs nothing, or what is fixed, and one index does not give that colour",
-    "mirror": "nothing above this mirror absorbs, so that it reflects all light",
-    "metal": f"a conductor (k >= eta) reflects more, {CONDUCTOR_MIN:.3f} at least, and what lies above absorbs nothing",
-    "blur": "what lies above it blurs light more than that, or bounces it too often",
-    "index": "a fixed index is outside its bounds, 1 to {eta_max:g} or k >= eta",
-    "fixed": "a fixed roughness is not the one that gives that blur",
-    "unmet energy": "no stack is found with that energy and all else as asked",
-    "unmet blur": "no stack is found with that blur and all else as asked",
-}
-#: What reflects too little: of a dielectric, of a conductor, of either where its index is fixed.
-TOO_LITTLE = ("energy", "bright", "absorption")
-#: What the nearest stack that is found misses most, where no bound is in the way.
-UNMET = ("unmet energy", "unmet blur")
-
-
-@dataclass(frozen=True)
-class Direction:
-    """One way to change a target: the quantity, its description, and the nearest target that has a stack."""
-
-    what: str
-    words: str
-    change: float
-    target: Target
 
 
 @dataclass(frozen=True)
@@ -70,36 +40,14 @@ CLOSELY = Pace(8, 12, 5, True)
 ROUGHLY = Pace(4, 1, 3, False)  # where another model moves on from what is found
 
 
-class Infeasible(NoSolution):
-    """No stack gives the target.
-
-    lobe: the first one from the top, counted from 1, that cannot be given; 0 where it is all of them. constraint: what
-    forbids it, a key of `REASONS`, or "sum". directions: the targets that can be reached, the nearest first, of each
-    description one.
-    """
-
-    def __init__(self, why: str, lobe: int, constraint: str, directions: list[Direction]) -> None:
-        self.why, self.lobe, self.constraint = why, lobe, constraint
-        self.directions = list({direction.words: direction for direction in reversed(directions)}.values())[::-1]
-        hints = "; ".join(direction.words for direction in directions)
-        super().__init__(f"no stack: {why}" + (f" (possible: {hints})" if hints else ""))
-
-    @property
-    def nearest(self) -> Target | None:
-        """The target with the smallest change, of all directions."""
-        return self.directions[0].target if self.directions else None
-
-
 def infeasible(target: Target, model: Model) -> Infeasible:
     """The error for a target without a stack, with the nearest targets that have one.
 
     A model without a closed form is explained by the nearest one that has; its ways out are moved to where the model
     itself has stacks.
     """
-    if stacks.exact(target, model):
+    if exact(target, model):
         return _in_closed_form(target, model)
-    from velatura.inverse import refined  # which drags, for reasons that stand here
-
     met = refined.obstacle(target, model)
     if met is not None:
         bound, found = met
@@ -135,11 +83,6 @@ def _in_closed_form(target: Target, model: Model, pace: Pace = CLOSELY) -> Infea
 
 
 # Why -----------------------------------------------------------------------------------------------------------------
-
-
-def because(lobe: int, constraint: str, target: Target) -> str:
-    """The reason in words."""
-    return f"lobe {lobe + 1}: {REASONS[constraint].format(eta_max=target.eta_max)}"
 
 
 def why_not(target: Target, model: Model) -> tuple[int, str]:
@@ -454,18 +397,3 @@ def _with_energy(target: Target, n: int, colour: np.ndarray) -> Target:
     """The target with another energy of a lobe, a number where it is grey."""
     r, g, b = (float(e) for e in colour)
     return target.with_lobe(n, energy=r if r == g == b else (r, g, b))
-
-
-def distance(one: Target, other: Target) -> float:
-    """By which logarithms the energies and variances of two targets differ."""
-    total = 0.0
-    for a, b in zip(one.lobes, other.lobes):
-        total += float(np.sum(np.abs(np.log(np.maximum(a.colour, LEAST) / np.maximum(b.colour, LEAST)))))
-        s_a, s_b = (max(float(BLUR.variance(lobe.roughness)), LEAST) for lobe in (a, b))
-        total += abs(float(np.log(s_a / s_b)))
-    return total
-
-
-def digits(value: float | tuple[float, ...]) -> str:
-    """A number or colour in a message."""
-    return f"{value:.4g}" if isinstance(value, float) else "[" + ", ".join(f"{x:.4g}" for x in value) + "]"

@@ -14,8 +14,9 @@ from velatura.errors import InvalidInput
 from velatura.inverse import angles
 from velatura.inverse.angles import Directions, ReflectanceTable
 from velatura.inverse.descent import ALONE, ROUNDS, Descent, End, Fit, descended, fit, written
-from velatura.inverse.explain import Infeasible
-from velatura.inverse.stacks import Solution, alternatives, model_of
+from velatura.inverse.invert import alternatives, model_of
+from velatura.inverse.reasons import Infeasible
+from velatura.inverse.solution import Solution
 from velatura.inverse.target import Target, read
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.variance import Isotropic

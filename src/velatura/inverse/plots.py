@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from velatura.errors import needs
 from velatura.inverse.angles import ReflectanceTable, grouped, table_of
 from velatura.inverse.descent import Fit
-from velatura.inverse.equivalence import Coordinate, EquivalenceClass
-from velatura.inverse.partial_stack import Layers
+
+if TYPE_CHECKING:  # a class draws itself
+    from velatura.inverse.equivalence import Coordinate, EquivalenceClass
+    from velatura.inverse.partial_stack import Layers
 
 RESOLUTION = 256
 PANELS, PAIRS = 6, 12  # angles of incidence, and correlations, that are drawn of a fit

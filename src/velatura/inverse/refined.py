@@ -16,18 +16,19 @@ import numpy as np
 from velatura.errors import InvalidInput
 from velatura.inverse import interface, requests, stacks
 from velatura.inverse.drag import Bound, DraggedStack, pinned, plain, seen
-from velatura.inverse.explain import UNMET, Direction, digits, distance
 from velatura.inverse.interface import ENERGY_MIN, Choice
 from velatura.inverse.partial_stack import Array, Layers
-from velatura.inverse.stacks import Partial, Solution
-from velatura.inverse.target import BLUR, Target
+from velatura.inverse.reasons import UNMET, Direction, digits
+from velatura.inverse.solution import EFFORTS, Solution, closed_form_paths, in_closed_form, solutions
+from velatura.inverse.stacks import Partial
+from velatura.inverse.target import BLUR, Target, distance
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Isotropic, Roughness
 from velatura.stack import Stack
 
 GREY = Bound(0, "colour", 1, 0.0)  # one index for all channels
-EFFORT = stacks.EFFORTS[:1]  # to find a stack near which the model is met
+EFFORT = EFFORTS[:1]  # to find a stack near which the model is met
 STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
 READINGS = 60  # to find ways out, as interfaces that are read
 LEAST_READINGS, MOST_READINGS = 5, 8  # of stacks, for one way
@@ -47,7 +48,7 @@ def search(target: Target, model: Model) -> Solution | None:
 
     Of brushed lobes the search goes on from the stack that came nearest, if none of them leads to one.
     """
-    own = _of(target, model.surrogate, stacks.EFFORTS)
+    own = _of(target, model.surrogate, EFFORTS)
     if own is not None:
         first = next(own)
         others = itertools.chain(_corrected(first, target, model), own, _approaching(target, model.surrogate))
@@ -88,7 +89,7 @@ def _corrected(found: Solution, target: Target, model: Model) -> Iterator[Soluti
         for k, (lobe, axes) in enumerate(zip(target.lobes, f.roughness(x[count:]).reshape(-1, 2))):
             asked = asked.with_lobe(k, energy=tuple(x[3 * k : 3 * k + 3].tolist()))
             asked = asked.with_roughness(k, Roughness(axes[0], axes[1], lobe.axes.rotation))
-        return stacks.in_closed_form(asked, model.surrogate, EFFORT)
+        return in_closed_form(asked, model.surrogate, EFFORT)
 
     request = goal = numbers(target)
     for _ in range(MAPPED):
@@ -105,14 +106,14 @@ def _corrected(found: Solution, target: Target, model: Model) -> Iterator[Soluti
 def _of(start: Target, model: Model, efforts: Sequence[tuple[int, int]]) -> Iterator[Solution] | None:
     """Stacks with the lobes of a start: the preferred ones of either side, then ones from all over. None if there are
     none."""
-    paths = stacks.found(_as_fixed(start, model), model, efforts)
+    paths = closed_form_paths(_as_fixed(start, model), model, efforts)
     if not paths:
         return None
     order = np.argsort(paths.cost, kind="stable")
     _, first = np.unique(_sides(start, paths)[order], return_index=True)
     spread = np.linspace(0, len(order) - 1, OWN, dtype=int)
     some = list(dict.fromkeys([*sorted(first), *spread]))[:OWN]
-    return stacks.solutions(start, model, paths, order[some].tolist())
+    return solutions(start, model, paths, order[some].tolist())
 
 
 def _sides(target: Target, paths: Partial) -> Array:
@@ -179,7 +180,7 @@ def _keeps(layers: Sequence[Layers], target: Target) -> bool:
 def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
     """What keeps the model from lobes that the nearest one in closed form has a stack for, and that stack; None if it
     has none."""
-    found = stacks.in_closed_form(target, model.surrogate, EFFORT)
+    found = in_closed_form(target, model.surrogate, EFFORT)
     if found is None:
         return None
     there = moved(found, target, model, giving=False, effort=0)
@@ -198,7 +199,7 @@ def ways(offered: Sequence[Direction], target: Target, model: Model) -> list[Dir
         if (form, loose) in tried or (found and readings < LEAST_READINGS):
             continue
         tried.append((form, loose))
-        start = stacks.in_closed_form(way.target, model.surrogate, EFFORT)
+        start = in_closed_form(way.target, model.surrogate, EFFORT)
         if start is not None:
             near = nearest(start, form, loose, model, max(readings, LEAST_READINGS))
             left -= READINGS // 2
@@ -332,7 +333,7 @@ def _requested(found: Solution, target: Target, model: Model) -> Solution | Boun
             energy = tuple(np.maximum(request[3 * k : 3 * k + 3], 0).tolist())
             asked = asked.with_lobe(k, energy=energy).with_roughness(k, kind(*s).roughness(f))
         asked = _as_fixed(asked.with_lobe(0, energy=first), found.model) if held else asked
-        return stacks.in_closed_form(asked, found.model, EFFORT)
+        return in_closed_form(asked, found.model, EFFORT)
 
     def read(solution: Solution) -> Array:
         return numbers(seen(solution.stack, target, model))

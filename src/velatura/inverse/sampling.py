@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from velatura.inverse import interface, stacks
 from velatura.inverse.equivalence import VANISHED, metal_depths, random_depths
 from velatura.inverse.interface import DENSER, RARER, Choice
 from velatura.inverse.partial_stack import Array, Layers, join, take
-from velatura.inverse.stacks import Partial, Solution
+from velatura.inverse.stacks import Partial
 from velatura.inverse.target import Target, TargetLobe
 from velatura.model import Model
 from velatura.ops import Value
@@ -129,14 +129,14 @@ def _indices(paths: Partial, target: Target, which: list[int]) -> Array:
 # Over all free coordinates -------------------------------------------------------------------------------------------
 
 
-def drawn(known: Solution, rng: np.random.Generator) -> Partial:
-    """Stacks with the lobes of a known one, by its model in closed form, drawn over all that its target leaves free.
+def drawn(target: Target, model: Model, known: Sequence[Layers], rng: np.random.Generator) -> Partial:
+    """Stacks with the lobes of a known one, by a model in closed form, drawn over all that its target leaves free.
 
     They are drawn anywhere, and near the known one in case that there is none elsewhere; the former come first. Their
     costs are weights: shares of the ranges of coordinates that they are drawn from.
     """
-    target, layers = known.target, iter(known.layers)
-    paths = dataclasses.replace(stacks.beginning(target, known.model), cost=np.ones(1))
+    layers = iter(known)
+    paths = dataclasses.replace(stacks.beginning(target, model), cost=np.ones(1))
     count = DRAWN_COATED if target.has_films else DRAWN
     for n, lobe in enumerate(target.lobes):
         own = [next(layers) for _ in range(lobe.interfaces)]

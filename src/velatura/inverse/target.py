@@ -19,6 +19,7 @@ from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, F
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
 ROUND = 1e-6  # difference of roughnesses of a lobe that has no axes
+LEAST = 1e-4  # energy or variance below which targets do not differ
 
 
 @dataclass(frozen=True)
@@ -346,3 +347,13 @@ def _lobe(number: int, entry: Any) -> TargetLobe:
         return TargetLobe.from_dict(entry)
     except InvalidInput as error:
         raise InvalidInput(f"lobe {number}: {error}") from None
+
+
+def distance(one: Target, other: Target) -> float:
+    """By which logarithms the energies and variances of two targets differ."""
+    total = 0.0
+    for a, b in zip(one.lobes, other.lobes):
+        total += float(np.sum(np.abs(np.log(np.maximum(a.colour, LEAST) / np.maximum(b.colour, LEAST)))))
+        s_a, s_b = (max(float(BLUR.variance(lobe.roughness)), LEAST) for lobe in (a, b))
+        total += abs(float(np.log(s_a / s_b)))
+    return total

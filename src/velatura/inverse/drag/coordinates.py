@@ -18,7 +18,6 @@ import numpy as np
 from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.inverse import films
-from velatura.inverse.explain import because
 from velatura.inverse.interface import (
     CONDUCTOR_MAX,
     CONDUCTOR_MIN,
@@ -29,6 +28,7 @@ from velatura.inverse.interface import (
     least,
 )
 from velatura.inverse.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
+from velatura.inverse.reasons import because
 from velatura.inverse.target import Target
 from velatura.model import Model
 from velatura.model.papers.adding import lobes

@@ -24,9 +24,9 @@ from velatura.inverse.drag.coordinates import (
     retinted,
 )
 from velatura.inverse.drag.newton import Compromise, Problem, Solution
-from velatura.inverse.explain import UNMET
 from velatura.inverse.interface import CONDUCTOR_MAX, ENERGY_MIN
 from velatura.inverse.partial_stack import Above, Array, Layers, named_as
+from velatura.inverse.reasons import UNMET
 from velatura.inverse.target import Fixed, Target, TargetLobe, kind_of
 from velatura.model import Model
 from velatura.model.registry import stack_lobes

@@ -9,8 +9,8 @@ import numpy as np
 
 from velatura import ops
 from velatura.inverse.drag.coordinates import SLACK, Bound, Point, Reading
-from velatura.inverse.explain import UNMET
 from velatura.inverse.partial_stack import Array
+from velatura.inverse.reasons import UNMET
 
 ROUNDS = 8
 ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
