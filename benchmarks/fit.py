@@ -19,7 +19,7 @@ from rows import parsed
 import velatura as vt
 from velatura.checks import Probe
 from velatura.inverse import Directions, Fit, Infeasible, ReflectanceTable, fit_target
-from velatura.inverse.angles import compressed, table_of
+from velatura.inverse.fitting.angles import compressed, table_of
 from velatura.model import DEFAULT
 from velatura.stack import Stack
 

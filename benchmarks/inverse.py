@@ -20,19 +20,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from rows import parsed, row
 
-from velatura.inverse import (
-    Above,
-    Choice,
-    EquivalenceClass,
-    Target,
-    equivalence,
-    interface,
-    invert,
-    invert_stack,
-    pair,
-)
-from velatura.inverse.drag import seen
-from velatura.inverse.partial_stack import Array, Layers, join, take
+from velatura.inverse import Above, Choice, EquivalenceClass, Target, invert, invert_stack
+from velatura.inverse.lobes import equivalence, interface, pair
+from velatura.inverse.lobes.partial_stack import Array, Layers, join, take
+from velatura.inverse.local.dragged import seen
 from velatura.model import DEFAULT, MODELS, Model, named
 from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS

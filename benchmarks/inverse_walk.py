@@ -17,8 +17,8 @@ from refusals import wish
 from rows import parsed
 
 from velatura.figures import bati2021_25
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import invert
-from velatura.inverse.figure_targets import FIGURES
 from velatura.model import DEFAULT, named
 
 SEEN = 0.01  # energy that the noise of walks leaves visible

@@ -20,7 +20,7 @@ from rows import parsed
 from velatura.errors import VelaturaError
 from velatura.inverse import Infeasible, Target, invert, invert_stack, solution
 from velatura.inverse.explain import infeasible
-from velatura.inverse.target import BLUR
+from velatura.inverse.lobes.target import BLUR
 from velatura.model import DEFAULT, named
 
 OF_FIXED = ("absorption", "excess", "index", "fixed", "upper")  # reasons that freeing what is fixed lifts

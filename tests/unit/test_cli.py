@@ -26,7 +26,7 @@ import pytest
 import velatura
 from velatura.cli import options, progress
 from velatura.errors import MissingTool, NoSolution
-from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
+from velatura.inverse.lobes.target import Fixed, Target, TargetLobe, load_target
 from velatura.kernel import Component
 from velatura.scenes.stage import width_and_height
 

@@ -15,8 +15,8 @@ from velatura.editor import appearance, class_maps
 from velatura.errors import InvalidInput
 from velatura.inverse import Target, invert
 from velatura.inverse.coats import scattered
-from velatura.inverse.drag import DraggedStack
-from velatura.inverse.drag.coordinates import Space
+from velatura.inverse.local.coordinates import Space
+from velatura.inverse.local.dragged import DraggedStack
 from velatura.model import named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Roughness

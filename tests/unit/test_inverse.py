@@ -7,19 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from velatura.inverse import (
-    Above,
-    Choice,
-    EquivalenceClass,
-    Layers,
-    interface,
-    invert_interface,
-    invert_pair,
-    pair,
-)
-from velatura.inverse.interface import DENSER, RARER
-from velatura.inverse.partial_stack import join, take
-from velatura.inverse.roots import false_position
+from velatura.inverse import Above, Choice, EquivalenceClass, Layers, invert_interface, invert_pair
+from velatura.inverse.lobes import interface, pair
+from velatura.inverse.lobes.interface import DENSER, RARER
+from velatura.inverse.lobes.partial_stack import join, take
+from velatura.inverse.lobes.roots import false_position
 from velatura.model import MODELS, Model, named
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Isotropic, Roughness

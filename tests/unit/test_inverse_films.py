@@ -11,7 +11,7 @@ from benchmarks import benchmark
 import velatura as vt
 from velatura.errors import InvalidInput
 from velatura.inverse import Infeasible, Target, alternatives, invert_stack
-from velatura.inverse.drag import seen
+from velatura.inverse.local.dragged import seen
 from velatura.model import named
 from velatura.stack import Interface, Stack
 

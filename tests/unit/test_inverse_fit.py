@@ -12,7 +12,7 @@ from fuzzing.imports import tensors
 
 from velatura.errors import InvalidInput
 from velatura.inverse import Directions, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
-from velatura.inverse.fitting import _merged, _turned, compared
+from velatura.inverse.fitting.simplify import _merged, _turned, compared
 from velatura.model import Model, named
 from velatura.model.registry import stack_lobes
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, load, loads

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from velatura.inverse import Above, Choice, Directions, EquivalenceClass, Target, interface, invert_interface, stacks
-from velatura.inverse.angles import ANGLES, AZIMUTHS, TILTS, ReflectanceTable
+from velatura.inverse import Above, Choice, Directions, EquivalenceClass, Target, invert_interface
 from velatura.inverse.coats import _choices
-from velatura.inverse.descent import CONDUCTOR, DEPTH_MAX, Descent, extinction, share
-from velatura.inverse.drag import DraggedStack
-from velatura.inverse.interface import DENSER, RARER
-from velatura.inverse.partial_stack import Layers
+from velatura.inverse.fitting.angles import ANGLES, AZIMUTHS, TILTS, ReflectanceTable
+from velatura.inverse.fitting.descent import CONDUCTOR, DEPTH_MAX, Descent, extinction, share
+from velatura.inverse.lobes import interface, stacks
+from velatura.inverse.lobes.interface import DENSER, RARER
+from velatura.inverse.lobes.partial_stack import Layers
+from velatura.inverse.local.dragged import DraggedStack
 from velatura.model import named
 from velatura.model.variance import ALPHA_MIN, Isotropic, Roughness
 from velatura.optics import fresnel

@@ -12,11 +12,12 @@ from benchmarks import benchmark
 
 import velatura as vt
 from velatura.errors import InvalidInput
-from velatura.inverse import Infeasible, Target, alternatives, invert, invert_stack, requests
-from velatura.inverse.drag import DraggedStack, coordinates
-from velatura.inverse.drag.newton import Nearest, Problem
-from velatura.inverse.figure_targets import FIGURES
-from velatura.inverse.partial_stack import read_whole
+from velatura.figures.bati2021_targets import FIGURES
+from velatura.inverse import Infeasible, Target, alternatives, invert, invert_stack
+from velatura.inverse.lobes.partial_stack import read_whole
+from velatura.inverse.local import coordinates, surrogate
+from velatura.inverse.local.dragged import DraggedStack
+from velatura.inverse.local.newton import Nearest, Problem
 from velatura.inverse.reasons import REASONS
 from velatura.model import named
 from velatura.stack import Medium, Stack
@@ -299,10 +300,10 @@ def test_requests_are_changed_until_their_answers_are_read_as_is_wanted() -> Non
     def read(x: Any) -> Any:
         return np.array([0.7 * x[0] + 0.2 * x[1] ** 2, 0.9 * x[1] + 0.1 * x[0]])
 
-    found = requests.met(lambda x: x, read, goal, goal, goal)
+    found = surrogate.met(lambda x: x, read, goal, goal, goal)
     assert found is not None
     np.testing.assert_allclose(read(found), goal, rtol=1e-6)
-    assert requests.met(lambda x: None, read, goal, goal, goal) is None
+    assert surrogate.met(lambda x: None, read, goal, goal, goal) is None
 
 
 @pytest.mark.parametrize("saturates", [False, True])
@@ -318,7 +319,7 @@ def test_requests_for_what_no_answer_has_end_soon_near_the_goal(saturates: bool)
         return np.minimum(x, (0.6, 1.0))
 
     goal = np.array([0.8, 0.3])
-    found = requests.met(ask, read, 0.5 * goal, goal, goal)
+    found = surrogate.met(ask, read, 0.5 * goal, goal, goal)
     assert found is not None
     assert read(found)[0] == pytest.approx(0.6, abs=0.01)
     assert read(found)[1] == pytest.approx(0.3, abs=1e-6 if saturates else 0.1)

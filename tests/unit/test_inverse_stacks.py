@@ -13,6 +13,7 @@ from benchmarks import benchmark
 
 import velatura as vt
 from velatura.errors import InvalidInput, NoSolution
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import (
     Above,
     Choice,
@@ -26,10 +27,9 @@ from velatura.inverse import (
     invert,
     invert_stack,
     load_target,
-    pair,
     plots,
 )
-from velatura.inverse.figure_targets import FIGURES
+from velatura.inverse.lobes import pair
 from velatura.model import MODELS, Model, named
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel

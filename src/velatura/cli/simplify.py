@@ -23,7 +23,7 @@ def simplify(
     # Refuse what cannot work before anything slow begins
     stack, switches = options.read(material, settings)
     from velatura import inverse
-    from velatura.inverse.fitting import compared
+    from velatura.inverse.fitting.simplify import compared
 
     fit.check(output)
     picture, name = invert.picture(material) if plot else None, Path(material).stem

@@ -14,11 +14,12 @@ import numpy as np
 
 from velatura.editor.messages import LOBES, Answer, Body, Verb, document, material_of, model_of
 from velatura.errors import InvalidInput, NoSolution
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Infeasible, Target, coat, invert_stack, solution
 from velatura.inverse.coats import with_albedo
-from velatura.inverse.drag import Bound, DraggedStack, plain, seen
-from velatura.inverse.figure_targets import FIGURES
-from velatura.inverse.interface import conductor_tint
+from velatura.inverse.lobes.interface import conductor_tint
+from velatura.inverse.local.coordinates import Bound, plain
+from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.reasons import REASONS, UNMET
 from velatura.model import Model, named
 from velatura.model.registry import stack_lobes

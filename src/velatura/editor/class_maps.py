@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 from velatura.editor.appearance import answered, dragged, lobe_of
 from velatura.editor.messages import Answer, Body, Verb, array
 from velatura.errors import InvalidInput
-from velatura.inverse import EquivalenceClass, Target, interface, stacks
-from velatura.inverse.drag import Bound, DraggedStack, with_depth
-from velatura.inverse.interface import conductor_extinction, conductor_index
+from velatura.inverse import EquivalenceClass, Target
+from velatura.inverse.lobes import interface, stacks
+from velatura.inverse.lobes.interface import conductor_extinction, conductor_index
+from velatura.inverse.local import members as classes
+from velatura.inverse.local.coordinates import Bound
+from velatura.inverse.local.dragged import DraggedStack, with_depth
 from velatura.optics import fresnel
 from velatura.stack.values import Colour
 
@@ -89,7 +92,7 @@ def member(body: Body) -> Answer:
         # Nothing but what absorbs above it makes another first interface reflect the same
         (part,) = _members(near, lobe).member(goal[0])
         depths[0], goal = np.maximum(np.broadcast_to(part.tau, (3, 1))[:, 0], 0.0), here
-    found, bound = near.member(lobe, goal, depths)
+    found, bound = classes.member(near, lobe, goal, depths)
     reached = found.depths_of(lobe)
     if bound is None and any(np.max(np.abs(reached[n] - depth)) > SLACK for n, depth in depths.items()):
         bound = Bound(lobe, "bright", -1, 0.0)  # a medium above a metal gives way

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.figures.looks import MODEL, Looks, Panel, interfaces, mark, of_layers
 from velatura.inverse import EquivalenceClass, invert_stack, plots
-from velatura.inverse.figure_targets import FIGURES
 from velatura.stack import Stack
 
 ETA_1, ETA_2 = 1.2, 4.0

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.figures.looks import MODEL, Looks, Panel, interfaces, mark
 from velatura.inverse import invert_stack
-from velatura.inverse.figure_targets import FIGURES
 from velatura.optics import fresnel
 from velatura.stack import Stack
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from velatura.figures import Progress, canvas, looks
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.figures.looks import MODEL
 from velatura.inverse import alternatives, grazing, invert_stack, plots
-from velatura.inverse.figure_targets import FIGURES
 from velatura.model.registry import stack_lobes
 from velatura.stack import Stack
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from velatura import reference
 from velatura.figures import Progress, canvas
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Target, invert_stack
-from velatura.inverse.figure_targets import FIGURES
 from velatura.model import named
 from velatura.model.registry import stack_lobes
 from velatura.model.roughness_maps import MAPS

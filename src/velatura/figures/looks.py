@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from velatura import scenes
 from velatura.figures import Progress, canvas
+from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Layers, invert_stack, on_black
-from velatura.inverse.figure_targets import FIGURES
 from velatura.inverse.plots import CHANNELS, FILLS
 from velatura.model.lobe_statistics import StackLobes
 from velatura.model.registry import stack_lobes

@@ -4,20 +4,20 @@ After Bati et al. 2021, "An Inverse Method for the Exploration of Layered Materi
 read by the model's own recursion, so that what is found holds for the model that renders it.
 """
 
-from velatura.inverse import smooth_pair
-from velatura.inverse.angles import Directions, ReflectanceTable, table_of
 from velatura.inverse.coats import Coated, coat
-from velatura.inverse.descent import Estimate, Fit, Other, fit
-from velatura.inverse.equivalence import Coordinate, EquivalenceClass
-from velatura.inverse.fitting import fit_target, simplify
-from velatura.inverse.interface import Choice, invert_interface
+from velatura.inverse.fitting.angles import Directions, ReflectanceTable, table_of
+from velatura.inverse.fitting.descent import Estimate, Fit, Other, fit
+from velatura.inverse.fitting.simplify import fit_target, simplify
+from velatura.inverse.fitting.table_files import load_table
 from velatura.inverse.invert import alternatives, grazing, invert_stack, on_black
-from velatura.inverse.pair import Pair, invert_pair
-from velatura.inverse.partial_stack import Above, Layers
+from velatura.inverse.lobes import smooth_pair
+from velatura.inverse.lobes.equivalence import Coordinate, EquivalenceClass
+from velatura.inverse.lobes.interface import Choice, invert_interface
+from velatura.inverse.lobes.pair import Pair, invert_pair
+from velatura.inverse.lobes.partial_stack import Above, Layers
+from velatura.inverse.lobes.target import Fixed, Target, TargetLobe, load_target
 from velatura.inverse.reasons import Direction, Infeasible
 from velatura.inverse.solution import Solution
-from velatura.inverse.table_files import load_table
-from velatura.inverse.target import Fixed, Target, TargetLobe, load_target
 
 __all__ = [
     "Above",

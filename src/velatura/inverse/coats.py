@@ -9,14 +9,14 @@ from functools import partial
 import numpy as np
 
 from velatura.errors import InvalidInput, NoSolution
-from velatura.inverse import interface, requests
-from velatura.inverse.descent import written
-from velatura.inverse.equivalence import dislike
-from velatura.inverse.interface import DENSER, RARER, Choice, conductor_tint
-from velatura.inverse.partial_stack import NORMAL, Above, Array, Layers, Mask, join
+from velatura.inverse.lobes import interface
+from velatura.inverse.lobes.equivalence import dislike
+from velatura.inverse.lobes.interface import DENSER, RARER, Choice, conductor_tint
+from velatura.inverse.lobes.partial_stack import NORMAL, Above, Array, Layers, Mask, join, written
+from velatura.inverse.lobes.roots import bisect
+from velatura.inverse.lobes.stacks import Partial, pruned
+from velatura.inverse.local import surrogate
 from velatura.inverse.reasons import REASONS
-from velatura.inverse.roots import bisect
-from velatura.inverse.stacks import Partial, pruned
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
 from velatura.model.papers.adding import lobes
@@ -67,7 +67,7 @@ class Coated:
         return {"energy": self.after.energy[0][:, 0].tolist(), "alpha": self.after.alpha[0][..., 0].tolist()}
 
     def change(self) -> list[dict[str, list[float]]]:
-        """For every interface of the bare material energy (rgb) and roughness (two axes), before and after."""
+        """Energy (rgb) and roughness (two axes) for every interface of the bare material, before and after."""
         rows = []
         for k, energy in enumerate(self.before.energy):
             rows.append(
@@ -129,7 +129,7 @@ def coat(
 
 
 def _missed(stack: Stack, found: Coated) -> list[str]:
-    """What is not kept, of lobes for which no loss stands yet."""
+    """Descriptions of lobes that are not kept, of those for which no loss stands yet."""
     named, missed, lobes = " ".join(found.losses), list[str](), iter(found.change())
     for n, layer in enumerate(stack.layers):
         where = f"layer {n} ({type(layer).__name__.lower()})"
@@ -180,7 +180,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> Kept:
 
     goal, first = _numbers(stack_lobes(stack, 1.0, model=model)), np.array([_entries(*lobe) for lobe in wanted]).ravel()
     scale = np.abs(goal) + SMALL
-    kept = requests.met(ask, read, first, goal, scale)
+    kept = surrogate.met(ask, read, first, goal, scale)
     if kept is not None and (not refused or np.abs(read(kept) - goal).max() < MISSED):
         return kept
     if not refused:
@@ -190,7 +190,7 @@ def _kept(stack: Stack, top: Layers, eta_max: float, model: Model) -> Kept:
     request, nearest = refused[-1]
     solved = solver_reads(Material.of(stack.with_layers([*coating, *nearest[0]])))[len(coating) :]
     lost = np.abs(np.ravel([_entries(*lobe) for lobe in solved]) - request) > LEAST * scale
-    found = requests.met(near, read, request, goal, scale, ~lost) or nearest
+    found = surrogate.met(near, read, request, goal, scale, ~lost) or nearest
     return found[0], found[1] or nearest[1]
 
 
@@ -264,7 +264,7 @@ def _nearest(paths: Partial, energy: Array, variance: Variance, choices: Sequenc
     count = len(some.cost)
 
     def tried(x: Array, y: Array) -> tuple[Partial, Array]:
-        """Below all stacks, and by all choices: lobes of other energies and widths, and how far they are, (N,)."""
+        """Stacks with other lobes, below all stacks and by all choices, and how far these lobes are, (N,)."""
         x, y, path = np.repeat(x, count), np.repeat(y, count), np.tile(np.arange(count), len(x))
         darker, brighter = own.max() * np.exp(np.minimum(x, 0)), own.min() * np.exp(np.maximum(x, 0))
         wished = np.where(x < 0, np.minimum(own, darker), np.maximum(own, brighter))

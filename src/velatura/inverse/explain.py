@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from velatura.inverse import refined, stacks
+from velatura.inverse import refined
+from velatura.inverse.lobes import stacks
+from velatura.inverse.lobes.target import BLUR, LEAST, Fixed, Target, TargetLobe, distance
 from velatura.inverse.reasons import TOO_LITTLE, TOO_MUCH, UNMET, Direction, Infeasible, because, digits
 from velatura.inverse.solution import exact
-from velatura.inverse.target import BLUR, LEAST, Fixed, Target, TargetLobe, distance
 from velatura.model import Model
 
 EFFORT = ((12, 32), (24, 128))
@@ -24,7 +27,7 @@ ROUNDING = 1e-9  # by which lobes stay below what there is
 
 @dataclass(frozen=True)
 class Pace:
-    """How closely ways out are searched.
+    """Effort of a search for ways out.
 
     steps, halvings: by which a target that can be reached is looked for, and then approached. ways: that are
     approached. channels: whether single channels are changed, too.
@@ -194,7 +197,7 @@ class Search:
         for k in range(n, len(target.lobes)):
             now = target.model_copy(update={"lobes": (*lobes, target.lobes[k])})
             if not self.possible(now):
-                nearest = self.nearest([*_of_blur(now, k), *_as_dark_as_must_be(now, k)])
+                nearest = self.nearest([*_of_blur(now, k), _darker(now, k)])
                 if not nearest:
                     return None
                 words, change = f"{direction.words} and {nearest[0].words}", direction.change + nearest[0].change
@@ -228,57 +231,41 @@ class Search:
 
 def _of_energy(target: Target, n: int, channels: bool = True) -> Iterator[Way]:
     """A lobe of other energy: all of it, one channel, the dark ones or the bright ones, or grey."""
-    lobe, what = target.lobes[n], f"lobe {n + 1} energy"
-    own = np.maximum(lobe.colour, LEAST)
-
-    def way(name: str, along: Callable[[float], np.ndarray], far: float = FAR, inclusive: bool = False) -> Way:
-        def words(t: Target) -> str:
-            return f"{name} {digits(t.lobes[n].energy)}"
-
-        return Way(name, target, lambda x: _with_energy(target, n, along(x)), words, far, inclusive=inclusive)
-
+    own, what = np.maximum(target.lobes[n].colour, LEAST), f"lobe {n + 1} energy"
     for sign in (-1, 1):
-        yield way(what, lambda x, sign=sign: own * np.exp(sign * x))  # type: ignore[misc]
+        yield _with_energy(target, n, _scaled(own, sign))
     if np.ptp(own) == 0:
         return
     for channel, name in zip(np.eye(3), "rgb" if channels else ""):
         for sign in (-1, 1):
-            yield way(f"{what} {name}", lambda x, by=sign * channel: own * np.exp(by * x))  # type: ignore[misc]
+            yield _with_energy(target, n, _scaled(own, sign * channel), f"{what} {name}")
     apart = float(np.log(own.max() / own.min()))
-    yield way(f"{what}, its dark channels", lambda x: np.maximum(own, own.min() * np.exp(x)), apart)
-    yield way(f"{what}, its bright channels", lambda x: np.minimum(own, own.max() * np.exp(-x)), apart)
-    grey = np.full(3, own.mean())
+    dark, bright = _scaled(own.min(), 1), _scaled(own.max(), -1)
+    yield _with_energy(target, n, lambda x: np.maximum(own, dark(x)), f"{what}, its dark channels", far=apart)
+    yield _with_energy(target, n, lambda x: np.minimum(own, bright(x)), f"{what}, its bright channels", far=apart)
     for sign in (-1, 1):
-        yield way(f"{what}, grey", lambda x, sign=sign: grey * np.exp(sign * x), inclusive=True)  # type: ignore[misc]
+        yield _with_energy(target, n, _scaled(np.full(3, own.mean()), sign), f"{what}, grey", inclusive=True)
 
 
-def _as_dark_as_must_be(target: Target, n: int) -> Iterator[Way]:
+def _darker(target: Target, n: int, cost: float = 0.0) -> Way:
     """A lobe of less energy."""
-    own = np.maximum(target.lobes[n].colour, LEAST)
-
-    def words(t: Target) -> str:
-        return f"lobe {n + 1} energy {digits(t.lobes[n].energy)}"
-
-    yield Way(f"lobe {n + 1} energy", target, lambda x: _with_energy(target, n, own * np.exp(-x)), words)
+    return _with_energy(target, n, _scaled(np.maximum(target.lobes[n].colour, LEAST), -1), cost=cost)
 
 
-def _of_blur(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
-    """A lobe of other variance."""
-    what, s = f"lobe {n + 1} variance", float(BLUR.variance(target.lobes[n].roughness))
-
-    def words(t: Target) -> str:
-        return f"{what} {digits(t.lobes[n].variance or 0.0)}"
-
-    def sharper(x: float) -> Target:
-        return target.with_variance(n, float(s * np.exp(-x)))
-
-    def wider(x: float) -> Target:
-        return target.with_variance(n, float(max(s, LEAST) * np.exp(x)))
-
+def _sharper(target: Target, n: int, cost: float = 0.0) -> Iterator[Way]:
+    """A lobe of less variance, unless it has none."""
+    s = float(BLUR.variance(target.lobes[n].roughness))
     if s > 0:
-        yield Way(what, target, sharper, words, FAR, cost)
-    if s < (widest := float(BLUR.variance(1.0))):
-        yield Way(what, target, wider, words, float(np.log(widest / max(s, LEAST))), cost)
+        yield _with_variance(target, n, _scaled(s, -1), cost=cost)
+
+
+def _of_blur(target: Target, n: int) -> Iterator[Way]:
+    """A lobe of other variance."""
+    yield from _sharper(target, n)
+    s, widest = float(BLUR.variance(target.lobes[n].roughness)), float(BLUR.variance(1.0))
+    if s < widest:
+        s = max(s, LEAST)
+        yield _with_variance(target, n, _scaled(s, 1), far=float(np.log(widest / s)))
 
 
 def _of_form(target: Target, n: int, last: bool) -> Iterator[Way]:
@@ -302,23 +289,8 @@ def _of_form(target: Target, n: int, last: bool) -> Iterator[Way]:
 def _of_others(target: Target, n: int) -> Iterator[Way]:
     """Lobes above, less bright or less blurred."""
     for k in range(n):
-        own, s = np.maximum(target.lobes[k].colour, LEAST), float(BLUR.variance(target.lobes[k].roughness))
-
-        def dimmer(x: float, k: int = k, own: np.ndarray = own) -> Target:
-            return _with_energy(target, k, own * np.exp(-x))
-
-        def sharper(x: float, k: int = k, s: float = s) -> Target:
-            return target.with_variance(k, float(s * np.exp(-x)))
-
-        def energy(t: Target, k: int = k) -> str:
-            return f"lobe {k + 1} energy {digits(t.lobes[k].energy)}"
-
-        def variance(t: Target, k: int = k) -> str:
-            return f"lobe {k + 1} variance {digits(t.lobes[k].variance or 0.0)}"
-
-        yield Way(f"lobe {k + 1} energy", target, dimmer, energy, FAR, OTHER)
-        if s > 0:
-            yield Way(f"lobe {k + 1} variance", target, sharper, variance, FAR, OTHER)
+        yield _darker(target, k, OTHER)
+        yield from _sharper(target, k, OTHER)
 
 
 def _dimmed(target: Target) -> Iterator[Way]:
@@ -328,7 +300,7 @@ def _dimmed(target: Target) -> Iterator[Way]:
     def darker(x: float) -> Target:
         changed = target
         for n, lobe in enumerate(target.lobes):
-            changed = _with_energy(changed, n, np.array(lobe.colour) * np.exp(-x) / total)
+            changed = changed.with_energy(n, np.array(lobe.colour) * np.exp(-x) / total)
         return changed
 
     def words(t: Target) -> str:
@@ -341,46 +313,31 @@ def _capped(target: Target) -> Iterator[Way]:
     """One lobe of at most what the others leave, and then less."""
     total = np.sum([lobe.colour for lobe in target.lobes], axis=0)
     for n, lobe in enumerate(target.lobes):
-        left = (1 - (total - np.array(lobe.colour))) * (1 - ROUNDING)
-        if left.min() <= LEAST:
-            continue
-
-        def lower(x: float, n: int = n, left: np.ndarray = left) -> Target:
-            return _with_energy(target, n, np.minimum(target.lobes[n].colour, left * np.exp(-x)))
-
-        def words(t: Target, n: int = n) -> str:
-            return f"lobe {n + 1} energy {digits(t.lobes[n].energy)}"
-
-        yield Way(f"lobe {n + 1} energy", target, lower, words, inclusive=True)
+        own = np.array(lobe.colour)
+        left = (1 - (total - own)) * (1 - ROUNDING)
+        if left.min() > LEAST:
+            yield _with_energy(target, n, partial(_at_most, own, left), inclusive=True)
 
 
 def _to_sure(target: Target) -> Iterator[Way]:
-    """Towards lobes that are almost always possible, dark and blurred more the deeper they lie; then nothing fixed."""
-    for kept in dict.fromkeys((target, freed(target, films=True), freed(target))):
+    """Lobes ever more like ones that are almost always possible: dark, and blurred more the deeper they lie."""
+    for kept in dict.fromkeys((target, target.freed(films=True), target.freed())):
         for dark in SURE:
             sure, s = kept, 0.0
             for n, lobe in enumerate(target.lobes):
                 s = max(2.5 * s, float(BLUR.variance(lobe.roughness)), LEAST)
-                energy = dark if lobe.base == "dielectric" else 0.4
-                sure = _with_energy(sure, n, np.full(3, energy)).with_variance(n, s)
-
-            def along(x: float, kept: Target = kept, sure: Target = sure) -> Target:
-                changed = kept
-                for n, (lobe, to) in enumerate(zip(kept.lobes, sure.lobes)):
-                    one, two = (np.log(np.maximum(each.colour, LEAST)) for each in (lobe, to))
-                    a, b = (max(float(BLUR.variance(each.roughness)), LEAST) for each in (lobe, to))
-                    changed = _with_energy(changed, n, np.exp(one + x * (two - one)))
-                    changed = changed.with_variance(n, float(a * (b / a) ** x))
-                return changed
-
-            yield Way("lobes", target, along, _described, 1.0, OTHER)
+                sure = sure.with_energy(n, np.full(3, dark if lobe.base == "dielectric" else 0.4)).with_variance(n, s)
+            yield Way("lobes", target, partial(_between, kept, sure), _described, 1.0, OTHER)
 
 
-def freed(target: Target, films: bool = False) -> Target:
-    """The target with nothing fixed, or `films` alone."""
-    for n, lobe in enumerate(target.lobes):
-        target = target.with_lobe(n, fixed=lobe.fixed.films_alone if films else Fixed())
-    return target
+def _between(one: Target, other: Target, x: float) -> Target:
+    """A target a share x of the way, in logarithms, from one to another."""
+    found = one
+    for n, lobes in enumerate(zip(one.lobes, other.lobes)):
+        e, e_other = (np.log(np.maximum(lobe.colour, LEAST)) for lobe in lobes)
+        s, s_other = (max(float(BLUR.variance(lobe.roughness)), LEAST) for lobe in lobes)
+        found = found.with_energy(n, np.exp(e + x * (e_other - e))).with_variance(n, float(s * (s_other / s) ** x))
+    return found
 
 
 def _described(target: Target) -> str:
@@ -393,7 +350,35 @@ def _at(target: Target, changed: Target, name: str, cost: float) -> Way:
     return Way(name, target, lambda x: changed, lambda t: name, 0.0, cost, inclusive=True)
 
 
-def _with_energy(target: Target, n: int, colour: np.ndarray) -> Target:
-    """The target with another energy of a lobe, a number where it is grey."""
-    r, g, b = (float(e) for e in colour)
-    return target.with_lobe(n, energy=r if r == g == b else (r, g, b))
+def _with_energy(target: Target, n: int, along: Callable[[float], np.ndarray], name: str = "", **options: Any) -> Way:
+    """The way to other energies of a lobe."""
+    name = name or f"lobe {n + 1} energy"
+    return Way(
+        name,
+        target,
+        lambda x: target.with_energy(n, along(x)),
+        lambda t: f"{name} {digits(t.lobes[n].energy)}",
+        **options,
+    )
+
+
+def _with_variance(target: Target, n: int, along: Callable[[float], float], **options: Any) -> Way:
+    """The way to other variances of a lobe."""
+    name = f"lobe {n + 1} variance"
+    return Way(
+        name,
+        target,
+        lambda x: target.with_variance(n, float(along(x))),
+        lambda t: f"{name} {digits(t.lobes[n].variance or 0.0)}",
+        **options,
+    )
+
+
+def _scaled(value: Any, by: Any) -> Callable[[float], Any]:
+    """The value times exp(by x), over x."""
+    return lambda x: value * np.exp(by * x)
+
+
+def _at_most(value: np.ndarray, bound: np.ndarray, x: float) -> np.ndarray:
+    """The value, clamped from above to a bound times exp(-x)."""
+    return np.minimum(value, bound * np.exp(-x))

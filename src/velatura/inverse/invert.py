@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from velatura.inverse import refined, sampling
+from velatura.inverse import refined
 from velatura.inverse.explain import infeasible
-from velatura.inverse.partial_stack import Array
+from velatura.inverse.lobes import sampling
+from velatura.inverse.lobes.partial_stack import Array
+from velatura.inverse.lobes.target import Target, read
 from velatura.inverse.solution import EFFORTS, Solution, exact, in_closed_form, solutions
-from velatura.inverse.target import Target, read
 from velatura.model import DEFAULT, Model, named
 from velatura.model.registry import stack_lobes
 from velatura.model.variance import ALPHA_MIN
@@ -109,7 +110,7 @@ def alternatives(
 
 
 def _met(drawn: Solution, first: Solution) -> Solution | None:
-    """What is drawn, moved to where the model of the first stack reads its lobes; None if there is no such stack."""
+    """The drawn stack, moved to where the model of the first stack reads its lobes; None if there is no such stack."""
     if exact(first.target, first.model):
         return drawn
     met = refined.moved(drawn, first.reached or first.target, first.model)

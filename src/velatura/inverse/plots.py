@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from velatura.errors import needs
-from velatura.inverse.angles import ReflectanceTable, grouped, table_of
-from velatura.inverse.descent import Fit
+from velatura.inverse.fitting.angles import ReflectanceTable, grouped, table_of
+from velatura.inverse.fitting.descent import Fit
 
 if TYPE_CHECKING:  # a class draws itself
-    from velatura.inverse.equivalence import Coordinate, EquivalenceClass
-    from velatura.inverse.partial_stack import Layers
+    from velatura.inverse.lobes.equivalence import Coordinate, EquivalenceClass
+    from velatura.inverse.lobes.partial_stack import Layers
 
 RESOLUTION = 256
 PANELS, PAIRS = 6, 12  # angles of incidence, and correlations, that are drawn of a fit

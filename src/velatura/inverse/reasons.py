@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from velatura.errors import NoSolution
-from velatura.inverse.interface import CONDUCTOR_MIN
-from velatura.inverse.target import Target
+from velatura.inverse.lobes.interface import CONDUCTOR_MIN
+from velatura.inverse.lobes.target import Target
 
 TOO_MUCH = "energies sum to {total:.4g}, above 1"
 REASONS = {

@@ -14,14 +14,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.inverse import interface, requests, stacks
-from velatura.inverse.drag import Bound, DraggedStack, pinned, plain, seen
-from velatura.inverse.interface import ENERGY_MIN, Choice
-from velatura.inverse.partial_stack import Array, Layers
+from velatura.inverse.lobes import interface, stacks
+from velatura.inverse.lobes.interface import ENERGY_MIN, Choice
+from velatura.inverse.lobes.partial_stack import Array
+from velatura.inverse.lobes.stacks import Partial
+from velatura.inverse.lobes.target import BLUR, Target, distance
+from velatura.inverse.local import surrogate
+from velatura.inverse.local.coordinates import Bound, plain
+from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.reasons import UNMET, Direction, digits
 from velatura.inverse.solution import EFFORTS, Solution, closed_form_paths, in_closed_form, solutions
-from velatura.inverse.stacks import Partial
-from velatura.inverse.target import BLUR, Target, distance
 from velatura.model import Model
 from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Isotropic, Roughness
@@ -32,7 +34,6 @@ EFFORT = EFFORTS[:1]  # to find a stack near which the model is met
 STARTS, WIDER = (1.0, 0.7, 0.4, 0.15), 2.5  # energies, and variances of a lobe below another, that a wish starts from
 READINGS = 60  # to find ways out, as interfaces that are read
 LEAST_READINGS, MOST_READINGS = 5, 8  # of stacks, for one way
-KEPT = 1e-6  # by which what is fixed may be missed
 SAID = 1e-4  # changes of quantities that are mentioned, as logarithms
 TRIES, OWN, FEWER = 6, 4, 2  # stacks that are begun with; those that have the lobes of one target; where none has
 PARTS = (1.0, 0.5, 0.25)  # of a correction, where all of it has no stack
@@ -135,7 +136,7 @@ def moved(found: Solution, target: Target, model: Model, giving: bool = True, ef
 
     giving: whether kept coordinates may change at bounds, which takes longer. effort: as `DraggedStack.met`.
     """
-    if any(pinned(lobe, first=n == 0) for n, lobe in enumerate(target.lobes)):
+    if target.pinned:
         return _requested(found, target, model)
     dragged = _dragged(found, target, model)
     if dragged is None or dragged.achromatic(target) is not target:
@@ -154,32 +155,17 @@ def from_start(start: Stack, target: Target, model: Model) -> Solution | None:
     layers, dragged = plain(start), DraggedStack.of(start, target, model, with_pins=True)
     if dragged is None or start.exterior != target.exterior:
         return None
-    if dragged.snapped(target) == target and _keeps(layers, target):
+    if dragged.snapped(target) == target and target.kept(layers):
         return Solution(target, model, tuple(layers))
     there = moved(Solution(target, model, tuple(layers)), target, model)
     return there if isinstance(there, Solution) and there.reached is None else None
 
 
-def _keeps(layers: Sequence[Layers], target: Target) -> bool:
-    """Whether layers have the values that a target fixes."""
-    parts = iter(layers)
-    for lobe in target.lobes:
-        for n in range(lobe.interfaces):
-            part = next(parts)
-            asked_films = lobe.fixed.of("films", n)
-            if asked_films is not None and asked_films != part.films:
-                return False
-            has = {"eta": part.eta, "k": part.kappa, "alpha": part.roughness[:2], "tau": part.tau}
-            for key, value in has.items():
-                asked = lobe.fixed.of(key, n)
-                if asked is not None and np.abs(np.ravel(value) - np.ravel(asked)).max() > KEPT:
-                    return False
-    return True
-
-
 def obstacle(target: Target, model: Model) -> tuple[Bound, Solution] | None:
-    """What keeps the model from lobes that the nearest one in closed form has a stack for, and that stack; None if it
-    has none."""
+    """The bound that keeps the model from lobes that the nearest one in closed form has a stack for, and that stack.
+
+    None if the closed form has none.
+    """
     found = in_closed_form(target, model.surrogate, EFFORT)
     if found is None:
         return None
@@ -219,7 +205,7 @@ def ways_from(found: Solution, target: Target, bound: Bound, model: Model) -> li
 
 
 def _readings(target: Target, interfaces: int) -> int:
-    """How many readings of a stack of a target read as many interfaces; brushed ones count twice."""
+    """The number of readings of a stack of a target that read as many interfaces; brushed ones count twice."""
     units = sum(lobe.interfaces for lobe in target.lobes)
     return min(interfaces // (units if target.kind is Isotropic else 2 * units), MOST_READINGS)
 
@@ -342,7 +328,7 @@ def _requested(found: Solution, target: Target, model: Model) -> Solution | Boun
     scale = np.r_[np.maximum(goal[: 3 * count], 1e-3), np.abs(goal[3 * count :]) + SMALL]
     held = _as_fixed(target, found.model) is not target
     free = np.arange(len(goal)) >= (3 if held else 0)
-    best = requests.met(ask, read, goal, goal, scale, free)
+    best = surrogate.met(ask, read, goal, goal, scale, free)
     if best is None:
         return Bound(count - 1, "fixed", 1, 0.0)
     reached = seen(best.stack, target, model)

@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from velatura.inverse import sampling
-from velatura.inverse.drag import seen
-from velatura.inverse.equivalence import VANISHED, EquivalenceClass
-from velatura.inverse.partial_stack import Layers
-from velatura.inverse.stacks import Partial, class_of, follow, is_open, start
-from velatura.inverse.target import Target
+from velatura.inverse.lobes import sampling
+from velatura.inverse.lobes.equivalence import VANISHED, EquivalenceClass
+from velatura.inverse.lobes.partial_stack import Layers
+from velatura.inverse.lobes.stacks import Partial, class_of, follow, is_open, start
+from velatura.inverse.lobes.target import Target
+from velatura.inverse.local.dragged import seen
 from velatura.model import Model
 from velatura.stack import Stack
 

@@ -192,7 +192,7 @@ def inverse(stack: Stack, seed: int, model: str = DEFAULT, **switches: str) -> A
     """The stack that inverse design finds for lobes of a stack at normal incidence, its films kept: as asked, and by
     interface."""
     from velatura.inverse import invert_stack
-    from velatura.inverse.target import ROUND
+    from velatura.inverse.lobes.target import ROUND
 
     if stack.base:
         raise InvalidInput("inverse: not of a stack with a diffuse base")

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from velatura.inverse import interface, pair
-from velatura.inverse.equivalence import EquivalenceClass, dislike
-from velatura.inverse.interface import DENSER, RARER, Choice
-from velatura.inverse.partial_stack import Above, Array, Batch, Layers, take
-from velatura.inverse.roots import false_position
-from velatura.inverse.target import Target, TargetLobe
+from velatura.inverse.lobes import interface, pair
+from velatura.inverse.lobes.equivalence import EquivalenceClass, dislike
+from velatura.inverse.lobes.interface import DENSER, RARER, Choice
+from velatura.inverse.lobes.partial_stack import Above, Array, Batch, Layers, take
+from velatura.inverse.lobes.roots import false_position
+from velatura.inverse.lobes.target import Target, TargetLobe
 from velatura.model import Model
 from velatura.model.variance import Variance
 from velatura.ops import Value
@@ -201,7 +201,7 @@ def _pinned(lobe: TargetLobe, key: str, n: int) -> Any:
 
 
 def _held(layers: Layers, lobe: TargetLobe, n: int) -> Layers:
-    """With the constraint that a fixed roughness equals the one that the target needs."""
+    """The interfaces with the constraint that a fixed roughness equals the one that the target needs."""
     alpha = lobe.fixed.of("alpha", n)
     if alpha is None:
         return layers

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from velatura import ops
-from velatura.inverse.drag.coordinates import SLACK, Bound, Point, Reading
-from velatura.inverse.partial_stack import Array
+from velatura.inverse.lobes.partial_stack import Array
+from velatura.inverse.local.approach import bounded_step
+from velatura.inverse.local.coordinates import SLACK, Bound, Point, Reading, units
 from velatura.inverse.reasons import UNMET
 
 ROUNDS = 8
@@ -104,18 +105,15 @@ class Problem:
         closed = not space.slow
         enough = ENOUGH if bound and closed else ALMOST if closed else SLOW_ALMOST
         free = space.free if compromise is None or compromise.of_goal else np.r_[space.free, compromise.coordinate]
-        x, part, blocked = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, dict[int, int]()
-        before, missing = None, self._missing(self.start.reading, part)
-        least, waited = np.inf, 0
+        x, part, before = self.start.x, 0.0 if compromise and compromise.of_goal else 1.0, None
+        blocked, least, waited = dict[int, int](), np.inf, 0
         for n in range(ROUNDS if closed else SLOW_ROUNDS):
             # See what is missing, and how that changes
             known = n == 0 and bound is None
             reading = self.start.reading if known else space.reading(x, free, before)
             before = x, reading
-            missing, slopes = self._missing(reading, part), self._scaled(reading.slopes)
-            if compromise:
-                missing, slopes = self._on_bound(compromise, missing, slopes, x, free)
-            if not np.all(np.isfinite(slopes)) or not np.all(np.isfinite(missing)):
+            missing, slopes = self._equations(compromise, reading, part, x, free)
+            if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missing))):
                 break
             nearest.keep(x, missing[: len(space.free)])
 
@@ -147,23 +145,17 @@ class Problem:
 
         giving: whether what absorbs between lobes moves, too, which may be needed for roughnesses below 1.
         """
-        from scipy.optimize import lsq_linear  # slow to load
-
         space, damping = self.start.space, DAMPED
         depths = [own.depth for own in space.interfaces if giving and own.depth is not None]
         free = np.r_[space.free, depths].astype(int)
         for _ in range(rounds):
             x, before = nearest.x, nearest.missing
-            points = space.points(x, free)
-            read = space.read(points)
-            size = np.abs(x[free]) + 0.01
-            slopes = (read[:, 1:] - read[:, :1]) / (points[free, 1 + np.arange(len(free))] - x[free]) * size
+            here, size = space.differences(x, free), units(x[free])
             low, high = ((end[free] - x[free]) / size for end in space.box)
             for _ in range(DAMPINGS):
-                a = np.vstack([self._scaled(slopes), damping * np.eye(len(free))])
-                b = np.r_[self._scaled(self.goal - read[:, 0]), np.zeros(len(free))]
+                ahead = self._scaled(here.slopes * size), self._scaled(self.goal - here.value)
                 tried = x.copy()
-                tried[free] += size * lsq_linear(a, b, (low, np.maximum(high, low + SLACK)), method="bvls").x
+                tried[free] += size * bounded_step(*ahead, damping, low, np.maximum(high, low + SLACK))
                 tried = space.clipped(tried)
                 nearest.keep(tried, self._scaled(space.read(tried[:, None])[:, 0] - self.goal))
                 if nearest.missing < before / 2:
@@ -195,10 +187,16 @@ class Problem:
         """The way to the goal, in units of the goal."""
         return self._scaled(self.goal - self.start.reading.value)
 
-    def _on_bound(
-        self, compromise: Compromise, missing: Array, slopes: Array, x: Array, free: Array
+    def _equations(
+        self, compromise: Compromise | None, reading: Reading, part: float, x: Array, free: Array
     ) -> tuple[Array, Array]:
-        """The equations with one more, that the point lies on a bound, and one more unknown if the goal gives way."""
+        """What a reading misses of a part of the way, and its slopes.
+
+        In a compromise one equation more, that the point lies on a bound, and one more unknown if the goal gives way.
+        """
+        missing, slopes = self._scaled(reading.value - self._on_the_way(part)), self._scaled(reading.slopes)
+        if compromise is None:
+            return missing, slopes
         margin, change = self.start.space.margin_slopes(compromise.bound, x, free)
         if compromise.of_goal:
             slopes, change = np.c_[slopes, -self.way], np.r_[change, 0.0]
@@ -211,11 +209,8 @@ class Problem:
         here = self.start.reading.value
         return here + part * (self.goal - here)
 
-    def _missing(self, reading: Reading, part: float) -> Array:
-        return self._scaled(reading.value - self._on_the_way(part))
-
     def _scaled(self, x: Array) -> Array:
-        """Of readings, or their slopes, those that count, in units of the goal."""
+        """The readings, or their slopes, that count, in units of the goal."""
         return (x[self.start.space.counted].T / self._scale).T
 
     @cached_property

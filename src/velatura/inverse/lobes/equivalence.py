@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from velatura.inverse import interface, pair, smooth_pair
-from velatura.inverse.interface import DENSER, DIELECTRIC, RARER, Choice
-from velatura.inverse.partial_stack import Above, Array, Batch, Layers, Mask, mapped, take
-from velatura.inverse.roots import bisect, intervals
-from velatura.inverse.smooth_pair import Interval
+from velatura.inverse.lobes import interface, pair, smooth_pair
+from velatura.inverse.lobes.interface import DENSER, DIELECTRIC, RARER, Choice
+from velatura.inverse.lobes.partial_stack import Above, Array, Batch, Layers, Mask, mapped, take
+from velatura.inverse.lobes.roots import bisect, intervals
+from velatura.inverse.lobes.smooth_pair import Interval
 from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.stack.values import Film
@@ -414,7 +414,7 @@ class EquivalenceClass:
 
     @property
     def _tau(self) -> Value:
-        """Of the medium above a pair."""
+        """Optical depth of the medium above a pair."""
         return 0.0 if self.tau is None else self.tau
 
     @property
@@ -551,10 +551,9 @@ def dislike(eta_0: Value, layers: Layers) -> Array:
 
 
 def _depth(below: Above, rest: _Rest, eta: Array, coated: tuple[Film, ...]) -> Array:
-    """Optical depths (C, N) with which dielectrics of given indices reflect enough (Bati et al. 2021, Eq. 13)."""
+    """Optical depths (C, N) with which dielectrics of given indices reflect enough."""
     layers = Layers("dielectric", eta[None], None, rest.roughness, 0.0, films=coated)
-    found = below.reflectance(layers)
-    return 0.5 * np.log(np.maximum(found, interface.ENERGY_MIN) / rest.r)
+    return interface.optical_depth(below.reflectance(layers), rest.r, interface.ENERGY_MIN)
 
 
 def _draw(spans: list[Interval], u: Array) -> Array:

@@ -17,8 +17,8 @@ import numpy as np
 
 from velatura import ops
 from velatura.errors import InvalidInput
-from velatura.inverse import films
-from velatura.inverse.interface import (
+from velatura.inverse.lobes import coatings
+from velatura.inverse.lobes.interface import (
     CONDUCTOR_MAX,
     CONDUCTOR_MIN,
     ENERGY_MIN,
@@ -27,9 +27,9 @@ from velatura.inverse.interface import (
     conductor_tint,
     least,
 )
-from velatura.inverse.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
+from velatura.inverse.lobes.partial_stack import NORMAL, Array, Layers, named_as, read_whole, variance_of, whole
+from velatura.inverse.lobes.target import Target
 from velatura.inverse.reasons import because
-from velatura.inverse.target import Target
 from velatura.model import Model
 from velatura.model.papers.adding import lobes
 from velatura.model.papers.prepare import prepare
@@ -225,15 +225,15 @@ class Space:
         found = np.vstack([energy, np.minimum(variance, VARIANCE_MAX).reshape(-1, x.shape[1])])
         return found if self.factors is None else self.factors[:, None] * found
 
-    def points(self, x: Array, free: Array) -> Array:
-        """A point, and those of differences along some coordinates, (D, 1 + free).
+    def differences(self, x: Array, free: Array) -> Reading:
+        """The reading at a point, by differences of the model itself along some coordinates.
 
         Differences are to smaller values, away from the singular indices of the darkest metals, except near 0.
         """
         points = np.repeat(x[:, None], len(free) + 1, axis=1)
-        away = np.where(x[free] > NEAR, -STEP, STEP)
-        points[free, 1 + np.arange(len(free))] += away * (np.abs(x[free]) + 0.01)
-        return points
+        points[free, 1 + np.arange(len(free))] += np.where(x[free] > NEAR, -STEP, STEP) * units(x[free])
+        read = self.read(points)
+        return Reading(read[:, 0], (read[:, 1:] - read[:, :1]) / (points[free, 1 + np.arange(len(free))] - x[free]))
 
     def reading(self, x: Array, free: Array, before: tuple[Array, Reading] | None = None) -> Reading:
         """The reading at a point, by differences along some coordinates.
@@ -244,23 +244,37 @@ class Space:
         closed = not self.slow
         if before and not closed:
             value, step = self.read(x[:, None])[:, 0], x[free] - before[0][free]
-            along = step / (np.abs(x[free]) + 0.01) ** 2
+            along = step / units(x[free]) ** 2
             missed = value - before[1].value - before[1].slopes @ step
             return Reading(value, before[1].slopes + np.outer(missed, ops.divide(along, along @ step)))
-        points = self.points(x, free)
-        read = self.quickly.read(points)
-        slopes = (read[:, 1:] - read[:, :1]) / (points[free, 1 + np.arange(len(free))] - x[free])
+        near = self.quickly.differences(x, free)
         if closed:
-            return Reading(read[:, 0], slopes)
+            return near
         value = self.read(x[:, None])[:, 0]
-        ratio = self._sizes(value) / np.maximum(self._sizes(read[:, 0]), ENERGY_MIN)
-        return Reading(value, slopes * np.clip(ratio, 0.1, 10)[:, None])
+        ratio = self._sizes(value) / np.maximum(self._sizes(near.value), ENERGY_MIN)
+        return Reading(value, near.slopes * np.clip(ratio, 0.1, 10)[:, None])
 
     def _sizes(self, value: Array) -> Array:
         """Sizes of a reading: of energies, and of the variances of every interface, for each of their entries."""
         energies, variances = np.split(value, [3 * self.lobes])
         sizes = np.abs(variances).reshape(-1, self.entries).sum(axis=1)
         return np.r_[energies, np.repeat(sizes, self.entries)]
+
+    def goal(self, wish: Target) -> Array:
+        """The reading, (3 K + V I,), with which a target is met."""
+        f = MAPS[self.model.map]
+        s = [np.ravel(list(vars(wish.lobes[own.lobe].blur(f, self.kind)).values())) for own in self.interfaces]
+        return np.concatenate([[max(e, ENERGY_MIN) for lobe in wish.lobes for e in lobe.colour], *s])
+
+    def target_of(self, reading: Array, form: Target) -> Target:
+        """The target of a form with lobes as they are read, of a pair with the mean variance of both interfaces."""
+        variances = reading[3 * self.lobes :].reshape(len(self.interfaces), -1)
+        for k in range(self.lobes):
+            s = np.mean([variances[n] for n, own in enumerate(self.interfaces) if own.lobe == k], axis=0)
+            roughness = named_as(self.kind(*s).roughness(MAPS[self.model.map]), form.lobes[k].axes.rotation)
+            form = form.with_lobe(k, energy=tuple(reading[3 * k : 3 * k + 3].tolist()))
+            form = form.with_roughness(k, roughness)
+        return form
 
     def _brightest(self, own: InterfaceCoordinates, x: Array, s: Array) -> Array:
         """The variance of the channel in which the lobe must reflect most, if every channel has its own."""
@@ -367,7 +381,7 @@ class Space:
                 largest = span > span.max() - SLACK
                 tied[own.reflectances, own.reflectances] |= largest[:, None] & largest
         together = tied[:, free]
-        steps = STEP * (np.abs(x[free]) + 0.01)
+        steps = STEP * units(x[free])
         (margins,) = self.margins([bound], np.c_[x, x[:, None] + steps * together])
         return float(margins[0]), (margins[1:] - margins[0]) / (steps * together.sum(axis=0))
 
@@ -407,7 +421,7 @@ class Point:
         """The same stack, where variances are folded if they are not here, and the other way round."""
         space, known = self.space, self.known
         if known:
-            steps = STEP * (np.abs(self.x[space.free]) + 0.01)
+            steps = STEP * units(self.x[space.free])
             here, there = space.refolded(self.x), np.empty((len(space.free), len(space.free)))
             for n, c in enumerate(space.free):
                 x = self.x.copy()
@@ -420,6 +434,11 @@ class Point:
     def layers(self) -> list[Layers]:
         """Its interfaces, each with the medium above it."""
         return self.space.layers(self.x[:, None])
+
+
+def units(x: Array) -> Array:
+    """Units of coordinates: their sizes, and a little."""
+    return np.abs(x) + 0.01
 
 
 def _conductor(own: InterfaceCoordinates, reflectances: Array) -> tuple[Array, Array, Value]:
@@ -530,7 +549,7 @@ class Reader:
     def _shown_by(self, ratio: float, coated: tuple[Film, ...]) -> int:
         """The channel in which an index below films shows most."""
         eta = self.eta_1 * ratio * np.array([[1 - SHIFT, 1 + SHIFT]])
-        r = films.AtNormal(films.values(coated), self.eta_1, eta, None).at(1.0, None)
+        r = coatings.AtNormal(coatings.values(coated), self.eta_1, eta, None).at(1.0, None)
         return int(np.argmax(np.abs(r[:, 1] - r[:, 0])))
 
     def _mirror(self, k: int, values: dict[str, Any]) -> InterfaceCoordinates:
@@ -566,12 +585,12 @@ class Reader:
     def _responses(self, reflectance: Array, values: dict[str, Any]) -> tuple[Array, Array]:
         """Changes (3, 1) of the logarithm of what a conductor below films reflects: by that of its own reflectance, and
         by its tint."""
-        tint, own = values["tint"], films.values(values["films"])
+        tint, own = values["tint"], coatings.values(values["films"])
         u = np.clip(reflectance, CONDUCTOR_MIN + 1e-12, CONDUCTOR_MAX / (1 + SHIFT)) * np.array([[1, 1 + SHIFT, 1]])
         turned = np.where(tint > 0.5, -SHIFT, SHIFT)
         eta = conductor_index(u, tint + turned * np.array([[0, 0, 1]]))
         kappa = np.maximum(conductor_extinction(u, eta), eta)
-        r = np.log(films.AtNormal(own, self.eta_1, eta * self.eta_1, kappa * self.eta_1).at(1.0, None) + ENERGY_MIN)
+        r = np.log(coatings.AtNormal(own, self.eta_1, eta * self.eta_1, kappa * self.eta_1).at(1.0, None) + ENERGY_MIN)
         return (r[:, 1:2] - r[:, :1]) / np.log1p(SHIFT), (r[:, 2:] - r[:, :1]) / turned
 
     def _blur(self, lobe: int, roughness: Roughness) -> slice:

@@ -17,17 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.errors import InvalidInput
-from velatura.inverse import angles
-from velatura.inverse.angles import ReflectanceTable, radiance
-from velatura.inverse.interface import conductor_extinction
-from velatura.inverse.partial_stack import CLEAR, Array
+from velatura.inverse.fitting import angles
+from velatura.inverse.fitting.angles import ReflectanceTable, radiance
+from velatura.inverse.lobes.interface import conductor_extinction
+from velatura.inverse.lobes.partial_stack import CLEAR, Array, written
 from velatura.model import Model, named, variance_kind
 from velatura.model.papers import bsdf
 from velatura.model.variance import ALPHA_MIN
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.stack import (
-    RGB,
     DiffuseValues,
     InterfaceValues,
     LayerValues,
@@ -130,7 +129,7 @@ class Free:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Of its coordinate."""
+        """Bounds of its coordinate."""
         return self.coordinate(self.low), self.coordinate(self.high)
 
     def name(self, layer: int) -> str:
@@ -202,7 +201,7 @@ def descended(
 
 @dataclass(frozen=True)
 class End:
-    """Where a descent ends: a point (free,), and its residuals."""
+    """End of a descent: a point (free,), and its residuals."""
 
     descent: Descent
     x: Array
@@ -280,13 +279,13 @@ class End:
 
     @property
     def variance(self) -> float:
-        """Of the residuals."""
+        """Variance of the residuals."""
         count, free = self.slopes.shape
         return max(float(np.sum(self.residuals**2)) / max(count - free, 1), LEAST**2)
 
     @cached_property
     def information(self) -> Array:
-        """What is known of the coordinates, (free, free), as a multiple of the inverse variance of the residuals.
+        """Information about the coordinates, (free, free), as a multiple of the inverse variance of the residuals.
 
         By the table, and by the bounds: as much as an even distribution between them has.
         """
@@ -295,7 +294,7 @@ class End:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the coordinates, (free, free), by leaving out one group of directions after the other.
+        """Covariance of the coordinates, (free, free), by leaving out one group of directions after the other.
 
         So it holds the errors of the model, which are alike within a group, as well as noise: a jackknife, linearised
         (Bell & McCaffrey 2002), as wide as Student's distribution asks of so few, and wider by SHARED. A coordinate
@@ -335,7 +334,7 @@ class Descent:
 
     @cached_property
     def material(self) -> Material:
-        """Of the start: a colour (3, 1, 1), for channels, points and directions, or a float.
+        """Values of the start: a colour (3, 1, 1), for channels, points and directions, or a float.
 
         For k of a metal it has its reflectance, as a share of what eta allows: that is what absorption trades with.
         """
@@ -400,7 +399,7 @@ class Descent:
         return replace(best, x=self._smaller_first(best.x))
 
     def residuals(self, x: Array) -> Array:
-        """As `missed`, at P points x (P, free), with the gap."""
+        """Residuals at P points x (P, free), (P, 3 N): `missed`, and the gap."""
         if self.slow:
             return np.array([self._read(one) for one in x])
         material = self.material
@@ -413,7 +412,7 @@ class Descent:
         return self.missed(len(x), *radiance(seen, self.table.directions)) + self.gap
 
     def _read(self, x: Array) -> Array:
-        """As `missed`, at one point (free,), of the material there."""
+        """Errors of the material at one point (free,), in the form of `missed`."""
         try:
             if not np.isfinite(x).all():  # SciPy's step where all coordinates lie on bounds
                 raise InvalidInput("no material")
@@ -578,14 +577,6 @@ def _changed(value: Value, free: Free, x: Array) -> Value:
     own = np.broadcast_to(value, (3, *x.shape)).copy()
     own[free.channel] = x
     return own
-
-
-def written(value: Array) -> float | RGB:
-    """A colour as in a material: one number if its channels are equal."""
-    if np.ptp(value) == 0:
-        return float(value[0])
-    r, g, b = (float(x) for x in value)
-    return r, g, b
 
 
 def _clear(layer: LayerValues) -> bool:

@@ -11,13 +11,14 @@ from itertools import combinations
 import numpy as np
 
 from velatura.errors import InvalidInput
-from velatura.inverse import angles
-from velatura.inverse.angles import Directions, ReflectanceTable
-from velatura.inverse.descent import ALONE, ROUNDS, Descent, End, Fit, descended, fit, written
+from velatura.inverse.fitting import angles
+from velatura.inverse.fitting.angles import Directions, ReflectanceTable
+from velatura.inverse.fitting.descent import ALONE, ROUNDS, Descent, End, Fit, descended, fit
 from velatura.inverse.invert import alternatives, model_of
+from velatura.inverse.lobes.partial_stack import written
+from velatura.inverse.lobes.target import Target, read
 from velatura.inverse.reasons import Infeasible
 from velatura.inverse.solution import Solution
-from velatura.inverse.target import Target, read
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.variance import Isotropic
 from velatura.stack import (

@@ -18,6 +18,7 @@ from velatura.stack.schema import Parameter, Record, show
 from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
+KEPT = 1e-6  # by which what is fixed may be missed
 ROUND = 1e-6  # difference of roughnesses of a lobe that has no axes
 LEAST = 1e-4  # energy or variance below which targets do not differ
 
@@ -114,6 +115,13 @@ class Fixed(Record):
         """The films, with nothing else fixed."""
         return Fixed(films=self.films)
 
+    def kept(self, interface: int, part: Any) -> bool:
+        """Whether an interface with the medium above it (`Layers`) has what is fixed of an interface of the lobe."""
+        has = {"eta": part.eta, "k": part.kappa, "alpha": part.roughness[:2], "tau": part.tau}
+        asked = {key: self.of(key, interface) for key in has}
+        apart = [np.abs(np.ravel(has[key]) - np.ravel(x)).max() for key, x in asked.items() if x is not None]
+        return self.of("films", interface) in (None, part.films) and all(x <= KEPT for x in apart)
+
     def of(self, key: str, interface: int) -> Any:
         """The value that an interface of the lobe must keep, None where it is free."""
         entries = getattr(self, key)
@@ -200,6 +208,18 @@ class TargetLobe(Record):
         u, v, _ = self.axes
         return u if not self.brushed else float(BLUR.roughness((BLUR.variance(u) + BLUR.variance(v)) / 2))
 
+    @property
+    def fixes_last(self) -> bool:
+        """Whether its last interface, or the medium above that, keeps a value other than its roughness."""
+        return any(self.fixed.of(key, self.interfaces - 1) is not None for key in ("eta", "k", "tau"))
+
+    def pinned(self, first: bool) -> bool:
+        """Whether more is fixed than a drag keeps anyway: media above the first lobe and of pairs, their index."""
+        last = self.interfaces - 1
+        pins = [("eta", last), ("k", last), *(("alpha", n) for n in range(self.interfaces))]
+        pins += [("tau", last)] if last or not first else []
+        return any(self.fixed.of(key, n) is not None for key, n in pins)
+
     def blur(self, f: RoughnessMap, kind: type[Variance]) -> Variance:
         """The variance of the lobe, (1,) each, of a kind that holds it, in the space of a roughness map."""
         s = kind.of(self.axes, f)
@@ -257,6 +277,16 @@ class Target(Record):
         return float(np.sum([lobe.colour for lobe in self.lobes], axis=0).max())
 
     @property
+    def pinned(self) -> bool:
+        """Whether more is fixed of any lobe than a drag keeps anyway."""
+        return any(lobe.pinned(first=n == 0) for n, lobe in enumerate(self.lobes))
+
+    def kept(self, layers: Iterable[Any]) -> bool:
+        """Whether interfaces (`Layers`), from the top, have all values that are fixed."""
+        places = ((lobe, n) for lobe in self.lobes for n in range(lobe.interfaces))
+        return all(lobe.fixed.kept(n, part) for (lobe, n), part in zip(places, layers))
+
+    @property
     def has_films(self) -> bool:
         """Whether an interface has thin films."""
         return any(lobe.fixed.films_of(n) for lobe in self.lobes for n in range(lobe.interfaces))
@@ -277,6 +307,18 @@ class Target(Record):
         lobes = list(self.lobes)
         lobes[index] = lobes[index].model_copy(update=changes)
         return self.model_copy(update={"lobes": tuple(lobes)})
+
+    def freed(self, films: bool = False) -> Target:
+        """This target with nothing fixed, or `films` alone."""
+        found = self
+        for n, lobe in enumerate(self.lobes):
+            found = found.with_lobe(n, fixed=lobe.fixed.films_alone if films else Fixed())
+        return found
+
+    def with_energy(self, index: int, colour: Iterable[float]) -> Target:
+        """This target with another energy of one lobe, a number where it is grey."""
+        r, g, b = map(float, colour)
+        return self.with_lobe(index, energy=r if r == g == b else (r, g, b))
 
     def with_variance(self, index: int, variance: float) -> Target:
         """This target with another mean variance of one lobe, whose axes stay in proportion."""
@@ -350,7 +392,7 @@ def _lobe(number: int, entry: Any) -> TargetLobe:
 
 
 def distance(one: Target, other: Target) -> float:
-    """By which logarithms the energies and variances of two targets differ."""
+    """Sum of the differences between two targets, of logarithms of their energies and variances."""
     total = 0.0
     for a, b in zip(one.lobes, other.lobes):
         total += float(np.sum(np.abs(np.log(np.maximum(a.colour, LEAST) / np.maximum(b.colour, LEAST)))))

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from velatura.inverse import interface, stacks
-from velatura.inverse.equivalence import VANISHED, metal_depths, random_depths
-from velatura.inverse.interface import DENSER, RARER, Choice
-from velatura.inverse.partial_stack import Array, Layers, join, take
-from velatura.inverse.stacks import Partial
-from velatura.inverse.target import Target, TargetLobe
+from velatura.inverse.lobes import interface, stacks
+from velatura.inverse.lobes.equivalence import VANISHED, metal_depths, random_depths
+from velatura.inverse.lobes.interface import DENSER, RARER, Choice
+from velatura.inverse.lobes.partial_stack import Array, Layers, join, take
+from velatura.inverse.lobes.stacks import Partial
+from velatura.inverse.lobes.target import Target, TargetLobe
 from velatura.model import Model
 from velatura.ops import Value
 

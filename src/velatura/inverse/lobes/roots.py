@@ -59,7 +59,7 @@ def first_crossing(function: Callable[[Array], Array], nodes: Array, each: Array
 
 
 def nearest_to_zero(function: Callable[[Array], Array], nodes: Array, each: Array) -> Array:
-    """Where functions come nearest to 0, given their values (K, ...) at nodes (K,)."""
+    """Points where functions come nearest to 0, given their values (K, ...) at nodes (K,)."""
     width = abs(nodes[1] - nodes[0])
     best, off = nodes[np.argmin(np.abs(each), axis=0)], np.min(np.abs(each), axis=0)
     for _ in range(NARROWED):

@@ -1,4 +1,4 @@
-"""From a stack towards lobes that it may not be able to have: the nearest that it can.
+"""The lobes nearest to some that a stack may not be able to have.
 
 Every stack that is read lies within the bounds of its coordinates, so that there is an answer at any time.
 """
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from velatura.inverse.drag.coordinates import Bound, Point, Reading, Space
-from velatura.inverse.partial_stack import Array, Mask
+from velatura.inverse.lobes.partial_stack import Array, Mask
+from velatura.inverse.local.coordinates import Bound, Point, Reading, Space, units
 from velatura.optics import fresnel
 
 MAY, STAYS = (0.03, 1e-4), 1.0  # weights of lobes that may change, at first and in the end, and of others
@@ -91,7 +91,7 @@ class Approach:
 
     @property
     def _logarithmic(self) -> Array:
-        """What is added to readings, of which logarithms are seen: energies, and variances along axes; 0 of others."""
+        """Offsets of readings whose logarithms are seen: of energies, and of variances along axes; 0 of others."""
         space, count = self.start.space, 3 * self.start.space.lobes
         of_variance = [0.0 if field.name == "xy" else BLURRED for field in dataclasses.fields(space.kind)]
         return np.r_[np.full(count, FAINT), np.tile(of_variance, len(space.interfaces))]
@@ -132,21 +132,18 @@ class Approach:
     def _step(self, x: Array, missing: Array, slopes: Array, free: Array, reach: float) -> Array:
         """The point, within the bounds, to which a step of some coordinates leads that makes up best for what is
         missing."""
-        from scipy.optimize import lsq_linear  # slow to load
-
-        space, size = self.start.space, np.abs(x[free]) + 0.01
+        space, size = self.start.space, units(x[free])
         low, high = (end[free] - x[free] for end in space.box)
         for below, above in self.caps:
             high[free == below] = x[above] - x[below]
         far = reach * self._reach(x)[free]
         low, high = np.maximum(low, -far) / size, np.minimum(high, far) / size
         high = np.maximum(high, low + 1e-12)
-        a = np.vstack([slopes * size, STILL * np.eye(len(free))])
-        b = np.r_[missing, np.zeros(len(free))]
+        a, b = slopes * size, missing
         kept: list[Bound] = []
         step = np.zeros(len(free))
         for _ in range(BOUNDS):
-            step = np.clip(lsq_linear(a, b, (low, high), method="bvls").x, low, high) * size
+            step = bounded_step(a, b, STILL, low, high) * size
             broken = self._broken(x, step, free)
             if broken is None or broken in kept:
                 break
@@ -190,3 +187,12 @@ class Approach:
             if own.log_index is not None:
                 reach[own.log_index] = 0.2
         return reach
+
+
+def bounded_step(slopes: Array, missing: Array, damping: float, low: Array, high: Array) -> Array:
+    """The step within bounds that makes up best for what is missing, damped (Levenberg, Marquardt)."""
+    from scipy.optimize import lsq_linear  # slow to load
+
+    count = slopes.shape[1]
+    a, b = np.vstack([slopes, damping * np.eye(count)]), np.r_[missing, np.zeros(count)]
+    return np.clip(lsq_linear(a, b, (low, high), method="bvls").x, low, high)

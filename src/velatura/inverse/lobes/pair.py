@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from velatura.inverse import films, interface
-from velatura.inverse.interface import CLOSED_FORM, DIELECTRIC, Choice, Found
-from velatura.inverse.partial_stack import Above, Array, Layers, Mask
+from velatura.inverse.lobes import coatings, interface
+from velatura.inverse.lobes.interface import CLOSED_FORM, DIELECTRIC, Choice, Found
+from velatura.inverse.lobes.partial_stack import Above, Array, Layers, Mask
 from velatura.model import Model, named
 from velatura.model.variance import Variance
 from velatura.ops import Value
@@ -106,6 +106,6 @@ def top(
     """The upper interfaces of pairs, with films."""
     upper = interface.with_index(above, eta_1, tau, variance, energy if printed else None, coated)
     left = np.min(1 - upper.energy / np.maximum(energy, interface.ENERGY_MIN), axis=0)
-    slack = films.NEAR if coated else interface.SLACK
+    slack = coatings.NEAR if coated else interface.SLACK
     margins = {"upper": interface.margin(left, slack), "index": interface.within(eta_1, eta_max)}
     return dataclasses.replace(upper, layers=upper.layers.with_margins(**margins))

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from velatura import ops
-from velatura.inverse import films
-from velatura.inverse.partial_stack import Above, Array, Batch, Layers, Mask
-from velatura.inverse.roots import false_position, first_crossing, nearest_to_zero
-from velatura.inverse.target import BLUR
+from velatura.inverse.lobes import coatings
+from velatura.inverse.lobes.partial_stack import Above, Array, Batch, Layers, Mask
+from velatura.inverse.lobes.roots import false_position, first_crossing, nearest_to_zero
+from velatura.inverse.lobes.target import BLUR
 from velatura.model import Model, named
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
@@ -63,8 +63,8 @@ class Choice:
 
     @property
     def slack(self) -> float:
-        """By which constraints may be broken: what films reflect is known roughly here."""
-        return films.NEAR if self.films else NEGLIGIBLE
+        """Amount by which constraints may be broken: what films reflect is known roughly here."""
+        return coatings.NEAR if self.films else NEGLIGIBLE
 
 
 DIELECTRIC = Choice()
@@ -135,14 +135,14 @@ def solve(above: Above, energy: Array, variance: Variance, choice: Choice) -> Fo
         missing, apart = energy / np.maximum(lobe.energy, ops.TINY), variance + read * -1.0
         apart_e = np.abs(energy - lobe.energy) / np.maximum(energy.max(axis=0) if choice.films else lobe.energy, FAINT)
         off = np.maximum(np.max(apart_e, axis=0), _size(apart))
-        if not np.any(layers.feasible & (off > (films.NEAR if choice.films else ENOUGH))):
+        if not np.any(layers.feasible & (off > (coatings.NEAR if choice.films else ENOUGH))):
             break
         before, want_e, want_s = (
             (want_s, read),
             want_e * np.clip(missing, 0.5, 2.0),
             _secant(want_s, read, apart, before),
         )
-    missed = 2 * films.NEAR if choice.films else MISSED
+    missed = 2 * coatings.NEAR if choice.films else MISSED
     layers = layers.with_margins(model=np.where(layers.feasible & (off > missed), -off, 0.0))
     return Found(layers, below, lobe.energy, read)
 
@@ -233,7 +233,7 @@ def _closed_form(
         layers = dielectric(above, r, roughness, choice, nothing=np.all(energy <= ENERGY_MIN, axis=0))
     margins = {"blur": margin(least(s_r)), **layers.margins}
     reflectance = above.reflectance(layers)
-    tau = 0.5 * np.log(np.maximum(reflectance, ops.TINY) / r)  # Bati et al. 2021, Eq. 13
+    tau: Value = optical_depth(reflectance, r)
     # With films dark channels are missed by shares of the bright ones
     more = _apart(reflectance, r) if choice.films else tau
     if choice.tau is not None or not choice.absorbs:
@@ -249,6 +249,14 @@ def _closed_form(
         margins["absorption"] = margin(np.min(more, axis=0), choice.slack)
         tau = np.where((tau < 0) & (more >= -choice.slack), 0.0, tau)
     return dataclasses.replace(layers, tau=tau, margins=margins), reflectance
+
+
+def optical_depth(reflectance: Value, r: Array, least: float = ops.TINY) -> Array:
+    """Optical depth above interfaces of a reflectance, `least` at least, that then reflect r.
+
+    Negative where they reflect too little (Bati et al. 2021, Eq. 13).
+    """
+    return np.asarray(0.5 * np.log(np.maximum(reflectance, least) / r))
 
 
 def attenuated(above: Above, energy: Array) -> Array:
@@ -343,7 +351,7 @@ def _coated_dielectric(above: Above, r: Array, roughness: Roughness, choice: Cho
 
 
 def _apart(reflectance: Value, r: Array) -> Array:
-    """By how much reflectances (C, N) are above others, as shares of the brightest channel of these."""
+    """Excess of reflectances (C, N) over others, as shares of the brightest channel of these."""
     return np.asarray((reflectance - r) / np.max(r, axis=0))
 
 
@@ -396,7 +404,7 @@ class Metals:
         return Layers("conductor", *index, self.roughness, 0.0, films=self.choice.films)
 
     def reflectance(self, u: Array) -> Array:
-        """What they reflect below their stacks."""
+        """Reflectances of the metals below their stacks."""
         return np.asarray(self.above.reflectance(self.layers(u)))
 
 
@@ -442,12 +450,12 @@ def _coated_metals(metals: Metals, r: Array, shape: tuple[int, ...]) -> tuple[Me
         there = dataclasses.replace(metals, choice=dataclasses.replace(metals.choice, tint=tried))
         each = np.array([there.reflectance(low + x * (high - low)) for x in nodes]) / r - 1
         # What is too bright may be absorbed
-        dark = films.NEAR if metals.choice.absorbs and metals.choice.tau is None else -each.min(axis=0)
-        room = np.minimum(np.minimum(dark, each.max(axis=0)), films.NEAR)
+        dark = coatings.NEAR if metals.choice.absorbs and metals.choice.tau is None else -each.min(axis=0)
+        room = np.minimum(np.minimum(dark, each.max(axis=0)), coatings.NEAR)
         better = room > best + 1e-6
         tint, best = np.where(better, tried, tint), np.where(better, room, best)
         least, most = (np.where(better, x, old) for x, old in ((each.min(axis=0), least), (each.max(axis=0), most)))
-        if np.all(best >= films.NEAR):
+        if np.all(best >= coatings.NEAR):
             break
     metals = dataclasses.replace(metals, choice=dataclasses.replace(metals.choice, tint=tint))
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from velatura import files, kernel
 from velatura.errors import InvalidInput
-from velatura.inverse.angles import AZIMUTHS, Directions, ReflectanceTable
-from velatura.inverse.partial_stack import Array
+from velatura.inverse.fitting.angles import AZIMUTHS, Directions, ReflectanceTable
+from velatura.inverse.lobes.partial_stack import Array
 from velatura.stack.schema import show
 
 IN_PLANE = ("theta_i", "theta_o", "phi", "r", "g", "b")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.inverse.partial_stack import Array, take
+from velatura.inverse.lobes.partial_stack import Array, take
 from velatura.model import Model, named, variance_kind
 from velatura.model.base import Query
 from velatura.model.context import Context
@@ -58,7 +58,7 @@ class Directions:
 
     @classmethod
     def of(cls, theta_i: Array, theta_o: Array, phi: Array, azimuth: Array | float = 0.0) -> Directions:
-        """From angles in degrees: phi is the azimuth from wi to wo, 180 for the mirror direction."""
+        """Directions from angles in degrees; phi is the azimuth from wi to wo, 180 for the mirror direction."""
         return cls(_direction(theta_i, azimuth), _direction(theta_o, azimuth + phi), theta_i)
 
     @classmethod
@@ -80,7 +80,9 @@ class Directions:
 
     @classmethod
     def about_halves(cls, tilt: Array, apart: Array, turn: Array) -> Directions:
-        """Of half-vectors at `tilt` and wi at (`apart`, `turn`) from those, in degrees (Rusinkiewicz 1998).
+        """Directions from half-vector and difference angles, in degrees (Rusinkiewicz 1998).
+
+        tilt: of half-vectors from the normal. apart, turn: of wi from those.
 
         The azimuth of wi is 0. Some may lie below the surface.
         """
@@ -150,7 +152,7 @@ def table_of(
 
 
 def read(material: Material, directions: Directions, model: Model) -> tuple[Value, Value]:
-    """As `radiance`, of a material with values of NumPy by any model."""
+    """Reflected radiance and energy, like `radiance`, of a material with values of NumPy by any model."""
     seen = model.body(material, variance_kind(material), Context())
     if isinstance(seen, bsdf.Lobed):
         return radiance(seen, directions)
@@ -175,7 +177,7 @@ def radiance(seen: bsdf.Lobed, directions: Directions) -> tuple[Value, Value]:
 
 
 def report(wanted: ReflectanceTable, found: ReflectanceTable) -> list[dict[str, float]]:
-    """For every angle of incidence `theta_i`: root mean squares of f cos theta_o (`wanted`), and of its error.
+    """Root mean squares of f cos theta_o (`wanted`), and of its error, for every angle of incidence `theta_i`.
 
     `error` is that of all of it, `relative` its share of `wanted`. Many angles are put into groups, by their middle.
     """
@@ -195,7 +197,7 @@ def _direction(theta: Array, phi: Array | float) -> Array:
 
 
 def energies(before: ReflectanceTable, after: ReflectanceTable) -> list[dict[str, Any]]:
-    """For every angle of incidence `theta_i` the energies of two tables, [r, g, b], of the mean azimuth."""
+    """Energies of two tables, [r, g, b], of the mean azimuth, for every angle of incidence `theta_i`."""
     assert before.energy is not None and after.energy is not None
     theta_i, mean = before.directions.incidence
     rows = zip(theta_i.tolist(), (before.energy @ mean).T.tolist(), (after.energy @ mean).T.tolist())

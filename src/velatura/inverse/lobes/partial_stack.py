@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.inverse import films
-from velatura.inverse.target import ROUND
+from velatura.inverse.lobes import coatings
+from velatura.inverse.lobes.target import ROUND
 from velatura.model import Model
 from velatura.model.lobe_statistics import StackLobes, with_axes_named
 from velatura.model.papers import adding, operators
@@ -26,6 +26,7 @@ from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.stack import (
+    RGB,
     DiffuseValues,
     Film,
     Interface,
@@ -89,7 +90,7 @@ class Layers(Batch):
         return reduce(np.logical_and, (margin >= 0 for margin in self.margins.values()))
 
     def with_margins(self, **margins: Array) -> Layers:
-        """With further constraints."""
+        """The interfaces with further constraints."""
         return dataclasses.replace(self, margins={**self.margins, **margins})
 
     def written(self, n: int, axis: float = 0.0) -> list[Layer]:
@@ -251,7 +252,7 @@ def read_whole(path: Sequence[Layers], exterior: float, model: Model) -> StackLo
 
 
 def _unbrushed(layer: LayerValues) -> LayerValues:
-    """With one roughness where two differ by rounding, so that stacks are solved in the axes of the others."""
+    """The layer, with one roughness where two differ by rounding: stacks are solved in the axes of the others."""
     if isinstance(layer, InterfaceValues) and np.allclose(layer.alpha_u, layer.alpha_v, rtol=0, atol=ROUND):
         return dataclasses.replace(layer, alpha_v=layer.alpha_u)
     return layer
@@ -261,8 +262,8 @@ def _interface(layers: Layers, above: Value | None) -> InterfaceValues:
     """The interfaces, with what films below an index `above` reflect unless that is None."""
     u, v, rotation = layers.roughness
     eta = None if layers.kind == "mirror" else layers.eta
-    own = films.values(layers.films) if layers.films else ()
-    coating = films.AtNormal(own, above, eta, layers.kappa) if own and above is not None else None
+    own = coatings.values(layers.films) if layers.films else ()
+    coating = coatings.AtNormal(own, above, eta, layers.kappa) if own and above is not None else None
     return InterfaceValues(layers.kind, u, v, rotation * (180 / np.pi), eta, layers.kappa, own, coating)
 
 
@@ -327,3 +328,11 @@ def _plain(value: Value | None, n: int) -> Any:
     colour = np.atleast_2d(value)
     numbers = tuple(float(x) for x in colour[:, n if colour.shape[-1] > 1 else 0])
     return numbers[0] if max(numbers) - min(numbers) <= SAME * max(map(abs, numbers)) else numbers
+
+
+def written(value: Array) -> float | RGB:
+    """A colour as in a material: one number if its channels are equal."""
+    if np.ptp(value) == 0:
+        return float(value[0])
+    r, g, b = (float(x) for x in value)
+    return r, g, b

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from velatura.inverse.partial_stack import Array, Mask
+from velatura.inverse.lobes.partial_stack import Array, Mask
 
 ROUNDS, ENOUGH = 24, 1e-6  # of requests, and what may be missing, in units of the goal
 PATIENCE = 6  # rounds without an answer that is nearer

@@ -53,11 +53,11 @@ class AtNormal(Coated):
         return self.k_2 is None and any(np.any(film.k > 0) for film in self.films)
 
     def reversed(self) -> AtNormal:
-        """As seen from below."""
+        """The films as light from below meets them."""
         return AtNormal(self.films[::-1], self.eta_2, self.eta_1, None)
 
     def averaged(self, often: bool) -> tuple[Average, Average]:
-        """Of facets that are met once or often, by their roughness (N,); what one smooth facet absorbs."""
+        """Averages over facets that are met once or often, by their roughness (N,); the share that a facet absorbs."""
         return lambda cos_theta, alpha: self._average(alpha, often), lambda cos_theta, alpha: self._absorbed
 
     @property
@@ -69,11 +69,11 @@ class AtNormal(Coated):
         return self._colours(np.ones((1, 1)), "transmitted")[..., 0]
 
     def between(self, cos_1: Value, cos_2: Value, like: Value) -> Value:
-        """Of one smooth facet."""
+        """Reflectance of one smooth facet."""
         return self.at(cos_1, like)
 
     def at(self, cosine: Value, like: Value) -> Value:
-        """Of one smooth facet."""
+        """Reflectance of one smooth facet."""
         return self._colours(np.ones((1, 1)))[..., 0]
 
     def _average(self, alpha: ArrayLike, often: bool) -> Array:
@@ -93,7 +93,7 @@ class AtNormal(Coated):
         return np.asarray(found + again if often else found)
 
     def _colours(self, cosines: Array, share: str = "reflected") -> Array:
-        """At cosines (N, J), or (1, J), by channel: (3, N, J)."""
+        """A share of the light at cosines (N, J), or (1, J), by channel: (3, N, J)."""
         k_2 = 0.0 if self.k_2 is None else self.k_2
         each = [np.atleast_2d(np.asarray(x, float)) for x in (self.eta_1, self.eta_2, k_2)]
         shape = np.broadcast_shapes(*(x.shape for x in each), (1, len(cosines)))

@@ -1,0 +1,1 @@
+"""Fits beyond normal incidence: stacks that approximate a table of reflectance over angles."""

@@ -1,0 +1,1 @@
+"""Lobes to interfaces, from the top, by models in closed form (Bati et al. 2021)."""
