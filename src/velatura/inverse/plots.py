@@ -20,6 +20,7 @@ RESOLUTION = 256
 PANELS, PAIRS = 6, 12  # angles of incidence, and correlations, that are drawn of a fit
 SIZE, DPI = (4.2, 4.2), 90  # of a picture: inches, and pixels in one
 FILLS = ("#d62728", "#2ca02c", "#1f77b4")  # of red, green and blue
+DASHED = {"linewidth": 1, "linestyle": "--"}
 CHANNELS = ("red", "green", "blue")
 STAR: dict[str, Any] = {
     "color": "white",
@@ -60,71 +61,78 @@ def draw(axes: Any, members: EquivalenceClass, chosen: tuple[Layers, ...] | None
     coordinates = {one.name: one for one in members.coordinates} if chosen else {}
     half = {name: np.array(one.high) / 2 for name, one in coordinates.items() if name == "tau_0"}
     drawn = {"eta_1", "eta_2", "tau_1"} if members.free else {"tint"}
-    eta_max = members.choice.eta_max
     colours = FILLS if np.ptp(members.energy) > 0 else ("0.4",)
-    if members.free == 2:
-        axis = np.linspace(1, eta_max, RESOLUTION)
-        depths = members.grid(axis, axis)
-        for channel, colour in enumerate(colours):
-            axes.contourf(axis, axis, depths[channel].T, levels=(0, np.inf), colors=[colour], alpha=0.2)
-            for curve in members.boundary(channel=channel):
-                axes.plot(*curve.T, color=colour, linewidth=1)
-        least = np.min(depths, axis=0)
-        axes.contourf(axis, axis, least.T, levels=(0, np.inf), colors=["0.7"])
-        axes.contour(axis, axis, np.where(np.isnan(least), -1, least).T, levels=(0,), colors="black", linewidths=1)
-        if half:
-            below = np.nan_to_num(np.min(members.held(**half).grid(axis, axis), axis=0), nan=-1)
-            axes.contour(axis, axis, below.T, levels=(0,), colors="black", linewidths=1, linestyles="--")
-        axes.set(xlabel="eta of the upper interface", ylabel="eta of the lower one")
-        axes.set(xlim=(1, eta_max), ylim=(1, eta_max))
-        _name_fills(axes, colours)
-    elif members.free == 1:
-        for channel, colour in enumerate(colours):
-            name = CHANNELS[channel] if len(colours) > 1 else "all channels"
-            for low, high in members.indices_1():
-                axis = np.linspace(low, high, 65)
-                least, most = (depth[channel] for depth in members.depths_1(axis))
-                axes.fill_between(axis, least, most, color=colour, alpha=0.25)
-                axes.plot(axis, least, color=colour, linewidth=1.5, label=name)
-                name = "_"
-        if half:
-            for low, high in members.held(**half).indices_1():
-                axis = np.linspace(low, high, 65)
-                for channel, colour in enumerate(colours):
-                    most = members.held(**half).depths_1(axis)[1][channel]
-                    axes.plot(axis, most, color=colour, linewidth=1, linestyle="--")
-        which = "coat" if members.interfaces == 2 else "medium above"
-        axes.set(
-            xlabel="eta of the coat" if members.interfaces == 2 else "eta",
-            xlim=(1, eta_max),
-            ylabel=f"optical depth of the {which}",
-        )
-        axes.set_ylim(bottom=0)
-    else:
-        tint = np.linspace(0, 1, 129)
-        for channel, colour in enumerate(colours):
-            eta, kappa = _conductor(members, tint, channel)
-            axes.plot(eta, kappa, color=colour, label=CHANNELS[channel] if len(colours) > 1 else "all channels")
-            if channel == 0:  # where no other curve is: below and beyond the ends
-                for end, label, offset, side in ((0, "tint 0", (0, -6), "top"), (-1, "tint 1", (6, 0), "center")):
-                    align = "left" if end else "center"
-                    place = {"xytext": offset, "textcoords": "offset points", "ha": align, "va": side}
-                    axes.annotate(label, (eta[end], kappa[end]), fontsize="small", **place)
-            if half:
-                axes.plot(*_conductor(members.held(**half), tint, channel), color=colour, linewidth=1, linestyle="--")
-        axes.margins(0.12)
-        axes.set(xlabel="eta", ylabel="k")
+    below = members.held(**half) if half else None
+    (_draw_conductor, _draw_line, _draw_pair)[members.free](axes, members, below, colours)
     if chosen is not None:
         x, y = _place(members, chosen)
         numbers = [f"{np.ravel(part.eta)[0]:.2f}" for part in chosen[: members.free]]
         axes.plot(x, y, label=" ".join(["chosen", *(["eta", ", ".join(numbers)] if numbers else [])]), **STAR)
     if half:
-        axes.plot([], [], color="black", linewidth=1, linestyle="--", label=f"below tau_0 {_numbers(half['tau_0'])}")
+        axes.plot([], [], **DASHED, color="black", label=f"below tau_0 {_numbers(half['tau_0'])}")
     if chosen is not None:
         axes.legend(fontsize="small")
     others = [f"{name} {_range(one)}" for name, one in coordinates.items() if name not in drawn]
     if others:
         axes.set_xlabel(f"{axes.get_xlabel()}\nalso free: {'; '.join(others)}")
+
+
+def _draw_pair(axes: Any, members: EquivalenceClass, below: EquivalenceClass | None, colours: Sequence[str]) -> None:
+    """Index against index, and dashed what is left `below` a medium that absorbs."""
+    axis = np.linspace(1, members.choice.eta_max, RESOLUTION)
+    depths = members.grid(axis, axis)
+    for channel, colour in enumerate(colours):
+        axes.contourf(axis, axis, depths[channel].T, levels=(0, np.inf), colors=[colour], alpha=0.2)
+        for curve in members.boundary(channel=channel):
+            axes.plot(*curve.T, color=colour, linewidth=1)
+    least = np.min(depths, axis=0)
+    axes.contourf(axis, axis, least.T, levels=(0, np.inf), colors=["0.7"])
+    axes.contour(axis, axis, np.where(np.isnan(least), -1, least).T, levels=(0,), colors="black", linewidths=1)
+    if below:
+        rest = np.nan_to_num(np.min(below.grid(axis, axis), axis=0), nan=-1)
+        axes.contour(axis, axis, rest.T, levels=(0,), colors="black", linewidths=1, linestyles="--")
+    axes.set(xlabel="eta of the upper interface", ylabel="eta of the lower one")
+    axes.set(xlim=(1, members.choice.eta_max), ylim=(1, members.choice.eta_max))
+    _name_fills(axes, colours)
+
+
+def _draw_line(axes: Any, members: EquivalenceClass, below: EquivalenceClass | None, colours: Sequence[str]) -> None:
+    """The first index against what absorbs above the last interface."""
+    for channel, colour in enumerate(colours):
+        name = CHANNELS[channel] if len(colours) > 1 else "all channels"
+        for span in members.indices_1():
+            axis = np.linspace(*span, 65)
+            least, most = (depth[channel] for depth in members.depths_1(axis))
+            axes.fill_between(axis, least, most, color=colour, alpha=0.25)
+            axes.plot(axis, least, color=colour, linewidth=1.5, label=name)
+            name = "_"
+    if below:
+        for span in below.indices_1():
+            axis = np.linspace(*span, 65)
+            for most, colour in zip(below.depths_1(axis)[1], colours):
+                axes.plot(axis, most, **DASHED, color=colour)
+    index, medium = ("eta of the coat", "coat") if members.interfaces == 2 else ("eta", "medium above")
+    axes.set(xlabel=index, xlim=(1, members.choice.eta_max), ylabel=f"optical depth of the {medium}")
+    axes.set_ylim(bottom=0)
+
+
+def _draw_conductor(
+    axes: Any, members: EquivalenceClass, below: EquivalenceClass | None, colours: Sequence[str]
+) -> None:
+    """eta and k over the tint."""
+    tint = np.linspace(0, 1, 129)
+    for channel, colour in enumerate(colours):
+        eta, kappa = _conductor(members, tint, channel)
+        axes.plot(eta, kappa, color=colour, label=CHANNELS[channel] if len(colours) > 1 else "all channels")
+        if channel == 0:  # where no other curve is: below and beyond the ends
+            for end, label, offset, side in ((0, "tint 0", (0, -6), "top"), (-1, "tint 1", (6, 0), "center")):
+                align = "left" if end else "center"
+                place = {"xytext": offset, "textcoords": "offset points", "ha": align, "va": side}
+                axes.annotate(label, (eta[end], kappa[end]), fontsize="small", **place)
+        if below:
+            axes.plot(*_conductor(below, tint, channel), **DASHED, color=colour)
+    axes.margins(0.12)
+    axes.set(xlabel="eta", ylabel="k")
 
 
 def _range(one: Coordinate) -> str:
