@@ -151,24 +151,12 @@ class Search:
 
     model: Model
     pace: Pace = CLOSELY
-    followed: dict[tuple[TargetLobe, ...], stacks.Partial] = field(default_factory=dict)
+    followed: stacks.Known = field(default_factory=dict)
 
     def possible(self, target: Target) -> bool:
         """Whether a target has a stack."""
-        if target.brightness > 1:
-            return False
-        paths, (spread, keep) = stacks.beginning(target, self.model), EFFORT[0]
-        for n, lobe in enumerate(target.lobes):
-            known = target.lobes[: n + 1]
-            if known in self.followed:
-                paths = self.followed[known]
-            else:
-                paths = stacks.pruned(stacks.extended(paths, lobe, target, spread, n == 0), lobe.interfaces, keep)
-                if n < len(target.lobes) - 1:
-                    self.followed[known] = paths
-            if not len(paths.cost):
-                return False
-        return True
+        paths = stacks.follow(target, self.model, *EFFORT[0], self.followed)
+        return target.brightness <= 1 and all(len(each.cost) for each in paths)
 
     def nearest(self, ways: Iterable[Way]) -> list[Direction]:
         """The first targets along ways that have a stack, of each description one; the nearest of them."""

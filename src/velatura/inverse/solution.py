@@ -15,6 +15,7 @@ from velatura.inverse.lobes.stacks import Partial, class_of, follow, is_open, st
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.local.dragged import seen
 from velatura.model import Model
+from velatura.ops import Value
 from velatura.stack import Stack
 
 EFFORTS = ((12, 32), (24, 128), (64, 512))  # indices tried between the interfaces of a pair, and partial stacks kept
@@ -42,18 +43,12 @@ class Solution:
 
     def alike(self, other: Solution) -> bool:
         """Whether another stack of the same form has almost the same values."""
-        pairs = [
-            values
-            for one, two in zip(self.layers, other.layers)
-            for values in (
-                (one.eta, two.eta),
-                (one.kappa, two.kappa),
-                (one.tau, two.tau),
-                *zip(one.roughness[:2], two.roughness[:2]),
-            )
-            if values[0] is not None
-        ]
-        return all(np.allclose(*values, rtol=ALIKE, atol=ALIKE) for values in pairs)
+
+        def values(layers: Iterable[Layers]) -> list[Value]:
+            return [x for part in layers for x in (part.eta, part.kappa, part.tau, *part.roughness[:2])]
+
+        each = zip(values(self.layers), values(other.layers))
+        return all(a is None or np.allclose(a, b, rtol=ALIKE, atol=ALIKE) for a, b in each)
 
     @cached_property
     def in_closed_form(self) -> Solution:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -69,11 +70,8 @@ def closer(target: Target, model: Model, found: Partial | None) -> Partial | Non
 
 def _of_first(target: Target, model: Model, first: int) -> Array | None:
     """Indices between the interfaces of the first pair, (N,), each for a stack above it; None if there are none."""
-    paths, lobe = stacks.beginning(target, model), target.lobes[first]
-    for n in range(first):
-        own = target.lobes[n]
-        paths = stacks.pruned(stacks.extended(paths, own, target, 1, n == 0), own.interfaces, ELITES)
-    spans = []
+    spans, lobe = [], target.lobes[first]
+    paths = [stacks.beginning(target, model), *islice(stacks.follow(target, model, 1, ELITES), first)][-1]
     for n in range(len(paths.cost)):
         above = take(paths.above, np.array([n]), len(paths.cost))
         spans += stacks.class_of(above, lobe, target, first == 0).indices_1()

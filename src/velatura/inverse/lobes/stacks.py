@@ -43,11 +43,21 @@ class Partial(Batch):
         return Partial(above, layers, self.cost[index])
 
 
-def follow(target: Target, model: Model, spread: int, keep: int) -> Iterator[Partial]:
-    """The partial stacks after every lobe."""
-    paths = beginning(target, model)
+#: Partial stacks by the lobes that they have.
+Known = dict[tuple[TargetLobe, ...], Partial]
+
+
+def follow(target: Target, model: Model, spread: int, keep: int, known: Known | None = None) -> Iterator[Partial]:
+    """The partial stacks after every lobe; `known`: those of targets that have the first lobes in common."""
+    paths, last = beginning(target, model), len(target.lobes) - 1
     for n, lobe in enumerate(target.lobes):
-        paths = pruned(extended(paths, lobe, target, spread, first=n == 0), lobe.interfaces, keep)
+        first = target.lobes[: n + 1]
+        if known and first in known:
+            paths = known[first]
+        else:
+            paths = pruned(extended(paths, lobe, target, spread, first=n == 0), lobe.interfaces, keep)
+            if known is not None and n < last:
+                known[first] = paths
         yield paths
 
 

@@ -21,6 +21,7 @@ STILL = 1e-7  # weight of the coordinates themselves, where readings leave them 
 ON_BOUND = 1e3  # weight of a bound that no box of coordinates expresses
 BOUNDS, HALVINGS = 4, 40  # of these in one step, and of a step that breaks one of them nevertheless
 ROUNDS, ENOUGH, CLOSE = 10, 1e-3, 1e-2  # of steps, the share by which the last gets nearer, and the shortest
+FURTHER, LITTLE = 0.7, 0.01  # share of a reflectance by which it changes in a step, and least change
 MET = 1e-8  # what is missing where all is met
 SETTLED = 0.9  # share of what was missing, above which corrections end
 FAINT, BLURRED = 1e-4, 0.01  # energy and variance that is added before logarithms are compared
@@ -136,7 +137,7 @@ class Approach:
         low, high = (end[free] - x[free] for end in space.box)
         for below, above in self.caps:
             high[free == below] = x[above] - x[below]
-        far = reach * self._reach(x)[free]
+        far = reach * space.reach(x, FURTHER, LITTLE)[free]
         low, high = np.maximum(low, -far) / size, np.minimum(high, far) / size
         high = np.maximum(high, low + 1e-12)
         a, b = slopes * size, missing
@@ -177,16 +178,6 @@ class Approach:
                 x[own.reflectances] = np.minimum(x[own.reflectances], fresnel.normal_incidence(end / above))
                 above = float(np.mean(space.layers(x[:, None])[n].eta))
         return x
-
-    def _reach(self, x: Array) -> Array:
-        """The longest step of every coordinate."""
-        reach = np.full(len(x), np.inf)
-        for own in self.start.space.interfaces:
-            if own.reflectances is not None:
-                reach[own.reflectances] = np.maximum(0.7 * x[own.reflectances], 0.01)
-            if own.log_index is not None:
-                reach[own.log_index] = 0.2
-        return reach
 
 
 def bounded_step(slopes: Array, missing: Array, damping: float, low: Array, high: Array) -> Array:

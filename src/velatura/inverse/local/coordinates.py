@@ -40,6 +40,7 @@ from velatura.optics import fresnel
 from velatura.stack import Film, InterfaceValues, Kind, Material, MediumValues, Stack, number
 
 SLACK = 1e-8  # by which a bound may be broken
+INDEX_REACH = 0.2  # the longest step of the logarithm of an index
 STEP = 1e-5  # of a coordinate, to see how the lobes change
 NEAR = 1e-3  # coordinates above which it is to smaller values
 SAME = 1e-6  # difference of tints that count as equal
@@ -332,6 +333,16 @@ class Space:
                 channels = own.reflectances.stop - own.reflectances.start
                 found += [3 * own.lobe + c for c in (range(3) if channels == 3 else (own.reference,))]
         return np.array([*found, *(3 * self.lobes + n for n in range(self.entries * len(self.interfaces)))])
+
+    def reach(self, x: Array, share: float, least: float) -> Array:
+        """The longest steps, (D,): of reflectances a share of them, `least` at least, and of logarithms of indices."""
+        reach = np.full(len(x), np.inf)
+        for own in self.interfaces:
+            if own.reflectances is not None:
+                reach[own.reflectances] = np.maximum(share * x[own.reflectances], least)
+            if own.log_index is not None:
+                reach[own.log_index] = INDEX_REACH
+        return reach
 
     # Bounds ----------------------------------------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ FAR, MEASURED_FAR = 0.2, 8  # the same where a search does not give up
 DAMPED, DAMPINGS, GAINED = 1e-3, 3, 0.9  # damping of these rounds at first, tenfold ones that are tried, and least gain
 JUMP = 3e-4  # what may be missing of other lobes in the end, since readings jump where nodes are shared out anew
 BLURRED = 0.2  # most that a folded variance changes by in a round
-FURTHER = 0.7  # share of a reflectance by which it changes in a round
+HALF, FURTHER, LITTLE = 0.5, 0.7, 0.05  # shares of a reflectance by which it changes in a round, and least change
 NEARER, SLOW_PATIENCE = 0.8, 5  # share of what was missing that is nearer, and such rounds without any
 
 
@@ -190,7 +190,7 @@ class Problem:
     def _equations(
         self, compromise: Compromise | None, reading: Reading, part: float, x: Array, free: Array
     ) -> tuple[Array, Array]:
-        """What a reading misses of a part of the way, and its slopes.
+        """The shortfall of a reading from a part of the way, and its slopes.
 
         In a compromise one equation more, that the point lies on a bound, and one more unknown if the goal gives way.
         """
@@ -228,23 +228,9 @@ class Problem:
         """
         space = self.start.space
         if not space.slow:
-            return np.clip(moved, -self._reach[free], self._reach[free])
-        reach = np.full(len(x), np.inf)
+            reach = space.reach(self.start.x, HALF, LITTLE)[free]
+            return np.clip(moved, -reach, reach)
+        reach = space.reach(x, FURTHER, LITTLE)
         for own in space.interfaces:
-            if own.reflectances is not None:
-                reach[own.reflectances] = np.maximum(FURTHER * x[own.reflectances], 0.05)
-            if own.log_index is not None:
-                reach[own.log_index] = 0.2
             reach[own.variance] = BLURRED if space.folded else 0.5 * np.abs(x[own.variance]).max() + 0.02
         return moved * min(1.0, float(np.min(reach[free] / np.maximum(np.abs(moved), ops.TINY))))
-
-    @cached_property
-    def _reach(self) -> Array:
-        """The longest step of every coordinate in one round."""
-        reach = np.full(len(self.start.x), np.inf)
-        for own in self.start.space.interfaces:
-            if own.reflectances is not None:
-                reach[own.reflectances] = np.maximum(0.5 * self.start.x[own.reflectances], 0.05)
-            if own.log_index is not None:
-                reach[own.log_index] = 0.2
-        return reach
