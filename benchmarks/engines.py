@@ -25,7 +25,7 @@ import velatura
 from velatura.figures import belcour2018, weier2020, yamaguchi2019
 from velatura.model import MODELS, Model, named
 from velatura.shader import shader
-from velatura.shader.glsl import Vulkan
+from velatura.shader.printers.glsl import Vulkan
 
 PRESETS = "coated-gold,varnished-paint,frosted-glass"
 TEXEL = 16  # bytes, of RGBA32F

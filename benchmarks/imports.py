@@ -27,7 +27,7 @@ from velatura.programs.gltf import read as gltf
 from velatura.programs.openpbr import read as openpbr
 from velatura.programs.principled import read as principled
 from velatura.programs.standard_surface import read as standard_surface
-from velatura.sampling.low_discrepancy import square
+from velatura.renderer.low_discrepancy import square
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "shared"))
 

@@ -22,7 +22,7 @@ from generated_surfaces import GLTF, OPENPBR, Surface, values
 
 from velatura.optics.directions import directions
 from velatura.programs.closures import Directions
-from velatura.sampling.low_discrepancy import square
+from velatura.renderer.low_discrepancy import square
 
 COSINES = (1.0, 0.7, 0.35)
 NODES = 2048  # directions of reflection, drawn by the cosine

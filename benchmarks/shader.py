@@ -36,7 +36,7 @@ from velatura.model.context import Context, at_a_point
 from velatura.model.papers import bsdf
 from velatura.model.solved import solve
 from velatura.shader import record, shader, variance
-from velatura.shader.glsl import GLSL
+from velatura.shader.printers.glsl import GLSL
 from velatura.stack import Material, Stack
 
 #: Of textures: ranges by key, drawn for presets of several kinds, seen from some cosines.

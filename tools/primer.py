@@ -13,8 +13,8 @@ from typing import Any
 import velatura as vt
 from velatura.model import named
 from velatura.shader import record
-from velatura.shader.symbol import Operand
-from velatura.shader.tape import tape
+from velatura.shader.recorder.symbol import Operand
+from velatura.shader.recorder.tape import tape
 
 DATA = Path(__file__).parents[1] / "docs" / "_static" / "primer-data.js"
 MODEL = named("belcour2018", reflectance="fresnel", tir="off")  # without tables

@@ -20,7 +20,7 @@ import numpy as np
 
 from velatura import kernel
 from velatura.errors import InvalidInput
-from velatura.sampling import coated
+from velatura.films import coated
 from velatura.stack import (
     Address,
     Brushing,

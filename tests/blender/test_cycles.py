@@ -23,7 +23,8 @@ from with_cycles import pictures as by_cycles
 import velatura as vt
 from velatura import kernel
 from velatura.model import named
-from velatura.shader import closures, recording
+from velatura.shader import closures
+from velatura.shader.recorder import recording
 from velatura.stack import Material, Stack
 
 OUTPUT = ROOT / "site/blender"  # where pictures of both are left

@@ -16,9 +16,10 @@ import velatura as vt
 from velatura.model import named
 from velatura.model.papers import bsdf
 from velatura.optics import fresnel
-from velatura.shader import closures, recording
+from velatura.shader import closures
 from velatura.shader.closures import Closure
 from velatura.shader.polynomials import Fit
+from velatura.shader.recorder import recording
 from velatura.stack import Material
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())

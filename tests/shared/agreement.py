@@ -14,18 +14,18 @@ from machines import Changing, Machine
 
 from velatura import tables
 from velatura.editor import messages
+from velatura.films import coated as interfaces
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf
 from velatura.model.solved import rotation_frame, solve
 from velatura.model.solved.solve import Solver
 from velatura.optics import ggx
-from velatura.sampling import coated as interfaces
 from velatura.shader import Recording, Shader, constant, material, record, shader, variance
-from velatura.shader.bake import Bake
-from velatura.shader.c_like import CLike
-from velatura.shader.films import beside
-from velatura.shader.glsl import GLSL
-from velatura.shader.solved import Tabulated
+from velatura.shader.lookups.bake import Bake
+from velatura.shader.lookups.columns import Tabulated
+from velatura.shader.lookups.films import beside
+from velatura.shader.printers.c_like import CLike
+from velatura.shader.printers.glsl import GLSL
 from velatura.stack import Film, Interface, Kind, Material, Stack
 
 Pattern: TypeAlias = tuple[tuple[Kind, ...], str]

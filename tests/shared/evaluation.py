@@ -11,7 +11,7 @@ import numpy as np
 
 from velatura import ops, tables
 from velatura.ops import Value
-from velatura.shader.symbol import Operand, Symbol, in_order, inside, operand
+from velatura.shader.recorder.symbol import Operand, Symbol, in_order, inside, operand
 
 _ARITHMETIC: dict[str, Callable[..., Any]] = {
     "add": operator.add,

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from velatura import kernel
+from velatura.films import coated
 from velatura.model import Model
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf
 from velatura.optics.ggx import Direction
-from velatura.sampling import coated, directional_grid
-from velatura.shader import closures, recording
+from velatura.renderer import directional_grid
+from velatura.shader import closures
 from velatura.shader.closures import Closure
+from velatura.shader.recorder import recording
 from velatura.stack import Brushing, Material, Stack, Texture
 from velatura.stack import number as plain
 

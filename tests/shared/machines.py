@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from velatura.shader.c_like import FILMS, MAPS, SAMPLER, TABLES, VALUES, CLike
-from velatura.shader.glsl import Desktop, Vulkan
-from velatura.shader.hlsl import Hlsl, Slang
-from velatura.shader.printer import Struct
-from velatura.shader.wgsl import Wgsl
+from velatura.shader.printers.c_like import FILMS, MAPS, SAMPLER, TABLES, VALUES, CLike
+from velatura.shader.printers.glsl import Desktop, Vulkan
+from velatura.shader.printers.hlsl import Hlsl, Slang
+from velatura.shader.printers.printer import Struct
+from velatura.shader.printers.wgsl import Wgsl
 
 THREADS = 64  # of a group
 RESULTS, GIVEN = 0, 1  # bindings of the second group

@@ -12,9 +12,9 @@ import numpy as np
 import tmm
 
 from velatura import stack
+from velatura.films import coated, polarised
 from velatura.optics import coatings, films
 from velatura.optics.films import Film, Response
-from velatura.sampling import coated, polarised_films
 from velatura.stack import Interface, Layer, Medium, Stack
 
 THICK = 1e9  # nm, of a medium, whose extinction then changes no reflectance
@@ -29,7 +29,7 @@ def light_of(wavelength_nm: float) -> Iterator[None]:
 
     def forget() -> None:
         coated._coated.cache_clear()
-        polarised_films.polarised_films.cache_clear()
+        polarised.polarised_films.cache_clear()
 
     forget()
     try:

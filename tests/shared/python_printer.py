@@ -11,14 +11,14 @@ import numpy as np
 
 from velatura import ops
 from velatura.shader import Printer
-from velatura.shader.atlas import Layout
-from velatura.shader.bake import Bake, Group
-from velatura.shader.cost import Cost
+from velatura.shader.lookups.atlas import Layout
+from velatura.shader.lookups.bake import Bake, Group
+from velatura.shader.lookups.columns import Solution, Tabulated
 from velatura.shader.material import Brushed, Entry, Filled, Mapped
-from velatura.shader.printer import ATOM, Output, Struct
-from velatura.shader.solved import Solution, Tabulated
-from velatura.shader.statements import assignments, statements
-from velatura.shader.symbol import Kind, Operand, Symbol
+from velatura.shader.printers.printer import ATOM, Output, Struct
+from velatura.shader.printers.statements import assignments, statements
+from velatura.shader.recorder.cost import Cost
+from velatura.shader.recorder.symbol import Kind, Operand, Symbol
 
 _COMPARE = {"less": "<", "greater": ">", "at_most": "<=", "at_least": ">="}
 _ELEMENTS = {"x": 0, "y": 1, "z": 2, "r": 0}

@@ -11,7 +11,7 @@ from machines import MACHINES
 
 import velatura as vt
 from velatura.shader import shader
-from velatura.shader.glsl import Vulkan
+from velatura.shader.printers.glsl import Vulkan
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "engines.md"
 

@@ -22,7 +22,8 @@ from velatura import kernel
 from velatura.bakes import TARGETS
 from velatura.exports import FORMATS
 from velatura.exports.request import headed
-from velatura.shader import atlas, shader
+from velatura.shader import shader
+from velatura.shader.lookups import atlas
 
 Run = Callable[..., tuple[int, str, str]]
 

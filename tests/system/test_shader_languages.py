@@ -32,7 +32,7 @@ from spirv import counts
 
 import velatura as vt
 from velatura.shader import constant, record, shader
-from velatura.shader.glsl import Vulkan
+from velatura.shader.printers.glsl import Vulkan
 from velatura.shader.program import prefixed
 
 # Patterns that together have every kind of layer and every shape; merged lobes, films, brushed `velatura`, and the form

@@ -10,10 +10,10 @@ import tmm
 
 import velatura as vt
 from velatura import kernel
+from velatura.films import coated
 from velatura.optics import films, fresnel
 from velatura.optics.coatings import Coating, ColouredFilm, quadrature
 from velatura.optics.films import Film
-from velatura.sampling import coated
 from velatura.shader import shader
 from velatura.stack import Material
 from velatura.stack.spectra import srgb_sensitivity, srgb_weights

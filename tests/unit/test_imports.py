@@ -26,26 +26,27 @@ MAY_IMPORT = {
     "pictures": "",
     "stack": "readers",
     "optics": "ops",
-    "sampling": "stack optics ops",
-    "tables": "optics ops sampling",
-    "model": "stack optics tables ops sampling",
-    "binding": "stack sampling kernel",
-    "plugins": "stack optics tables model ops kernel binding sampling",
-    "shader": "stack optics tables model ops sampling",
-    "programs": "light stack optics sampling model reference binding kernel pictures",
+    "renderer": "stack optics ops",
+    "films": "stack optics ops renderer",
+    "tables": "optics ops renderer",
+    "model": "stack optics tables ops renderer films",
+    "binding": "stack renderer films kernel",
+    "plugins": "stack optics tables model ops kernel binding renderer films",
+    "shader": "stack optics tables model ops renderer films",
+    "programs": "light stack optics renderer films model reference binding kernel pictures",
     "bakes": "programs",  # and `imports`: public names
     "imports": "programs",
     "exports": "stack model shader programs",
-    "inverse": "stack optics tables model ops sampling kernel",
-    "light": "sampling",
-    "reference": "light stack optics ops kernel binding sampling",
+    "inverse": "stack optics tables model ops renderer films kernel",
+    "light": "renderer",
+    "reference": "light stack optics ops kernel binding renderer films",
     "checks": "kernel",
     "scenes": "kernel",
-    "comparison": "light stack optics model reference sampling checks scenes api kernel bakes",
-    "benchmark": "light stack optics model reference sampling checks comparison api kernel bakes programs",
+    "comparison": "light stack optics model reference renderer films checks scenes api kernel bakes",
+    "benchmark": "light stack optics model reference renderer films checks comparison api kernel bakes programs",
     "progress": "",
     "sweeps": "stack optics model inverse reference checks api kernel progress",
-    "figures": "stack optics ops sampling model inverse reference checks scenes comparison api kernel",
+    "figures": "stack optics ops renderer films model inverse reference checks scenes comparison api kernel",
 }
 
 # The ends of the stream -> who may import them.
@@ -63,7 +64,7 @@ IMPORTED_BY = {
 # The renderer -> who may import it, and inside functions only: importing Velatura must not load it.
 RENDERER = {
     "mitsuba": "kernel",
-    "drjit": "kernel ops sampling tables binding plugins reference checks scenes benchmark figures",
+    "drjit": "kernel ops renderer films tables binding plugins reference checks scenes benchmark figures",
 }
 
 # Modules -> what importing them must not load.
@@ -200,7 +201,7 @@ if TYPE_CHECKING:
 def f():
     import drjit as dr
     import_module("velatura.api")
-TABLE = {"bake": "velatura.shader.bake"}
+TABLE = {"bake": "velatura.shader.lookups.bake"}
 """
     found = dict(imports(path, text))
     assert found == {
@@ -213,7 +214,7 @@ TABLE = {"bake": "velatura.shader.bake"}
         "mitsuba": False,
         "drjit": False,
         "velatura.api": False,
-        "velatura.shader.bake": False,
+        "velatura.shader.lookups.bake": False,
     }
 
 

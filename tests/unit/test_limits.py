@@ -20,7 +20,7 @@ from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.model.variance import variance_kind
 from velatura.optics import fresnel
-from velatura.sampling import low_discrepancy
+from velatura.renderer import low_discrepancy
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 
 COSINES = np.array([1.0, 0.7, 0.35, 0.1])

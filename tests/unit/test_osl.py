@@ -12,14 +12,16 @@ from agreement import PATTERNS, coated, random_case
 from evaluation import evaluate
 
 import velatura as vt
+from velatura.films import coated as interfaces
 from velatura.model import MODELS, named
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf
-from velatura.sampling import coated as interfaces
-from velatura.shader import closures, films, recording, variance
+from velatura.shader import closures, variance
 from velatura.shader.closures import Closure
-from velatura.shader.osl import osl
-from velatura.shader.symbol import in_order
+from velatura.shader.lookups import films
+from velatura.shader.printers.osl import osl
+from velatura.shader.recorder import recording
+from velatura.shader.recorder.symbol import in_order
 from velatura.stack import Material
 
 CLOSED = [model.name for model in MODELS if model.closed_form]

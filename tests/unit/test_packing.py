@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from velatura.sampling import directional_grid
-from velatura.sampling.directional_grid import Packing, Summed
+from velatura.renderer import directional_grid
+from velatura.renderer.directional_grid import Packing, Summed
 
 RNG = np.random.default_rng(0)
 SHAPE = (7,)

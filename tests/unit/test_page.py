@@ -19,8 +19,8 @@ from velatura import tables
 from velatura.editor.service import VERBS
 from velatura.model import named
 from velatura.shader import material, shader
-from velatura.shader.bake import PLACE, Bake
-from velatura.shader.films import tables as tables_of_films
+from velatura.shader.lookups.bake import PLACE, Bake
+from velatura.shader.lookups.films import tables as tables_of_films
 from velatura.stack import Varying, presets
 
 PAGE = Path(__file__).parents[1] / "page"

@@ -13,10 +13,10 @@ import pytest
 import tmm
 from mixed_films import light_of, random_mixed
 
+from velatura.films import polarised
 from velatura.optics import fresnel
 from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.reference import statistics, stokes
-from velatura.sampling import polarised_films
 from velatura.stack import Film, Interface, Stack, srgb_sensitivity
 
 WAVELENGTH = 540.0  # nm
@@ -40,7 +40,7 @@ def test_matrices_are_those_of_the_amplitudes(depths_nm: list[float], k: float) 
     """From both sides, under total reflection too: shares of s and p, and their phases. The first film may absorb."""
     n = [1.1, *[2.0 + 1j * k, 1.4, 2.3][: len(depths_nm)], 1.7]
     films = tuple(ColouredFilm((float(np.real(x)),) * 3, (float(np.imag(x)),) * 3, d) for x, d in zip(n[1:], depths_nm))
-    found = polarised_films.polarised_films(Coating(films, (1.1,) * 3, (1.7,) * 3), False, srgb_sensitivity)
+    found = polarised.polarised_films(Coating(films, (1.1,) * 3, (1.7,) * 3), False, srgb_sensitivity)
     for indices, depths in ((n, depths_nm), (n[::-1], depths_nm[::-1])):
         eta = indices[-1] / indices[0]
         for cosine in (0.05, 0.3, 0.55, 0.76, 0.9, 1.0):

@@ -19,7 +19,7 @@ from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
-from velatura.shader import symbol
+from velatura.shader.recorder import symbol
 
 Array = NDArray[np.floating]
 Direction = tuple[Any, Any, Any]

@@ -18,8 +18,9 @@ from velatura.model.solved.lobes import remainder
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.transmission import internal_reflections
 from velatura.optics import fresnel
-from velatura.shader import record, symbol
-from velatura.shader.solved import Tabulated
+from velatura.shader import record
+from velatura.shader.lookups.columns import Tabulated
+from velatura.shader.recorder import symbol
 from velatura.stack import Material
 
 Array = NDArray[np.floating]

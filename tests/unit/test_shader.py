@@ -20,17 +20,17 @@ import velatura as vt
 from velatura import ops, tables
 from velatura.errors import InvalidInput
 from velatura.shader import Recording, constant, record, shader
-from velatura.shader.atlas import texels
-from velatura.shader.bake import Bake, Group
-from velatura.shader.cost import Cost, cost
-from velatura.shader.films import tables as tables_of_films
-from velatura.shader.glsl import GLSL
-from velatura.shader.graph import Graph
+from velatura.shader.lookups.atlas import texels
+from velatura.shader.lookups.bake import Bake, Group
+from velatura.shader.lookups.columns import Tabulated
+from velatura.shader.lookups.films import tables as tables_of_films
 from velatura.shader.material import place
-from velatura.shader.solved import Tabulated
-from velatura.shader.statements import statements
-from velatura.shader.symbol import Symbol, colour, component, in_order, number
-from velatura.shader.tape import tape
+from velatura.shader.printers.glsl import GLSL
+from velatura.shader.printers.statements import statements
+from velatura.shader.recorder.cost import Cost, cost
+from velatura.shader.recorder.graph import Graph
+from velatura.shader.recorder.symbol import Symbol, colour, component, in_order, number
+from velatura.shader.recorder.tape import tape
 from velatura.stack import loads
 
 X, Y = np.random.default_rng(1).uniform(0.05, 0.95, (2, 20))

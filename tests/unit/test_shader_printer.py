@@ -14,7 +14,7 @@ from python_printer import PythonPrinter, put, run
 import velatura as vt
 from velatura.model import MODELS
 from velatura.shader import constant, record, shader
-from velatura.shader.bake import Bake
+from velatura.shader.lookups.bake import Bake
 
 PYTHON = PythonPrinter()
 NAMES = [model.name for model in MODELS]

@@ -16,7 +16,7 @@ from velatura.programs.closures import Directions
 from velatura.programs.gltf import formulas as gltf
 from velatura.programs.openpbr import formulas as openpbr
 from velatura.programs.principled import formulas as principled
-from velatura.sampling.low_discrepancy import square
+from velatura.renderer.low_discrepancy import square
 from velatura.stack import srgb_sensitivity
 
 U1, U2 = square(20_000)

@@ -17,7 +17,7 @@ from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.variance import variance_kind
 from velatura.optics import fresnel, ggx
-from velatura.shader import symbol
+from velatura.shader.recorder import symbol
 from velatura.stack import Material
 from velatura.stack.flat_names import Address
 

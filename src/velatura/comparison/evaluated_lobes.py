@@ -21,7 +21,7 @@ from velatura.model.registry import stack_lobes
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
 from velatura.reference import WalkedLobe
-from velatura.sampling.low_discrepancy import at_nodes, square
+from velatura.renderer.low_discrepancy import at_nodes, square
 from velatura.stack import Material, Stack
 
 Array = NDArray[np.floating]

@@ -8,7 +8,7 @@ import numpy as np
 
 from velatura.editor.messages import Answer, Body, Verb, array, field, material_of
 from velatura.errors import InvalidInput
-from velatura.shader.films import coated_layers
+from velatura.shader.lookups.films import coated_layers
 from velatura.stack import srgb_sensitivity
 
 COLOURS = 128  # over the range of thickness

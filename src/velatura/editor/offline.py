@@ -30,7 +30,8 @@ from velatura.errors import InvalidInput
 from velatura.exports.request import headed
 from velatura.model import MODELS, Model, named
 from velatura.scenes.objects import OBJECTS
-from velatura.shader import atlas, shader
+from velatura.shader import shader
+from velatura.shader.lookups import atlas
 from velatura.stack import Stack, preset, presets
 from velatura.stack.layers import KINDS
 

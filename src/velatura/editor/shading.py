@@ -12,14 +12,15 @@ import numpy as np
 from velatura.editor.messages import array
 from velatura.errors import InvalidInput
 from velatura.model import Model
-from velatura.shader import Shader, atlas, constant, films, shader
-from velatura.shader.bake import Bake
+from velatura.shader import Shader, constant, shader
+from velatura.shader.lookups import atlas, films
+from velatura.shader.lookups.bake import Bake
 from velatura.stack import Address, Stack, Varying
 from velatura.stack.schema import unknown
 from velatura.tables import load
 
 if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.solved import Tabulated
+    from velatura.shader.lookups.columns import Tabulated
 
 #: Of an interface with a roughness for each axis, in the material that stands for all of its pattern.
 _STRETCHED = {"alpha_v": 0.2, "rotation": 30.0}

@@ -10,11 +10,13 @@ import numpy as np
 
 from velatura.exports.request import Export, Request, origin, relative
 from velatura.programs import xml
-from velatura.shader import closures, mtlx, recording
+from velatura.shader import closures
 from velatura.shader.material import constant as as_constant
 from velatura.shader.material import identifier, title
-from velatura.shader.nodes import constant
+from velatura.shader.printers import mtlx
+from velatura.shader.printers.nodes import constant
 from velatura.shader.program import described
+from velatura.shader.recorder import recording
 from velatura.stack import Address, Stack, Varying
 
 LINE = 110  # characters of comments
@@ -24,7 +26,7 @@ def write(request: Request) -> Export:
     """The node, its graphs, and a material that uses it.
 
     Raises:
-        InvalidInput: as `velatura.shader.mtlx.record`.
+        InvalidInput: as `velatura.shader.printers.mtlx.record`.
     """
     stack = request.stack
     recorded = mtlx.record(stack, recording.drawn_by(stack, request.model))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from velatura.exports.request import Export, Request, headed
-from velatura.shader.osl import osl
+from velatura.shader.printers.osl import osl
 
 
 def write(request: Request) -> Export:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from velatura.exports.request import Export, Request, headed
 from velatura.shader import shader
-from velatura.shader.c_like import CLike
-from velatura.shader.glsl import Desktop, Glsl, Vulkan
-from velatura.shader.hlsl import Hlsl, Slang
+from velatura.shader.printers.c_like import CLike
+from velatura.shader.printers.glsl import Desktop, Glsl, Vulkan
+from velatura.shader.printers.hlsl import Hlsl, Slang
+from velatura.shader.printers.wgsl import Wgsl
 from velatura.shader.program import PREFIX
-from velatura.shader.wgsl import Wgsl
 
 #: The language of each format.
 LANGUAGES: dict[str, type[CLike]] = {

@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from velatura import kernel, ops
 from velatura.api import lobes
+from velatura.films.coated import NODES, Coated
 from velatura.optics import fresnel, ggx
-from velatura.sampling.coated import NODES, Coated
 from velatura.stack import Interface, Stack
 from velatura.stack.spectra import srgb_weights
 

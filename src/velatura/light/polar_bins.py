@@ -13,7 +13,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.sampling.low_discrepancy import gauss
+from velatura.renderer.low_discrepancy import gauss
 
 Array = NDArray[np.floating]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.films.coated import Coated, Sampled
 from velatura.ops import Value
-from velatura.sampling.coated import Coated, Sampled
 from velatura.tables import coordinates
 
 NODES = (65, 33)  # over direction and roughness

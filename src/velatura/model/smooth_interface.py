@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from velatura import ops
+from velatura.films import coated
+from velatura.films.coated import Either, Films
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.sampling import coated
-from velatura.sampling.coated import Either, Films
 from velatura.stack import InterfaceValues, Material
 from velatura.stack.chain import Meeting, chain
 

@@ -17,7 +17,7 @@ from velatura.model.solved.textures import Textured
 from velatura.model.variance import Variance
 from velatura.plugins import progress, spectral
 from velatura.plugins.spectral import Spectra
-from velatura.sampling.variables import plain
+from velatura.renderer.differentiated import plain
 
 
 class Bodies(Protocol):

@@ -15,7 +15,7 @@ from velatura.model.papers.adding import Lobe
 from velatura.model.papers.prepare import Prepared
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid, low_discrepancy
+from velatura.renderer import directional_grid, low_discrepancy
 
 BEGIN_NM, END_NM = 360.0, 830.0  # of the wavelengths that Mitsuba renders
 NODES = 48  # over these, a multiple of those of a ray

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from velatura.optics import fresnel, ggx, refraction
 from velatura.programs.parameters import ALPHA_MIN as ALPHA_MIN
-from velatura.sampling.low_discrepancy import square
+from velatura.renderer.low_discrepancy import square
 from velatura.stack import srgb_weights
 
 Array: TypeAlias = NDArray[np.floating]

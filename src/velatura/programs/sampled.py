@@ -18,7 +18,7 @@ from velatura.model.context import Context
 from velatura.optics import fresnel, ggx, refraction
 from velatura.programs.closures import ALPHA_MIN, Directions
 from velatura.programs.from_stack import Described, Facets
-from velatura.sampling.low_discrepancy import square
+from velatura.renderer.low_discrepancy import square
 
 Array: TypeAlias = NDArray[np.floating]
 

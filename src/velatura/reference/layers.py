@@ -13,13 +13,13 @@ from math import pi
 from typing import TypeVar
 
 from velatura import ops
+from velatura.films import coated
+from velatura.films.coated import Coated, OfInterface
+from velatura.films.polarised import PolarisedFilms, polarised_films
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
-from velatura.sampling import coated
-from velatura.sampling.coated import Coated, OfInterface
-from velatura.sampling.polarised_films import PolarisedFilms, polarised_films
 from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
 from velatura.stack.values import Pair
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.optics import ggx
-from velatura.sampling.low_discrepancy import square
+from velatura.renderer.low_discrepancy import square
 
 Array = NDArray[np.floating]
 

@@ -29,10 +29,11 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.directions import directions
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid
-from velatura.sampling.directional_grid import Curves
-from velatura.sampling.low_discrepancy import fibonacci, square
-from velatura.shader import films, recording
+from velatura.renderer import directional_grid
+from velatura.renderer.directional_grid import Curves
+from velatura.renderer.low_discrepancy import fibonacci, square
+from velatura.shader.lookups import films
+from velatura.shader.recorder import recording
 from velatura.stack import Address, Brushing, Material, Stack, Texture
 from velatura.stack import number as plain
 

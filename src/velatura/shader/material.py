@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from velatura.shader.printer import Field, Struct
-from velatura.shader.symbol import Operand, operand
+from velatura.shader.printers.printer import Field, Struct
+from velatura.shader.recorder.symbol import Operand, operand
 from velatura.stack import Address, Brushing, Stack, Texture, Varying
 from velatura.stack import number as plain
 

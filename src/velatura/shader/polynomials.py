@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid
+from velatura.renderer import directional_grid
 from velatura.shader.closures import Closure, Columns, Tabulated, bounded
 
 DEGREE = 8

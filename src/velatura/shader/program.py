@@ -14,16 +14,17 @@ import numpy as np
 from velatura.errors import InvalidInput, remark
 from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.papers.lobe_merging import merging
-from velatura.shader import atlas, films, material
-from velatura.shader.bake import Bake
-from velatura.shader.cost import Cost, cost
-from velatura.shader.glsl import GLSL
-from velatura.shader.printer import Field, Printer, Struct
-from velatura.shader.recording import Recording, part, record
+from velatura.shader import material
+from velatura.shader.lookups import atlas, films
+from velatura.shader.lookups.bake import Bake
+from velatura.shader.printers.glsl import GLSL
+from velatura.shader.printers.printer import Field, Printer, Struct
+from velatura.shader.recorder.cost import Cost, cost
+from velatura.shader.recorder.recording import Recording, part, record
 from velatura.stack import MaterialLike, Texture, load
 
 if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.solved import Tabulated
+    from velatura.shader.lookups.columns import Tabulated
 
 
 PREFIX = "vt"  # of names in code

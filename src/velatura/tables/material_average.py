@@ -11,7 +11,7 @@ import numpy as np
 
 from velatura import ops
 from velatura.ops import Value
-from velatura.sampling.packets import Packets, packets
+from velatura.renderer.packets import Packets, packets
 from velatura.tables import coordinates
 
 Average = Callable[[Value, Value], Value]  # of cos_theta and alpha

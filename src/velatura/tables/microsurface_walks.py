@@ -13,7 +13,7 @@ import numpy as np
 
 from velatura.optics import fresnel, ggx, microsurface, refraction
 from velatura.optics.ggx import Direction
-from velatura.sampling.low_discrepancy import cube
+from velatura.renderer.low_discrepancy import cube
 
 QUASI_RANDOM = 4  # meetings whose numbers come from the sequence; later ones, which matter less, draw random numbers
 DIMENSIONS = 9  # of a sequence that all points share, likewise

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from velatura.files import whole
-from velatura.sampling.packets import Packets, packets
+from velatura.renderer.packets import Packets, packets
 
 FILE = Path(__file__).with_name("tables.npz")
 

@@ -10,7 +10,7 @@ import velatura as vt
 from fuzzing import Failure
 from fuzzing.stacks import random_stack
 from velatura import kernel
-from velatura.sampling.variables import RELATIVE, RELATIVES, STEPS
+from velatura.renderer.differentiated import RELATIVE, RELATIVES, STEPS
 
 MOST = 4  # values of a stack that are tried
 SAMPLES = 4096

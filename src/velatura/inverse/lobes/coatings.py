@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from velatura.films.coated import Coated
 from velatura.ops import Value
 from velatura.optics.coatings import FINEST, PER_PERIOD, RANGE_NM
 from velatura.optics.films import Film as FilmOfChannel
 from velatura.optics.films import coherent
-from velatura.sampling.coated import Coated
 from velatura.stack import FilmValues, Interface, Material, Stack, srgb_sensitivity
 from velatura.stack.values import Film
 from velatura.tables import Average

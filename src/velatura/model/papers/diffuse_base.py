@@ -15,13 +15,13 @@ from math import pi
 import numpy as np
 
 from velatura import ops, tables
+from velatura.films.coated import Either, OfInterface
 from velatura.model.context import as_it_is
 from velatura.model.papers import operators
 from velatura.model.papers.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.ops import Value
 from velatura.optics import fresnel, phase
 from velatura.optics.ggx import Direction
-from velatura.sampling.coated import Either, OfInterface
 from velatura.tables import Tables, diffuse_nodes
 
 Settle = Callable[[Value], Value]

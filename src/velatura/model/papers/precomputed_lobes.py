@@ -16,7 +16,7 @@ from velatura.model.roughness_maps import AS_IT_IS
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid
+from velatura.renderer import directional_grid
 
 # Reflected, and transmitted if anything is, for a direction above the surface
 Lobes = Callable[[Direction], tuple[list[Lobe], Lobe | None]]

@@ -10,6 +10,8 @@ from functools import partial
 from math import pi
 
 from velatura import ops, tables
+from velatura.films import coated
+from velatura.films.coated import Coated, Either, absorbs
 from velatura.model.base import Model
 from velatura.model.context import Context
 from velatura.model.film_average import film_average
@@ -18,8 +20,6 @@ from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.variance import Roughness, Variance, variance_kind
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.sampling import coated
-from velatura.sampling.coated import Coated, Either, absorbs
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.stack.chain import Meeting, chain
 from velatura.tables import Average, Row, Tables

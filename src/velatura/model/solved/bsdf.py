@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from velatura import ops
+from velatura.films.coated import OfInterface, either
 from velatura.model.base import ALL, Query
 from velatura.model.directions import select_direction, upright
 from velatura.model.roughness_maps import RoughnessMap
@@ -31,7 +32,6 @@ from velatura.model.variance import PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling.coated import OfInterface, either
 
 ENERGY_EPS = 1e-9  # energy of a part that is drawn even where it has none
 GRAZING = 1e-6  # cosine

@@ -22,7 +22,7 @@ from velatura.model.solved.transmission.direct import Transmission
 from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling import low_discrepancy
+from velatura.renderer import low_discrepancy
 
 Array = NDArray[np.floating]
 

@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from velatura.model.solved.columns import Columns
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.variance import ALPHA_MIN
-from velatura.sampling import directional_grid
+from velatura.renderer import directional_grid
 from velatura.stack import InterfaceValues, Material
 
 Array = NDArray[np.floating]

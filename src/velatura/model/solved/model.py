@@ -85,7 +85,7 @@ class SolvedModel(Model):
 
 def _is_solved(material: Material) -> bool:
     """Whether a material with constants of a renderer spreads light, but for a diffuse base alone, which is exact."""
-    from velatura.sampling.variables import plain
+    from velatura.renderer.differentiated import plain
 
     return not _is_bare(material) and any(layer.spreads for layer in plain(material).layers)
 

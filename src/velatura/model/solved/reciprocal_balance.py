@@ -18,7 +18,7 @@ from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import combined
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import low_discrepancy
+from velatura.renderer import low_discrepancy
 
 Array = NDArray[np.floating]
 Shares = Callable[[Direction], Sequence[tuple[Array, Array]]]

@@ -15,7 +15,7 @@ from velatura.model.variance import PerAxis, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling.variables import Variables, plain
+from velatura.renderer.differentiated import Variables, plain
 from velatura.stack import Address, InterfaceValues, Material
 
 

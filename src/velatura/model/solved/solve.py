@@ -33,10 +33,10 @@ from velatura.model.solved.transmission.internal_reflections import Rest
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import differences, directional_grid, low_discrepancy
-from velatura.sampling.directional_grid import Packing
-from velatura.sampling.variables import Variables
-from velatura.sampling.variables import plain as plain
+from velatura.renderer import directional_grid, finite_differences, low_discrepancy
+from velatura.renderer.differentiated import Variables
+from velatura.renderer.differentiated import plain as plain
+from velatura.renderer.directional_grid import Packing
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.tables import Tables
 
@@ -485,11 +485,11 @@ def solve(material: Material, model: Model, variance: type[Variance], context: C
             flat.append(side.numbers)
         return flat
 
-    flat, made = iter(differences.differentiable(arrays, given.given, given.around, context.number)), []
+    flat, made = iter(finite_differences.differentiable(arrays, given.given, given.around, context.number)), []
     for seen, layout, packing in zip(sides(material), layouts, packings):
         tables = [directional_grid.interleaved(next(flat), solver.shape, context.number) for _ in packing.tables]
         curves, column = packing.curves(tables), next(flat)
-        numbers = column[:, None] if context.colour is channels else differences.numbers(column, context.number)
+        numbers = column[:, None] if context.colour is channels else finite_differences.numbers(column, context.number)
         made.append(solver.side(seen, layout, curves, remainder_of(numbers, solver, context), context))
     return solver.bsdf(material, made)
 

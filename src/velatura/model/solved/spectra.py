@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
+from velatura.films import coated
 from velatura.model.base import Body, Model
 from velatura.model.context import Context
 from velatura.model.solved.columns import Declaration
@@ -27,9 +28,9 @@ from velatura.model.solved.texture_axes import Wavelengths
 from velatura.model.variance import Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import coated, differences, directional_grid
-from velatura.sampling.directional_grid import Curves
-from velatura.sampling.variables import Variables
+from velatura.renderer import directional_grid, finite_differences
+from velatura.renderer.differentiated import Variables
+from velatura.renderer.directional_grid import Curves
 from velatura.stack import Material
 
 Array = NDArray[np.floating]
@@ -117,7 +118,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
         declared[:] = [side.declaration for side in found]
         return [flat for side in found for flat in _flat(side, solver, places, nodes)]
 
-    flat = iter(differences.differentiable(arrays, given.given, given.around, context.number))
+    flat = iter(finite_differences.differentiable(arrays, given.given, given.around, context.number))
     shapes = solver.shape, (*solver.shape, nodes), (nodes,)
     made = []
     for order in ([column.colour for column in each.columns] for each in declared):

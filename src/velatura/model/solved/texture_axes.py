@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from velatura import ops
+from velatura.films import coated
 from velatura.ops import Value
-from velatura.sampling import coated
 from velatura.stack import Address, Material
 
 Array = NDArray[np.floating]

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.films import coated
 from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
 from velatura.model.solved import solve, texture_axes
@@ -34,10 +35,10 @@ from velatura.model.solved.transmission.combined import Parts
 from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import coated, differences, directional_grid
-from velatura.sampling.directional_grid import Packed, Packing, Summed
-from velatura.sampling.packets import WIDTH, aligned
-from velatura.sampling.variables import Variables
+from velatura.renderer import directional_grid, finite_differences
+from velatura.renderer.differentiated import Variables
+from velatura.renderer.directional_grid import Packed, Packing, Summed
+from velatura.renderer.packets import WIDTH, aligned
 from velatura.stack import Address, InterfaceValues, Material
 
 Array = NDArray[np.floating]
@@ -296,10 +297,10 @@ def _tabulated(
 
     def constants(rows: Array) -> list[list[Value]]:
         kept = rows.ravel() if context.number is None else context.number(aligned(rows.ravel()))
-        values = context.settle(differences.numbers(kept, context.number))
+        values = context.settle(finite_differences.numbers(kept, context.number))
         return [values[k : k + rows.shape[1]] for k in range(0, rows.size, rows.shape[1])]
 
-    flat = iter(differences.differentiable(tables, given.given, given.around, context.number))
+    flat = iter(finite_differences.differentiable(tables, given.given, given.around, context.number))
     terms = []
     for k, (group, _) in enumerate(groups):
         places = tuple(axis.places for axis in group)

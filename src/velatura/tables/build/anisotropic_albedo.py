@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from velatura.optics import ggx
-from velatura.sampling.low_discrepancy import square
+from velatura.renderer.low_discrepancy import square
 from velatura.tables import coordinates
 from velatura.tables.build.quadrature import Progress
 from velatura.tables.store import Table

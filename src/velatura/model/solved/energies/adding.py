@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.films import coated
 from velatura.model.solved.energies.interfaces import Facets, Setting, colours, interface
 from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.operators import Layer, Operator
-from velatura.sampling import coated
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.stack.chain import chain
 

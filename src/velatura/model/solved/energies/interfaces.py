@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from velatura import ops, tables
+from velatura.films.coated import Coated, dielectric_between, dielectric_passing
 from velatura.model.solved.energies.modes import TINY, Basis, Light
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.optics import fresnel, ggx
-from velatura.sampling.coated import Coated, dielectric_between, dielectric_passing
-from velatura.sampling.low_discrepancy import fibonacci
+from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import InterfaceValues
 from velatura.tables import Tables, coordinates
 from velatura.tables.microsurface_walks import shares_in_the_end

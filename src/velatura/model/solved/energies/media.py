@@ -13,7 +13,7 @@ from velatura.model.solved.energies.interfaces import Setting, colours, scaled
 from velatura.model.solved.energies.modes import TINY, Light
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.optics import phase
-from velatura.sampling.low_discrepancy import fibonacci
+from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import MediumValues
 
 Array = NDArray[np.floating]

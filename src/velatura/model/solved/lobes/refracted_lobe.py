@@ -23,7 +23,7 @@ from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling import low_discrepancy
+from velatura.renderer import low_discrepancy
 
 COS_MIN = 1e-3  # times the index inside; what refraction does not reach meets the interface at this one
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number

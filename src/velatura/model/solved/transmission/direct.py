@@ -36,13 +36,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.films import coated
+from velatura.films.coated import Films, dielectric_passing
 from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.variance import ALPHA_MIN, Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
-from velatura.sampling import coated, low_discrepancy
-from velatura.sampling.coated import Films, dielectric_passing
+from velatura.renderer import low_discrepancy
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.stack.chain import chain
 

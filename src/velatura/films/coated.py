@@ -20,9 +20,9 @@ from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.optics.coatings import Coating, ColouredFilm, quadrature
 from velatura.optics.films import COHERENT_NM, Film, Response, coherent
-from velatura.sampling.differences import differentiable
-from velatura.sampling.packets import Packets, aligned, packets
-from velatura.sampling.variables import Variables, plain
+from velatura.renderer.differentiated import Variables, plain
+from velatura.renderer.finite_differences import differentiable
+from velatura.renderer.packets import Packets, aligned, packets
 from velatura.stack import Address, FilmValues, InterfaceValues, Material, luminance_sensitivity, srgb_sensitivity
 
 Array = NDArray[np.floating]

@@ -17,18 +17,18 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from velatura.errors import remark
-from velatura.shader.atlas import WIDTH, Layout
-from velatura.shader.bake import Bake, Group
-from velatura.shader.cost import Cost
-from velatura.shader.films import WIDTH as LINE_OF_FILMS
+from velatura.shader.lookups.atlas import WIDTH, Layout
+from velatura.shader.lookups.bake import Bake, Group
+from velatura.shader.lookups.films import WIDTH as LINE_OF_FILMS
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
-from velatura.shader.printer import FUNCTIONS, Field, Output, Printer, Struct
-from velatura.shader.statements import assignments, statements
-from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
+from velatura.shader.printers.printer import FUNCTIONS, Field, Output, Printer, Struct
+from velatura.shader.printers.statements import assignments, statements
+from velatura.shader.recorder.cost import Cost
+from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
 from velatura.stack import Texture
 
 if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.solved import Tabulated
+    from velatura.shader.lookups.columns import Tabulated
 
 #: Places of what a program is given, counted from the first binding.
 TABLES, FILMS, VALUES, SAMPLER, MAPS = range(5)

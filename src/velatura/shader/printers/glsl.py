@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from velatura.shader.c_like import SAMPLER, VALUES, CLike
-from velatura.shader.cost import Cost
-from velatura.shader.printer import ATOM
+from velatura.shader.printers.c_like import SAMPLER, VALUES, CLike
+from velatura.shader.printers.printer import ATOM
+from velatura.shader.recorder.cost import Cost
 
 _COMPARE = {"less": "lessThan", "greater": "greaterThan", "at_most": "lessThanEqual", "at_least": "greaterThanEqual"}
 

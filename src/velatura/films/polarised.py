@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.films.coated import NODES, Sampled
 from velatura.ops import Value
 from velatura.optics.coatings import Coating, Sensitivity
 from velatura.optics.polarisation import Mueller
-from velatura.sampling.coated import NODES, Sampled
 
 Array = NDArray[np.floating]
 

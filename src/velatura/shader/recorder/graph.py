@@ -6,7 +6,7 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from velatura.ops import Value
-from velatura.shader.symbol import Operand, Symbol, in_order, inside, operand
+from velatura.shader.recorder.symbol import Operand, Symbol, in_order, inside, operand
 
 COMMUTE = {"add", "multiply", "minimum", "maximum", "both"}
 DEAR = dict.fromkeys(("exp", "log", "sin", "cos", "power", "arctan2"), 4)  # as many operations

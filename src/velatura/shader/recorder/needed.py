@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
-from velatura.shader.symbol import Operand, Symbol, in_order, inside
+from velatura.shader.recorder.symbol import Operand, Symbol, in_order, inside
 
 OWN, ANY = 3, 4  # channels: that in which the value itself is used, any
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling.low_discrepancy import integers
-from velatura.sampling.packets import Packets, packets
+from velatura.renderer.low_discrepancy import integers
+from velatura.renderer.packets import Packets, packets
 
 LINE = (512,)  # nodes, where functions depend on the cosine alone
 SINE_MIN = 1e-6  # so that there is an azimuth at the normal

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
-from velatura.shader.graph import COMMUTE
-from velatura.shader.symbol import Operand, Symbol, in_order
+from velatura.shader.recorder.graph import COMMUTE
+from velatura.shader.recorder.symbol import Operand, Symbol, in_order
 
 #: Operations with a detail besides their name: a table, or a channel.
 _DETAILED = ("texels", "value", "component", "film")

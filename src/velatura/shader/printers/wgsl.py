@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from velatura.shader.c_like import SAMPLER, VALUES, CLike
 from velatura.shader.material import PARAMETERS
-from velatura.shader.printer import ATOM, Field
-from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN
+from velatura.shader.printers.c_like import SAMPLER, VALUES, CLike
+from velatura.shader.printers.printer import ATOM, Field
+from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN
 
 _TYPES = {"float": "f32", "int": "i32", "bvec3": "vec3<bool>"}
 _TYPES |= {f"{short}vec{n}": f"vec{n}{end}" for short, end in (("", "f"), ("i", "i")) for n in (2, 3, 4)}

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from velatura import tables
-from velatura.shader import atlas
-from velatura.shader.films import FILM
-from velatura.shader.graph import work
-from velatura.shader.needed import most, needed
-from velatura.shader.symbol import Operand, Symbol, in_order, inside, is_colour
+from velatura.shader.lookups import atlas
+from velatura.shader.lookups.films import FILM
+from velatura.shader.recorder.graph import work
+from velatura.shader.recorder.needed import most, needed
+from velatura.shader.recorder.symbol import Operand, Symbol, in_order, inside, is_colour
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from math import floor, log10
 from typing import NamedTuple
 
-from velatura.shader.graph import Graph
-from velatura.shader.symbol import Operand, Symbol, component, in_order, is_colour, operand
+from velatura.shader.recorder.graph import Graph
+from velatura.shader.recorder.symbol import Operand, Symbol, component, in_order, is_colour, operand
 
 SMALL = 1e-4  # of constants: generators write six digits after the point
 LOOKED_UP = frozenset({"texels", "value", "film", "baked"})  # operations that graphs have no nodes for

@@ -34,8 +34,8 @@ from velatura.model.variance import Covariance, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.shader.bake import Group, Texture, together
-from velatura.shader.symbol import LAYOUT, REMAINDER, SHOWN, colour, number
+from velatura.shader.lookups.bake import Group, Texture, together
+from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, colour, number
 from velatura.stack import InterfaceValues, Material, MediumValues, Stack
 
 OF_POLYNOMIAL = 8  # colours

@@ -11,14 +11,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence, Set
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 
-from velatura.shader.symbol import Kind, Operand
+from velatura.shader.recorder.symbol import Kind, Operand
 
 if TYPE_CHECKING:
-    from velatura.shader.atlas import Layout
-    from velatura.shader.bake import Bake, Group
-    from velatura.shader.cost import Cost
+    from velatura.shader.lookups.atlas import Layout
+    from velatura.shader.lookups.bake import Bake, Group
+    from velatura.shader.lookups.columns import Tabulated
     from velatura.shader.material import Filled
-    from velatura.shader.solved import Tabulated
+    from velatura.shader.recorder.cost import Cost
 
 Output: TypeAlias = tuple[Operand, Kind]  # a value, and the kind as which it is returned
 

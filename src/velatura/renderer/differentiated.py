@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from velatura.ops import Value
-from velatura.sampling import differences
+from velatura.renderer import finite_differences
 from velatura.stack import Address, Material
 
 # Steps over a value; those of films are small to phases
@@ -28,14 +28,14 @@ STEP = 0.005
 class Variables:
     """Those of a material, each with the values, and their channel, that it stands for."""
 
-    given: list[differences.Variable]
+    given: list[finite_differences.Variable]
     addresses: list[Address]
 
     @classmethod
     def of(cls, material: Material) -> Variables:
         """Those among a renderer's values."""
         addresses, values = zip(*material.values())
-        return cls(differences.variables(values), list(addresses))
+        return cls(finite_differences.variables(values), list(addresses))
 
     def around(self, k: int, x: float) -> tuple[float, float]:
         """Numbers a step below and above that of the k-th variable, x, within the range."""

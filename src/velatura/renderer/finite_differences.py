@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.ops import Value
-from velatura.sampling.packets import aligned
+from velatura.renderer.packets import aligned
 
 Array = NDArray[np.floating]
 Around = Callable[[int, float], tuple[float, float]]

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from velatura.shader.c_like import SAMPLER, VALUES, CLike
-from velatura.shader.printer import ATOM
+from velatura.shader.printers.c_like import SAMPLER, VALUES, CLike
+from velatura.shader.printers.printer import ATOM
 
 _NUMBERS = {"": "float", "i": "int", "b": "bool"}
 _WORDS = {"mix": "lerp"} | {f"{short}vec{n}": f"{name}{n}" for short, name in _NUMBERS.items() for n in (2, 3, 4)}

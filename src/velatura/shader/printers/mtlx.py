@@ -19,14 +19,15 @@ from velatura.errors import InvalidInput
 from velatura.model import Model
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.shader import closures, recording
+from velatura.shader import closures
 from velatura.shader.closures import Closure, Closures
-from velatura.shader.graph import Graph
 from velatura.shader.material import brushed, place
-from velatura.shader.nodes import LOOKED_UP, Node, Nodes, constant, string
 from velatura.shader.polynomials import Fit
+from velatura.shader.printers.nodes import LOOKED_UP, Node, Nodes, constant, string
 from velatura.shader.program import described
-from velatura.shader.symbol import colour, in_order, number
+from velatura.shader.recorder import recording
+from velatura.shader.recorder.graph import Graph
+from velatura.shader.recorder.symbol import colour, in_order, number
 from velatura.stack import Address, Brushing, Stack, Texture, Varying
 
 COS_MIN = 1e-3  # of the direction of view

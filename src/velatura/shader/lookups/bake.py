@@ -23,9 +23,9 @@ from velatura.model.papers.prepare import Prepared
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid
-from velatura.shader.symbol import Operand, Symbol, component, number, operand
-from velatura.shader.tape import Tape, tape
+from velatura.renderer import directional_grid
+from velatura.shader.recorder.symbol import Operand, Symbol, component, number, operand
+from velatura.shader.recorder.tape import Tape, tape
 from velatura.stack import Material
 
 Apart = Callable[[Value], Iterable[Value]]  # the channels of a colour

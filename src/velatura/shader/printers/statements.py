@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain, count
 
-from velatura.shader import atlas
-from velatura.shader.needed import OWN, needed, ordered
-from velatura.shader.printer import ATOM, CONDITION, NEGATIVE, Language, Output
-from velatura.shader.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
+from velatura.shader.lookups import atlas
+from velatura.shader.printers.printer import ATOM, CONDITION, NEGATIVE, Language, Output
+from velatura.shader.recorder.needed import OWN, needed, ordered
+from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order, inside, is_colour
 
 ARGUMENTS = frozenset({"m", "l", "wi", "wo", "u"})  # of the functions
 _LONG = 104  # characters of an expression that gets a name of its own

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from velatura import ops
 from velatura.errors import InvalidInput
+from velatura.films import coated
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.base import Body
 from velatura.model.context import at_a_point
@@ -21,16 +22,17 @@ from velatura.model.papers.prepare import PreparedInterface
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import coated
-from velatura.shader import films, material, symbol
-from velatura.shader.bake import Bake, bake, bake_known
-from velatura.shader.graph import Graph, known_before
-from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
+from velatura.shader import material
+from velatura.shader.lookups import films
+from velatura.shader.lookups.bake import Bake, bake, bake_known
+from velatura.shader.recorder import symbol
+from velatura.shader.recorder.graph import Graph, known_before
+from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order, operand
 from velatura.stack import Address, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
 
 if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.solved import Tabulated
+    from velatura.shader.lookups.columns import Tabulated
 
 
 LATER = ("wo.", "u.")  # inputs that are known after wi
@@ -117,7 +119,7 @@ def record(
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
     baked: Bake | Tabulated | None = None
     if solved:
-        from velatura.shader.solved import tabulated
+        from velatura.shader.lookups.columns import tabulated
 
         baked = tabulated(stack, recorded, chosen, kind, general=parameters)
     elif uniform and parameters:

@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.errors import InvalidInput
+from velatura.films import coated
+from velatura.films.coated import NODES, Absorbing, Average, Axis, Coated
 from velatura.model import Model
 from velatura.model.film_average import NODES as AVERAGED
 from velatura.model.film_average import film_average
 from velatura.ops import Value
-from velatura.sampling import coated
-from velatura.sampling.coated import NODES, Absorbing, Average, Axis, Coated
-from velatura.shader.atlas import Layout
-from velatura.shader.symbol import Symbol, operand
+from velatura.shader.lookups.atlas import Layout
+from velatura.shader.recorder.symbol import Symbol, operand
 from velatura.stack import Address, Interface, InterfaceValues, Material, Stack, Texture, Varying, number
 from velatura.tables import coordinates
 

@@ -18,17 +18,19 @@ from velatura.model import DEFAULT, Model, named
 from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
-from velatura.sampling import directional_grid
-from velatura.shader import atlas, closures, films, recording
-from velatura.shader.bake import Group, together
+from velatura.renderer import directional_grid
+from velatura.shader import closures
 from velatura.shader.closures import Closure, Closures, Columns, Loss, Tabulated
-from velatura.shader.graph import Graph
+from velatura.shader.lookups import atlas, films
+from velatura.shader.lookups.bake import Group, together
 from velatura.shader.material import brushed, identifier, place, title
 from velatura.shader.material import constant as as_constant
-from velatura.shader.printer import ATOM, Language
+from velatura.shader.printers.printer import ATOM, Language
+from velatura.shader.printers.statements import statements
 from velatura.shader.program import described
-from velatura.shader.statements import statements
-from velatura.shader.symbol import Kind, Operand, Symbol, in_order, operand
+from velatura.shader.recorder import recording
+from velatura.shader.recorder.graph import Graph
+from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order, operand
 from velatura.stack import Address, Brushing, MaterialLike, Stack, Texture, Varying, load
 
 LINE = 116  # characters of comments

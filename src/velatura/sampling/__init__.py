@@ -1,1 +1,0 @@
-"""Functions sampled over directions, and the numbers to sample with."""
