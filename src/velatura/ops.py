@@ -22,6 +22,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import fields, is_dataclass
 from functools import cache
 from itertools import pairwise
 from typing import Any, Protocol
@@ -353,6 +354,29 @@ def clip(x: Value, low: Value, high: Value) -> Value:
 def select(condition: Value, a: Value, b: Value) -> Value:
     """`a` where the condition holds, else `b`; both are worked out."""
     return _dialect(condition, a, b).select(condition, a, b)
+
+
+def select_record(condition: Value, yes: Any, no: Any) -> Any:
+    """`yes` where the condition holds, else `no`: dataclasses, tuples and lists value by value.
+
+    What is the same in both, or an equal constant, stays as it is; None in either is None. A class whose records are
+    no sum of their values states its own choice as a static method `selected`, of the same arguments.
+    """
+    if yes is no:
+        return yes
+    own = getattr(type(yes), "selected", None) or getattr(type(no), "selected", None)
+    if own:
+        return own(condition, yes, no)
+    if yes is None or no is None:
+        return None
+    if isinstance(yes, tuple | list):
+        items = [select_record(condition, x, y) for x, y in zip(yes, no)]
+        return type(yes)(*items) if hasattr(yes, "_fields") else type(yes)(items)
+    if is_dataclass(yes):
+        kind: Any = type(yes)
+        return kind(*(select_record(condition, getattr(yes, x.name), getattr(no, x.name)) for x in fields(yes)))
+    known = isinstance(yes, float | bool) and isinstance(no, float | bool) and yes == no
+    return yes if known else select(condition, yes, no)
 
 
 def divide(a: Value, b: Value) -> Value:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -211,3 +212,17 @@ def test_values_and_gradients_are_finite_at_the_edge(function: Callable[[Any], A
     assert y[0] == value
     assert np.isfinite(x.grad.numpy()).all()
     assert function(0.0) == value
+
+
+def test_records_are_selected_value_by_value() -> None:
+    @dataclass
+    class Pair:
+        a: Any
+        b: tuple[Any, ...] | None
+
+    yes, no = Pair(X, (1.0, Y)), Pair(Y, (1.0, X))
+    found = ops.select_record(X < Y, yes, no)
+    assert np.array_equal(found.a, np.where(X < Y, X, Y)) and np.array_equal(found.b[1], np.where(X < Y, Y, X))
+    assert found.b[0] == 1.0 and isinstance(found.b[0], float)
+    assert ops.select_record(X < Y, yes, yes) is yes
+    assert ops.select_record(X < Y, yes, replace(no, b=None)).b is None

@@ -115,14 +115,14 @@ def _sample_interface(meeting: SurfaceMeeting, carried: Value, u1: Value, u2: Va
     chance = ops.divide(ops.mean(carried * reflectance), ops.mean(carried * (reflectance + passing)))
     chance = ops.select(meeting.opaque, 1.0, chance)
     reflected = u3 < chance
-    o = select(reflected, ggx.reflect(i, h), refraction.refract(i, h, eta))
+    o = ops.select_record(reflected, ggx.reflect(i, h), refraction.refract(i, h, eta))
     # Weigh
     share = ops.select(reflected, reflectance, passing)
     weight = ops.divide(share, ops.select(reflected, chance, 1 - chance)) * surface.masking(o)
     weight = ops.select(_same(o[2] > 0, reflected), weight, 0.0)
     density, back = _densities(surface, i, h, o, ops.select(reflected, 1.0, eta))
     density = ops.select(surface.smooth, _spread(i, o, eta), density) * ops.mean(share)
-    light = select(reflected, mirrored, refracted)
+    light = ops.select_record(reflected, mirrored, refracted)
     light = light and light.seen_by(surface.out_of)
     return ScatteringEvent(surface.out_of(o), weight, reflected, density, ops.select(surface.smooth, 1.0, back), light)
 
@@ -173,17 +173,8 @@ def _with_diffuse_base(
         return interface()
     if meeting.layers.count == 1:
         return diffuse()
-    pairs = zip(vars(diffuse()).values(), vars(interface()).values())
-    return ScatteringEvent(*(select(meeting.opaque, a, b) for a, b in pairs))
-
-
-def select(where: Value, a: Value, b: Value) -> Value:
-    """`ops.select` of values, directions or polarisations, which may be left out of both."""
-    if a is None or b is None:
-        return None
-    if isinstance(a, Polarisation):
-        return Polarisation(*(select(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
-    return tuple(select(where, x, y) for x, y in zip(a, b)) if isinstance(a, tuple) else ops.select(where, a, b)
+    scattered: ScatteringEvent = ops.select_record(meeting.opaque, diffuse(), interface())
+    return scattered
 
 
 def _same(a: Value, b: Value) -> Value:

@@ -15,7 +15,7 @@ from velatura.optics import ggx, microsurface, refraction
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Polarisation
 from velatura.reference import events
-from velatura.reference.events import ScatteringEvent, SurfaceMeeting, select
+from velatura.reference.events import ScatteringEvent, SurfaceMeeting
 
 _MOST_EVENTS = 1000
 _FLOOR = 0.02  # density, per steradian
@@ -55,12 +55,14 @@ def scatter(
         rough &= meeting.opaque ^ True
     # Scatter between the facets elsewhere
     flight = _fly(types, meeting, carried, rng, active & rough, surface.into(target))
-    wo = surface.out_of(select(flight.outside, flight.w, _reverse(flight.w)))
+    wo = surface.out_of(ops.select_record(flight.outside, flight.w, _reverse(flight.w)))
     many = _weighed(events.evaluate(meeting, wo, flight.outside), flight.weight)
     if flight.light is not None:
-        many = replace(many, light=select(flight.outside, flight.light, flight.light.inverted).seen_by(surface.out_of))
+        many = replace(
+            many, light=ops.select_record(flight.outside, flight.light, flight.light.inverted).seen_by(surface.out_of)
+        )
     value = _weighed(towards, flight.value)
-    return _choose(rough, many, once), _choose(rough, value, towards), flight.rng
+    return ops.select_record(rough, many, once), ops.select_record(rough, value, towards), flight.rng
 
 
 def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[ScatteringEvent, Any]:
@@ -73,7 +75,7 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     colour = types.Float(1) + 0.0 * meeting.shares(1.0)[0]
     flight = _fly(types, meeting, colour, rng, rough, UP)
     through = flight.outside ^ True
-    wo = select(through, surface.out_of(_reverse(flight.w)), once.wo)
+    wo = ops.select_record(through, surface.out_of(_reverse(flight.w)), once.wo)
     # Weigh by what single events would do, here and back
     i = meeting.wi
     below = meeting.above ^ True
@@ -81,7 +83,7 @@ def sample_refraction(types: Any, meeting: SurfaceMeeting, rng: Any) -> tuple[Sc
     densities = events.evaluate(back, (i[0], i[1], -i[2]), False)
     turned = replace(densities, wo=wo, density=densities.density_back, density_back=densities.density)
     many = _weighed(turned, ops.select(through, flight.weight, 0.0))
-    return _choose(rough, many, once), flight.rng
+    return ops.select_record(rough, many, once), flight.rng
 
 
 def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: Value, target: Direction) -> Flight:
@@ -102,7 +104,7 @@ def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: 
         f.alive &= f.rank <= 1
         i = _reverse(f.w)
         # Send light to the target
-        goal = select(f.outside, target, _reverse(target))
+        goal = ops.select_record(f.outside, target, _reverse(target))
         f.value = ops.select(f.alive, f.value + f.weight * _value(meeting, f, i, goal), f.value)
         # Meet a facet
         h = ggx.sample_visible(i, *alpha, f.rng.next_float32(), f.rng.next_float32())
@@ -115,10 +117,12 @@ def _fly(types: Any, meeting: SurfaceMeeting, carried: Value, rng: Any, active: 
         share = ops.select(reflected, reflectance / chance, ops.divide(passing, 1 - chance))
         f.weight = ops.select(f.alive, f.weight * share, f.weight)
         # Turn; for refracted light the surface is upside down
-        o = select(reflected, ggx.reflect(i, h), _reverse(refraction.refract(i, h, _eta(meeting, f.outside))))
-        f.w = select(f.alive, o, f.w)
+        o = ops.select_record(
+            reflected, ggx.reflect(i, h), _reverse(refraction.refract(i, h, _eta(meeting, f.outside)))
+        )
+        f.w = ops.select_record(f.alive, o, f.w)
         if mirrored is not None and refracted is not None:
-            f.light = select(f.alive, select(reflected, mirrored, refracted.inverted), f.light)
+            f.light = ops.select_record(f.alive, ops.select_record(reflected, mirrored, refracted.inverted), f.light)
         f.rank = ops.select(reflected | (f.alive ^ True), f.rank, 1 - f.rank)
         f.outside ^= f.alive & (reflected ^ True)
         f.count += 1
@@ -147,7 +151,7 @@ def _value(meeting: SurfaceMeeting, flight: Flight, i: Direction, goal: Directio
     share = ops.select(same_side, *meeting.layers.shares(meeting.j, ops.maximum(cos_i, 0.0), *sides))
     density = microsurface.visible(i, h, *alpha) * refraction.jacobian(cos_i, cos_o, eta)
     rank = ops.select(same_side, flight.rank, 1 - flight.rank)
-    leaves = microsurface.escape(select(same_side, goal, _reverse(goal)), rank, *alpha)
+    leaves = microsurface.escape(ops.select_record(same_side, goal, _reverse(goal)), rank, *alpha)
     return share * ops.select(serves, density * leaves, 0.0)
 
 
@@ -164,10 +168,6 @@ def _sides(meeting: SurfaceMeeting, outside: Value) -> tuple[Value, Value, Value
 
 def _weighed(event: ScatteringEvent, weight: Value) -> ScatteringEvent:
     return replace(event, weight=weight, density=event.density + _FLOOR, density_back=event.density_back + _FLOOR)
-
-
-def _choose(where: Value, a: ScatteringEvent, b: ScatteringEvent) -> ScatteringEvent:
-    return ScatteringEvent(*(select(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
 
 
 def _reverse(w: Direction) -> Direction:

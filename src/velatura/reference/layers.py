@@ -8,9 +8,9 @@ chooses.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import pi
-from typing import TypeVar
+from typing import Any
 
 from velatura import ops
 from velatura.films import coated
@@ -82,9 +82,6 @@ class WalkedSlab:
         return ops.exp(-(self.absorption + self.scattering) * length)
 
 
-Part = TypeVar("Part", WalkedSurface, WalkedSlab)
-
-
 @dataclass(frozen=True)
 class WalkedLayers:
     """Surfaces and slabs from the top, slab n included; `base` is the kind of the last surface.
@@ -119,23 +116,18 @@ class WalkedLayers:
     def reversed(self, where: Value) -> WalkedLayers:
         """The stack seen from below where the condition holds; only for one that transmits."""
 
-        def swap(items: Sequence[Value]) -> tuple[Value, ...]:
-            return tuple(_choose(where, below, above) for above, below in zip(items, reversed(items)))
-
-        def swapped(items: Sequence[Part]) -> tuple[Part, ...]:
-            columns = (swap([getattr(item, field.name) for item in items]) for field in fields(items[0]))
-            return tuple(type(items[0])(*values) for values in zip(*columns))
-
-        surfaces, slabs = swapped(self.surfaces), swapped(self.slabs)
-        return replace(self, surfaces=surfaces, slabs=slabs, index=swap(self.index), flipped=where)
+        surfaces, slabs, index = (
+            ops.select_record(where, items[::-1], items) for items in (self.surfaces, self.slabs, self.index)
+        )
+        return replace(self, surfaces=surfaces, slabs=slabs, index=index, flipped=where)
 
     # Surfaces and slabs -----------------------------------------------------------------------------------------------
 
     def surface(self, j: Value) -> WalkedSurface:
-        return _picked(self.surfaces, j)
+        return pick(self.surfaces, j)
 
     def slab(self, k: Value) -> WalkedSlab:
-        return _picked(self.slabs, k)
+        return pick(self.slabs, k)
 
     def is_base(self, j: Value) -> Value:
         return True if self.count == 1 else j == self.count - 1
@@ -184,7 +176,7 @@ class WalkedLayers:
         passes = cos_t > 0
         between = mueller(*fresnel.dielectric_amplitudes(cosine, cos_t, n_out / n_in))
         total = mueller(*fresnel.total_amplitudes(cosine, eta))
-        reflection = _of_either(passes, between, replace(total, s=1.0, p=1.0))
+        reflection = ops.select_record(passes, between, replace(total, s=1.0, p=1.0))
         refraction = complement(reflection)
         if any(self._on_dielectrics):
             bare, above = (reflection, refraction), self._from_above(above)
@@ -196,7 +188,7 @@ class WalkedLayers:
                 return _polarised(films).dielectric(films.from_rarer(above), cosine, cos_t, eta, n_in)
 
             each = [matrices(films) for films in self._on_dielectrics]
-            reflection, refraction = (self._picked(column, j) for column in zip(*each))
+            reflection, refraction = (self._of_interface(column, j) for column in zip(*each))
         if self.base == "mirror":
             base = Mueller(1.0, 1.0, -1.0, 0.0)
         elif self.base == "conductor" and (films := self.films[-1]):
@@ -205,15 +197,11 @@ class WalkedLayers:
             base = mueller(*fresnel.conductor_amplitudes(cosine, self.index[-1] / n_in, self.extinction / n_in))
         else:
             return reflection, refraction
-        return _of_either(self.is_base(j), base, reflection), refraction
+        return ops.select_record(self.is_base(j), base, reflection), refraction
 
-    def _picked(self, matrices: Sequence[Mueller], j: Value) -> Mueller:
-        columns = zip(*(vars(matrix).values() for matrix in matrices))
-        return Mueller(*(self._of_interface(column, j) for column in columns))
-
-    def _of_interface(self, items: Sequence[Value], j: Value) -> Value:
-        """The value of surface j, of those of the interfaces as they are listed."""
-        return _choose(self.flipped, pick(items[::-1], j), pick(items, j))
+    def _of_interface(self, items: Sequence[Any], j: Value) -> Any:
+        """Value or record of surface j, among those of the interfaces as they are listed."""
+        return ops.select_record(self.flipped, pick(items[::-1], j), pick(items, j))
 
     def meet(
         self,
@@ -283,16 +271,11 @@ def zeros(material: Material) -> set[Address]:
     }
 
 
-def _picked(parts: Sequence[Part], index: Value) -> Part:
-    """The surface or slab at an index, by its fields."""
-    return type(parts[0])(*(pick([getattr(part, field.name) for part in parts], index) for field in fields(parts[0])))
-
-
-def pick(items: Sequence[Value], index: Value) -> Value:
-    """The item at an index that differs from lane to lane; without a look-up where all items are one."""
+def pick(items: Sequence[Any], index: Value) -> Any:
+    """The value or record at an index that differs from lane to lane; without a look-up where all are one."""
     chosen = items[-1]
     for i, item in reversed(list(enumerate(items[:-1]))):
-        chosen = _choose(index == i, item, chosen)
+        chosen = ops.select_record(index == i, item, chosen)
     return chosen
 
 
@@ -306,15 +289,6 @@ def _surface(layer: InterfaceValues, matched: Value) -> WalkedSurface:
     smooth = (ops.maximum(u, v) < ALPHA_MIN) | matched
     turn = 0.0 if _is_zero(rotation) else rotation * (pi / 180)
     return WalkedSurface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)
-
-
-def _choose(where: Value, a: Value, b: Value) -> Value:
-    same = a is b or (isinstance(a, float | bool) and isinstance(b, float | bool) and a == b)
-    return a if same else ops.select(where, a, b)
-
-
-def _of_either(where: Value, a: Mueller, b: Mueller) -> Mueller:
-    return Mueller(*(_choose(where, x, y) for x, y in zip(vars(a).values(), vars(b).values())))
 
 
 def _product(a: Value, b: Value) -> Value:

@@ -164,7 +164,7 @@ def _scatter(types: Any, layers: WalkedLayers, path: Path, out: WayOut | None, p
         density = ops.select(path.inside, phase.henyey_greenstein(cosine, g), density)
         chain = ops.select(path.inside, 1.0, chain)
         slab = ops.select(path.inside, path.slab, slab)
-        light = light and events.select(path.inside, unpolarised(turned, path.weight), light)
+        light = light and ops.select_record(path.inside, unpolarised(turned, path.weight), light)
     path.smooth &= (rough | path.inside) ^ True
     path.w, path.slab, path.light = ggx.normalize(turned), slab, light
     path.density, path.chain = density, ops.minimum(chain, events.HUGE)
