@@ -20,7 +20,7 @@ import numpy as np
 
 from velatura import kernel
 from velatura.errors import InvalidInput
-from velatura.films import coated
+from velatura.films import textured as textured_films
 from velatura.stack import (
     Address,
     Brushing,
@@ -283,12 +283,12 @@ class Binding:
             return ()
         spans = []
         for address in (self.addresses[name] for name in self.images):
-            if address.role in coated.UNKNOWN:
-                texels = self._texels(address, coated.UNKNOWN)
-                spans.append(coated.Span(address, float(texels.min()), float(texels.max())))
+            if address.role in textured_films.UNKNOWN:
+                texels = self._texels(address, textured_films.UNKNOWN)
+                spans.append(textured_films.Span(address, float(texels.min()), float(texels.max())))
         number = mi.Float if dr.is_jit_v(mi.Float) else None
         some = {**dict.fromkeys(self.images, 0.0), **self._colours()}
-        return coated.constant(Material.from_flat(self.stack, some, self._light), spans, number)
+        return textured_films.constant_films(Material.from_flat(self.stack, some, self._light), spans, number)
 
     @property
     def interferes(self) -> bool:

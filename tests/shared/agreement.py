@@ -14,7 +14,7 @@ from machines import Changing, Machine
 
 from velatura import tables
 from velatura.editor import messages
-from velatura.films import coated as interfaces
+from velatura.films.of_material import films_of
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf
 from velatura.model.solved import rotation_frame, solve
@@ -127,7 +127,7 @@ def in_numpy(case: Case, recording: Recording) -> Results:
     if isinstance(recording.baked, Tabulated):
         return _solved(stack, recording.baked.solver, wi, wo, u)
     alone = Material.of(stack)
-    material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(interfaces.of(alone))
+    material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(films_of(alone))
     body = bsdf.body(material, recording.model, variance(stack), at_a_point())
     seen = bsdf.scattered(body, wi)
     lobes = [*seen.reflected, *([seen.transmitted] if seen.transmitted else [])]

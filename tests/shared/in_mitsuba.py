@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from velatura import kernel
-from velatura.films import coated
+from velatura.films.of_material import films_of
 from velatura.model import Model
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf
@@ -75,7 +75,7 @@ def of_table(baked: closures.Tabulated) -> Found:
 def of_layers(stack: Stack, model: Model) -> Found:
     """The closures of a model in closed form, worked out at every point."""
     mi = kernel.mitsuba()
-    coatings = coated.of(Material.of(stack, lambda at, x: 0.0 if isinstance(x, Texture) else plain(at, x)))
+    coatings = films_of(Material.of(stack, lambda at, x: 0.0 if isinstance(x, Texture) else plain(at, x)))
     # Images stand upright where v goes up, as in Blender; Mitsuba's rectangle has their first row at v = 0
     upright = mi.ScalarTransform3f().scale([1, -1])
     images = {

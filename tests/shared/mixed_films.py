@@ -12,7 +12,7 @@ import numpy as np
 import tmm
 
 from velatura import stack
-from velatura.films import coated, polarised
+from velatura.films import of_material, polarised
 from velatura.optics import coatings, films
 from velatura.optics.films import Film, Response
 from velatura.stack import Interface, Layer, Medium, Stack
@@ -28,7 +28,7 @@ def light_of(wavelength_nm: float) -> Iterator[None]:
         return np.repeat(shares(np.array([wavelength_nm]), cosines).swapaxes(1, 2), 3, axis=1)
 
     def forget() -> None:
-        coated._coated.cache_clear()
+        of_material._coated.cache_clear()
         polarised.polarised_films.cache_clear()
 
     forget()

@@ -10,7 +10,7 @@ import tmm
 
 import velatura as vt
 from velatura import kernel
-from velatura.films import coated
+from velatura.films.of_material import films_of
 from velatura.optics import films, fresnel
 from velatura.optics.coatings import Coating, ColouredFilm, quadrature
 from velatura.optics.films import Film
@@ -242,7 +242,7 @@ def test_what_is_sampled_is_a_fine_integration_at_any_angle(kind: str) -> None:
         else:
             layer = vt.Interface(eta=n if kind == "glass" else 1.0, films=on_it)
         stack = vt.Stack([layer], exterior=n if kind == "glass from inside" else 1.0)
-        (sampled,) = coated.of(Material.of(stack))
+        (sampled,) = films_of(Material.of(stack))
         assert sampled and sampled.coating
         cosines = np.array([*rng.uniform(0, 1, 8), *rng.uniform(1e-3, 0.05, 4), 1.0])
         assert np.abs(sampled.at(cosines, 1.0) - finely(sampled.coating, cosines)).max() < 3e-3
@@ -330,5 +330,5 @@ def test_a_fixed_quadrature_has_the_colours_of_a_fine_one(thickest_nm: float) ->
 @pytest.mark.parametrize("preset", [name for name in vt.presets() if not any(vt.preset(name).films)])
 def test_interfaces_without_films_have_no_tables(preset: str) -> None:
     """Neither rows of reflectances, nor a texture beside a shader."""
-    assert not any(coated.of(Material.of(vt.preset(preset))))
+    assert not any(films_of(Material.of(vt.preset(preset))))
     assert shader(vt.preset(preset)).films is None

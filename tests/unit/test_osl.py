@@ -12,7 +12,7 @@ from agreement import PATTERNS, coated, random_case
 from evaluation import evaluate
 
 import velatura as vt
-from velatura.films import coated as interfaces
+from velatura.films.of_material import films_of
 from velatura.model import MODELS, named
 from velatura.model.context import at_a_point
 from velatura.model.papers import bsdf
@@ -46,7 +46,7 @@ def test_recorded_closures_are_those_of_numpy(pattern, model: str, filmed: bool)
     body = bsdf.body(recorded, chosen, variance(stack), at_a_point())
     found = closures.of_body(body, wi, straight=stack.thin)
     alone = Material.of(stack)
-    material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(interfaces.of(alone))
+    material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(films_of(alone))
     known = bsdf.body(material, chosen, variance(stack), at_a_point())
     truth = closures.of_body(known, tuple(case.directions["wi"]), straight=stack.thin)
 

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from velatura import kernel, ops
 from velatura.api import lobes
-from velatura.films.coated import NODES, Coated
+from velatura.films.tables import NODES, Coated
 from velatura.optics import fresnel, ggx
 from velatura.stack import Interface, Stack
 from velatura.stack.spectra import srgb_weights

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.films.coated import NODES, Sampled
+from velatura.films.tables import NODES, ColourTable
 from velatura.ops import Value
 from velatura.optics.coatings import Coating, Sensitivity
 from velatura.optics.polarisation import Mueller
@@ -27,17 +27,17 @@ class PolarisedFilms:
     side over the one at the critical angle. It is None for what is opaque, which has the first of the others alone.
     """
 
-    def __init__(self, within: Sampled, total: Sampled | None) -> None:
+    def __init__(self, within: ColourTable, total: ColourTable | None) -> None:
         self.within, self.total = within, total
 
     def opaque(self, cosine: Value, like: Value) -> Mueller:
-        """Of light that an opaque interface reflects, by colours of the kind of `like`."""
+        """Matrix of light that an opaque interface reflects, by colours of the kind of `like`."""
         return Mueller(*self.within.colours(like, cosine))
 
     def dielectric(
         self, from_rarer: Value, cosine: Value, cos_t: Value, eta: Value, like: Value
     ) -> tuple[Mueller, Mueller]:
-        """Of light that is reflected, and refracted, for cosines on its own side and beyond, 0 where it is totally
+        """Matrices of reflected and of refracted light, for cosines on its own side and beyond, 0 where it is totally
         reflected, and the index there over that here."""
         assert self.total
         passes = cos_t > 0
@@ -51,11 +51,11 @@ class PolarisedFilms:
 
 @functools.lru_cache(16)
 def polarised_films(coating: Coating, opaque: bool, sensitivity: Sensitivity) -> PolarisedFilms:
-    """Of films between a medium of the lower index, above, and one of the higher, or an opaque one."""
+    """Matrices of films between a medium of the lower index, above, and one of the higher, or an opaque one."""
     cosines = np.linspace(0, 1, NODES)
 
     def matrix(of: Coating, name: str, cos: Array, most: Array | float = 1.0) -> list[Array]:
-        """Its numbers, of shares up to `most` in the mean of s and p."""
+        """Numbers of a matrix, of shares up to `most` in the mean of s and p."""
         names = [f"{name}_{part}" for part in ("s", "p", "real", "imaginary")]
         s, p, real, imaginary = of.shares(names, cos, sensitivity)
         # Colours outside sRGB are clipped as those of unpolarised light are
@@ -76,5 +76,5 @@ def polarised_films(coating: Coating, opaque: bool, sensitivity: Sensitivity) ->
     return PolarisedFilms(_sampled([*reflected, *below, *passed]), _sampled(total))
 
 
-def _sampled(parts: list[Array]) -> Sampled:
-    return Sampled(np.concatenate(parts).T.copy())
+def _sampled(parts: list[Array]) -> ColourTable:
+    return ColourTable(np.concatenate(parts).T.copy())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.films.coated import Coated, Sampled
+from velatura.films.tables import Coated, ColourTable
 from velatura.ops import Value
 from velatura.tables import coordinates
 
@@ -18,7 +18,7 @@ WALKED = 4  # roughnesses for one at which light walks between facets
 COARSE, FEW = (33, 9), 144  # nodes, and normals, of coarse ones
 
 
-class FilmAverage(Sampled):
+class FilmAverage(ColourTable):
     """The directional albedo of an isotropic interface, sampled over direction and roughness, and after it what films
     of a dielectric absorb.
 
@@ -69,5 +69,5 @@ def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverag
     found = found.transpose(2, 0, 1)
     if coarse:
         even = np.meshgrid(*(np.linspace(0, 1, n) for n in NODES), indexing="ij")
-        found = np.stack(ops.interpolate(Sampled(found), *(each.ravel() for each in even)), axis=-1)
+        found = np.stack(ops.interpolate(ColourTable(found), *(each.ravel() for each in even)), axis=-1)
     return FilmAverage(found.reshape(*NODES, -1).copy(), channels, critical)

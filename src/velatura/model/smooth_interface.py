@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from velatura import ops
-from velatura.films import coated
-from velatura.films.coated import Either, Films
+from velatura.films.of_material import films_of
+from velatura.films.reflectance import Films, InterfaceFilms
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.stack import InterfaceValues, Material
@@ -24,7 +24,7 @@ class SmoothInterface(ops.Named):
     eta: Value | None
     kappa: Value | None
     n12: Value
-    films: Films = field(default=None, kw_only=True)
+    films: Films | None = field(default=None, kw_only=True)
 
     @classmethod
     def of(cls, meeting: Meeting) -> SmoothInterface:
@@ -45,7 +45,7 @@ class SmoothInterface(ops.Named):
         if self.eta is None:
             return 1.0
         if self.films:
-            if self.opaque and not isinstance(self.films, Either):
+            if self.opaque and isinstance(self.films, InterfaceFilms):
                 return self.films.at(cos_theta, self.eta)
             return self.films.between(cos_theta, fresnel.cos_transmitted(cos_theta, self.n12), self.eta)
         if self.kappa is None:
@@ -78,5 +78,5 @@ class SmoothInterface(ops.Named):
 
 def smooth_interfaces(material: Material) -> list[SmoothInterface]:
     """The interfaces of a material from the top."""
-    each = chain(material, coated.of(material))
+    each = chain(material, films_of(material))
     return [SmoothInterface.of(meeting) for meeting in each if isinstance(meeting.layer, InterfaceValues)]

@@ -13,9 +13,10 @@ from math import pi
 from typing import Any
 
 from velatura import ops
-from velatura.films import coated
-from velatura.films.coated import Coated, OfInterface
+from velatura.films.of_material import films_of
 from velatura.films.polarised import PolarisedFilms, polarised_films
+from velatura.films.reflectance import InterfaceFilms
+from velatura.films.tables import Coated
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
@@ -97,7 +98,7 @@ class WalkedLayers:
     extinction: Value = 0.0
     albedo: Value = 0.0
     microsurface: bool = False
-    films: tuple[OfInterface | None, ...] = ()
+    films: tuple[InterfaceFilms | None, ...] = ()
     flipped: Value = False
 
     @property
@@ -161,7 +162,7 @@ class WalkedLayers:
         return ops.select(is_base, base, reflected), ops.select(is_base, 0.0, passing)
 
     @property
-    def _on_dielectrics(self) -> Sequence[OfInterface | None]:
+    def _on_dielectrics(self) -> Sequence[InterfaceFilms | None]:
         """The films on each surface, but for those of an opaque one."""
         return self.films if self.transmits else (*self.films[:-1], None)
 
@@ -181,7 +182,7 @@ class WalkedLayers:
         if any(self._on_dielectrics):
             bare, above = (reflection, refraction), self._from_above(above)
 
-            def matrices(films: OfInterface | None) -> tuple[Mueller, Mueller]:
+            def matrices(films: InterfaceFilms | None) -> tuple[Mueller, Mueller]:
                 if not films:
                     return bare
                 assert isinstance(films, Coated)
@@ -229,9 +230,9 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
     surfaces: list[WalkedSurface] = []
     slabs: list[WalkedSlab] = []
     index: list[Value] = [material.exterior]
-    films: list[OfInterface | None] = []
+    films: list[InterfaceFilms | None] = []
     medium, last = WalkedSlab(), material.layers[-1]
-    for layer, on_it in zip(material.solid().layers, coated.of(material)):
+    for layer, on_it in zip(material.solid().layers, films_of(material)):
         if isinstance(layer, MediumValues):
             medium = WalkedSlab(_product(layer.sigma_a, layer.depth), _product(layer.sigma_s, layer.depth), layer.g)
             continue
@@ -258,7 +259,7 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
     )
 
 
-def _polarised(films: OfInterface) -> PolarisedFilms:
+def _polarised(films: InterfaceFilms) -> PolarisedFilms:
     assert isinstance(films, Coated) and films.coating
     return polarised_films(films.coating, films.n12 is None, srgb_sensitivity)
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from velatura.films.coated import Coated
+from velatura.films.tables import Coated
 from velatura.ops import Value
 from velatura.optics.coatings import FINEST, PER_PERIOD, RANGE_NM
 from velatura.optics.films import Film as FilmOfChannel

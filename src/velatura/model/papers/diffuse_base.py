@@ -15,7 +15,7 @@ from math import pi
 import numpy as np
 
 from velatura import ops, tables
-from velatura.films.coated import Either, OfInterface
+from velatura.films.reflectance import Films
 from velatura.model.context import as_it_is
 from velatura.model.papers import operators
 from velatura.model.papers.prepare import Prepared, PreparedInterface, PreparedMedium
@@ -228,7 +228,7 @@ class _Films:
     """Films on an interface of a relative index, by colour and for all, as diffuse light from one side meets them."""
 
     tables: Tables
-    films: Either | OfInterface
+    films: Films
     eta: Value
     n12: Value
     alpha: Value

@@ -10,8 +10,9 @@ from functools import partial
 from math import pi
 
 from velatura import ops, tables
-from velatura.films import coated
-from velatura.films.coated import Coated, Either, absorbs
+from velatura.films.of_material import films_of
+from velatura.films.reflectance import Either, absorbs
+from velatura.films.tables import Coated
 from velatura.model.base import Model
 from velatura.model.context import Context
 from velatura.model.film_average import film_average
@@ -98,7 +99,7 @@ def prepare(
     layers: list[PreparedInterface | PreparedMedium] = []
     n_leaving, base = None, None
     n: Value = 1.0  # index so far, over that outside
-    for meeting in chain(material, coated.of(material)):
+    for meeting in chain(material, films_of(material)):
         layer, above = meeting.layer, meeting.above
         if isinstance(layer, InterfaceValues):
             layers.append(_interface(layer, meeting, n_leaving, averages, variance))

@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from velatura import ops
-from velatura.films.coated import OfInterface, either
+from velatura.films.reflectance import InterfaceFilms
 from velatura.model.base import ALL, Query
 from velatura.model.directions import select_direction, upright
 from velatura.model.roughness_maps import RoughnessMap
@@ -373,13 +373,13 @@ def _of_either(where: Value, a: SmoothInterface | None, b: SmoothInterface | Non
     eta, n12 = (
         ops.select(where, getattr(a, name) if a else 1.0, getattr(b, name) if b else 1.0) for name in ("eta", "n12")
     )
-    return replace(some, eta=eta, n12=n12, films=either(where, *(x.films if x else None for x in (a, b))))
+    return replace(some, eta=eta, n12=n12, films=ops.select_record(where, *(x.films if x else None for x in (a, b))))
 
 
 def select(where: Value, a: Any, b: Any) -> Any:
     """Records of values, value by value; what is known of a record holds where it does of both."""
-    if isinstance(a, OfInterface) or isinstance(b, OfInterface):
-        return either(where, a, b)
+    if isinstance(a, InterfaceFilms) or isinstance(b, InterfaceFilms):
+        return ops.select_record(where, a, b)
     if is_dataclass(a) and not isinstance(a, type):
         return type(a)(*(select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
     if isinstance(a, tuple) and hasattr(a, "_fields"):

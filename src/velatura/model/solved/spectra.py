@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
-from velatura.films import coated
+from velatura.films.of_material import greatest_optical_thickness_nm
 from velatura.model.base import Body, Model
 from velatura.model.context import Context
 from velatura.model.solved.columns import Declaration
@@ -129,7 +129,7 @@ def solve(material: Material, places: Array, model: Model, variance: type[Varian
 
 def nodes_of(material: Material) -> int:
     """How many nodes resolve the spectra of a material of numbers."""
-    return int(min(max(NODES, PER_NM * coated.optical_nm(material)), NODES_MAX))
+    return int(min(max(NODES, PER_NM * greatest_optical_thickness_nm(material)), NODES_MAX))
 
 
 def axis(material: Material, places: Array) -> Wavelengths:

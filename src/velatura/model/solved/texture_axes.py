@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from velatura import ops
-from velatura.films import coated
+from velatura.films import textured as textured_films
 from velatura.ops import Value
 from velatura.stack import Address, Material
 
@@ -36,7 +36,7 @@ COARSER = 1.2  # times, where there would be too many nodes
 QUARTER = 90.0  # of a turn, to either side
 
 #: What textures span that cannot be looked at, by role; values beyond take the nearest.
-UNKNOWN = {**dict.fromkeys(("depth", "sigma_a", "sigma_s"), (0.0, 6.25)), **coated.UNKNOWN}
+UNKNOWN = {**dict.fromkeys(("depth", "sigma_a", "sigma_s"), (0.0, 6.25)), **textured_films.UNKNOWN}
 
 
 @dataclass(frozen=True)

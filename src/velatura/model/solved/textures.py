@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.films import coated
+from velatura.films import textured as textured_films
 from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
 from velatura.model.solved import solve, texture_axes
@@ -228,8 +228,8 @@ def _tabulated(
     together = min(len(ranges), TOGETHER if isotropic and not spectral and not films else 2)
     material = material.solid()
     numbers = solve.plain(material)
-    spans = [coated.Span(at, *ends) for of, *ends in _textures(ranges) for at in of]
-    step = partial(_step, coated.highest(numbers, spans))
+    spans = [textured_films.Span(at, *ends) for of, *ends in _textures(ranges) for at in of]
+    step = partial(_step, textured_films.highest(numbers, spans))
     waves_max = WAVES_MAX[together] if films == 1 else WAVES_OF_TWO
     spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together, step(x[0][0]), waves_max) for x in ranges]
     start = texture_axes.placed(numbers, spanned, [axis.middle for axis in spanned])
@@ -330,7 +330,7 @@ def _step(highest: Material, address: Address) -> float | None:
         return None
     layer = highest.layers[address.layer]
     assert isinstance(layer, InterfaceValues)
-    return coated.step(address, layer)
+    return textured_films.step(address, layer)
 
 
 Group = tuple[Axis | Wavelengths, ...]

@@ -3,7 +3,7 @@
 Code knows them by name: `film2` is the reflectance of the facets of layer 2 over the cosine, `film2_above` and
 `film2_below` its directional albedo for light from either side. Of a dielectric with films that absorb, `film2_rarer`,
 `film2_denser` and `film2_passing` are the reflectances from either side and what passes, over the coordinate of
-`sampling.coated.Absorbing`, and `film2_above_lost` and `film2_below_lost` the averages of what is absorbed. Where a
+`films.tables.Absorbing`, and `film2_above_lost` and `film2_below_lost` the averages of what is absorbed. Where a
 user changes values, code knows which interfaces have films, and whether these absorb, and no more; the texture changes
 with the values.
 
@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.errors import InvalidInput
-from velatura.films import coated
-from velatura.films.coated import NODES, Absorbing, Average, Axis, Coated
+from velatura.films.of_material import films_of
+from velatura.films.tables import NODES, Absorbing, Average, Coated, ThicknessAxis
+from velatura.films.textured import over_thickness
 from velatura.model import Model
 from velatura.model.film_average import NODES as AVERAGED
 from velatura.model.film_average import film_average
@@ -58,7 +59,7 @@ class Read(Coated):
         data: Array | None,
         n12: Value | None,
         absorbing: bool,
-        axis: Axis | None = None,
+        axis: ThicknessAxis | None = None,
         turned: bool = False,
     ) -> None:
         super().__init__(np.empty((0, 3)) if data is None else data, 1, axis=axis)
@@ -153,7 +154,7 @@ def coated_layers(stack: Stack) -> list[Coated | None]:
     Raises:
         InvalidInput: an index of a film, or beside one, that comes from one; or several thicknesses of one interface.
     """
-    beside, axes = _beside(stack), dict[int, Axis]()
+    beside, axes = _beside(stack), dict[int, ThicknessAxis]()
 
     def value(address: Address, described: Any) -> Value:
         thickness = address.role == "film_thickness_nm"
@@ -169,17 +170,16 @@ def coated_layers(stack: Stack) -> list[Coated | None]:
 
     material = Material.of(stack, value)
     return [
-        coated.over_thickness(material, n, axes[n], ()) if n in axes else films
-        for n, films in enumerate(coated.of(material))
+        over_thickness(material, n, axes[n], ()) if n in axes else films for n, films in enumerate(films_of(material))
     ]
 
 
-def _axis(address: Address, texture: Texture) -> Axis:
+def _axis(address: Address, texture: Texture) -> ThicknessAxis:
     """The thicknesses that texels from 0 to 1 give."""
     assert address.film is not None
     ends = np.array(texture.curve or (0.0, 1.0)) * texture.scale + texture.offset
     low, high = np.clip((ends.min(), ends.max()), *address.declared.within).tolist()
-    return Axis.around(address.film, low, high, STEP_NM)
+    return ThicknessAxis.around(address.film, low, high, STEP_NM)
 
 
 def _beside(stack: Stack) -> set[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from velatura import ops
 from velatura.errors import InvalidInput
-from velatura.films import coated
+from velatura.films.of_material import films_of
 from velatura.model import DEFAULT, Model, named, variance_kind
 from velatura.model.base import Body
 from velatura.model.context import at_a_point
@@ -126,7 +126,7 @@ def record(
         baked = bake(recorded, prepared())
     elif baking and stack.interfaces:
         numbers = Material.of(stack)
-        numbers = numbers.coated(coated.of(numbers))
+        numbers = numbers.coated(films_of(numbers))
         baked = bake_known(prepared(), bsdf.body(numbers, chosen, kind, at_a_point()))
     shown: list[str] = []
     with ops.readable():

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.films import coated
+from velatura.films.of_material import films_of
 from velatura.model.solved.energies.interfaces import Facets, Setting, colours, interface
 from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.operators import Layer, Operator
@@ -112,7 +112,7 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
     """
     outside = float(ops.mean(colours(material.exterior)))
     found: list[Part] = []
-    for meeting in chain(material.solid(), coated.of(material)):
+    for meeting in chain(material.solid(), films_of(material)):
         if isinstance(meeting.layer, InterfaceValues):
             found.append(Facets.of(meeting.layer, meeting.above, outside, meeting.films))
             continue

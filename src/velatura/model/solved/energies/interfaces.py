@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from velatura import ops, tables
-from velatura.films.coated import Coated, dielectric_between, dielectric_passing
+from velatura.films.reflectance import dielectric_between, dielectric_passing
+from velatura.films.tables import Coated
 from velatura.model.solved.energies.modes import TINY, Basis, Light
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.optics import fresnel, ggx

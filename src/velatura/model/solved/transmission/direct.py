@@ -36,8 +36,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.films import coated
-from velatura.films.coated import Films, dielectric_passing
+from velatura.films.of_material import films_of
+from velatura.films.reflectance import Films, dielectric_passing
 from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.variance import ALPHA_MIN, Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
@@ -83,7 +83,7 @@ class Refraction(ops.Named):
     area: Value
     sign: Value
     least: Value
-    films: Films = None
+    films: Films | None = None
 
     def passing(self, cos_1: Value, cos_2: Value) -> Value:
         """What facets let pass (a colour) for cosines above and below, by Fresnel."""
@@ -140,7 +140,7 @@ def transmission(
     n = 1.0
     refractions: list[Refraction] = []
     slabs = [Slab()]
-    for meeting in chain(material.solid(), coated.of(material)):
+    for meeting in chain(material.solid(), films_of(material)):
         layer = meeting.layer
         if isinstance(layer, MediumValues):
             tau_s = layer.sigma_s * layer.depth
@@ -166,7 +166,9 @@ def is_none(x: Value) -> bool:
     return isinstance(x, float | np.ndarray) and not np.any(x)
 
 
-def _crossing(layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance], films: Films) -> Refraction:
+def _crossing(
+    layer: InterfaceValues, above: Value, n_1: Value, kind: type[Variance], films: Films | None
+) -> Refraction:
     eta = layer.eta / above
     ratio = ops.mean(layer.eta) / ops.mean(above)  # and so its inverse from the other side
     u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
