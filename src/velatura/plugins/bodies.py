@@ -72,7 +72,7 @@ class Prepared:
         return self.spectra.at(lobed, si.wavelengths) if self.spectra else lobed
 
     def lobed(self, si: Any, active: Any) -> bsdf.Lobed:
-        return bsdf.body(self.binding.steered(si, active), self.model, self.variance, at_a_point())
+        return bsdf.body(self.binding.at_fixed_wavelengths(si, active), self.model, self.variance, at_a_point())
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Tabulated:
         return self.textured.balanced
 
     def at(self, si: Any, active: Any) -> Body:
-        material = self.binding.steered(si, active)
+        material = self.binding.at_fixed_wavelengths(si, active)
         return self.textured.at(material, _places(self.mi, si) if self.mi.is_spectral else None)
 
 
@@ -109,7 +109,7 @@ class OverWavelengths:
         return self.solved.symmetric
 
     def at(self, si: Any, active: Any) -> Body:
-        return self.solved.at(self.binding.steered(si, active), _places(self.mi, si))
+        return self.solved.at(self.binding.at_fixed_wavelengths(si, active), _places(self.mi, si))
 
 
 def _places(mi: Any, si: Any) -> Any:
@@ -160,11 +160,11 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     if binding.varies:
         if mi.is_spectral:
             context = replace(context, colour=partial(_spectrum, mi))
-        material, ranges = binding.tabulated(texture_axes.UNKNOWN)
+        material, ranges = binding.with_ranges(texture_axes.UNKNOWN)
         colours = binding.steering or binding.interferes
         waves = [spectra.axis(binding.at_wavelengths(nm, material), places)] if colours else []
         known = before.textured if isinstance(before, Tabulated) else None
-        symbolic = binding.symbolic(binding.looked_at())
+        symbolic = binding.with_gradients_opaque()
         textured = model.textured(material, [*waves, *ranges], symbolic, variance, context, known)
         if textured:
             return Tabulated(mi, binding, textured)

@@ -92,7 +92,7 @@ def make(mi: Any) -> type:
             declared = EXCEPTIONS[form, shape]
             # The albedo of a base hardly resolves a critical angle outside; where it is a sum over cosines, it errs by
             # up to 2.5 % below several interfaces
-            seen = self.binding.looked_at()
+            seen = self.binding.with_constants()
             known = [layer.eta for layer in seen.interfaces if not (layer.eta is None or isinstance(layer.eta, Image))]
             below_outside = any(np.mean(np.array(eta)) < np.max(np.array(seen.exterior)) for eta in known)
             inexact = self.binding.stack.base and (below_outside or (len(seen.interfaces) > 1 and not solved))
@@ -107,8 +107,8 @@ def make(mi: Any) -> type:
             """Compute the values that do not depend on direction, and the flags of the surface."""
             binding = self.binding
             binding.update()
-            seen = binding.looked_at()
-            self.variance = variance_kind(binding.symbolic(seen))
+            seen = binding.with_constants()
+            self.variance = variance_kind(binding.with_gradients_opaque())
             self.bodies = bodies.of(mi, binding, self.model, self.variance, before)
             # Say how light leaves
             self.delta = not binding.varies and not any(layer.spreads for layer in seen.layers)

@@ -149,8 +149,9 @@ def is_number(value: object) -> bool:
 
 def _mean(texture: Texture, is_colour: bool) -> float | RGB:
     """The mean of an image over its texels."""
-    from velatura import binding, kernel
+    from velatura import kernel
+    from velatura.binding.textures import texels as texels_of_file
 
-    texels = binding.texels(kernel.mitsuba(), texture.texture.name, texture, is_colour)
+    texels = texels_of_file(kernel.mitsuba(), texture.texture.name, texture, is_colour)
     mean = texture.scale * np.mean(texels, axis=(0, 1)) + texture.offset
     return colour(mean if mean.size == 3 else float(mean[0])) if is_colour else float(np.mean(mean))

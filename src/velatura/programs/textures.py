@@ -7,7 +7,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from velatura import binding, kernel
+from velatura import kernel
+from velatura.binding.textures import texels as texels_of_file
 from velatura.programs.parameters import RGB, Values
 from velatura.programs.program import Carried, Program
 from velatura.stack import Address, Brushing, Stack, Texture, Varying
@@ -30,7 +31,7 @@ def _mean(address: Address, value: Varying) -> float | RGB:
         return value.offset
     assert isinstance(value, Texture)
     colour = address.colour and value.channel in (None, "rgb")
-    texels = binding.texels(kernel.mitsuba(), address.name, value, colour)
+    texels = texels_of_file(kernel.mitsuba(), address.name, value, colour)
     mean = np.clip(value.scale * texels + value.offset, *address.declared.within).mean(axis=(0, 1))
     if len(mean) == 1:
         return float(mean[0])

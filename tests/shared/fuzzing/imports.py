@@ -25,7 +25,8 @@ import numpy as np
 import velatura as vt
 from fuzzing import Failure
 from fuzzing.files import WORDS, bytes_changed, changed
-from velatura import binding, kernel
+from velatura import kernel
+from velatura.binding.textures import texels as texels_of_file
 from velatura.errors import InvalidInput
 from velatura.inverse import load_table
 from velatura.programs import embedded
@@ -143,7 +144,7 @@ def _table(path: Path) -> Wrong:
 
 def _texture(path: Path) -> Wrong:
     """The texels are finite."""
-    texels = binding.texels(kernel.mitsuba(), "alpha", vt.Texture(texture=path, channel="r"), False)
+    texels = texels_of_file(kernel.mitsuba(), "alpha", vt.Texture(texture=path, channel="r"), False)
     return None if texels.size and np.isfinite(texels).all() else ("texels are not finite", str(texels.shape))
 
 
