@@ -22,7 +22,7 @@ from velatura.model.solved.solve import Solver
 from velatura.optics import ggx
 from velatura.shader import Recording, Shader, constant, material, record, shader, variance
 from velatura.shader.lookups.bake import Bake
-from velatura.shader.lookups.columns import Tabulated
+from velatura.shader.lookups.columns import SolvedLookUp
 from velatura.shader.lookups.films import beside
 from velatura.shader.printers.c_like import CLike
 from velatura.shader.printers.glsl import GLSL
@@ -124,7 +124,7 @@ def in_numpy(case: Case, recording: Recording) -> Results:
     """The values of the model; where it solves materials, those of the first stack for all directions."""
     stack = case.stack
     wi, wo, u = (tuple(case.directions[name]) for name in ("wi", "wo", "u"))
-    if isinstance(recording.baked, Tabulated):
+    if isinstance(recording.baked, SolvedLookUp):
         return _solved(stack, recording.baked.solver, wi, wo, u)
     alone = Material.of(stack)
     material = Material.from_flat(stack, {**alone.flat(), **case.values}).coated(films_of(alone))
@@ -280,7 +280,7 @@ class Changeable:
 
     def given(self, case: Case) -> Results:
         """The results where the program is given the values and the solution of a case's stack."""
-        assert isinstance(self.made.baked, Tabulated)
+        assert isinstance(self.made.baked, SolvedLookUp)
         found = self.made.baked.solve(case.stack)
         arrays = {"vt_shown": np.ones(len(self.made.shown)), "vt_remainder": np.array(found.remainder)}
         if len(found.layout):

@@ -12,8 +12,8 @@ import numpy as np
 from velatura import ops
 from velatura.shader import Printer
 from velatura.shader.lookups.atlas import Layout
-from velatura.shader.lookups.bake import Bake, Group
-from velatura.shader.lookups.columns import Solution, Tabulated
+from velatura.shader.lookups.columns import Solution, SolvedLookUp
+from velatura.shader.lookups.lookup import Group, LookUp
 from velatura.shader.material import Brushed, Entry, Filled, Mapped
 from velatura.shader.printers.printer import ATOM, Output, Struct
 from velatura.shader.printers.statements import assignments, statements
@@ -144,7 +144,7 @@ class PythonPrinter(Printer):
             for x in layouts
         )
 
-    def lookup(self, bake: Bake | Tabulated) -> str:
+    def lookup(self, bake: LookUp) -> str:
         return "".join(
             f"vt_baked_{x.name} = lambda *place: vt_read(vt_baked, {bake.nodes}, {bake.sides}, {tuple(x[1:])}, place)\n"
             for x in bake.groups
@@ -192,7 +192,7 @@ def put(target: Any, place: str, value: Any) -> None:
     setattr(target, last, value)
 
 
-def reader(baked: Tabulated, found: Solution | None = None) -> Callable[[Group, Sequence[Any]], Any]:
+def reader(baked: SolvedLookUp, found: Solution | None = None) -> Callable[[Group, Sequence[Any]], Any]:
     """What reads a group of texels of a solved material at a place."""
     solved = found or baked.solved
     assert solved is not None

@@ -19,7 +19,7 @@ from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.transmission import internal_reflections
 from velatura.optics import fresnel
 from velatura.shader import record
-from velatura.shader.lookups.columns import Tabulated
+from velatura.shader.lookups.columns import SolvedLookUp
 from velatura.shader.recorder import symbol
 from velatura.stack import Material
 
@@ -216,5 +216,5 @@ def test_columns_of_rounding_are_not_scaled_up() -> None:
     for alpha in np.linspace(0.02, 0.05, 7).tolist():
         metal = Stack([Interface(eta=(0.15, 2.14, 2.47), k=(3.8, 0.55, 1.35), alpha=(alpha, 0.3 * alpha))])
         baked = record(metal).baked
-        assert isinstance(baked, Tabulated) and baked.solved
+        assert isinstance(baked, SolvedLookUp) and baked.solved
         assert np.abs(baked.solved.remainder).max() < 1e-4

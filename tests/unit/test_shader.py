@@ -21,9 +21,10 @@ from velatura import ops, tables
 from velatura.errors import InvalidInput
 from velatura.shader import Recording, constant, record, shader
 from velatura.shader.lookups.atlas import texels
-from velatura.shader.lookups.bake import Bake, Group
-from velatura.shader.lookups.columns import Tabulated
+from velatura.shader.lookups.bake import Bake
+from velatura.shader.lookups.columns import SolvedLookUp
 from velatura.shader.lookups.films import tables as tables_of_films
+from velatura.shader.lookups.lookup import Group
 from velatura.shader.material import place
 from velatura.shader.printers.glsl import GLSL
 from velatura.shader.printers.statements import statements
@@ -151,8 +152,8 @@ def test_a_recording_answers_as_numpy_does(pattern, model: str) -> None:
     truth = in_numpy(case, recording)
     values: dict[str, Any] = {f"m.{place}": case.values[name] for name, place in recording.read.items()}
     values |= {f"{name}.{axis}": w[k] for name, w in case.directions.items() for k, axis in enumerate("xyz")}
-    solved = isinstance(recording.baked, Tabulated)  # with a texture in single precision
-    if isinstance(recording.baked, Tabulated):
+    solved = isinstance(recording.baked, SolvedLookUp)  # with a texture in single precision
+    if isinstance(recording.baked, SolvedLookUp):
         values["vt_baked"] = reader(recording.baked)
 
     lobes = dict(zip(recording.lobes, evaluate(list(recording.lobes.values()), values)))
@@ -284,7 +285,7 @@ def test_another_medium_is_shaded_by_the_same_program() -> None:
 def test_a_solved_material_takes_few_fetches(name: str, fetches: int) -> None:
     """Energies, which neither values nor samples need, are read apart; and nothing of the layers is."""
     made = shader(vt.preset(name))
-    assert isinstance(made.baked, Tabulated)
+    assert isinstance(made.baked, SolvedLookUp)
     columns, energies = made.baked.groups
     assert (columns.name, energies.name) == ("columns", "energies")
     assert columns.texels * 2 ** len(made.baked.nodes) == made.costs["vt_lobes"].texels == fetches
@@ -309,7 +310,7 @@ def test_values_that_change_are_solved_anew(name: str, films: bool) -> None:
         other = other.replace(layer0_film0_eta=2.2, layer0_film0_thickness_nm=160)
     general, alone = shader(stack, values="uniforms"), shader(other)
     assert general.key == shader(other, values="uniforms").key
-    assert isinstance(general.baked, Tabulated)
+    assert isinstance(general.baked, SolvedLookUp)
     found = general.baked.solve(other)
     recordings = [record(stack, parameters=True), record(other)]
     colours = {f"vt_remainder[{k}]": colour[:, None] for k, colour in enumerate(found.remainder)}
@@ -509,7 +510,7 @@ def test_every_lobe_belongs_to_its_interfaces(model: str, lobes: list[list[int]]
     film = {"interface": {"eta": 1.3, "alpha": 0.1}}
     made = shader(vt.Stack([coat, film, {"medium": {}}, coat, film]), model, values="uniforms")
     assert made.lobes == lobes
-    solved = isinstance(made.baked, Tabulated)
+    solved = isinstance(made.baked, SolvedLookUp)
     firsts = [0, 1, 2, 4] if solved else range(len(lobes))  # below the medium, a veil comes after each lobe
     rest = ["remainder"] if solved else []
     assert list(made.shown) == [*(f"reflected[{k}]" for k in firsts), *rest, "transmitted"]

@@ -20,7 +20,7 @@ from velatura.stack.schema import unknown
 from velatura.tables import load
 
 if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.lookups.columns import Tabulated
+    from velatura.shader.lookups.columns import SolvedLookUp
 
 #: Of an interface with a roughness for each axis, in the material that stands for all of its pattern.
 _STRETCHED = {"alpha_v": 0.2, "rotation": 30.0}
@@ -98,9 +98,11 @@ def _contents(stack: Stack, made: Shader, model: Model, coarse: bool = False) ->
     return {**given, "solution": {name: array(x) for name, x in vars(found).items()}}
 
 
-def _tabulated(made: Shader) -> Tabulated | None:
-    """The lookup of a solved material."""
-    return None if isinstance(made.baked, Bake) else made.baked
+def _tabulated(made: Shader) -> SolvedLookUp | None:
+    """The look-up of a material that is solved, else None."""
+    from velatura.shader.lookups.columns import SolvedLookUp  # it loads SciPy
+
+    return made.baked if isinstance(made.baked, SolvedLookUp) else None
 
 
 def _free(stack: Stack, made: Shader) -> list[tuple[Address, Any]]:

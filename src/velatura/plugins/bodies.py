@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, is_dataclass, replace
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -16,109 +17,31 @@ from velatura.model.solved import spectra, texture_axes
 from velatura.model.solved.textures import Textured
 from velatura.model.variance import Variance
 from velatura.plugins import progress, spectral
-from velatura.plugins.spectral import Spectra
 from velatura.renderer.differentiated import plain
 
 
-class Bodies(Protocol):
-    """`diffuse` and `balanced` are those of all bodies."""
-
-    @property
-    def diffuse(self) -> bool: ...
-
-    @property
-    def balanced(self) -> bool: ...
-
-    def at(self, si: Any, active: Any) -> Body:
-        """The material at a surface point."""
-
-
 @dataclass(frozen=True)
-class Uniform:
-    """One body for all points and wavelengths."""
+class Bodies:
+    """The body of a material at each point, by `at(si, active)`; `diffuse` and `balanced` are those of all bodies.
 
-    body: Body
+    `textured` are the tables that it reads, where textures change what was solved; `lobed` gives lobes in closed form
+    whose energies are computed for each ray, where `at` reads them from tables over wavelength.
+    """
 
-    @property
-    def diffuse(self) -> bool:
-        return self.body.diffuse
-
-    @property
-    def balanced(self) -> bool:
-        return self.body.balanced
-
-    def at(self, si: Any, active: Any) -> Body:
-        return self.body
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """Lobes in closed form, prepared from the values of each point; where the material is uniform, with energies that
-    were sampled once over wavelengths."""
-
-    binding: Binding
-    model: Model
-    variance: type[Variance]
-    spectra: Spectra | None = None
-
-    balanced = False
-
-    @property
-    def diffuse(self) -> bool:
-        return self.binding.stack.base is not None
-
-    def at(self, si: Any, active: Any) -> Body:
-        lobed = self.lobed(si, active)
-        return self.spectra.at(lobed, si.wavelengths) if self.spectra else lobed
-
-    def lobed(self, si: Any, active: Any) -> bsdf.Lobed:
-        return bsdf.body(self.binding.at_fixed_wavelengths(si, active), self.model, self.variance, at_a_point())
-
-
-@dataclass(frozen=True)
-class Tabulated:
-    """Bodies by tables over what textures change."""
-
-    mi: Any
-    binding: Binding
-    textured: Textured
-
-    diffuse = True  # the remainder comes after the lobes
-
-    @property
-    def balanced(self) -> bool:
-        return self.textured.balanced
-
-    def at(self, si: Any, active: Any) -> Body:
-        material = self.binding.at_fixed_wavelengths(si, active)
-        return self.textured.at(material, _places(self.mi, si) if self.mi.is_spectral else None)
-
-
-@dataclass(frozen=True)
-class OverWavelengths:
-    """A uniform material that was solved over wavelengths."""
-
-    mi: Any
-    binding: Binding
-    solved: spectra.Spectra
-
-    diffuse = True
-
-    @property
-    def balanced(self) -> bool:
-        return self.solved.symmetric
-
-    def at(self, si: Any, active: Any) -> Body:
-        return self.solved.at(self.binding.at_fixed_wavelengths(si, active), _places(self.mi, si))
+    at: Callable[[Any, Any], Body]
+    diffuse: bool
+    balanced: bool
+    textured: Textured | None = None
+    lobed: Callable[[Any, Any], Body] | None = None
 
 
 def _places(mi: Any, si: Any) -> Any:
-    """Of fixed wavelengths on the spectrum, and of those of a ray."""
+    """Places of fixed wavelengths on the spectrum, and of those of a ray."""
     return mi.ArrayXf([*spectral.places(STEERING_NM), *spectral.places(si.wavelengths)])
 
 
 def _spectrum(mi: Any, *channels: Any) -> Any:
-    """A colour at fixed wavelengths, and at those of a ray."""
+    """Colour at fixed wavelengths, and at those of a ray."""
     return mi.ArrayXf(list(channels) or [0.0] * (2 * len(mi.UnpolarizedSpectrum())))
 
 
@@ -143,39 +66,49 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
     shown = progress.line("velatura: solving textured materials")
     context = Context(number=number, colour=mi.UnpolarizedSpectrum, settle=settled, progress=shown)
     if binding.uniform:
-        body = model.body(binding.uniform_material(), variance, context)
-        return Uniform(settled(body))
-    nodes = spectra.NODES
+        body = settled(model.body(binding.uniform_material(), variance, context))
+        return Bodies(lambda si, active: body, body.diffuse, body.balanced)
+    values, nodes = binding.at_fixed_wavelengths, spectra.NODES
     if binding.interferes and not binding.varies:
         nodes = spectra.nodes_of(plain(binding.uniform_material()))
         nodes += -nodes % len(mi.UnpolarizedSpectrum())  # as many as rays carry at a time
     nm = [*STEERING_NM, *np.linspace(spectral.BEGIN_NM, spectral.END_NM, nodes).tolist()]
     places = np.array(spectral.places(nm))
-    if not binding.varies:
-        over = model.over_wavelengths(binding.at_wavelengths(nm), places, variance, context)
-        if over:
-            return OverWavelengths(mi, binding, settled(over))
-        model = model.pointwise
-    prepared = Prepared(binding, model, variance)
     if binding.varies:
         if mi.is_spectral:
             context = replace(context, colour=partial(_spectrum, mi))
         material, ranges = binding.with_ranges(texture_axes.UNKNOWN)
         colours = binding.steering or binding.interferes
         waves = [spectra.axis(binding.at_wavelengths(nm, material), places)] if colours else []
-        known = before.textured if isinstance(before, Tabulated) else None
-        symbolic = binding.with_gradients_opaque()
-        textured = model.textured(material, [*waves, *ranges], symbolic, variance, context, known)
+        opaque, known = binding.with_gradients_opaque(), before and before.textured
+        textured = model.textured(material, [*waves, *ranges], opaque, variance, context, known)
         if textured:
-            return Tabulated(mi, binding, textured)
-    if binding.varies or number is None or not binding.stack.interfaces:
-        return prepared
 
+            def from_tables(si: Any, active: Any) -> Body:
+                return textured.at(values(si, active), _places(mi, si) if mi.is_spectral else None)
+
+            return Bodies(from_tables, True, textured.balanced, textured)
+    elif solved := model.over_wavelengths(binding.at_wavelengths(nm), places, variance, context):
+        solved = settled(solved)
+        return Bodies(lambda si, active: solved.at(values(si, active), _places(mi, si)), True, solved.symmetric)
+    else:
+        model = model.pointwise
+
+    # In closed form, from the values of each point
+    def lobed(si: Any, active: Any) -> bsdf.Lobed:
+        return bsdf.body(values(si, active), model, variance, at_a_point())
+
+    diffuse = binding.stack.base is not None
+    if binding.varies or number is None or not binding.stack.interfaces:
+        return Bodies(lobed, diffuse, False)
+
+    # Energies over wavelengths are sampled once
     def at_wavelengths(wavelengths: Any) -> bsdf.Lobed:
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(wavelengths))
         si.wavelengths = wavelengths
-        return prepared.lobed(si, True)
+        return lobed(si, True)
 
     over = nodes if binding.interferes else spectral.NODES
     fixed = settled(bsdf.body(binding.uniform_material(), model, variance, context))
-    return Prepared(binding, model, variance, settled(spectral.sample(mi, fixed, at_wavelengths, over)))
+    sampled = settled(spectral.sample(mi, fixed, at_wavelengths, over))
+    return Bodies(lambda si, active: sampled.at(lobed(si, active), si.wavelengths), diffuse, False, lobed=lobed)

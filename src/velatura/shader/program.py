@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -16,16 +16,13 @@ from velatura.model import DEFAULT, SWITCHES, Model, named
 from velatura.model.papers.lobe_merging import merging
 from velatura.shader import material
 from velatura.shader.lookups import atlas, films
-from velatura.shader.lookups.bake import Bake
+from velatura.shader.lookups.lookup import LookUp
 from velatura.shader.printers.glsl import GLSL
 from velatura.shader.printers.printer import Field, Printer, Struct
 from velatura.shader.recorder.cost import Cost, cost
-from velatura.shader.recorder.recording import Recording, part, record
+from velatura.shader.recorder.recording import Recording, record
+from velatura.shader.recorder.seen import part
 from velatura.stack import MaterialLike, Texture, load
-
-if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.lookups.columns import Tabulated
-
 
 PREFIX = "vt"  # of names in code
 _PREFIX = re.compile(r"(?!gl_)[A-Za-z](_?[A-Za-z0-9])*")
@@ -56,7 +53,7 @@ class Shader:
     lobes: Sequence[Sequence[int]]
     shown: Sequence[str]
     shares: Sequence[str]
-    baked: Bake | Tabulated | None
+    baked: LookUp | None
     film_tables: Sequence[str]
     films: np.ndarray | None  # their texture, float32 of shape (height, width, 4); None without any
     costs: Mapping[str, Cost]
@@ -70,16 +67,12 @@ class Shader:
     @property
     def columns(self) -> np.ndarray | None:
         """The texture `vt_baked` of known values, float32 of shape (height, width, 4)."""
-        if self.baked is None:
-            return None
-        if isinstance(self.baked, Bake):
-            return self.baked.texels
-        return None if self.baked.solved is None else self.baked.solved.texels
+        return self.baked.known if self.baked else None
 
     @cached_property
     def key(self) -> str:
         """Equal for equal code."""
-        tape = self.baked.tape if isinstance(self.baked, Bake) else None
+        tape = self.baked.tape if self.baked else None
         return hashlib.sha256(f"{self.text}{tape}".encode()).hexdigest()[:16]
 
 
@@ -128,7 +121,7 @@ def shader(
     parts = [
         printer.header(name, described(recording.model), not recording.read, costs),
         printer.structs(material.structs(stack, read)),
-        *([printer.parameters(len(shown), *_changing(baked))] if shown else []),
+        *([printer.parameters(len(shown), *((baked.colours, baked.numbers) if baked else (0, 0)))] if shown else []),
         printer.material(filled),
         printer.structs(_structs(recording)),
         *([printer.tables(layouts)] if layouts else []),
@@ -147,7 +140,7 @@ def shader(
         maps={prefixed(name, prefix): image for name, image in filled.samplers.items()},
         lobes=_interfaces(recording),
         shown=shown,
-        shares=_shares(recording),
+        shares=recording.shares,
         baked=baked,
         film_tables=[layout.name for layout in placed],
         films=films.texture(films.tables(stack, recording.films, recording.model)),
@@ -174,25 +167,12 @@ def _costs(recording: Recording) -> dict[str, Cost]:
     return {name: cost(outputs, axes) for name, outputs in functions.items()}
 
 
-def _changing(baked: Bake | Tabulated | None) -> tuple[int, int]:
-    """How many colours of the remainder change with values, and how many numbers of the layout."""
-    return (0, 0) if baked is None or isinstance(baked, Bake) else (baked.colours, baked.numbers)
-
-
 def _interfaces(recording: Recording) -> list[list[int]]:
     """By reflected lobe that is shown, seen from above: the layers whose light it is."""
     places = recording.stack.surfaces[: len(recording.stack.interfaces)]
     if recording.energies:
         return [[place] for place in places]
     return [[places[k] for k in group] for group in merging(recording.model, len(places))]
-
-
-def _shares(recording: Recording) -> list[str]:
-    baked = recording.baked
-    if baked and not isinstance(baked, Bake):
-        return baked.shares if recording.shown else []
-    energies = [name for name in recording.kinds if part(name) in ("energy", "base_energy")]
-    return [*(name for name in energies if name.startswith("t")), *(name for name in energies if name[0] != "t")]
 
 
 def described(model: Model) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from velatura.model.variance import Isotropic
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.renderer import directional_grid
-from velatura.shader.recorder.symbol import Operand, Symbol, component, number, operand
+from velatura.shader.lookups.lookup import Group, LookUp, Texels, sides_read, texture, together
+from velatura.shader.recorder.seen import Seen, of_lobes
+from velatura.shader.recorder.symbol import Operand, component, number, operand
 from velatura.shader.recorder.tape import Tape, tape
 from velatura.stack import Material
 
@@ -35,44 +37,24 @@ PLANE = (95, 49)  # nodes over the cosine, twice as dense as those of most table
 PLACE = "place"  # an input: coordinates of cosine and azimuth, from 0 to 1, and the side, 0 above and 1 below
 
 
-class Group(NamedTuple):
-    """Texels that are read together: how many, from which on."""
-
-    name: str
-    begin: int
-    texels: int
-
-
-@dataclass(frozen=True)
-class Bake:
+@dataclass(frozen=True, kw_only=True)
+class Bake(LookUp):
     """The values for one direction, as columns of numbers, four to a texel: first what the layers above a diffuse
     base transmit, if there is one, then the lobes.
 
-    `body` reads its lobes from the texture. A line of texels holds one of them for all cosines; lines go over azimuths,
-    sides and texels. `nodes` are those over the cosine and maybe the azimuth. Of known values the texture is known, and
-    there are no columns.
+    `body` reads its lobes from the texture. Of known values the texture is known, and there are no columns.
     """
 
     columns: Sequence[Operand]
     body: bsdf.Lobed
-    nodes: tuple[int, ...]
-    groups: Sequence[Group]
-    texels: np.ndarray | None = None  # (height, nodes over the cosine, 4)
-
-    @property
-    def sides(self) -> int:
-        """1 where light comes from above only."""
-        return 1 if self.body.below is None else 2
-
-    @property
-    def height(self) -> int:
-        """Lines of the texture."""
-        return sum(group.texels for group in self.groups) * self.sides * prod(self.nodes[1:])
 
     @cached_property
     def tape(self) -> Tape:
         """The columns from the values of the material, `m.layer0.eta` and so on, and from a `place`."""
         return tape(self.columns)
+
+    def seen(self, wi: Direction, weighed: bool) -> Seen:
+        return of_lobes(self.body, wi, weighed, added=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Input of the interpreter, in JSON's types: the tape, its tables, and the nodes and sides."""
@@ -92,13 +74,13 @@ def bake(material: Material, body: bsdf.Lobed) -> Bake:
     columns += [0.0] * (4 * sum(group.texels for group in groups) - len(columns))
 
     # And read it
-    return Bake([operand(x) for x in columns], _read(body, nodes, groups, lobes), nodes, groups)
+    read, sides = _read(body, nodes, groups, lobes), 1 if body.below is None else 2
+    return Bake(columns=[operand(x) for x in columns], body=read, nodes=nodes, groups=groups, sides=sides)
 
 
 def bake_known(body: bsdf.Lobed, known: bsdf.Lobed) -> Bake:
     """The lobes of a body, which are `known` in NumPy, over direction."""
     nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
-    turns = prod(nodes[1:])
     w = directional_grid.directions(nodes, None)
 
     def apart(colour: Value) -> Iterable[Value]:
@@ -112,13 +94,11 @@ def bake_known(body: bsdf.Lobed, known: bsdf.Lobed) -> Bake:
     # Compute the lobes at the nodes
     sides = [on(known.lobes_above), *([] if known.below is None else [on(known.lobes_below)])]
     groups = _groups(known.above.base is not None, len(sides[0]))
-    texels = np.zeros((4 * sum(group.texels for group in groups), len(sides), *nodes[:1], turns), np.float32)
-    for side, columns in enumerate(sides):
-        for k, column in enumerate(columns):
-            texels[k, side] = np.broadcast_to(column, prod(nodes)).reshape(nodes[0], turns)
-    texture = texels.reshape(-1, 4, *texels.shape[1:]).transpose(0, 2, 4, 3, 1).reshape(-1, nodes[0], 4)
+    columns = ((k, np.stack([np.broadcast_to(x, prod(nodes)) for x in each])) for k, each in enumerate(zip(*sides)))
+    texels = texture(columns, groups, len(sides), nodes)
     _, lobes = _columns(known.lobes_above, known, w, apart)
-    return Bake([], _read(body, nodes, groups, lobes), nodes, groups, texture)
+    read = _read(body, nodes, groups, lobes)
+    return Bake(columns=[], body=read, nodes=nodes, groups=groups, sides=len(sides), known=texels)
 
 
 def _with_base(base: Base, w: Direction, columns: list[Value], apart: Apart) -> list[Value]:
@@ -161,49 +141,27 @@ def _apart(colour: Value) -> list[Operand]:
     return [component(operand(colour), channel) for channel in range(3)]
 
 
-def together(r: Value, g: Value, b: Value) -> Value:
-    return Symbol("colour", (r, g, b), "colour")
-
-
 # Lobes that are read
-
-
-@dataclass(frozen=True)
-class Texture:
-    """The columns of a group, over direction, on one side."""
-
-    shape: tuple[int, ...]
-    group: Group
-    side: Value
-    begin: int = 0
-
-    def __call__(self, w: Direction) -> Iterable[Value]:
-        at = [operand(x) for x in (*directional_grid.places(w, len(self.shape)), 0.0, self.side)]
-        texels = Symbol("baked", (at[0], at[1], at[-1]), "texels", self.group)
-        channels = range(self.begin, 4 * self.group.texels)
-        return [Symbol("component", (texels,), "number", channel) for channel in channels]
 
 
 @dataclass(frozen=True)
 class _Base(Base):
     """A base whose light is read."""
 
-    texture: Texture
+    texels: Texels
 
     def through(self, w: Direction) -> Value:
-        r, g, b, _ = self.texture(w)
+        r, g, b, _ = self.texels(w)
         return together(r, g, b)
 
 
 def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], count: int) -> bsdf.Lobed:
     """A body whose lobes are read from the texture."""
     transmits, held = body.below is not None, groups[-1]
-    # Light is on the side that wi is on, but for the symmetric form, which looks at others
-    side = 0.0 if not transmits else ops.select(number("wi.z") > 0, 0.0, 1.0)
-    sides = (0.0, 1.0) if body.above.model.form == "symmetric" else (side, side)
+    sides = sides_read(1 + transmits, body.above.model)
 
     def lobes(prepared: Prepared, side: Value) -> precomputed_lobes.Lobes:
-        columns = Texture(nodes, held, side, _OF_BASE if prepared.base else 0)
+        columns = Texels(nodes, held, side, _OF_BASE if prepared.base else 0)
         return precomputed_lobes.PrecomputedLobes(columns, together, 3, prepared, count, transmits)
 
     if body.below is not None:
@@ -212,7 +170,7 @@ def _read(body: bsdf.Lobed, nodes: tuple[int, ...], groups: Sequence[Group], cou
     read = replace(body, lobes_above=above, lobes_below=above)
     if body.above.base is None:
         return read
-    columns, through = Texture(nodes, held, 0.0), Texture(nodes, groups[0], 0.0)
+    columns, through = Texels(nodes, held, 0.0), Texels(nodes, groups[0], 0.0)
 
     def base(w: Direction) -> Base:
         channels = list(columns(w))[:_OF_BASE]

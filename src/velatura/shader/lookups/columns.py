@@ -34,7 +34,8 @@ from velatura.model.variance import Covariance, Variance, is_same
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.shader.lookups.bake import Group, Texture, together
+from velatura.shader.lookups.lookup import Group, LookUp, Texels, sides_read, texture, together
+from velatura.shader.recorder.seen import Seen
 from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, colour, number
 from velatura.stack import InterfaceValues, Material, MediumValues, Stack
 
@@ -57,70 +58,17 @@ class Solution:
     layout: Array
 
 
-@dataclass(frozen=True)
-class Places:
-    """Groups of texels that are read together, and of each column its place in them, or its value if it is constant."""
-
-    groups: Sequence[Group]
-    places: Sequence[int | float]
-
-    @property
-    def texels(self) -> int:
-        return sum(group.texels for group in self.groups)
-
-
-@dataclass(frozen=True)
-class Tabulated:
-    """A material, or all of its kind, whose columns are read from a texture by the recorded `body`.
-
-    A line of texels holds one of them for all cosines; lines go over azimuths, sides and texels. `nodes` are those over
-    the cosine and maybe the azimuth. They are of a material that was turned back by an `angle`, None for 0.
-    """
+@dataclass(frozen=True, kw_only=True)
+class SolvedLookUp(LookUp):
+    """A material, or all of its kind, whose columns are read from a texture; it was turned back by an `angle`, None for
+    0."""
 
     straight: Solved
     angle: Value | None
     solver: Solver
     layouts: Sequence[Layout]
-    columns: Places
+    places: Sequence[int | float]
     solved: Solution | None = None  # of one material
-
-    @property
-    def body(self) -> Body:
-        return self.straight if self.angle is None else Turned(self.straight, self.angle)
-
-    @property
-    def groups(self) -> Sequence[Group]:
-        return self.columns.groups
-
-    @property
-    def nodes(self) -> tuple[int, ...]:
-        return self.solver.shape
-
-    @property
-    def sides(self) -> int:
-        """1 where light comes from above only."""
-        return 1 if self.straight.below is None else 2
-
-    @property
-    def colours(self) -> int:
-        """Of the remainders of both sides."""
-        return OF_POLYNOMIAL * self.sides
-
-    @property
-    def numbers(self) -> int:
-        """Of its layout."""
-        bodies = [self.straight.above, *([self.straight.below] if self.straight.below else [])]
-        return sum(len(_flags(side.transmission)) for side in bodies if side.transmission) + (self.angle is not None)
-
-    @property
-    def turns(self) -> int:
-        """Nodes over the azimuth."""
-        return self.nodes[1] if len(self.nodes) > 1 else 1
-
-    @property
-    def height(self) -> int:
-        """Lines of the texture."""
-        return self.columns.texels * self.sides * self.turns
 
     @property
     def interfaces(self) -> list[int]:
@@ -133,7 +81,12 @@ class Tabulated:
         first = [f"reflected[{self.interfaces.index(k)}]" for k in dict.fromkeys(self.interfaces)]
         return [*first, "remainder", *(["transmitted"] if self.sides > 1 else [])]
 
-    def fields(self, wi: Direction, general: bool) -> dict[str, Value]:
+    def seen(self, wi: Direction, weighed: bool) -> Seen:
+        body: Body = self.straight if self.angle is None else Turned(self.straight, self.angle)
+        fields, energies = self._fields(wi, weighed), self._energies(wi)
+        return Seen(body, fields, *((self.shown, self._shares) if weighed else ([], [])), energies)
+
+    def _fields(self, wi: Direction, general: bool) -> dict[str, Value]:
         """All that values and samples take from wi, by its place in the struct; in `general`, the two parts of samples
         of light that goes straight through as well."""
         wi = self._turned_back(wi)
@@ -155,14 +108,14 @@ class Tabulated:
         return found
 
     @property
-    def shares(self) -> list[str]:
+    def _shares(self) -> list[str]:
         """The fields by which samples are shared in `general`, in the order in which they follow one another."""
         through = ["refracted", "mirrored", "of_bounced", "of_rest"] if self.sides > 1 else []
         chances = [f"reflected[{k}].chance" for k in range(len(self.interfaces))]
         return [*(f"passed_{name}" for name in through), *chances, "remainder_chance"]
 
-    def energies(self, wi: Direction) -> list[Value]:
-        """Of what `shown` names, colours."""
+    def _energies(self, wi: Direction) -> list[Value]:
+        """Energies of what `shown` names, colours."""
         columns = self.straight.seen(self._turned_back(wi))[0].columns
         lobes = list(zip(columns.energies, self.interfaces))
         found = [sum(energy for energy, each in lobes if each == k) for k in dict.fromkeys(self.interfaces)]
@@ -188,39 +141,16 @@ class Tabulated:
             found = solver.solve(material, own[:1]) * self.sides
         else:
             found = solver.solve(material, own)
-        solved = self.solution(solver, found, material, own, frame.degrees(numbers))
+        texels = _texture(_rows(solver, found), self.places, self.groups, self.nodes)
+        degrees = None if self.angle is None else frame.degrees(numbers)
+        solved = Solution(texels, _remainders(found), _layout_numbers(solver, material, own, degrees))
         if lately is not None:
             lately.clear()
             lately.update(made)
         return solved
 
-    def solution(
-        self,
-        solver: Solver,
-        found: Sequence[SolvedSide],
-        material: Material,
-        layouts: Sequence[Layout],
-        degrees: Value,
-    ) -> Solution:
-        transmissions = map(solver.transmission, solve.sides(material), layouts)
-        layout = [] if self.angle is None else [degrees]
-        layout += [flag for transmission in transmissions if transmission for flag in _flags(transmission)]
-        return Solution(
-            self.texels(_rows(solver, found)), np.concatenate(list(map(_colours, found))), np.array(layout, np.float32)
-        )
 
-    def texels(self, rows: Array) -> Array:
-        """The texture of columns, (rows, sides, nodes); a line of zeros where all of them are constant."""
-        if not self.height:
-            return np.zeros((1, 1, 4), np.float32)
-        columns = np.zeros((4 * self.columns.texels, self.sides, self.nodes[0], self.turns), np.float32)
-        for row, place in zip(rows, self.columns.places, strict=True):
-            if isinstance(place, int):
-                columns[place] = row.reshape(columns.shape[1:])
-        return columns.reshape(-1, 4, *columns.shape[1:]).transpose(0, 2, 4, 3, 1).reshape(self.height, -1, 4)
-
-
-def tabulated(stack: Stack, material: Material, model: Model, variance: type[Variance], general: bool) -> Tabulated:
+def tabulated(stack: Stack, material: Material, model: Model, variance: type[Variance], general: bool) -> SolvedLookUp:
     """The recorded body of a stack; a `general` one is that of all values, and has weights of its parts."""
     numbers, frame = _numbers(stack)
     plain, flags = frame.back(numbers), map(number, (f"{LAYOUT}[{k}]" for k in count()))
@@ -243,13 +173,48 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
         sides.append(
             replace(side, transmission=_any(side.transmission, flags)) if general and side.transmission else side
         )
-    columns = _placed(sides[0], rows)
-    for k, beam in enumerate(_beams(len(sides), model)):
-        curves = _Curves(columns, tuple(Texture(solver.shape, group, beam) for group in columns.groups))
+    groups, places = _placed(sides[0], rows)
+    for k, beam in enumerate(sides_read(len(sides), model)[: len(sides)]):
+        curves = _Curves(places, tuple(Texels(solver.shape, group, beam) for group in groups))
         sides[k] = replace(_Weighed(**vars(sides[k])) if general else sides[k], curves=curves)
     angle = None if is_same(degrees, 0.0) else degrees * (pi / 180)
-    made = Tabulated(solver.bsdf(material.solid(), sides), angle, solver, layouts, columns)
-    return made if found is None else replace(made, solved=made.solution(solver, found, plain, layouts, degrees))
+    solved = None
+    if found is not None and rows is not None:
+        layout_numbers = _layout_numbers(solver, plain, layouts, None if angle is None else degrees)
+        solved = Solution(_texture(rows, places, groups, solver.shape), _remainders(found), layout_numbers)
+    flagged = sum(len(_flags(side.transmission)) for side in sides if side.transmission)
+    return SolvedLookUp(
+        nodes=solver.shape,
+        groups=groups,
+        sides=len(sides),
+        known=solved.texels if solved else None,
+        colours=OF_POLYNOMIAL * len(sides),
+        numbers=flagged + (angle is not None),
+        straight=solver.bsdf(material.solid(), sides),
+        angle=angle,
+        solver=solver,
+        layouts=layouts,
+        places=places,
+        solved=solved,
+    )
+
+
+def _texture(rows: Array, places: Sequence[int | float], groups: Sequence[Group], nodes: tuple[int, ...]) -> Array:
+    """The texture of columns, (rows, sides, nodes), but for constant ones."""
+    placed = ((place, row) for row, place in zip(rows, places, strict=True) if isinstance(place, int))
+    return texture(placed, groups, rows.shape[1], nodes)
+
+
+def _remainders(found: Sequence[SolvedSide]) -> Array:
+    """Colours of the remainders of all sides."""
+    return np.concatenate(list(map(_colours, found)))
+
+
+def _layout_numbers(solver: Solver, material: Material, layouts: Sequence[Layout], degrees: Value | None) -> Array:
+    """The angle by which a material was turned back, if it may be, and the flags of its layout."""
+    transmissions = map(solver.transmission, solve.sides(material), layouts)
+    flags = [flag for transmission in transmissions if transmission for flag in _flags(transmission)]
+    return np.array(([] if degrees is None else [degrees]) + flags, np.float32)
 
 
 def _flags(transmission: Transmission) -> list[Value]:
@@ -264,15 +229,11 @@ def _any(transmission: Transmission, flags: Iterator[Value]) -> Transmission:
     return replace(transmission, faces=faces, under=under, scattered=scattered, bounces=bounces)
 
 
-def _beams(sides: int, model: Model) -> list[Value]:
-    """The side of the texture that each side reads: where light is, but for the symmetric form, which looks at both."""
-    if sides == 1:
-        return [0.0]
-    return [0.0, 1.0] if model.form == "symmetric" else [ops.select(number("wi.z") > 0, 0.0, 1.0)] * 2
+def _placed(side: Side, rows: Array | None) -> tuple[Sequence[Group], Sequence[int | float]]:
+    """Groups of texels that are read together, and of each column its place in them, or its value if it is constant.
 
-
-def _placed(side: Side, rows: Array | None) -> Places:
-    """Where columns lie; those that are the same, if they are known, lie in one place."""
+    Columns that are the same, if they are known, lie in one place.
+    """
     seldom = side.declaration.groups(side.colours)
     total = len(seldom)
     constants: list[float | None] = [None] * total
@@ -288,7 +249,7 @@ def _placed(side: Side, rows: Array | None) -> Places:
         texels = -(-len(own) // 4)
         groups += [Group(name, begin, texels)] if texels else []
         begin += texels
-    return Places(groups, [x if x is not None else places[k] for k, x in zip(first, constants)])
+    return groups, [x if x is not None else places[k] for k, x in zip(first, constants)]
 
 
 class _Made(dict[Hashable, Any]):
@@ -310,12 +271,12 @@ class _Made(dict[Hashable, Any]):
 class _Curves:
     """The columns for a direction, as the code reads them."""
 
-    columns: Places
-    textures: tuple[Texture, ...]
+    places: Sequence[int | float]
+    textures: tuple[Texels, ...]
 
     def __call__(self, w: Direction) -> list[Value]:
         read = [x for texture in self.textures for x in texture(w)]
-        return [read[place] if isinstance(place, int) else place for place in self.columns.places]
+        return [read[place] if isinstance(place, int) else place for place in self.places]
 
 
 @dataclass(frozen=True)

@@ -12,23 +12,20 @@ from dataclasses import dataclass
 from itertools import groupby
 from math import inf
 from textwrap import wrap
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from velatura.errors import remark
 from velatura.shader.lookups.atlas import WIDTH, Layout
-from velatura.shader.lookups.bake import Bake, Group
 from velatura.shader.lookups.films import WIDTH as LINE_OF_FILMS
+from velatura.shader.lookups.lookup import Group, LookUp
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
 from velatura.shader.printers.printer import FUNCTIONS, Field, Output, Printer, Struct
 from velatura.shader.printers.statements import assignments, statements
 from velatura.shader.recorder.cost import Cost
 from velatura.shader.recorder.symbol import LAYOUT, REMAINDER, SHOWN, Kind, Operand, Symbol
 from velatura.stack import Texture
-
-if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.lookups.columns import Tabulated
 
 #: Places of what a program is given, counted from the first binding.
 TABLES, FILMS, VALUES, SAMPLER, MAPS = range(5)
@@ -273,7 +270,7 @@ class CLike(Printer):
         declared = _TABLES.format(self.texels_of, WIDTH) + self.texture("vt_tables", TABLES)
         return f"{declared}\n{self.spelled(_TEXELS + ''.join(map(_table, layouts)))}"
 
-    def lookup(self, bake: Bake | Tabulated) -> str:
+    def lookup(self, bake: LookUp) -> str:
         comment = _LOBES.format(self.texels_of, bake.nodes[0], bake.height) + self.texture("vt_baked", TABLES)
         return f"{comment}\n{self.spelled(_BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides))}"
 

@@ -22,7 +22,7 @@ from velatura.renderer import directional_grid
 from velatura.shader import closures
 from velatura.shader.closures import Closure, Closures, Columns, Loss, Tabulated
 from velatura.shader.lookups import atlas, films
-from velatura.shader.lookups.bake import Group, together
+from velatura.shader.lookups.lookup import Group, together
 from velatura.shader.material import brushed, identifier, place, title
 from velatura.shader.material import constant as as_constant
 from velatura.shader.printers.printer import ATOM, Language

@@ -15,8 +15,7 @@ from velatura.shader.recorder.symbol import Kind, Operand
 
 if TYPE_CHECKING:
     from velatura.shader.lookups.atlas import Layout
-    from velatura.shader.lookups.bake import Bake, Group
-    from velatura.shader.lookups.columns import Tabulated
+    from velatura.shader.lookups.lookup import Group, LookUp
     from velatura.shader.material import Filled
     from velatura.shader.recorder.cost import Cost
 
@@ -213,7 +212,7 @@ class Printer(Language):
         """The texture of tables, and functions that look up each of them in it."""
 
     @abstractmethod
-    def lookup(self, bake: Bake | Tabulated) -> str:
+    def lookup(self, bake: LookUp) -> str:
         """The texture of lobes over direction, and functions that look up each group of its texels."""
 
     @abstractmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain, count
 
 from velatura.shader.lookups import atlas
@@ -105,31 +105,27 @@ class _Statements:
     def _loop(self, symbol: Symbol, name: str) -> None:
         """A loop that fills an array, or goes from one state to the next."""
         bound, nodes, times = symbol.detail
-        count = len(symbol.args) - (0 if nodes else len(bound))
-        results, wide = symbol.args[-count:], any(is_colour(x) for x in symbol.args)
+        wide, index, printer = any(is_colour(x) for x in symbol.args), self._free("i"), self.printer
         kind: Kind = "colour" if wide else "number"
-        index, printer = self._free("i"), self.printer
-        filled = name if nodes else f"{name}_next"
         if nodes:
-            values = self._free("nodes")
-            self.lines += [*printer.nodes(values, nodes), *printer.results(name, kind, count * times)]
+            results, values, filled = symbol.args, self._free("nodes"), name
+            self.lines += [*printer.nodes(values, nodes), *printer.results(name, kind, len(results) * times)]
+            read, first = {bound[0]: printer.item(values, index)}, f"{len(results)} * {index} + "
+            places = [f"{first}{k}" for k in range(len(results))] if len(results) > 1 else [index]
         else:
-            self.lines += printer.state(name, filled, kind, [self.of(x, wide=wide) for x in symbol.args[:count]])
+            begin, results, filled = symbol.args[: len(bound)], symbol.args[len(bound) :], f"{name}_next"
+            self.lines += printer.state(name, filled, kind, [self.of(x, wide=wide) for x in begin])
+            read = {x: printer.item(name, str(k)) for k, x in enumerate(bound)}
+            places = [str(k) for k in range(len(results))]
 
         # Write the values that depend on bound ones
         before, self.lines = self.lines, []
         outside, self.open = self.open, self.open | set(bound)
         body = [x for x in in_order(results) if set(bound) & self.inside[x] and self.inside[x] <= self.open]
-        for x in body:
-            if x.op == "bound":
-                self.text[x] = printer.item(*((values, index) if nodes else (name, str(bound.index(x.detail))))), ATOM
+        self.text |= {x: (read[x.detail], ATOM) for x in body if x.op == "bound"}
         self._write([x for x in body if x.op != "bound"])
-        place = f"{count} * {index} + " if nodes and count > 1 else ""
-        for k, result in enumerate(results):
-            at = (f"{place}{k}" if count > 1 else index) if nodes else str(k)
-            self.lines.append(printer.store(filled, at, self.of(result, wide=wide)))
-        if not nodes:
-            self.lines.append(printer.advance(name, filled))
+        stored = [printer.store(filled, place, self.of(x, wide=wide)) for place, x in zip(places, results)]
+        self.lines += stored if nodes else [*stored, printer.advance(name, filled)]
         for x in body:
             self.text.pop(x, None)
         self.open = outside
@@ -169,32 +165,15 @@ class _Statements:
         """The text, and how strongly its last operator binds."""
         op, args, printer = symbol.op, symbol.args, self.printer
         wide = any(is_colour(x) for x in args)
-        if op == "input":
-            return printer.input(symbol.detail), ATOM
-        if op == "value":
-            return printer.value(symbol.detail, [self.of(x, wide=wide) for x in args], wide), ATOM
-        if op == "film":
-            return printer.film(symbol.detail, [self.of(x) for x in args]), ATOM
-        if op == "item":
-            return printer.item(self.of(args[0], ATOM), str(symbol.detail)), ATOM
-        if op == "component":
-            assert isinstance(args[0], Symbol)
-            return printer.component(self.of(args[0], ATOM), symbol.detail, args[0].kind), ATOM
-        if op == "colour":
-            return printer.colour([self.of(x) for x in args]), ATOM
-        if op == "negative":
-            return f"-{self.of(args[0], ATOM)}", NEGATIVE
-        if op == "select":
-            return self._selected(symbol)
+        if write := _EXPRESSIONS.get(op):
+            return write(self, symbol, wide)
         if op == "minimum" and args[0] in self.clamped:
             assert isinstance(args[0], Symbol)
             return printer.call("clip", [self.of(x) for x in (*args[0].args, args[1])], wide), ATOM
         if op in printer.functions:
             return printer.call(op, [self.of(x, wide=wide) for x in args], wide), ATOM
-        if wide and op == "both":
-            return printer.each_channel(op, *map(self.of, args)), ATOM
-        if wide and op in _COMPARE:
-            return printer.each_channel(op, *(self.of(x, wide=True) for x in args)), ATOM
+        if wide and op in (*_COMPARE, "both"):
+            return printer.each_channel(op, *(self.of(x, wide=op != "both") for x in args)), ATOM
         sign, precedence = printer.operators[op]
         return f"{self.of(args[0], precedence)} {sign} {self.of(args[1], precedence + 1)}", precedence
 
@@ -208,9 +187,29 @@ class _Statements:
         x, low = inner.args
         return isinstance(x, Symbol) and isinstance(low, float) and isinstance(high, float)
 
-    def _selected(self, symbol: Symbol) -> tuple[str, int]:
+    def select(self, symbol: Symbol) -> tuple[str, int]:
+        """The text of a choice, and how strongly it binds."""
         condition, a, b = symbol.args
         wide = symbol.kind == "colour"
         if is_colour(condition):
             return self.printer.select_channels(self.of(condition), self.of(a, wide=True), self.of(b, wide=True)), ATOM
         return self.printer.select(self.of(condition, CONDITION), self.of(a, wide=wide), self.of(b, wide=wide))
+
+
+def _component(s: _Statements, x: Symbol) -> str:
+    (whole,) = x.args
+    assert isinstance(whole, Symbol)
+    return s.printer.component(s.of(whole, ATOM), x.detail, whole.kind)
+
+
+#: Texts of operations that are neither functions nor operators of a language, and how strongly they bind.
+_EXPRESSIONS: dict[str, Callable[[_Statements, Symbol, bool], tuple[str, int]]] = {
+    "input": lambda s, x, wide: (s.printer.input(x.detail), ATOM),
+    "value": lambda s, x, wide: (s.printer.value(x.detail, [s.of(each, wide=wide) for each in x.args], wide), ATOM),
+    "film": lambda s, x, wide: (s.printer.film(x.detail, list(map(s.of, x.args))), ATOM),
+    "item": lambda s, x, wide: (s.printer.item(s.of(x.args[0], ATOM), str(x.detail)), ATOM),
+    "component": lambda s, x, wide: (_component(s, x), ATOM),
+    "colour": lambda s, x, wide: (s.printer.colour(list(map(s.of, x.args))), ATOM),
+    "negative": lambda s, x, wide: (f"-{s.of(x.args[0], ATOM)}", NEGATIVE),
+    "select": lambda s, x, wide: s.select(x),
+}

@@ -53,11 +53,7 @@ def known_before(
     """The numbers and colours that do not depend on inputs whose names begin as `later` says, and that values which do
     are made of: those that take that many operations at least. What is `given` takes none."""
     order = in_order(outputs, given)
-    bound, depend = inside(order), set[Symbol]()
-    for x in order:
-        own = x.op == "input" and x.detail.startswith(later)
-        if x not in given and (own or any(y in depend for y in x.args)):
-            depend.add(x)
+    bound, depend = inside(order), _depending(order, given, later)
     read = {y for x in order if x in depend or bound[x] for y in x.args if isinstance(y, Symbol)}
     found = dict.fromkeys(given)
     for x in order:
@@ -65,6 +61,16 @@ def known_before(
         if known and x not in found and sum(work(y) for y in in_order([x], found) if y not in found) >= least:
             found[x] = None
     return [x for x in found if x not in given]
+
+
+def _depending(order: Sequence[Symbol], given: Collection[Symbol], later: tuple[str, ...]) -> set[Symbol]:
+    """The symbols that depend on inputs whose names begin as `later` says."""
+    found = set[Symbol]()
+    for x in order:
+        is_later = x.op == "input" and x.detail.startswith(later)
+        if x not in given and (is_later or any(y in found for y in x.args)):
+            found.add(x)
+    return found
 
 
 def work(x: Symbol) -> int:

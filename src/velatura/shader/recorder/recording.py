@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain, count
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TypeGuard
 
 from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.films.of_material import films_of
 from velatura.model import DEFAULT, Model, named, variance_kind
-from velatura.model.base import Body
 from velatura.model.context import at_a_point
-from velatura.model.papers import bsdf, precomputed_lobes
-from velatura.model.papers.adding import Lobe
-from velatura.model.papers.diffuse_base import Base
-from velatura.model.papers.lobe_merging import merging
-from velatura.model.papers.prepare import PreparedInterface
+from velatura.model.papers import bsdf
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Variance
 from velatura.ops import Value
-from velatura.optics.ggx import Direction
 from velatura.shader import material
 from velatura.shader.lookups import films
-from velatura.shader.lookups.bake import Bake, bake, bake_known
+from velatura.shader.lookups.bake import bake, bake_known
+from velatura.shader.lookups.lookup import LookUp
 from velatura.shader.recorder import symbol
 from velatura.shader.recorder.graph import Graph, known_before
-from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order, operand
+from velatura.shader.recorder.seen import Seen, of_lobes
+from velatura.shader.recorder.symbol import Kind, Operand, Symbol, in_order
+from velatura.shader.recorder.tape import Tape
 from velatura.stack import Address, Material, Stack, Varying, as_described
 from velatura.stack.schema import unknown
-
-if TYPE_CHECKING:  # it loads SciPy
-    from velatura.shader.lookups.columns import Tabulated
-
 
 LATER = ("wo.", "u.")  # inputs that are known after wi
 LEAST = 4  # operations for which a value that is known once wi is has a place of its own
@@ -45,14 +38,14 @@ class Recording:
     rest from these, wo, and random numbers u.
 
     Inputs are named as in the shader: `m.layer0.eta`, `wi.x`, `l.reflected[0].energy`, ... `baked` is the texture that
-    lobes are read from, if they are not added up; `shown` names the weights of lobes, where they have any. `energies`
-    are those of all parts of a solved material, whose lobes do not hold them.
+    lobes are read from, if they are not added up; `shown`, `shares` and `energies` are those of `Seen`.
     """
 
     stack: Stack
     model: Model
-    baked: Bake | Tabulated | None
+    baked: LookUp | None
     shown: Sequence[str]
+    shares: Sequence[str]
     kinds: Mapping[str, Kind]
     lobes: Mapping[str, Operand]
     energies: Sequence[Operand]
@@ -73,12 +66,16 @@ class Recording:
     @property
     def films(self) -> set[str]:
         """The tables of films that the code looks up, or a tape does."""
-        return films.read_by(self.symbols) | set(self.baked.tape.films if isinstance(self.baked, Bake) else ())
+        return films.read_by(self.symbols).union(self._tape.films if self._tape else ())
 
     @property
     def parameters(self) -> dict[str, str]:
-        """Those that anything reads: a tape, which stands for the code that works out the lobes, reads others."""
-        return {**self._places(set(self.baked.tape.inputs)), **self.read} if isinstance(self.baked, Bake) else self.read
+        """Values that anything reads: a tape, which stands for the code that works out the lobes, reads others."""
+        return {**self._places(self._tape.inputs if self._tape else ()), **self.read}
+
+    @property
+    def _tape(self) -> Tape | None:
+        return self.baked.tape if self.baked else None
 
     def _places(self, inputs: Collection[str]) -> dict[str, str]:
         places = {address.name: material.place(address) for address, _ in self.stack.values()}
@@ -117,7 +114,7 @@ def record(
     recorded = films.recorded(symbols(stack, constants), stack, parameters)
     kind = structure(stack) if parameters else variance(stack)
     prepared = partial(bsdf.body, recorded, chosen, kind, at_a_point())
-    baked: Bake | Tabulated | None = None
+    baked: LookUp | None = None
     if solved:
         from velatura.shader.lookups.columns import tabulated
 
@@ -128,30 +125,26 @@ def record(
         numbers = Material.of(stack)
         numbers = numbers.coated(films_of(numbers))
         baked = bake_known(prepared(), bsdf.body(numbers, chosen, kind, at_a_point()))
-    shown: list[str] = []
     with ops.readable():
-        energies: list[Value] = []
-        if baked is None or isinstance(baked, Bake):
-            body: Body
-            body, fields, shown = _lobed(baked.body if baked else prepared(), wi, baked is None, parameters)
-        else:
-            body, fields, energies = baked.body, baked.fields(wi, parameters), baked.energies(wi)
-            shown = baked.shown if parameters else []
-        value, density = body.eval_pdf(wi, wo)
-        drawn, _ = body.sample(wi, *u)
+        seen = baked.seen(wi, parameters) if baked else of_lobes(prepared(), wi, parameters, added=True)
+        value, density = seen.body.eval_pdf(wi, wo)
+        drawn, _ = seen.body.sample(wi, *u)
+    return _recorded(stack, chosen, baked, seen, [value, density, *drawn])
 
-    # Read the values that the lobes hold
-    graph, kinds = Graph(), _kinds(fields)
-    every = iter(graph.unique([*fields.values(), value, density, *drawn]))
-    lobes = {name: next(every) for name in fields}
+
+def _recorded(stack: Stack, model: Model, baked: LookUp | None, seen: Seen, others: Sequence[Value]) -> Recording:
+    """The recording of what is seen, and of value, density and sample, which read the values that the lobes hold."""
+    graph, kinds = Graph(), seen.kinds()
+    every = iter(graph.unique([*seen.fields.values(), *others]))
+    lobes = {name: next(every) for name in seen.fields}
     held = {x: _held(name, kinds[name], x) for name, x in reversed(lobes.items()) if _worth(x)}
     others = list(every)
     for x in known_before(others, held, LATER, LEAST):
         name = next(name for name in _names(x) if name not in kinds)
         kinds[name], lobes[name], held[x] = x.kind, x, _held(name, x.kind, x)
-    of_value, of_density, *sampled = Graph(held).unique(others)
-    found = Graph().unique(energies)
-    return Recording(stack, chosen, baked, shown, kinds, lobes, found, of_value, of_density, sampled)
+    value, density, *drawn = Graph(held).unique(others)
+    energies = Graph().unique(seen.energies)
+    return Recording(stack, model, baked, seen.shown, seen.shares, kinds, lobes, energies, value, density, drawn)
 
 
 def drawn_by(stack: Stack, model: Model) -> Model:
@@ -182,15 +175,6 @@ def check_constant(stack: Stack, constant: Collection[str]) -> None:
 def symbols(stack: Stack, constants: Collection[str]) -> Material:
     """A stack with inputs as its values, but for the `constants`."""
     return Material.of(stack, lambda at, x: material.constant(at, x) if at.name in constants else _input(at))
-
-
-def _lobed(
-    body: bsdf.Lobed, wi: Direction, added: bool, parameters: bool
-) -> tuple[bsdf.Lobed, dict[str, Value], list[str]]:
-    """A body, all that is known of it once wi is, and the names of its weights; `added` where lobes are added up."""
-    weighed, shown = _weighed(body) if parameters else (body, [])
-    base = body.above.base if added else None  # the values read of a base hold all of it
-    return weighed, _fields(bsdf.scattered(weighed, wi), base.worth if base else ()), shown
 
 
 def _names(x: Symbol) -> Iterator[str]:
@@ -232,58 +216,3 @@ def structure(stack: Stack) -> type[Variance]:
     if not pairs:
         return Isotropic
     return Covariance if any("rotation" in layer.model_fields_set for layer in pairs) else PerAxis
-
-
-def _weighed(body: bsdf.Lobed) -> tuple[bsdf.Lobed, list[str]]:
-    """A body with a weight for each reflected lobe, its base and its transmitted lobe; and their names."""
-    count = len(merging(body.above.model, sum(isinstance(layer, PreparedInterface) for layer in body.above.layers)))
-    names = [f"reflected[{k}]" for k in range(count)]
-    last = symbol.number(f"{symbol.SHOWN}[{count}]")
-
-    def lobe(seen: Lobe, weight: Value) -> Lobe:
-        return replace(seen, energy=seen.energy * weight)
-
-    def weighed(lobes: precomputed_lobes.Lobes) -> precomputed_lobes.Lobes:
-        def shown(w: Direction) -> tuple[list[Lobe], Lobe | None]:
-            reflected, passed = lobes(w)
-            weights = [symbol.number(f"{symbol.SHOWN}[{k}]") for k in range(count)]
-            return [lobe(*pair) for pair in zip(reflected, weights)], lobe(passed, last) if passed else None
-
-        return shown
-
-    def base(w: Direction) -> Base:
-        found = body.base(w)
-        assert found is not None
-        return replace(found, scale=found.scale * last, energy=found.energy * last)
-
-    shown = replace(body, lobes_above=weighed(body.lobes_above), lobes_below=weighed(body.lobes_below))
-    if body.below is not None:
-        return shown, [*names, "transmitted"]
-    return (replace(shown, base_above=base), [*names, "base"]) if body.above.base else (shown, names)
-
-
-def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> dict[str, Value]:
-    """All that is known once wi is, by its place in the struct; `worth` is that of the light over a diffuse base."""
-    lobes = {f"reflected[{k}]": lobe for k, lobe in enumerate(seen.reflected)}
-    if seen.transmitted is not None:
-        lobes["transmitted"] = seen.transmitted
-    parts = {place: {"energy": lobe.energy, **lobe.roughness._asdict()} for place, lobe in lobes.items()}
-    fields = {f"{place}.{part}": value for place, all_parts in parts.items() for part, value in all_parts.items()}
-    if seen.base:
-        fields |= {"base_scale": seen.base.scale, "base_energy": seen.base.energy}
-    return fields | {f"base_worth{k}": value for k, value in enumerate(worth)}
-
-
-def _kinds(fields: Mapping[str, Value]) -> dict[str, Kind]:
-    """By place: a part is a colour in all lobes, where it is in one, or may be."""
-    wide = {part(name) for name, value in fields.items() if symbol.is_colour(operand(value)) or _is_energy(name)}
-    return {name: "colour" if part(name) in wide else "number" for name in fields}
-
-
-def _is_energy(name: str) -> bool:
-    return part(name) == "energy" or name.startswith("base_")
-
-
-def part(name: str) -> str:
-    """Last part of the name of a field: `energy` for `reflected[0].energy`."""
-    return name.rpartition(".")[2]

@@ -29,6 +29,11 @@ _depth: ContextVar[int] = ContextVar("depth", default=0)  # of loops that are be
 _CONDITIONS = {"less", "greater", "at_most", "at_least", "both"}
 
 
+def _operator(op: str) -> tuple[Callable[[Any, Value], Value], Callable[[Any, Value], Value]]:
+    """Methods of a binary operator, for the recorded value on the left and on the right."""
+    return lambda a, b: record(op, a, b), lambda a, b: record(op, b, a)
+
+
 class Symbol:
     """A recorded value.
 
@@ -63,49 +68,18 @@ class Symbol:
         other.serial, other.title, other.name = self.serial, self.title, self.name
         return other
 
-    def __add__(self, other: Value) -> Value:
-        return record("add", self, other)
-
-    def __radd__(self, other: Value) -> Value:
-        return record("add", other, self)
-
-    def __sub__(self, other: Value) -> Value:
-        return record("subtract", self, other)
-
-    def __rsub__(self, other: Value) -> Value:
-        return record("subtract", other, self)
-
-    def __mul__(self, other: Value) -> Value:
-        return record("multiply", self, other)
-
-    def __rmul__(self, other: Value) -> Value:
-        return record("multiply", other, self)
-
-    def __truediv__(self, other: Value) -> Value:
-        return record("divide", self, other)
-
-    def __rtruediv__(self, other: Value) -> Value:
-        return record("divide", other, self)
+    __add__, __radd__ = _operator("add")
+    __sub__, __rsub__ = _operator("subtract")
+    __mul__, __rmul__ = _operator("multiply")
+    __truediv__, __rtruediv__ = _operator("divide")
+    __and__, __rand__ = _operator("both")
+    __lt__, _ = _operator("less")
+    __gt__, _ = _operator("greater")
+    __le__, _ = _operator("at_most")
+    __ge__, _ = _operator("at_least")
 
     def __neg__(self) -> Value:
         return record("negative", self)
-
-    def __lt__(self, other: Value) -> Value:
-        return record("less", self, other)
-
-    def __gt__(self, other: Value) -> Value:
-        return record("greater", self, other)
-
-    def __le__(self, other: Value) -> Value:
-        return record("at_most", self, other)
-
-    def __ge__(self, other: Value) -> Value:
-        return record("at_least", self, other)
-
-    def __and__(self, other: Value) -> Value:
-        return record("both", self, other)
-
-    __rand__ = __and__
 
     def __bool__(self) -> bool:
         raise TypeError("a recorded value is neither true nor false: use ops.select")
@@ -284,7 +258,7 @@ def in_order(outputs: Sequence[Value], given: Collection[Symbol] = ()) -> list[S
 
 
 def inside(order: Sequence[Symbol]) -> dict[Symbol, frozenset[str]]:
-    """By symbol: the bound symbols of the loops around it that it depends on."""
+    """The bound symbols of the loops around it that each symbol depends on."""
     found: dict[Symbol, frozenset[str]] = {}
     for symbol in order:
         own = {symbol.detail} if symbol.op == "bound" else set()
