@@ -60,14 +60,14 @@ def pictures(found: Found, job: dict[str, Any]) -> np.ndarray:
     return np.array(every)[..., :3]
 
 
-def of_table(baked: closures.Tabulated) -> Found:
+def of_table(baked: closures.TabulatedClosures) -> Found:
     """The closures of a solved material."""
     mi = kernel.mitsuba()
     flat = mi.Float(baked.rows[0].ravel().astype(np.float32))
     curves = directional_grid.interleaved(flat, baked.shape, mi.Float)
 
-    def read(w: Direction) -> closures.Columns:
-        return closures.Columns.of(curves(w), mi.Color3f)
+    def read(w: Direction) -> closures.ColumnReader:
+        return closures.ColumnReader.of(curves(w), mi.Color3f)
 
     return lambda si: baked.at(tuple(si.wi), read, baked.etas[0])
 

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, pi
-from threading import Lock
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,7 +18,7 @@ from velatura.films.reflectance import Films, InterfaceFilms
 from velatura.ops import Value
 from velatura.optics.coatings import Coating
 from velatura.optics.films import COHERENT_NM
-from velatura.renderer.packets import Packets, packets
+from velatura.renderer.packets import Grid, packets
 from velatura.stack import InterfaceValues
 
 Array = NDArray[np.floating]
@@ -36,23 +35,13 @@ MOST = ceil(COHERENT_NM / STEP_NM)  # steps between the ends of a texture: beyon
 FINE = 4  # thicknesses, by splines, from one that is worked out to the next
 MATCHED = 1e-6  # least square of the cosine at the critical angle
 
-_uploading = Lock()
 
-
-class ColourTable:
-    """Colours at the nodes of a grid, which a look-up interpolates; `data` has the channels on its last axis."""
+class ColourTable(Grid):
+    """Colours at the nodes of a grid, which a look-up interpolates."""
 
     def __init__(self, data: Array) -> None:
-        self.data, self.shape = data, data.shape[:-1]
-        self._packets: dict[Any, Packets] = {}
+        self.data, self._packets = data, {}
         self._number: Any = None
-
-    def packets(self, dialect: Any) -> Packets:
-        """The values for a Dr.Jit module, made at first use."""
-        with _uploading:
-            if dialect not in self._packets:
-                self._packets[dialect] = packets(self.data.ravel(), self.data.shape[-1], dialect)
-            return self._packets[dialect]
 
     def fetched(self, like: Value, *coordinates: Value) -> Value:
         """Colour of the kind of `like`."""

@@ -31,11 +31,7 @@ class FilmAverage(ColourTable):
 
     def __call__(self, cos_theta: Value, alpha: Value, like: Value) -> list[Value]:
         """Colours of the kind of `like`."""
-        x = (
-            coordinates.from_cosine(cos_theta)
-            if self.critical is None
-            else coordinates.from_angle(cos_theta, self.critical)
-        )
+        x = coordinates.from_incidence(cos_theta, self.critical)
         return self.colours(like, x, coordinates.from_roughness(alpha), count=self.channels)
 
 
@@ -47,7 +43,7 @@ def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverag
     opaque, n12 = films.n12 is None, films.n12 or 1.0
     critical = None if opaque or n12 >= 1 else float(np.arcsin(n12))
     x, y = (np.linspace(0, 1, n) for n in (COARSE if coarse else NODES))
-    cosines = np.asarray(coordinates.to_cosine(x) if critical is None else coordinates.to_angle(x, critical))
+    cosines = np.asarray(coordinates.to_incidence(x, critical))
     p = np.sqrt(np.maximum(1 - cosines * cosines, 0))
     samples = FEW if coarse else SAMPLES if critical is None else SAMPLES_INSIDE
     one, below = np.ones(1), np.full(1, n12)

@@ -59,7 +59,7 @@ class Coating:
 
     @property
     def absorbs(self) -> bool:
-        """Whether any of the films does."""
+        """Whether any of the films absorbs."""
         return any(any(film.k) for film in self.films)
 
     def reflectance(self, cos_theta: Array, sensitivity: Sensitivity) -> Array:
@@ -67,14 +67,14 @@ class Coating:
         return np.clip(self.shares(["reflected"], cos_theta, sensitivity)[0], 0.0, 1.0)
 
     def at(self, names: Sequence[str], cos_theta: Array, wavelengths_nm: Array) -> Array:
-        """As `shares`, of channels of one wavelength each (C,)."""
+        """Properties like those of `shares`, of channels of one wavelength each (C,)."""
         eta_1, eta_2, k_2 = (np.reshape(x, (-1, 1)) for x in (self.eta_1, self.eta_2, self.k_2))
         films = [Film(np.reshape(x.eta, (-1, 1)), np.reshape(x.k, (-1, 1)), x.thickness_nm) for x in self.films]
         found = coherent(cos_theta, wavelengths_nm[:, None], eta_1, films, eta_2, k_2)
         return np.stack([getattr(found, name) for name in names])
 
     def reversed(self) -> Coating:
-        """As seen from below, between media that do not absorb."""
+        """The coating seen from below, between media that do not absorb."""
         return replace(self, films=self.films[::-1], eta_1=self.eta_2, eta_2=self.eta_1)
 
     def shares(self, names: Sequence[str], cos_theta: Array, sensitivity: Sensitivity) -> Array:

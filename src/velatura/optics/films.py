@@ -18,7 +18,7 @@ from velatura import ops
 from velatura.ops import Value
 
 COHERENT_NM = 20_000.0  # optical thickness up to which colours may show that light keeps its phase across a film
-_GRAZING = 1e-12  # least square of q: what light grazes has a field that is linear over its depth, not constant
+_SQUARE_MIN = 1e-12  # least square of q: what light grazes has a field that is linear over its depth, not constant
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def _square(eta: Value, k: Value) -> _Complex:
 def _normal(square: _Complex, sin2: Value) -> _Complex:
     """q of light in a medium, by the square of its index; of two roots, that of a wave that decays downwards."""
     re, im = square.re - sin2, square.im
-    modulus = ops.maximum(ops.sqrt(re * re + im * im, None), _GRAZING)
+    modulus = ops.maximum(ops.sqrt(re * re + im * im, None), _SQUARE_MIN)
     greater = ops.sqrt(0.5 * (modulus + ops.absolute(re)), None)
     smaller = 0.5 * im / greater
     propagates = re >= 0

@@ -42,7 +42,7 @@ def dielectric_between(cos_theta: Value, cos_t: Value, eta: Value) -> Value:
 
 
 def dielectric_together(cos2: Value, n12: Value, eta: Value) -> Value:
-    """As `dielectric_between`, by the square of the cosine and the relative index n12 that refracts all colours."""
+    """Reflectance, as of `dielectric_between`, by the square of the cosine and the index n12 that refracts all."""
     eta = ops.minimum(eta, GREATEST)
     ratio2 = (eta / n12) * (eta / n12)
     inside2 = ops.maximum(eta * eta - ratio2 + ratio2 * cos2, 0.0)
@@ -50,7 +50,7 @@ def dielectric_together(cos2: Value, n12: Value, eta: Value) -> Value:
 
 
 def _dielectric(cos2: Value, inside2: Value, both: Value, eta2: Value) -> Value:
-    """By the squares of c = cos_theta, of g = eta cos_t inside and of eta, and the product c g.
+    """Reflectance by the squares of c = cos_theta, of g = eta cos_t inside and of eta, and the product c g.
 
     The mean of the squares of r_s = (c - g) / (c + g) and r_p = (eta2 c - g) / (eta2 c + g) is
     ((eta2 c^2 - g^2)^2 + (eta2 - 1)^2 (c g)^2) / ((c + g) (eta2 c + g))^2.

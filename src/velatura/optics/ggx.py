@@ -22,7 +22,7 @@ def rotate(w: Direction, angle: Value) -> Direction:
 
 
 def turned(w: Direction, cosine: Value, sine: Value) -> Direction:
-    """As `rotate`, by the cosine and the sine of the angle."""
+    """Coordinates like those of `rotate`, by the cosine and the sine of the angle."""
     return cosine * w[0] + sine * w[1], cosine * w[1] - sine * w[0], w[2]
 
 

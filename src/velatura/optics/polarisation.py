@@ -32,28 +32,28 @@ class Polarisation:
     v: Value
 
     def mirrored(self, where: Value) -> Polarisation:
-        """As seen in a mirror in the plane of z where the condition holds: x is turned, and right is left."""
+        """The parameters in a mirror in the plane of z where the condition holds: x is turned, and right is left."""
         x = self.x[0], self.x[1], ops.select(where, -self.x[2], self.x[2])
         return Polarisation(x, self.q, ops.select(where, -self.u, self.u), ops.select(where, -self.v, self.v))
 
     @property
     def inverted(self) -> Polarisation:
-        """With all directions turned around, of travel too: x and y keep their axes, and right is left."""
+        """The parameters with all directions turned around, of travel too: x and y keep axes, right is left."""
         return Polarisation(self.x, self.q, -self.u, -self.v)
 
     def seen_by(self, into: Callable[[Direction], Direction]) -> Polarisation:
-        """In the coordinates that a rotation leads to."""
+        """The parameters in the coordinates that a rotation leads to."""
         return Polarisation(into(self.x), self.q, self.u, self.v)
 
     def along(self, w: Direction, x: Direction) -> Polarisation:
-        """In the frame of another first direction x across the direction of travel w."""
+        """The parameters in the frame of another first direction x across the direction of travel w."""
         cosine, sine = ggx.dot(self.x, x), ggx.dot(ggx.cross(w, self.x), x)
         square = ops.maximum(cosine * cosine + sine * sine, ops.TINY)
         cos_2, sin_2 = (cosine * cosine - sine * sine) / square, 2 * cosine * sine / square
         return Polarisation(x, cos_2 * self.q + sin_2 * self.u, cos_2 * self.u - sin_2 * self.q, self.v)
 
     def at(self, w: Direction, h: Direction) -> Polarisation:
-        """In the frame of a facet of normal h."""
+        """The parameters in the frame of a facet of normal h."""
         s = ggx.cross(w, h)
         square = ggx.dot(s, s)
         tilted = square > _STRAIGHT
@@ -100,12 +100,12 @@ class Mueller:
 
 
 def mueller(amplitude_s: Complex, amplitude_p: Complex) -> Mueller:
-    """Of the amplitudes that a facet reflects; transmitted ones, if their squares are shares of the energy."""
+    """Matrix of the amplitudes that a facet reflects; transmitted ones, if their squares are shares of the energy."""
     (a, b), (c, d) = amplitude_s, amplitude_p
     return Mueller(a * a + b * b, c * c + d * d, a * c + b * d, b * c - a * d)
 
 
 def complement(reflection: Mueller) -> Mueller:
-    """Of refraction by an interface that reflects thus and absorbs nothing: s and p are transmitted in phase."""
+    """Matrix of refraction by an interface that reflects thus and absorbs nothing: s and p are transmitted in phase."""
     s, p = (ops.maximum(1 - part, 0.0) for part in (reflection.s, reflection.p))
     return Mueller(s, p, ops.sqrt(s * p), 0.0)

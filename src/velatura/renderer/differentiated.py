@@ -26,14 +26,14 @@ STEP = 0.005
 
 @dataclass(frozen=True)
 class Variables:
-    """Those of a material, each with the values, and their channel, that it stands for."""
+    """Differentiated numbers of a material, each with the values, and their channel, that it stands for."""
 
     given: list[finite_differences.Variable]
     addresses: list[Address]
 
     @classmethod
     def of(cls, material: Material) -> Variables:
-        """Those among a renderer's values."""
+        """The numbers that are differentiated among a renderer's values."""
         addresses, values = zip(*material.values())
         return cls(finite_differences.variables(values), list(addresses))
 

@@ -34,7 +34,7 @@ class Curves:
         return found
 
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
-        """For a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
+        """Values for a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
         interpolate = ops.interpolate_in_simplices if others else ops.interpolate
         return interpolate(self, *places(w, len(self.shape) - len(others)), *others)
 
@@ -49,7 +49,7 @@ class Packing:
 
     @classmethod
     def of(cls, rows: NDArray[np.floating], groups: Sequence[int], shared: bool = True) -> Packing:
-        """Of values (rows, ...), those of each group in a table of its own; `shared` where the same ones are one."""
+        """Packing of values (rows, ...), each group in a table of its own; `shared` where the same ones are one."""
         keys = [
             (group, row.astype(np.float32).tobytes() if shared else k)
             for k, (group, row) in enumerate(zip(groups, rows))
@@ -77,11 +77,11 @@ class Packed:
     places: tuple[int, ...]
 
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
-        """As `Curves`."""
+        """Values, like those of `Curves`."""
         return self._placed(table(w, *others) for table in self.tables)
 
     def at(self, *coordinates: Value) -> list[Value]:
-        """For coordinates from 0 to 1 on all axes, those of directions included."""
+        """Values for coordinates from 0 to 1 on all axes, those of directions included."""
         return self._placed(ops.interpolate_in_simplices(table, *coordinates) for table in self.tables)
 
     def _placed(self, tables: Iterable[list[Value]]) -> list[Value]:
@@ -97,7 +97,7 @@ class Summed:
     shares: Sequence[Sequence[Value]]
 
     def at(self, *coordinates: Value) -> list[Value]:
-        """As `Packed`."""
+        """Values, like those of `Packed`."""
         first, *others = zip(self.packed.at(*coordinates), self.shares)
         found = [first[0] * share for share in first[1]]
         for x, shares in others:
@@ -106,7 +106,7 @@ class Summed:
 
 
 def directions(shape: tuple[int, ...], number: type | None) -> Direction:
-    """Those at the nodes, for Dr.Jit's type of numbers (None for NumPy). Shape: (cosines,) or (cosines, azimuths)."""
+    """Directions at nodes, by Dr.Jit's type of numbers (None for NumPy). Shape: (cosines,) or (cosines, azimuths)."""
     index, real = integers(prod(shape), number)
     turns = prod(shape[1:])
     return direction(real(index // turns) / (shape[0] - 1), real(index % turns) / max(turns - 1, 1))

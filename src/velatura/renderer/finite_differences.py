@@ -28,7 +28,7 @@ class Variable:
 
 
 def variables(values: Sequence[Value]) -> list[Variable]:
-    """What is being differentiated among values of Dr.Jit; one for all places that are the same variable."""
+    """Variables among values of Dr.Jit; one for all places that are the same variable."""
     if all(isinstance(value, (float, np.ndarray)) for value in values):
         return []
     import drjit as dr
@@ -66,7 +66,7 @@ def differentiable(
             return [number(aligned(flat)) for flat in function(self.numbers)]
 
         def slopes(self) -> Iterator[list[Array]]:
-            """By variable, of all that the function returns."""
+            """Slopes of all that the function returns, by variable."""
             for k, x in enumerate(self.numbers):
                 low, high = around(k, x)
                 below, above = (function([*self.numbers[:k], end, *self.numbers[k + 1 :]]) for end in (low, high))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
 WIDTH = 8  # values that are fetched at once, at most; a power of two
 ALIGNED = 16  # values between addresses that the widest instructions read from
+
+_uploading = Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +28,25 @@ class Packets:
         """Where values that are fetched together begin at a node, and how many they are: a power of two."""
         for begin in range(0, self.count, WIDTH):
             yield begin, 1 << (min(self.count - begin, WIDTH) - 1).bit_length()
+
+
+class Grid:
+    """Values at the nodes of a grid, `data` with channels on the last axis; a Dr.Jit module gets them at first use."""
+
+    data: np.ndarray
+    _packets: dict[Any, Packets]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the grid, without the channels."""
+        return self.data.shape[:-1]
+
+    def packets(self, dialect: Any) -> Packets:
+        """The values for a Dr.Jit module (`drjit.llvm.ad`, say)."""
+        with _uploading:
+            if dialect not in self._packets:
+                self._packets[dialect] = packets(self.data.ravel(), self.data.shape[-1], dialect)
+            return self._packets[dialect]
 
 
 def packets(flat: Any, count: int, dialect: Any) -> Packets:

@@ -140,23 +140,23 @@ def bounded(roughness: Roughness) -> Roughness:
     return Roughness(ops.clip(u, ALPHA_MIN, 1.0), ops.clip(v, ALPHA_MIN, 1.0), rotation)
 
 
-# Tabulated over direction
+# TabulatedClosures over direction
 
 
-class Columns(NamedTuple):
+class ColumnReader(NamedTuple):
     """Columns at a direction, by their place: one as a number, or the three from there on as a colour."""
 
     number: Callable[[int], Value]
     colour: Callable[[int], Value]
 
     @classmethod
-    def of(cls, values: Sequence[Value], colour: Callable[..., Value]) -> Columns:
-        """Of all columns as numbers, and a function that makes a colour of three."""
+    def of(cls, values: Sequence[Value], colour: Callable[..., Value]) -> ColumnReader:
+        """Columns by all their numbers, and a function that makes a colour of three."""
         return cls(values.__getitem__, lambda k: colour(*values[k : k + 3]))
 
 
 @dataclass(frozen=True)
-class Tabulated:
+class TabulatedClosures:
     """The closures of a uniform material over direction, from above and, where it transmits, from below: `rows` (sides,
     nodes, columns). `kinds` are those of the closures, `etas` the relative index beyond, by side. Where roughness has
     no rotation (`variance` is PerAxis) its first axis lies in the plane of incidence."""
@@ -167,7 +167,7 @@ class Tabulated:
     etas: Sequence[float]
     rows: Array
 
-    def at(self, wi: Direction, read: Callable[[Direction], Columns], eta: Value) -> list[Closure]:
+    def at(self, wi: Direction, read: Callable[[Direction], ColumnReader], eta: Value) -> list[Closure]:
         """The closures for light from wi, of the columns that are read at an upright direction."""
         columns, k, found = read(upright(wi, wi)), 0, list[Closure]()
         for kind in self.kinds:
@@ -185,20 +185,20 @@ class Tabulated:
         return found
 
     def above(self, wi: Direction) -> list[Closure]:
-        """In NumPy, for light from above."""
+        """The closures in NumPy, for light from above."""
         curves = Curves(self.rows[0].reshape(*self.shape, -1), self.shape)
-        return self.at(wi, lambda w: Columns.of(curves(w), lambda *three: np.stack(three)), self.etas[0])
+        return self.at(wi, lambda w: ColumnReader.of(curves(w), lambda *three: np.stack(three)), self.etas[0])
 
 
 _SMOOTH = ("diffuse", "translucent")
 
 
 def _variance(kind: Kind, variance: type[Variance]) -> type[Variance]:
-    """Of the columns of a closure."""
+    """Kind of variance of the columns of a closure."""
     return variance if kind == "reflection" else Isotropic
 
 
-def tabulated(material: Material, model: Model, conserving: bool = False) -> Tabulated:
+def tabulated(material: Material, model: Model, conserving: bool = False) -> TabulatedClosures:
     """The closures of a material with values in NumPy, as `velatura.lobes` reports its lobes; for renderers whose
     facets are `conserving`, all light that they block leaves again."""
     isotropic = variance_kind(material) is Isotropic
@@ -213,7 +213,9 @@ def tabulated(material: Material, model: Model, conserving: bool = False) -> Tab
     bright = [k for k, closures in enumerate(zip(*each)) if max(np.max(c.weight) for c in closures) > FAINT]
     kept = bright or [0]
     rows = np.array([np.concatenate([_columns(closures[k], variance) for k in kept]).T for closures in each])
-    return Tabulated([each[0][k].kind for k in kept], variance, shape, etas, rows.astype(np.float32).astype(float))
+    return TabulatedClosures(
+        [each[0][k].kind for k in kept], variance, shape, etas, rows.astype(np.float32).astype(float)
+    )
 
 
 def _at_nodes(side: Material, model: Model, w: Direction, eta: float, conserving: bool) -> list[Closure]:
@@ -354,7 +356,7 @@ def _about(wi: Direction) -> tuple[Direction, Direction, Direction]:
 
 @dataclass(frozen=True)
 class Loss:
-    """What closures are off a model in light from one direction: total variation, which is half the sum of the
+    """Difference of closures from a model in light from one direction: total variation, which is half the sum of the
     differences over the light; and the greatest difference of albedo, over the colours."""
 
     cosine: float
@@ -366,7 +368,7 @@ class Loss:
 
 
 def losses(material: Material, model: Model, closures: Closures) -> Iterator[Loss]:
-    """Of the closures of a material with values in NumPy, for light from above."""
+    """Losses of the closures of a material with values in NumPy, for light from above."""
     material = material.solid()
     body = model.body(material, variance_kind(material), Context())
     asked = Query(radiance=False)

@@ -9,7 +9,7 @@ from velatura import ops
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.renderer import directional_grid
-from velatura.shader.closures import Closure, Columns, Tabulated, bounded
+from velatura.shader.closures import Closure, ColumnReader, TabulatedClosures, bounded
 
 DEGREE = 8
 MODES = 5  # of azimuth: a constant, cosines and sines of 2 and 4 times the angle
@@ -25,7 +25,7 @@ class Fit:
     Modes are 1, and cosine and sine of 2 and 4 times the azimuth where lobes are brushed.
     """
 
-    def __init__(self, baked: Tabulated) -> None:
+    def __init__(self, baked: TabulatedClosures) -> None:
         self.baked = baked
         self.modes = MODES if len(baked.shape) > 1 else 1
         x, y, z = (np.ravel(w) for w in directional_grid.directions(baked.shape, None))
@@ -44,11 +44,11 @@ class Fit:
             for closure in found
         ]
 
-    def _read(self, w: Direction) -> Columns:
+    def _read(self, w: Direction) -> ColumnReader:
         x, modes = ops.sqrt(w[2]), _modes(w, self.modes)
 
         def polynomial(coefficients: Array) -> Value:
-            """By Horner's rule, of the modes that count."""
+            """Sum over the modes that count, by Horner's rule."""
             total: Value = 0.0
             for k, (mode, each) in enumerate(zip(modes, coefficients)):
                 if k == 0 or np.abs(each).sum(axis=0).max() >= NEGLIGIBLE:
@@ -61,7 +61,7 @@ class Fit:
         def colour(k: int) -> Value:
             return polynomial(self.coefficients[..., k : k + 3, None])
 
-        return Columns(lambda k: polynomial(self.coefficients[..., k]), colour)
+        return ColumnReader(lambda k: polynomial(self.coefficients[..., k]), colour)
 
 
 def _modes(w: Direction, count: int) -> list[Value]:

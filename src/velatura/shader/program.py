@@ -157,7 +157,7 @@ def prefixed(text: str, prefix: str) -> str:
 
 
 def _costs(recording: Recording) -> dict[str, Cost]:
-    """By function; lobes that are read from a texture of one or two axes."""
+    """Cost of each function; lobes are read from a texture of one or two axes."""
     functions = {
         "vt_lobes": list(recording.lobes.values()),
         "vt_eval_pdf": [recording.value, recording.density],
@@ -168,7 +168,7 @@ def _costs(recording: Recording) -> dict[str, Cost]:
 
 
 def _interfaces(recording: Recording) -> list[list[int]]:
-    """By reflected lobe that is shown, seen from above: the layers whose light it is."""
+    """The layers whose light each reflected lobe is, seen from above."""
     places = recording.stack.surfaces[: len(recording.stack.interfaces)]
     if recording.energies:
         return [[place] for place in places]

@@ -74,6 +74,16 @@ def from_angle(cos_theta: Value, theta_c: Value) -> Value:
     return 0.5 + 0.5 * ops.select(beyond < 0, within, -outwards)
 
 
+def from_incidence(cos_theta: Value, theta_c: Value | None) -> Value:
+    """Coordinate of a cosine of incidence, on the angular axis where there is a critical angle."""
+    return from_cosine(cos_theta) if theta_c is None else from_angle(cos_theta, theta_c)
+
+
+def to_incidence(x: Value, theta_c: Value | None) -> Value:
+    """Cosine of incidence at coordinate x."""
+    return to_cosine(x) if theta_c is None else to_angle(x, theta_c)
+
+
 def to_angle(x: Value, theta_c: Value) -> Value:
     """Cosine of the angle of incidence at coordinate x."""
     within, outwards = 2 * x - 1, ops.maximum(1 - 2 * x, 0.0)

@@ -109,7 +109,7 @@ def fgd(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
 
 
 def _of_facets(tables: Tables, row: Row, cos_theta: Value, alpha: Value) -> Value:
-    """Without films."""
+    """Directional albedo of the interface without films."""
     from_cosine, from_roughness = coordinates.from_cosine(cos_theta), coordinates.from_roughness(alpha)
     channels = ops.interpolate(row.table, from_cosine, from_roughness)
     above = _dot(channels, row.reflectance)

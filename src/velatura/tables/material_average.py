@@ -34,11 +34,7 @@ class Sheet:
         return self.held
 
     def __call__(self, cos_theta: Value, alpha: Value) -> Value:
-        x = (
-            coordinates.from_cosine(cos_theta)
-            if self.theta_c is None
-            else coordinates.from_angle(cos_theta, self.theta_c)
-        )
+        x = coordinates.from_incidence(cos_theta, self.theta_c)
         channels = ops.interpolate(self, x, coordinates.from_roughness(alpha))
         return channels[0] if self.colour is None else self.colour(*channels)
 
@@ -48,8 +44,7 @@ def sample(average: Average, number: type, shape: tuple[int, ...], theta_c: Valu
     import drjit as dr
 
     x, y = (number(axis.ravel()) for axis in np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij"))
-    cosine = coordinates.to_cosine(x) if theta_c is None else coordinates.to_angle(x, theta_c)
-    values = average(cosine, coordinates.to_roughness(y)) + dr.zeros(number, dr.width(x))
+    values = average(coordinates.to_incidence(x, theta_c), coordinates.to_roughness(y)) + dr.zeros(number, dr.width(x))
     colour = type(values) if dr.size_v(values) > 1 and any(c.index != values[0].index for c in values) else None
     flat = dr.ravel(values) if colour else (values if dr.depth_v(values) <= 1 else values[0])
     dr.eval(flat)

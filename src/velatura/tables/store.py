@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from velatura.files import whole
-from velatura.renderer.packets import Packets, packets
+from velatura.renderer.packets import Grid, Packets
 
 FILE = Path(__file__).with_name("tables.npz")
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class Table(Grid):
     """Single-precision values at the nodes i/(N-1) of a two- or three-dimensional grid, channels on the last axis.
 
     `nodes` are the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in
@@ -29,18 +29,6 @@ class Table:
     nodes: tuple[float, ...] = ()
     powers: tuple[int, ...] = ()
     _packets: dict[Any, Packets] = field(default_factory=dict, repr=False)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Of the grid, without the channels."""
-        return self.data.shape[:-1]
-
-    def packets(self, dialect: Any) -> Packets:
-        """The table for a Dr.Jit module (`drjit.llvm.ad`, say), made at first use."""
-        with _uploading:
-            if dialect not in self._packets:
-                self._packets[dialect] = packets(self.data.ravel(), self.data.shape[-1], dialect)
-            return self._packets[dialect]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +78,7 @@ def load() -> Tables:
         return _loaded()
 
 
-_loading, _uploading = Lock(), Lock()
+_loading = Lock()
 
 
 @cache

@@ -50,8 +50,8 @@ Array = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class Solution:
-    """What a shader reads of a material: texels (height, width, 4), colours (8 sides, 3) of the remainders, and numbers
-    of its layout."""
+    """Contents of a material for a shader: texels (height, width, 4), colours (8 sides, 3) of the remainders, and
+    numbers of its layout."""
 
     texels: Array
     remainder: Array
@@ -72,12 +72,12 @@ class SolvedLookUp(LookUp):
 
     @property
     def interfaces(self) -> list[int]:
-        """By lobe: the number of its interface from the top."""
+        """Number of the interface of each lobe, from the top."""
         return [each.interface for each in self.layouts[0].lobes]
 
     @property
     def shown(self) -> list[str]:
-        """What has a weight: interfaces, by the first lobe of each, the remainder, and what passes."""
+        """Parts that have a weight: interfaces, by the first lobe of each, the remainder, and what passes."""
         first = [f"reflected[{self.interfaces.index(k)}]" for k in dict.fromkeys(self.interfaces)]
         return [*first, "remainder", *(["transmitted"] if self.sides > 1 else [])]
 
@@ -218,7 +218,7 @@ def _layout_numbers(solver: Solver, material: Material, layouts: Sequence[Layout
 
 
 def _flags(transmission: Transmission) -> list[Value]:
-    """Which interfaces shape the light that passes."""
+    """Flags of the interfaces that shape the light that passes."""
     return [*transmission.faces, *transmission.under, *transmission.scattered]
 
 
@@ -253,7 +253,7 @@ def _placed(side: Side, rows: Array | None) -> tuple[Sequence[Group], Sequence[i
 
 
 class _Made(dict[Hashable, Any]):
-    """What a solve has made, or has taken from what was made `before`."""
+    """Results that a solve has made, or has taken from those made `before`."""
 
     def __init__(self, before: Made) -> None:
         super().__init__()
@@ -324,7 +324,7 @@ def _colours(side: SolvedSide) -> Array:
 
 
 def _eventful(material: Material) -> Material:
-    """Of which all is drawn that layers like these may have: media scatter, and all indices differ."""
+    """A material that draws all that layers like these may have: media scatter, and all indices differ."""
     depth, g = SCATTERING
 
     def eventful(k: int, layer: Any) -> Any:

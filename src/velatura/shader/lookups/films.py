@@ -70,7 +70,7 @@ class Read(Coated):
         return self.absorbing
 
     def reversed(self) -> Read:
-        """As seen from below."""
+        """The films seen from below."""
         data, axis = self.data if len(self.data) else None, self.axis and self.axis.reversed()
         found = Read(self.name, data, 1 / self.n12, self.absorbing, axis, not self.turned)
         found.place = self.place
@@ -94,7 +94,7 @@ class Read(Coated):
         return Absorbing.coordinate(self.cosine(cos_1, cos_2), self.cosine(cos_2, cos_1), self.n12)
 
     def _side(self, k: int, at: Value) -> Value:
-        """What is reflected on either side, or passes."""
+        """Share that is reflected on either side, or that passes."""
         if len(self.data) and not isinstance(at, Symbol) and not self.place:
             return np.stack(ops.interpolate(self, float(at))[3 * k : 3 * k + 3])
         return self._symbol(at, f"{self.name}_{SIDES[k]}")

@@ -1,4 +1,4 @@
-"""What shader languages of C's kind share: the text of a program, in the words of each.
+"""Text that shader languages of C's kind share, in the words of each.
 
 Text that is the same in all of them is written in GLSL here; `CLike.spelled` gives it in the words of another. So that
 this takes no parser, functions have names of their own for colours (`vt_sqrt3`), and return no arrays.
@@ -201,7 +201,7 @@ class CLike(Printer):
         return "texel"
 
     def _filled(self, name: str, count: int, text: str, where: str = "") -> list[str]:
-        """In a loop, which compiles faster than reading texels one by one."""
+        """An array of texels, filled in a loop, which compiles faster than reading them one by one."""
         counter = self.counter(name)
         head, own = self.spelled(f"for (int {counter} = 0; {counter} < {count}; {counter}++)"), f"{name}[{counter}]"
         if not where:

@@ -30,7 +30,6 @@ from velatura.shader.recorder.graph import Graph
 from velatura.shader.recorder.symbol import colour, in_order, number
 from velatura.stack import Address, Brushing, Stack, Texture, Varying
 
-COS_MIN = 1e-3  # of the direction of view
 SLIGHT = 1e-6  # of its tangent, so that it has an azimuth
 INDEX_MIN = 1.223  # beyond a surface that refracts: MaterialX derives it from a reflectance of .01 at least
 _SMOOTH = {"diffuse": "oren_nayar_diffuse_bsdf", "translucent": "translucent_bsdf"}
@@ -170,7 +169,7 @@ def graph(name: str, node: str, target: str, stack: Stack, found: Sequence[Closu
     inputs = {
         "wi.x": of("add", "float", of("dotproduct", "float", view, tangent), SLIGHT),
         "wi.y": of("dotproduct", "float", view, across),
-        "wi.z": of("max", "float", cosine, COS_MIN),
+        "wi.z": of("max", "float", cosine, closures.COS_MIN),
     }
     for at, _ in values(stack, found):
         inputs[f"m.{place(at)}"] = Node("color3" if at.colour else "float", f'interfacename="{at.name}"')

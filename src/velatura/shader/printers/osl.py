@@ -20,7 +20,7 @@ from velatura.ops import Value
 from velatura.optics.ggx import Direction
 from velatura.renderer import directional_grid
 from velatura.shader import closures
-from velatura.shader.closures import Closure, Closures, Columns, Loss, Tabulated
+from velatura.shader.closures import Closure, Closures, ColumnReader, Loss, TabulatedClosures
 from velatura.shader.lookups import atlas, films
 from velatura.shader.lookups.lookup import Group, together
 from velatura.shader.material import brushed, identifier, place, title
@@ -157,7 +157,7 @@ def osl(
     chosen = recording.drawn_by(stack, asked)
     recording.check_constant(stack, constant)
     numbers, wi = closures.numbers(stack), recording.direction("wi")
-    baked: Tabulated | None = None
+    baked: TabulatedClosures | None = None
     known: Closures
     with ops.readable():
         if chosen.closed_form:
@@ -168,17 +168,17 @@ def osl(
     return _Program(stack, chosen, found, baked, list(closures.losses(numbers, asked, known))).made()
 
 
-def _read(baked: Tabulated, wi: Direction) -> list[Closure]:
+def _read(baked: TabulatedClosures, wi: Direction) -> list[Closure]:
     """Closures that are read from the array of columns."""
     group = Group("columns", 0, baked.rows.shape[-1])
     above = wi[2] > 0
     one = len(baked.etas) == 1
     side = 0.0 if one else ops.select(above, 0.0, 1.0)
 
-    def read(w: Direction) -> Columns:
+    def read(w: Direction) -> ColumnReader:
         at = [operand(x) for x in (*directional_grid.places(w, len(baked.shape)), side)]
         texels = Symbol("baked", tuple(at), "texels", group)
-        return Columns.of([Symbol("component", (texels,), "number", k) for k in range(group.texels)], together)
+        return ColumnReader.of([Symbol("component", (texels,), "number", k) for k in range(group.texels)], together)
 
     return baked.at(wi, read, baked.etas[0] if one else ops.select(above, *baked.etas))
 
@@ -190,7 +190,7 @@ class _Program:
     stack: Stack
     model: Model
     closures: Sequence[Closure]
-    baked: Tabulated | None
+    baked: TabulatedClosures | None
     losses: Sequence[Loss]
 
     def made(self) -> OslShader:
@@ -202,20 +202,27 @@ class _Program:
         symbols = in_order(found)
         read = {symbol.detail for symbol in symbols if symbol.op == "input"}
         values = [(at, x) for at, x in self.stack.values() if f"m.{place(at)}" in read]
-        maps = {f"{at.name}_map": x for at, x in values if isinstance(x, Texture)}
         varying = [(at, x) for at, x in values if isinstance(x, Varying)]
-        parameters = [_parameter(self.stack, at, x) for at, x in values if not isinstance(x, Varying)]
-        parameters += [_file(name, image) for name, image in maps.items()]
-        parameters += [*([_UV] if varying else []), *_PLACE]
-        each = [texts[k : k + 5] for k in range(0, len(texts), 5)]
-        body = [*self._arrays(symbols, varying), *(_varied(at, x) for at, x in varying), *_FRAME, *lines]
-        body += ["", *_sum([closure.kind for closure in self.closures], each)]
-        name, lines = self._name(), _indented(body)
-        shader = "\n".join([f"shader {name}(", ",\n".join(parameters), ")", "{", *lines, "}", ""])
-        lookup = _LOOKUP[len(self.baked.shape)].format(*self.baked.rows.shape, *self.baked.shape) if self.baked else ""
-        helpers = [text for called, text in _HELPERS.items() if re.search(rf"\b{called}\(", shader)]
+        body = [*self._arrays(symbols, varying), *(_varied(at, x) for at, x in varying), *_FRAME, *lines, ""]
+        body += _sum([closure.kind for closure in self.closures], [texts[k : k + 5] for k in range(0, len(texts), 5)])
+        name, parameters = self._name(), ",\n".join(self._parameters(values))
+        shader = "\n".join([f"shader {name}(", parameters, ")", "{", *_indented(body), "}", ""])
         turns = recording.variance(self.stack) is not Isotropic
-        return OslShader("\n".join([self._header(), *helpers, *([lookup] if lookup else []), shader]), name, turns)
+        return OslShader("\n".join([self._header(), *self._helpers(shader), shader]), name, turns)
+
+    def _parameters(self, values: Sequence[tuple[Address, Any]]) -> list[str]:
+        """The declarations of values, of the files of textures, and of the place on the surface."""
+        numbers = [_parameter(self.stack, at, x) for at, x in values if not isinstance(x, Varying)]
+        files = [_file(f"{at.name}_map", x) for at, x in values if isinstance(x, Texture)]
+        varies = any(isinstance(x, Varying) for _, x in values)
+        return [*numbers, *files, *([_UV] if varies else []), *_PLACE]
+
+    def _helpers(self, shader: str) -> list[str]:
+        """The functions that a shader calls."""
+        found = [text for called, text in _HELPERS.items() if re.search(rf"\b{called}\(", shader)]
+        if self.baked:
+            found.append(_LOOKUP[len(self.baked.shape)].format(*self.baked.rows.shape, *self.baked.shape))
+        return found
 
     def _name(self) -> str:
         """An identifier."""

@@ -117,7 +117,7 @@ class Language(ABC):
 
     @abstractmethod
     def select_channels(self, conditions: str, a: str, b: str) -> str:
-        """Likewise for each channel of colours."""
+        """The same choice for each channel of colours."""
 
     @abstractmethod
     def value(self, table: str, args: Sequence[str], wide: bool) -> str:
@@ -142,7 +142,7 @@ class Language(ABC):
         """The channels of a table at a place get a name, as a number of texels."""
 
     def all_of(self, conditions: Sequence[tuple[tuple[str, Kind], bool]]) -> str:
-        """That each of the conditions holds, or does not; of conditions of channels, any."""
+        """The condition that each one holds, or does not; of conditions of channels, any."""
         raise NotImplementedError
 
     def looked_up(self, name: str, kind: Kind, text: str, where: str) -> list[str]:
@@ -150,7 +150,7 @@ class Language(ABC):
         raise NotImplementedError
 
     def texels_where(self, where: str, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        """Likewise the channels of a table."""
+        """The channels of a table get a name; they are not read where a condition does not hold."""
         raise NotImplementedError
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""What the functions of a shader cost for one point of a material."""
+"""Cost of the functions of a shader for one point of a material."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def _passed(where: Where, symbol: Symbol, k: int) -> Where:
 
 
 def _chosen(symbol: Symbol, k: int) -> Case:
-    """What makes a choice take its argument of this number."""
+    """The case in which a choice takes its argument of this number."""
     condition = symbol.args[0]
     if symbol.op != "select" or k == 0 or not isinstance(condition, Symbol):
         return frozenset()

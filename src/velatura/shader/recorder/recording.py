@@ -178,7 +178,7 @@ def symbols(stack: Stack, constants: Collection[str]) -> Material:
 
 
 def _names(x: Symbol) -> Iterator[str]:
-    """For a value that is known once wi is."""
+    """Names for a value that is known once wi is."""
     name = f"wi_{x.name.strip('_') or 'value'}"
     return chain([name], (f"{name}_{n}" for n in count(2)))
 

@@ -9,16 +9,15 @@ import numpy as np
 from velatura.optics import ggx
 from velatura.renderer.low_discrepancy import square
 from velatura.tables import coordinates
-from velatura.tables.build.quadrature import Progress
+from velatura.tables.build.quadrature import ALPHA_MIN, COS_MIN, Progress
 from velatura.tables.store import Table
 
 SHAPE = (32, 24, 24)
 NORMALS = 1 << 13  # drawn for each point, evenly: an error of 3e-4
-COS_MIN, ALPHA_MIN = 1e-3, 1e-4  # stand in for 0
 
 
 def makers() -> dict[str, Callable[[Progress], Table]]:
-    """What makes the table."""
+    """The function that makes the table, by name."""
     return {"drawn": _drawn}
 
 

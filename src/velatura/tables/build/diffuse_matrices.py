@@ -12,7 +12,7 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.tables import coordinates
-from velatura.tables.build.quadrature import Progress, ignore
+from velatura.tables.build.quadrature import COS_MIN, Progress, ignore
 from velatura.tables.build.single_scattering import closest_interpolant
 from velatura.tables.diffuse_nodes import COUNT, OPEN, OPEN_WEIGHTS, TRAPPED, TRAPPED_WEIGHTS, edge_cosine
 from velatura.tables.microsurface_walks import MOST_MEETINGS, Walks
@@ -23,7 +23,6 @@ RETURNING = (11, 17)
 BETWEEN = (9, 9, 21)  # odd, for a node at equal indices
 PATHS, PATHS_ENTERING = 1024, 4096
 SOURCES, SOURCES_SMOOTH = 8, 400  # cosines on either side that stand for the light from a node
-COS_MIN = 1e-3  # stands in for 0
 
 
 def makers() -> dict[str, Callable[[Progress], Table]]:

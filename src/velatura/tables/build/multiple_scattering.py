@@ -24,8 +24,8 @@ from scipy.linalg import lstsq
 from velatura.optics import fresnel
 from velatura.tables import coordinates, microsurface_walks
 from velatura.tables.build import single_scattering
-from velatura.tables.build.quadrature import Progress, Reflections, average
-from velatura.tables.build.single_scattering import ABSORBING, ABSORBING_ANGLES, ALPHA_MIN, COS_MIN, FINE, INSIDE
+from velatura.tables.build.quadrature import ALPHA_MIN, COS_MIN, Progress, Reflections, average
+from velatura.tables.build.single_scattering import ABSORBING, ABSORBING_ANGLES, FINE, INSIDE
 from velatura.tables.store import Table
 
 DIELECTRIC_POWERS = {1: 8, 2: 3, 3: 2}  # how many angles Fresnel is raised to each power at, besides grazing

@@ -24,6 +24,7 @@ import numpy as np
 from velatura.optics import ggx
 
 NODES = 10  # on every piece of an integral: an error of 5e-5 at worst
+COS_MIN, ALPHA_MIN = 1e-3, 1e-4  # stand in for 0, where quadrature would divide by it
 CHUNK = 64  # points integrated at a time: their nodes fit the cache
 
 Progress = Callable[[float], None]  # called with the share that is done

@@ -41,7 +41,7 @@ def report(progress: Progress = ignore, with_yardstick: bool = False) -> list[di
 
 
 def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
-    """For each table, what gives the errors of its look-ups."""
+    """Functions that give the errors of the look-ups of each table."""
     cos_theta, alpha, eta, kappa = _points()
     below, above = 0.05 + 0.95 * eta, 1 + 3 * eta
     index = 0.05 + 3.95 * eta
@@ -88,13 +88,13 @@ def _measures(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
 
 
 def _measures_of_parts(tables: Tables) -> dict[str, Callable[[], np.ndarray]]:
-    """For the tables of diffuse light: errors of what an optical depth of .5 leaves of it, of light that comes from one
+    """Measures of the tables of diffuse light: errors of what an optical depth of .5 leaves of light from one
     direction, or evenly from all. Indices are those from 1.3 to 2.2."""
     cos_theta, alpha, *random = (x[:WALKED] for x in _points())
     n, other = (1.3 + 0.9 * x for x in random)
 
     def left(found: np.ndarray, n: np.ndarray) -> np.ndarray:
-        """Of parts, shape (nodes, points)."""
+        """Light that is left of parts, shape (nodes, points)."""
         return np.asarray((found * np.exp(-0.5 / np.array(diffuse_nodes.node_cosines(n)))).sum(axis=0))
 
     def entering() -> np.ndarray:

@@ -22,7 +22,7 @@ from scipy.stats import qmc
 
 from velatura.optics import fresnel
 from velatura.tables import coordinates
-from velatura.tables.build.quadrature import Progress, Reflections, average, ignore
+from velatura.tables.build.quadrature import ALPHA_MIN, COS_MIN, Progress, Reflections, average, ignore
 from velatura.tables.store import Table
 
 PLANE = (48, 48)  # nodes over cosine and roughness
@@ -31,7 +31,6 @@ ABSORBING = (36, 16, 20)  # likewise
 DIELECTRIC_RANK, CONDUCTOR_RANK = 8, 12
 ABSORBING_ANGLES = (0.15, 0.3, 0.4, 0.45, 0.5, 0.56, 0.68, 0.84, 1.0)  # as coordinates on the angular axis
 
-COS_MIN, ALPHA_MIN = 1e-3, 1e-4  # stand in for 0, where quadrature would divide by it
 FINE = 512  # nodes in the cosine for integrals against a fixed density
 
 
@@ -132,7 +131,7 @@ def _low_rank(weights: np.ndarray, indices: tuple[np.ndarray, np.ndarray], rank:
 
 
 def choose_angles(curves: np.ndarray, count: int) -> np.ndarray:
-    """Those of the `fine_cosines` whose rows of the curves, shape (FINE, indices), span the others best.
+    """The `fine_cosines` whose rows of the curves, shape (FINE, indices), span the others best.
 
     Averages weigh small cosines little, and so does the choice.
     """
