@@ -76,7 +76,7 @@ class PythonPrinter(Printer):
     def named(self, name: str, kind: Kind, text: str) -> str:
         return f"{name} = {text}"
 
-    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+    def texels(self, name: str, table: str, count: int, args: Sequence[str], where: str = "") -> list[str]:
         return [f"{name} = vt_{table}({', '.join(args)})"]
 
     def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:

@@ -18,11 +18,8 @@ _OF_32_BITS = (3242174889, 2447445414)  # the same as shares of 2^32
 @functools.cache
 def square(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of numbers in [0, 1), (count,) each; not to be written to."""
-    i = np.arange(count)
-    pairs = [(0.5 + i * step) % 1 for step in STEPS]
-    for numbers in pairs:
-        numbers.flags.writeable = False
-    return pairs[0], pairs[1]
+    u, v = _fixed(*((0.5 + np.arange(count) * step) % 1 for step in STEPS))
+    return u, v
 
 
 @functools.cache
@@ -33,9 +30,7 @@ def cube(count: int, dimensions: int) -> np.ndarray:
     for _ in range(64):
         root = (1 + root) ** (1 / (dimensions + 1))
     steps = root ** -np.arange(1.0, dimensions + 1)
-    numbers: np.ndarray = (0.5 + np.arange(1, count + 1) * steps[:, None]) % 1
-    numbers.flags.writeable = False
-    return numbers
+    return _fixed((0.5 + np.arange(1, count + 1) * steps[:, None]) % 1)[0]
 
 
 @functools.cache
@@ -45,18 +40,23 @@ def fibonacci(count: int) -> tuple[np.ndarray, np.ndarray]:
     while b < count:
         a, b = b, a + b
     i = np.arange(b)
-    u, v = (i * a / b + 0.5 / b) % 1, (i + 0.5) / b
-    u.flags.writeable = v.flags.writeable = False
+    u, v = _fixed((i * a / b + 0.5 / b) % 1, (i + 0.5) / b)
     return u, v
 
 
 @functools.cache
 def gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Nodes in [0, 1] and weights of the quadrature of Gauss and Legendre, (count,) each; not to be written to."""
-    x, weight = (0.5 * each for each in np.polynomial.legendre.leggauss(count))
-    x += 0.5
-    x.flags.writeable = weight.flags.writeable = False
+    x, weight = np.polynomial.legendre.leggauss(count)
+    x, weight = _fixed(0.5 * x + 0.5, 0.5 * weight)
     return x, weight
+
+
+def _fixed(*arrays: np.ndarray) -> list[np.ndarray]:
+    """Arrays that are not to be written to."""
+    for array in arrays:
+        array.flags.writeable = False
+    return list(arrays)
 
 
 def at_nodes(nodes: int, samples: int, number: type | None) -> tuple[Value, Value, Value]:

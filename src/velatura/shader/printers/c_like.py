@@ -171,15 +171,12 @@ class CLike(Printer):
     def named(self, name: str, kind: Kind, text: str) -> str:
         return self.declared(kind, name, text)
 
-    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        return self._filled(name, count, f"vt_{table}({self.counter(name)}, {', '.join(args)})")
+    def texels(self, name: str, table: str, count: int, args: Sequence[str], where: str = "") -> list[str]:
+        return self._filled(name, count, f"vt_{table}({self.counter(name)}, {', '.join(args)})", where)
 
     def baked(self, name: str, group: Group, place: Sequence[str]) -> list[str]:
         first = f"{group.begin} + {self.counter(name)}" if group.begin else self.counter(name)
         return self._filled(name, group.texels, f"vt_baked_texel({first}, {self.colour(place)})")
-
-    def texels_where(self, where: str, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        return self._filled(name, count, f"vt_{table}({self.counter(name)}, {', '.join(args)})", where)
 
     def all_of(self, conditions: Sequence[tuple[tuple[str, Kind], bool]]) -> str:
         def held(text: str, kind: Kind, holds: bool) -> str:

@@ -99,7 +99,7 @@ class Osl(Language):
     def named(self, name: str, kind: Kind, text: str) -> str:
         return f"{_TYPES[kind]} {name} = {text};"
 
-    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
+    def texels(self, name: str, table: str, count: int, args: Sequence[str], where: str = "") -> list[str]:
         _, _, nodes, channels = atlas.layouts([table])[0]
         at = ", ".join([*map(str, nodes), *args])
         return [f"float {name}[{channels}];", f"vt_texels(vt_{table}, {at}, {name});"]

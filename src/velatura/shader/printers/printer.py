@@ -73,7 +73,7 @@ class Language(ABC):
             between two constants.
         operators: by operation of two values, its sign and how strongly that binds, from 2 to 6.
         branches: whether look-ups that only one side of a choice needs are left out by a branch, as `all_of`,
-            `looked_up` and `texels_where` spell it.
+            `looked_up` and `texels` spell it.
     """
 
     words: ClassVar[frozenset[str]]
@@ -138,8 +138,9 @@ class Language(ABC):
         """A value gets a name."""
 
     @abstractmethod
-    def texels(self, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        """The channels of a table at a place get a name, as a number of texels."""
+    def texels(self, name: str, table: str, count: int, args: Sequence[str], where: str = "") -> list[str]:
+        """The channels of a table at a place get a name, as a number of texels; they are not read where a condition
+        does not hold."""
 
     def all_of(self, conditions: Sequence[tuple[tuple[str, Kind], bool]]) -> str:
         """The condition that each one holds, or does not; of conditions of channels, any."""
@@ -147,10 +148,6 @@ class Language(ABC):
 
     def looked_up(self, name: str, kind: Kind, text: str, where: str) -> list[str]:
         """A look-up gets a name; it is not made where a condition does not hold."""
-        raise NotImplementedError
-
-    def texels_where(self, where: str, name: str, table: str, count: int, args: Sequence[str]) -> list[str]:
-        """The channels of a table get a name; they are not read where a condition does not hold."""
         raise NotImplementedError
 
     @abstractmethod

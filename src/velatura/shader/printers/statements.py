@@ -85,10 +85,8 @@ class _Statements:
         args = [self.of(x) for x in symbol.args]
         if symbol.op == "baked":
             return self.printer.baked(name, symbol.detail, args)
-        count = atlas.texels(symbol.detail)
-        if symbol not in self.cases:
-            return self.printer.texels(name, symbol.detail, count, args)
-        return self.printer.texels_where(self._case(symbol), name, symbol.detail, count, args)
+        where = self._case(symbol) if symbol in self.cases else ""
+        return self.printer.texels(name, symbol.detail, atlas.texels(symbol.detail), args, where)
 
     def _case(self, symbol: Symbol) -> str:
         """The condition on which a look-up is needed."""
