@@ -18,7 +18,7 @@ from velatura.model.papers import bsdf
 from velatura.optics import fresnel
 from velatura.shader import closures
 from velatura.shader.closures import Closure
-from velatura.shader.polynomials import Fit
+from velatura.shader.polynomials import PolynomialFit
 from velatura.shader.recorder import recording
 from velatura.stack import Material
 
@@ -131,7 +131,7 @@ def test_generated_glsl_has_the_values_of_the_closures(browser: chromium.Browser
     point."""
     stack = vt.preset(preset)
     wi, wo = directions(11, stack.transmits)
-    fit = Fit(closures.tabulated(Material.of(stack), named(model), conserving=True))
+    fit = PolynomialFit(closures.tabulated(Material.of(stack), named(model), conserving=True))
     found = drawn(browser, vt.export(stack, "mtlx", model).text, wi, wo)
     np.testing.assert_allclose(found, of_closures(fit.above(tuple(wi)), wi, wo), rtol=0.02, atol=1e-4)
 

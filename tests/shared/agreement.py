@@ -21,7 +21,7 @@ from velatura.model.solved import rotation_frame, solve
 from velatura.model.solved.solve import Solver
 from velatura.optics import ggx
 from velatura.shader import Recording, Shader, constant, material, record, shader, variance
-from velatura.shader.lookups.bake import Bake
+from velatura.shader.lookups.bake import LobeLookUp
 from velatura.shader.lookups.columns import SolvedLookUp
 from velatura.shader.lookups.films import beside
 from velatura.shader.printers.c_like import CLike
@@ -388,7 +388,7 @@ def placed(stack: Stack, made: Shader) -> dict[str, list[float]]:
 
 def in_javascript(made: Shader, values: Mapping[str, list[float]], browser: Browser, quick: bool = False) -> np.ndarray:
     """The texture of lobes that the page works out, shape (height, width, 4), for values by place in the struct."""
-    assert isinstance(made.baked, Bake)
+    assert isinstance(made.baked, LobeLookUp)
     baked, known = made.baked.to_dict(), dict(tables.load().items())
     job = {
         "baked": baked,

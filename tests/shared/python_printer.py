@@ -11,8 +11,8 @@ import numpy as np
 
 from velatura import ops
 from velatura.shader import Printer
-from velatura.shader.lookups.atlas import Layout
-from velatura.shader.lookups.columns import Solution, SolvedLookUp
+from velatura.shader.lookups.atlas import TableLayout
+from velatura.shader.lookups.columns import SolvedContents, SolvedLookUp
 from velatura.shader.lookups.lookup import Group, LookUp
 from velatura.shader.material import Brushed, Entry, Filled, Mapped
 from velatura.shader.printers.printer import ATOM, Output, Struct
@@ -138,7 +138,7 @@ class PythonPrinter(Printer):
             )
         return self.literal(value) if isinstance(value, tuple) or not entry.wide else self.colour([self.literal(value)])
 
-    def tables(self, layouts: Sequence[Layout]) -> str:
+    def tables(self, layouts: Sequence[TableLayout]) -> str:
         return "".join(
             f"vt_{x.name} = lambda *place: vt_looked_up(vt_tables, {x.start}, {x.nodes}, {x.channels}, place)\n"
             for x in layouts
@@ -150,7 +150,7 @@ class PythonPrinter(Printer):
             for x in bake.groups
         )
 
-    def films(self, layouts: Sequence[Layout]) -> str:
+    def films(self, layouts: Sequence[TableLayout]) -> str:
         each = (f"{x.name!r}: ({x.start}, {x.nodes})" for x in layouts)
         look_up = "vt_film = lambda name, *at: vt_filmed(vt_films, *vt_placed[name], at)"
         return f"vt_placed = {{{', '.join(each)}}}\n{look_up}\n"
@@ -192,7 +192,7 @@ def put(target: Any, place: str, value: Any) -> None:
     setattr(target, last, value)
 
 
-def reader(baked: SolvedLookUp, found: Solution | None = None) -> Callable[[Group, Sequence[Any]], Any]:
+def reader(baked: SolvedLookUp, found: SolvedContents | None = None) -> Callable[[Group, Sequence[Any]], Any]:
     """What reads a group of texels of a solved material at a place."""
     solved = found or baked.solved
     assert solved is not None

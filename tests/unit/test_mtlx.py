@@ -12,7 +12,7 @@ from materialx import GENERATORS, document, generated
 import velatura as vt
 from velatura.model import named
 from velatura.shader.closures import losses, tabulated
-from velatura.shader.polynomials import Fit
+from velatura.shader.polynomials import PolynomialFit
 from velatura.stack import Material
 
 
@@ -69,7 +69,7 @@ def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float
     cosine, phi = np.meshgrid(np.linspace(0.2, 0.98, 9), np.linspace(0, 3, 7), indexing="ij")
     sine = np.sqrt(1 - cosine**2)
     wi = tuple(x.ravel() for x in (sine * np.cos(phi), sine * np.sin(phi), cosine))
-    for a, b in zip(Fit(baked).above(wi), baked.above(wi)):
+    for a, b in zip(PolynomialFit(baked).above(wi), baked.above(wi)):
         np.testing.assert_allclose(a.weight, b.weight, atol=0.01)
         np.testing.assert_allclose(np.sort(a.roughness[:2], 0), np.sort(b.roughness[:2], 0), atol=off)
 
@@ -78,7 +78,7 @@ def test_polynomials_are_the_columns_that_they_stand_for(preset: str, off: float
 def test_polynomials_of_models_in_closed_form_have_their_light(model: str) -> None:
     """Expected: as the closures in closed form, within .01 of the light: facets of both lose what they block."""
     material, chosen = Material.of(vt.preset("coated-gold")), named(model)
-    for loss in losses(material, chosen, Fit(tabulated(material, chosen)).above):
+    for loss in losses(material, chosen, PolynomialFit(tabulated(material, chosen)).above):
         assert loss.variation < 0.01
         assert loss.albedo < 0.002
 

@@ -19,7 +19,7 @@ from velatura import tables
 from velatura.editor.service import VERBS
 from velatura.model import named
 from velatura.shader import material, shader
-from velatura.shader.lookups.bake import PLACE, Bake
+from velatura.shader.lookups.bake import PLACE, LobeLookUp
 from velatura.shader.lookups.films import tables as tables_of_films
 from velatura.stack import Varying, presets
 
@@ -56,7 +56,7 @@ def question(name: str, model: str) -> tuple[dict[str, Any], list[Any]]:
     """A tape with inputs for it, as the page has them, and what its outputs are in NumPy."""
     stack = vt.Stack(COATED[name]) if name in COATED else vt.preset(name)
     baked = shader(stack, model, values="uniforms").baked
-    assert isinstance(baked, Bake)
+    assert isinstance(baked, LobeLookUp)
     values = {f"m.{material.place(address)}": (address, value) for address, value in stack.values()}
     inputs: dict[str, Any] = {}
     arrays: dict[str, Any] = {}

@@ -21,7 +21,7 @@ from velatura import ops, tables
 from velatura.errors import InvalidInput
 from velatura.shader import Recording, constant, record, shader
 from velatura.shader.lookups.atlas import texels
-from velatura.shader.lookups.bake import Bake
+from velatura.shader.lookups.bake import LobeLookUp
 from velatura.shader.lookups.columns import SolvedLookUp
 from velatura.shader.lookups.films import tables as tables_of_films
 from velatura.shader.lookups.lookup import Group
@@ -260,7 +260,7 @@ def test_no_change_of_a_value_changes_the_code(model: str) -> None:
 def test_a_uniform_material_is_shaded_without_its_layers() -> None:
     """The program reads neither tables nor media; the tape that works out the lobes does."""
     made = shader(vt.preset("varnished-paint"), "belcour2018", values="uniforms")
-    assert isinstance(made.baked, Bake)
+    assert isinstance(made.baked, LobeLookUp)
     assert "vt_tables" not in made.text
     assert "sigma_a" not in made.text
     assert "dielectric_multi" in made.baked.tape.tables
@@ -380,7 +380,7 @@ def test_films_may_change(text: str, model: str, textured: bool, tmp_path: Path)
     given["vt_films"] = tables_of_films(other, general.films | alone.films, general.model)
 
     def baked(group: Group, at: Any) -> Any:
-        assert isinstance(general.baked, Bake)
+        assert isinstance(general.baked, LobeLookUp)
         columns = evaluate(general.baked.columns, {**given, **dict(zip(("place.x", "place.y", "place.z"), at))})
         return columns[4 * group.begin : 4 * (group.begin + group.texels)]
 

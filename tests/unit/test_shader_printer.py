@@ -14,7 +14,7 @@ from python_printer import PythonPrinter, put, run
 import velatura as vt
 from velatura.model import MODELS
 from velatura.shader import constant, record, shader
-from velatura.shader.lookups.bake import Bake
+from velatura.shader.lookups.bake import LobeLookUp
 
 PYTHON = PythonPrinter()
 NAMES = [model.name for model in MODELS]
@@ -84,7 +84,7 @@ def test_lobes_over_direction_are_read_in_another_language(name: str) -> None:
     """Parameters from a uniform, weights of lobes, and lobes from the texture that the tape fills."""
     stack = vt.preset(name)
     made = shader(stack, "belcour2018", values="uniforms", printer=PYTHON)
-    assert isinstance(made.baked, Bake)
+    assert isinstance(made.baked, LobeLookUp)
     flat = [(address, np.ravel(constant(address, value))) for address, value in stack.values()]
     values = {address.name: np.resize(x, (3, 1)) if address.colour else x for address, x in flat}
 

@@ -14,7 +14,7 @@ from velatura.errors import InvalidInput
 from velatura.model import Model
 from velatura.shader import Shader, constant, shader
 from velatura.shader.lookups import atlas, films
-from velatura.shader.lookups.bake import Bake
+from velatura.shader.lookups.bake import LobeLookUp
 from velatura.stack import Address, Stack, Varying
 from velatura.stack.schema import unknown
 from velatura.tables import load
@@ -47,7 +47,7 @@ def shading(stack: Stack, model: Model, stretched: bool) -> dict[str, Any]:
     return {
         "key": made.key,
         "text": made.text,
-        "baked": made.baked.to_dict() if isinstance(made.baked, Bake) else None,
+        "baked": made.baked.to_dict() if isinstance(made.baked, LobeLookUp) else None,
         "uniforms": {address.name: made.uniforms[address.name] for address, _ in _free(stack, made)},
         "tables": ",".join(made.looked_up) or None,
         "maps": [

@@ -18,7 +18,7 @@ from velatura.films.reflectance import Films, InterfaceFilms
 from velatura.ops import Value
 from velatura.optics.coatings import Coating
 from velatura.optics.films import COHERENT_NM
-from velatura.renderer.packets import Grid, packets
+from velatura.renderer.packets import SampledGrid, packets
 from velatura.stack import InterfaceValues
 
 Array = NDArray[np.floating]
@@ -36,7 +36,7 @@ FINE = 4  # thicknesses, by splines, from one that is worked out to the next
 MATCHED = 1e-6  # least square of the cosine at the critical angle
 
 
-class ColourTable(Grid):
+class ColourTable(SampledGrid):
     """Colours at the nodes of a grid, which a look-up interpolates."""
 
     def __init__(self, data: Array) -> None:

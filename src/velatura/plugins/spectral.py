@@ -22,7 +22,7 @@ NODES = 48  # over these, a multiple of those of a ray
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class SpectralSide:
     """The lobes on one side: those of fixed wavelengths, and the energies of all."""
 
     fixed: precomputed_lobes.PrecomputedLobes
@@ -45,13 +45,13 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
-class Spectra:
+class SampledSpectra:
     """Both sides of a stack, the lower one where it transmits; the means of a diffuse base over wavelength."""
 
     mi: Any
     fixed: bsdf.Lobed
-    above: Side
-    below: Side | None
+    above: SpectralSide
+    below: SpectralSide | None
     means: directional_grid.Curves | None
 
     def at(self, body: bsdf.Lobed, wavelengths_nm: Any) -> bsdf.Lobed:
@@ -72,7 +72,7 @@ class Spectra:
         return replace(prepared, base=means)
 
 
-def sample(mi: Any, fixed: bsdf.Lobed, body_at: Callable[[Any], bsdf.Lobed], nodes: int) -> Spectra:
+def sample(mi: Any, fixed: bsdf.Lobed, body_at: Callable[[Any], bsdf.Lobed], nodes: int) -> SampledSpectra:
     """The spectra of a stack from its body for fixed wavelengths, and from that for those of rays, over as many
     wavelengths: a multiple of those of a ray."""
     above = _side(mi, fixed.lobes_above, lambda nm: body_at(nm).lobes_above, nodes)
@@ -81,12 +81,12 @@ def sample(mi: Any, fixed: bsdf.Lobed, body_at: Callable[[Any], bsdf.Lobed], nod
     if base is not None:
         columns = [_over_wavelengths(mi, x, 1, nodes) for x in base.means]
         means = directional_grid.curves(columns, (nodes,), mi.Float)
-    return Spectra(mi, fixed, above, below, means)
+    return SampledSpectra(mi, fixed, above, below, means)
 
 
 def _side(
     mi: Any, fixed: precomputed_lobes.Lobes, lobes_at: Callable[[Any], precomputed_lobes.Lobes], nodes: int
-) -> Side:
+) -> SpectralSide:
     import drjit as dr
 
     # See every direction at all wavelengths
@@ -102,7 +102,7 @@ def _side(
     # Keep what depends on them
     seen = [*reflected, *([passed] if fixed.transmits and passed else [])]
     flat = [_over_wavelengths(mi, lobe.energy, count, nodes) for lobe in seen]
-    return Side(fixed, directional_grid.curves(flat, (*shape, nodes), mi.Float))
+    return SpectralSide(fixed, directional_grid.curves(flat, (*shape, nodes), mi.Float))
 
 
 def _all_wavelengths(mi: Any, nodes: int, times: int = 1) -> Any:

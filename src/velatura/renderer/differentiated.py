@@ -28,7 +28,7 @@ STEP = 0.005
 class Variables:
     """Differentiated numbers of a material, each with the values, and their channel, that it stands for."""
 
-    given: list[finite_differences.Variable]
+    given: list[finite_differences.DifferentiatedNumber]
     addresses: list[Address]
 
     @classmethod

@@ -20,31 +20,31 @@ Around = Callable[[int, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class Variable:
+class DifferentiatedNumber:
     """A number that is being differentiated, and the values, with the channel, that it stands for."""
 
     number: Any
     places: list[tuple[int, int]]
 
 
-def variables(values: Sequence[Value]) -> list[Variable]:
+def variables(values: Sequence[Value]) -> list[DifferentiatedNumber]:
     """Variables among values of Dr.Jit; one for all places that are the same variable."""
     if all(isinstance(value, (float, np.ndarray)) for value in values):
         return []
     import drjit as dr
 
-    found: dict[int, Variable] = {}
+    found: dict[int, DifferentiatedNumber] = {}
     for k, value in enumerate(values):
         if not dr.is_array_v(value) or not dr.grad_enabled(value):
             continue
         for channel, number in enumerate(value if dr.depth_v(value) > 1 else [value]):
-            found.setdefault(number.index_ad, Variable(number, [])).places.append((k, channel))
+            found.setdefault(number.index_ad, DifferentiatedNumber(number, [])).places.append((k, channel))
     found.pop(0, None)  # channels without gradients
     return list(found.values())
 
 
 def differentiable(
-    function: Callable[[list[float]], list[Array]], given: Sequence[Variable], around: Around, number: Any
+    function: Callable[[list[float]], list[Array]], given: Sequence[DifferentiatedNumber], around: Around, number: Any
 ) -> list[Any]:
     """Flat arrays that a function returns for the numbers of variables, of Dr.Jit's type `number`; differentiable. None
     keeps NumPy's.

@@ -30,7 +30,7 @@ class Packets:
             yield begin, 1 << (min(self.count - begin, WIDTH) - 1).bit_length()
 
 
-class Grid:
+class SampledGrid:
     """Values at the nodes of a grid, `data` with channels on the last axis; a Dr.Jit module gets them at first use."""
 
     data: np.ndarray

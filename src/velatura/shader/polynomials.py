@@ -19,7 +19,7 @@ SINE2_MIN = 1e-6  # squared sine of a direction that has an azimuth
 Array = NDArray[np.floating]
 
 
-class Fit:
+class PolynomialFit:
     """The columns of closures as polynomials: coefficients (modes, degrees, columns).
 
     Modes are 1, and cosine and sine of 2 and 4 times the azimuth where lobes are brushed.

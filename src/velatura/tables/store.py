@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from velatura.files import whole
-from velatura.renderer.packets import Grid, Packets
+from velatura.renderer.packets import Packets, SampledGrid
 
 FILE = Path(__file__).with_name("tables.npz")
 
 
 @dataclass(frozen=True, eq=False)
-class Table(Grid):
+class Table(SampledGrid):
     """Single-precision values at the nodes i/(N-1) of a two- or three-dimensional grid, channels on the last axis.
 
     `nodes` are the angles at which Fresnel reflectance multiplies the channels of a low-rank table: cosines, or in

@@ -14,7 +14,7 @@ from velatura.tables import Table
 WIDTH = 1024  # texels
 
 
-class Layout(NamedTuple):
+class TableLayout(NamedTuple):
     """Where a table lies: its first texel, and its nodes along each axis, those along the last beside one another.
 
     A node has as many texels as hold its channels; the nodes of a table with a single channel share texels.
@@ -42,13 +42,13 @@ def every() -> list[str]:
     return [name for name, table in tables.load().items() if len(table.shape) <= 3]
 
 
-def layouts(names: Collection[str], among: Collection[str] | None = None) -> list[Layout]:
+def layouts(names: Collection[str], among: Collection[str] | None = None) -> list[TableLayout]:
     """Where each of the tables named lies in their texture, which may hold others."""
-    found: list[Layout] = []
+    found: list[TableLayout] = []
     start = 0
     for name, table in tables.load().items():
         if name in (names if among is None else among):
-            found.append(Layout(name, start, table.shape, table.data.shape[-1]))
+            found.append(TableLayout(name, start, table.shape, table.data.shape[-1]))
             start = found[-1].end
     return [layout for layout in found if layout.name in names]
 

@@ -38,7 +38,7 @@ PLACE = "place"  # an input: coordinates of cosine and azimuth, from 0 to 1, and
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bake(LookUp):
+class LobeLookUp(LookUp):
     """The values for one direction, as columns of numbers, four to a texel: first what the layers above a diffuse
     base transmit, if there is one, then the lobes.
 
@@ -61,7 +61,7 @@ class Bake(LookUp):
         return {**vars(self.tape), "tables": self.tape.tables, "nodes": self.nodes, "sides": self.sides}
 
 
-def bake(material: Material, body: bsdf.Lobed) -> Bake:
+def bake(material: Material, body: bsdf.Lobed) -> LobeLookUp:
     """The lobes of a body, recorded from the values of a material, over direction."""
     nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
     w = directional_grid.direction(number(f"{PLACE}.x"), number(f"{PLACE}.y") if len(nodes) > 1 else 0.0)
@@ -75,10 +75,10 @@ def bake(material: Material, body: bsdf.Lobed) -> Bake:
 
     # And read it
     read, sides = _read(body, nodes, groups, lobes), 1 if body.below is None else 2
-    return Bake(columns=[operand(x) for x in columns], body=read, nodes=nodes, groups=groups, sides=sides)
+    return LobeLookUp(columns=[operand(x) for x in columns], body=read, nodes=nodes, groups=groups, sides=sides)
 
 
-def bake_known(body: bsdf.Lobed, known: bsdf.Lobed) -> Bake:
+def bake_known(body: bsdf.Lobed, known: bsdf.Lobed) -> LobeLookUp:
     """The lobes of a body, which are `known` in NumPy, over direction."""
     nodes = directional_grid.LINE if body.above.variance is Isotropic else PLANE
     w = directional_grid.directions(nodes, None)
@@ -98,7 +98,7 @@ def bake_known(body: bsdf.Lobed, known: bsdf.Lobed) -> Bake:
     texels = texture(columns, groups, len(sides), nodes)
     _, lobes = _columns(known.lobes_above, known, w, apart)
     read = _read(body, nodes, groups, lobes)
-    return Bake(columns=[], body=read, nodes=nodes, groups=groups, sides=len(sides), known=texels)
+    return LobeLookUp(columns=[], body=read, nodes=nodes, groups=groups, sides=len(sides), known=texels)
 
 
 def _with_base(base: Base, w: Direction, columns: list[Value], apart: Apart) -> list[Value]:

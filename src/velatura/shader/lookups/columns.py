@@ -49,7 +49,7 @@ Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
-class Solution:
+class SolvedContents:
     """Contents of a material for a shader: texels (height, width, 4), colours (8 sides, 3) of the remainders, and
     numbers of its layout."""
 
@@ -68,7 +68,7 @@ class SolvedLookUp(LookUp):
     solver: Solver
     layouts: Sequence[Layout]
     places: Sequence[int | float]
-    solved: Solution | None = None  # of one material
+    solved: SolvedContents | None = None  # of one material
 
     @property
     def interfaces(self) -> list[int]:
@@ -124,7 +124,7 @@ class SolvedLookUp(LookUp):
     def _turned_back(self, w: Direction) -> Direction:
         return w if self.angle is None else ggx.rotate(w, self.angle)
 
-    def solve(self, stack: Stack, coarse: bool = False, lately: Made | None = None) -> Solution:
+    def solve(self, stack: Stack, coarse: bool = False, lately: Made | None = None) -> SolvedContents:
         """A stack of this kind. It takes from `lately` what the one before it has made of layers, and leaves there what
         it has. A `coarse` one is quicker, and is for light from above alone: that from below has the same columns
         where a program reads one side at a time."""
@@ -143,7 +143,7 @@ class SolvedLookUp(LookUp):
             found = solver.solve(material, own)
         texels = _texture(_rows(solver, found), self.places, self.groups, self.nodes)
         degrees = None if self.angle is None else frame.degrees(numbers)
-        solved = Solution(texels, _remainders(found), _layout_numbers(solver, material, own, degrees))
+        solved = SolvedContents(texels, _remainders(found), _layout_numbers(solver, material, own, degrees))
         if lately is not None:
             lately.clear()
             lately.update(made)
@@ -176,12 +176,12 @@ def tabulated(stack: Stack, material: Material, model: Model, variance: type[Var
     groups, places = _placed(sides[0], rows)
     for k, beam in enumerate(sides_read(len(sides), model)[: len(sides)]):
         curves = _Curves(places, tuple(Texels(solver.shape, group, beam) for group in groups))
-        sides[k] = replace(_Weighed(**vars(sides[k])) if general else sides[k], curves=curves)
+        sides[k] = replace(_WeighedSide(**vars(sides[k])) if general else sides[k], curves=curves)
     angle = None if is_same(degrees, 0.0) else degrees * (pi / 180)
     solved = None
     if found is not None and rows is not None:
         layout_numbers = _layout_numbers(solver, plain, layouts, None if angle is None else degrees)
-        solved = Solution(_texture(rows, places, groups, solver.shape), _remainders(found), layout_numbers)
+        solved = SolvedContents(_texture(rows, places, groups, solver.shape), _remainders(found), layout_numbers)
     flagged = sum(len(_flags(side.transmission)) for side in sides if side.transmission)
     return SolvedLookUp(
         nodes=solver.shape,
@@ -280,7 +280,7 @@ class _Curves:
 
 
 @dataclass(frozen=True)
-class _Weighed(Side):
+class _WeighedSide(Side):
     """A side with a weight, 0 or 1, for each interface, the remainder, and what passes."""
 
     def at(self, w: Direction) -> Columns:

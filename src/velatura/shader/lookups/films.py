@@ -30,7 +30,7 @@ from velatura.model import Model
 from velatura.model.film_average import NODES as AVERAGED
 from velatura.model.film_average import film_average
 from velatura.ops import Value
-from velatura.shader.lookups.atlas import Layout
+from velatura.shader.lookups.atlas import TableLayout
 from velatura.shader.recorder.symbol import Symbol, operand
 from velatura.stack import Address, Interface, InterfaceValues, Material, Stack, Texture, Varying, number
 from velatura.tables import coordinates
@@ -44,7 +44,7 @@ _NAME = re.compile(r"film(\d+)(?:_by(\d+))?(?:_(rarer|denser|passing))?(?:_(abov
 STEP_NM = 6.0  # between thicknesses that are worked out: 15 nm of optical thickness for an index of 2.5
 
 
-class Read(Coated):
+class RecordedFilms(Coated):
     """Films that code reads by `name`, `turned` as seen from below.
 
     `data` are those of its facets, which are None where values change; `n12` is then recorded, too. Films may absorb.
@@ -69,10 +69,10 @@ class Read(Coated):
     def absorbs(self) -> bool:
         return self.absorbing
 
-    def reversed(self) -> Read:
+    def reversed(self) -> RecordedFilms:
         """The films seen from below."""
         data, axis = self.data if len(self.data) else None, self.axis and self.axis.reversed()
-        found = Read(self.name, data, 1 / self.n12, self.absorbing, axis, not self.turned)
+        found = RecordedFilms(self.name, data, 1 / self.n12, self.absorbing, axis, not self.turned)
         found.place = self.place
         return found
 
@@ -140,7 +140,7 @@ def recorded(material: Material, stack: Stack, general: bool) -> Material:
                 below = material.exterior if material.thin and layer is layers[-1] else layer.eta
                 n12 = ops.mean(below) / ops.mean(above)
             name = f"film{n}_by{len(known.data)}" if known.axis else f"film{n}"
-            read: Any = Read(name, data, n12, known.absorbs, known.axis)
+            read: Any = RecordedFilms(name, data, n12, known.absorbs, known.axis)
             material = material.with_layer(n, coating=read)
         elif layer.films:
             material = material.with_layer(n, films=())
@@ -226,16 +226,16 @@ def tables(stack: Stack, names: Collection[str], model: Model, coarse: bool = Fa
     return found
 
 
-def layouts(names: Iterable[str]) -> list[Layout]:
+def layouts(names: Iterable[str]) -> list[TableLayout]:
     """Where each of the tables named lies in their texture."""
-    found: list[Layout] = []
+    found: list[TableLayout] = []
     start = 0
     for name in sorted(names):
         parts = _NAME.fullmatch(name)
         assert parts
         over = (int(parts[2]),) if parts[2] else ()
         nodes = AVERAGED if parts[4] else (*over, 2 * NODES - 1 if parts[3] else NODES)
-        found.append(Layout(name, start, nodes, 3))
+        found.append(TableLayout(name, start, nodes, 3))
         start = -(-found[-1].end // WIDTH) * WIDTH
     return found
 

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from velatura.errors import remark
-from velatura.shader.lookups.atlas import WIDTH, Layout
+from velatura.shader.lookups.atlas import WIDTH, TableLayout
 from velatura.shader.lookups.films import WIDTH as LINE_OF_FILMS
 from velatura.shader.lookups.lookup import Group, LookUp
 from velatura.shader.material import PARAMETERS, Brushed, Entry, Filled, Mapped
@@ -263,7 +263,7 @@ class CLike(Printer):
         bounded = f"max({texel}, {low})" if value.high == inf else f"clamp({texel}, {low}, {high})"
         return self.colour([bounded]) if entry.wide and not wide else bounded
 
-    def tables(self, layouts: Sequence[Layout]) -> str:
+    def tables(self, layouts: Sequence[TableLayout]) -> str:
         declared = _TABLES.format(self.texels_of, WIDTH) + self.texture("vt_tables", TABLES)
         return f"{declared}\n{self.spelled(_TEXELS + ''.join(map(_table, layouts)))}"
 
@@ -271,7 +271,7 @@ class CLike(Printer):
         comment = _LOBES.format(self.texels_of, bake.nodes[0], bake.height) + self.texture("vt_baked", TABLES)
         return f"{comment}\n{self.spelled(_BAKED[len(bake.nodes)].format(*bake.nodes, sides=bake.sides))}"
 
-    def films(self, layouts: Sequence[Layout]) -> str:
+    def films(self, layouts: Sequence[TableLayout]) -> str:
         height = -(-layouts[-1].end // LINE_OF_FILMS)
         declared = _FILMS.format(self.texels_of, LINE_OF_FILMS, height) + self.texture("vt_films", FILMS)
         return f"{declared}\n{self.spelled(_OF_FILMS.format(LINE_OF_FILMS) + ''.join(map(_film, layouts)))}"
@@ -323,7 +323,7 @@ def _described(image: Texture) -> str:
     return remark(image.texture.name) + decoded + curve
 
 
-def _table(layout: Layout) -> str:
+def _table(layout: TableLayout) -> str:
     """A function of the coordinates, of one texel of several."""
     name, start, nodes, channels = layout
     axes = "xyz"[: len(nodes)]
@@ -340,7 +340,7 @@ def _table(layout: Layout) -> str:
     return described + "\n".join([*_block(f"vec4 vt_{name}(int texel, {arguments})", [f"return {read};"]), ""])
 
 
-def _film(layout: Layout) -> str:
+def _film(layout: TableLayout) -> str:
     name, start, nodes, _ = layout
     if len(nodes) == 1:
         return f"vec3 vt_{name}(float x) {{ return vt_film_line({start}, {nodes[0]}, x); }}\n"

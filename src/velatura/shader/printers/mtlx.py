@@ -22,8 +22,8 @@ from velatura.optics.ggx import Direction
 from velatura.shader import closures
 from velatura.shader.closures import Closure, Closures
 from velatura.shader.material import brushed, place
-from velatura.shader.polynomials import Fit
-from velatura.shader.printers.nodes import LOOKED_UP, Node, Nodes, constant, string
+from velatura.shader.polynomials import PolynomialFit
+from velatura.shader.printers.nodes import LOOKED_UP, Node, NodeGraph, constant, string
 from velatura.shader.program import described
 from velatura.shader.recorder import recording
 from velatura.shader.recorder.graph import Graph
@@ -61,7 +61,7 @@ def record(stack: Stack, model: Model) -> Recorded:
 
 def _uniform(stack: Stack, model: Model, wi: Direction) -> Recorded:
     material = closures.numbers(stack)
-    plain, conserving = (Fit(closures.tabulated(material, model, kept)) for kept in (False, True))
+    plain, conserving = (PolynomialFit(closures.tabulated(material, model, kept)) for kept in (False, True))
     return Recorded(plain.above(wi), conserving.above(wi), plain.above)
 
 
@@ -111,7 +111,7 @@ def values(stack: Stack, found: Sequence[Closure]) -> list[tuple[Address, Any]]:
 
 def varying(values: Sequence[tuple[Address, Any]], file: Callable[[Path], str]) -> tuple[list[str], list[str]]:
     """Nodes of values that vary, and the inputs that take them; `file` gives the path of an image."""
-    nodes, connected = Nodes("value"), []
+    nodes, connected = NodeGraph("value"), []
     for at, x in values:
         if not isinstance(x, Varying):
             continue
@@ -124,7 +124,7 @@ def varying(values: Sequence[tuple[Address, Any]], file: Callable[[Path], str]) 
     return [line.removeprefix("  ") for line in nodes.lines], connected
 
 
-def _angle(nodes: Nodes, brushing: Brushing) -> Node:
+def _angle(nodes: NodeGraph, brushing: Brushing) -> Node:
     """Degrees of the direction away from the centre."""
     u, v, offset = brushed(brushing)
     turned = ops.arctan2(number("uv.y") - v, number("uv.x") - u) * degrees(1.0) + offset
@@ -133,7 +133,7 @@ def _angle(nodes: Nodes, brushing: Brushing) -> Node:
     return found
 
 
-def _image(nodes: Nodes, at: Address, image: Texture, file: str) -> Node:
+def _image(nodes: NodeGraph, at: Address, image: Texture, file: str) -> Node:
     """A value of a texel, scaled and kept within the bounds of its parameter."""
     channel = image.channel or "r"
     wide, kind = channel == "rgb", "color4" if channel == "a" else "color3"
@@ -151,7 +151,7 @@ def _image(nodes: Nodes, at: Address, image: Texture, file: str) -> Node:
 
 def graph(name: str, node: str, target: str, stack: Stack, found: Sequence[Closure]) -> list[str]:
     """The graph that stands for the node."""
-    nodes = Nodes()
+    nodes = NodeGraph()
     of, normal, tangent = (
         nodes.of,
         Node("vector3", 'interfacename="normal"'),

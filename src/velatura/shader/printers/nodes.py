@@ -38,7 +38,7 @@ def string(text: str) -> Node:
     return Node("string", f'value="{text}"')
 
 
-class Nodes:
+class NodeGraph:
     """Nodes, in order; `lines` are their elements."""
 
     def __init__(self, prefix: str = "n") -> None:

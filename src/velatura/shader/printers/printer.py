@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 from velatura.shader.recorder.symbol import Kind, Operand
 
 if TYPE_CHECKING:
-    from velatura.shader.lookups.atlas import Layout
+    from velatura.shader.lookups.atlas import TableLayout
     from velatura.shader.lookups.lookup import Group, LookUp
     from velatura.shader.material import Filled
     from velatura.shader.recorder.cost import Cost
@@ -205,7 +205,7 @@ class Printer(Language):
         """`vt_material`, which gives the values at texture coordinates, and the textures that it reads."""
 
     @abstractmethod
-    def tables(self, layouts: Sequence[Layout]) -> str:
+    def tables(self, layouts: Sequence[TableLayout]) -> str:
         """The texture of tables, and functions that look up each of them in it."""
 
     @abstractmethod
@@ -213,7 +213,7 @@ class Printer(Language):
         """The texture of lobes over direction, and functions that look up each group of its texels."""
 
     @abstractmethod
-    def films(self, layouts: Sequence[Layout]) -> str:
+    def films(self, layouts: Sequence[TableLayout]) -> str:
         """The texture of tables of thin films, and functions that look up each of them in it."""
 
     @abstractmethod
