@@ -18,6 +18,7 @@ from velatura.ops import Value
 from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.films import Film
 from velatura.stack import InterfaceValues, Material, luminance_sensitivity, srgb_sensitivity
+from velatura.stack.chain import Meeting, chain
 
 Array = NDArray[np.floating]
 
@@ -45,15 +46,11 @@ def films_of(material: Material) -> list[Any]:
 def tabulated_films(material: Material, may_absorb: Collection[int] = ()) -> list[Any]:
     """The films on each layer, taken to absorb on layers of these numbers."""
     found: list[InterfaceFilms | None] = []
-    above = material.exterior
-    for k, layer in enumerate(material.solid().layers):
-        films: InterfaceFilms | None = None
-        if isinstance(layer, InterfaceValues):
-            if layer.films and layer.coating:
-                films = layer.coating.of(layer, above)
-            elif layer.films:
-                films = _worked_out(layer, above, material.light, k in may_absorb)
-            above = layer.eta
+    for k, meeting in enumerate(chain(material.solid())):
+        layer, films = meeting.layer, None
+        if isinstance(layer, InterfaceValues) and layer.films:
+            own = layer.coating
+            films = own.of(layer, meeting.above) if own else _worked_out(meeting, material.light, k in may_absorb)
         found.append(films)
     return found
 
@@ -68,8 +65,10 @@ def optical_thickness_nm(layer: InterfaceValues) -> float:
     return sum(Film(float(np.max(x.eta)), 0.0, x.thickness_nm).in_colours().optical_nm for x in layer.films)
 
 
-def _worked_out(layer: InterfaceValues, above: Value, light: Any, may_absorb: bool) -> InterfaceFilms:
+def _worked_out(meeting: Meeting, light: Any, may_absorb: bool) -> InterfaceFilms:
     """The films on a layer; tables of the same NumPy values are made once."""
+    layer, above = meeting.layer, meeting.above
+    assert isinstance(layer, InterfaceValues)
     if not isinstance(light, str | np.ndarray):
         return AtWavelengths(light, above, layer.films, layer.eta, layer.k if layer.kind == "conductor" else None)
     count = {"srgb": 3, "luminance": 1}[light] if isinstance(light, str) else len(light)

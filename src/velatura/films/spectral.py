@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ class AtWavelengths(InterfaceFilms):
     films: tuple[FilmValues, ...]
     eta_2: Value
     k_2: Value | None
-    in_colours: bool = False
+    in_colours: bool = field(default=False, kw_only=True)
 
     @property
     def absorbs(self) -> bool:
@@ -84,11 +84,10 @@ class AtWavelengths(InterfaceFilms):
 class AtAPoint(AtWavelengths):
     """Reflectance for values that differ from point to point: a sum over the wavelengths of a `quadrature`."""
 
-    quadrature: SpectralQuadrature | None = None
+    quadrature: SpectralQuadrature
 
     @property
     def absorbs(self) -> bool:
-        assert self.quadrature
         return self.quadrature.absorb
 
     def _shares(self, cos_1: Value, cos_2: Value) -> tuple[Value, Value]:
@@ -111,7 +110,6 @@ class AtAPoint(AtWavelengths):
         def at(nm: Value) -> Sequence[Value]:
             return shares(AtWavelengths(nm, self.eta_1, self.films, self.eta_2, self.k_2, in_colours=True))
 
-        assert self.quadrature
         return [ops.clip(x, 0.0, 1.0) for x in self.quadrature.summed(at, count)]
 
 

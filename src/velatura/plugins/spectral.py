@@ -22,45 +22,38 @@ NODES = 48  # over these, a multiple of those of a ray
 
 
 @dataclass(frozen=True, eq=False)
-class SpectralSide:
-    """The lobes on one side: those of fixed wavelengths, and the energies of all."""
-
-    fixed: precomputed_lobes.PrecomputedLobes
-    energies: directional_grid.Curves
-
-    def at(self, mi: Any, place: Any) -> precomputed_lobes.Lobes:
-        """The lobes at the wavelengths of a ray, by their place among all."""
-
-        def lobes(w: Direction) -> tuple[list[Lobe], Lobe | None]:
-            reflected, passed = self.fixed(w)
-            channels = iter(self.energies(w, place))
-
-            def with_spectra(lobe: Lobe) -> Lobe:
-                return replace(lobe, energy=mi.ArrayXf([*lobe.energy, *next(channels)]))
-
-            reflected = [with_spectra(lobe) for lobe in reflected]
-            return reflected, with_spectra(passed) if passed else None
-
-        return lobes
-
-
-@dataclass(frozen=True, eq=False)
 class SampledSpectra:
-    """Both sides of a stack, the lower one where it transmits; the means of a diffuse base over wavelength."""
+    """The sides of a stack, one or both: the lobes of fixed wavelengths, and the energies of all; and the means of a
+    diffuse base over wavelength."""
 
     mi: Any
     fixed: bsdf.Lobed
-    above: SpectralSide
-    below: SpectralSide | None
+    sides: list[tuple[precomputed_lobes.PrecomputedLobes, directional_grid.Curves]]
     means: directional_grid.Curves | None
 
     def at(self, body: bsdf.Lobed, wavelengths_nm: Any) -> bsdf.Lobed:
         """The body for a ray, with the sampled values."""
         (place,) = places([wavelengths_nm])
-        above = self.above.at(self.mi, place)
-        if self.below is None or body.below is None:
-            return replace(body, above=self._with_means(body.above, place), lobes_above=above, lobes_below=above)
-        return replace(body, lobes_above=above, lobes_below=self.below.at(self.mi, place))
+        lobes = [self._lobes(*side, place) for side in self.sides]
+        above = self._with_means(body.above, place)
+        return replace(body, above=above, lobes_above=lobes[0], lobes_below=lobes[-1])
+
+    def _lobes(
+        self, fixed: precomputed_lobes.PrecomputedLobes, energies: directional_grid.Curves, place: Any
+    ) -> precomputed_lobes.Lobes:
+        """The lobes at the wavelengths of a ray, by their place among all."""
+
+        def lobes(w: Direction) -> tuple[list[Lobe], Lobe | None]:
+            reflected, passed = fixed(w)
+            channels = iter(energies(w, place))
+
+            def with_spectra(lobe: Lobe) -> Lobe:
+                return replace(lobe, energy=self.mi.ArrayXf([*lobe.energy, *next(channels)]))
+
+            reflected = [with_spectra(lobe) for lobe in reflected]
+            return reflected, with_spectra(passed) if passed else None
+
+        return lobes
 
     def _with_means(self, prepared: Prepared, place: Any) -> Prepared:
         base = self.fixed.above.base
@@ -75,18 +68,19 @@ class SampledSpectra:
 def sample(mi: Any, fixed: bsdf.Lobed, body_at: Callable[[Any], bsdf.Lobed], nodes: int) -> SampledSpectra:
     """The spectra of a stack from its body for fixed wavelengths, and from that for those of rays, over as many
     wavelengths: a multiple of those of a ray."""
-    above = _side(mi, fixed.lobes_above, lambda nm: body_at(nm).lobes_above, nodes)
-    below = _side(mi, fixed.lobes_below, lambda nm: body_at(nm).lobes_below, nodes) if fixed.below else None
+    sides = [_side(mi, fixed.lobes_above, lambda nm: body_at(nm).lobes_above, nodes)]
+    if fixed.below:
+        sides.append(_side(mi, fixed.lobes_below, lambda nm: body_at(nm).lobes_below, nodes))
     base, means = body_at(_all_wavelengths(mi, nodes)).above.base, None
     if base is not None:
         columns = [_over_wavelengths(mi, x, 1, nodes) for x in base.means]
         means = directional_grid.curves(columns, (nodes,), mi.Float)
-    return SampledSpectra(mi, fixed, above, below, means)
+    return SampledSpectra(mi, fixed, sides, means)
 
 
 def _side(
     mi: Any, fixed: precomputed_lobes.Lobes, lobes_at: Callable[[Any], precomputed_lobes.Lobes], nodes: int
-) -> SpectralSide:
+) -> tuple[precomputed_lobes.PrecomputedLobes, directional_grid.Curves]:
     import drjit as dr
 
     # See every direction at all wavelengths
@@ -102,7 +96,7 @@ def _side(
     # Keep what depends on them
     seen = [*reflected, *([passed] if fixed.transmits and passed else [])]
     flat = [_over_wavelengths(mi, lobe.energy, count, nodes) for lobe in seen]
-    return SpectralSide(fixed, directional_grid.curves(flat, (*shape, nodes), mi.Float))
+    return fixed, directional_grid.curves(flat, (*shape, nodes), mi.Float)
 
 
 def _all_wavelengths(mi: Any, nodes: int, times: int = 1) -> Any:
