@@ -157,7 +157,7 @@ def points_inside(shape: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray, 
 
 
 def _absorbing_inside(progress: Progress) -> Table:
-    """Per critical angle, U by least squares over extinctions from 0 to eta, at angles fixed on the angular axis."""
+    """U by critical angle, by least squares over extinctions from 0 to eta, at angles fixed on the angular axis."""
     cos_theta, alpha, theta_c = (axis.reshape(ABSORBING) for axis in points_inside(ABSORBING))
     slices = []
     for i, theta in enumerate(theta_c[0, 0]):
