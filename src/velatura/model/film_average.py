@@ -37,7 +37,8 @@ class FilmAverage(ColourTable):
 
 @functools.lru_cache(32)
 def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverage:
-    """Of an interface whose facets are met once or often; made once. A `coarse` one is quicker, for what moves."""
+    """The average of an interface whose facets are met once or often; made once. A `coarse` one is quicker, for what
+    moves."""
     from velatura.model.solved.energies.interfaces import Facets, of_first_events, shares_of_films
 
     opaque, n12 = films.n12 is None, films.n12 or 1.0

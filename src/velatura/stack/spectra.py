@@ -263,7 +263,7 @@ def srgb_sensitivity(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.float64
 
 
 def luminance_sensitivity(wavelengths_nm: NDArray[np.floating]) -> NDArray[np.float64]:
-    """As `srgb_sensitivity`, that of luminance (1, N)."""
+    """Sensitivity of luminance (1, N), like `srgb_sensitivity`."""
     import numpy as np
 
     shares: NDArray[np.float64] = np.array([LUMINANCE]) @ srgb_sensitivity(wavelengths_nm)
