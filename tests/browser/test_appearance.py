@@ -354,7 +354,7 @@ def test_scattering_media_and_mirrors_are_dragged_and_say_what_cannot_be(visit: 
     assert look.get_by_text("A medium that scatters stays where it is.").is_visible()
     assert look.get_by_label("Energy", exact=True).is_enabled()
 
-    open_material(page, "MomentumInSlabs brushing")
+    open_material(page, "Crossed brushing")
     chosen(page, 2)
     look.get_by_label("Energy", exact=True).fill("0.5")
     look.get_by_label("Energy", exact=True).press("Enter")
@@ -468,7 +468,7 @@ def test_what_cannot_be_had_is_said_beside_the_lobe(visit: Open) -> None:
     chosen(page, 2)
     look.get_by_label("Blur, slider").fill("0")
     answered(page)
-    look.locator(".refused", has_text="Query: blur 0").wait_for()
+    look.locator(".refused", has_text="Asked: blur 0").wait_for()
     assert look.locator("circle.ghost").count() == 1
     check_physical(page)
     page.page.get_by_role("button", name="Undo").click()

@@ -38,8 +38,8 @@ OF_DEFAULT = {
     ],
     "model/smooth_interface.py": [
         (
-            "    films: Films = field(default=None, kw_only=True)\n",
-            "    films: Films = field(default=None, kw_only=True)\n"
+            "    films: Films | None = field(default=None, kw_only=True)\n",
+            "    films: Films | None = field(default=None, kw_only=True)\n"
             "    dust: Value = field(default=0.0, kw_only=True)\n",
         ),
         ("n12, films=meeting.films)", "n12, films=meeting.films, dust=layer.dust)"),

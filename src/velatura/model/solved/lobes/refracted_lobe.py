@@ -220,7 +220,7 @@ def _inside(lobe: RefractedLobe, wi: Direction) -> tuple[Value, Value, Index, Di
 
 
 def _height(n: Index, z: Value) -> Value:
-    """Along the normal of the momentum inside, of light with a cosine outside."""
+    """Height, along the normal, of the momentum inside, of light with a cosine outside."""
     return ops.maximum(z, COS_MIN) if n.is_outside else ops.sqrt(_height2(n, z), None)
 
 
@@ -236,7 +236,7 @@ def _squares(w: Direction) -> Direction:
 
 
 def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: Index) -> tuple[Direction, Value]:
-    """Along the normal of light from outside the cone that is spread to a momentum p inside, and what scales that."""
+    """Vector along the normal of light from outside the cone that is spread to a momentum p inside, and its scale."""
     stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
     return (i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2), stretch
 

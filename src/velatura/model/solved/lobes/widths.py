@@ -130,7 +130,7 @@ class Tensor:
 
 
 def _sum(parts: Sequence[Tensor]) -> Tensor:
-    """Along the axes of the sum of all, powers q of widths add."""
+    """Sum of tensors: powers q of widths add along the axes of the sum of squares."""
     squares = Tensor(*(np.sum([getattr(part, entry) for part in parts], axis=0) for entry in ("xx", "xy", "yy")))
     angle = squares.angle
     u, v = (np.sum([part.width(angle + turn) ** Q for part in parts], axis=0) ** (1 / Q) for turn in AXES)
