@@ -17,7 +17,7 @@ demo: .venv/ready ## install, and render the preset coated-gold
 	@echo "The picture is $(CURDIR)/coated-gold.png"
 
 test: lint ## install, and run all checks: ruff, mypy, eslint, pytest
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -q -n 4 --dist loadfile tests/unit tests/system tests/browser
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -q -n 3 --dist loadfile tests/unit tests/system tests/browser
 
 lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
 	$(BIN)/ruff check
