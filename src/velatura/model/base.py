@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, TypeVar
 
@@ -157,8 +157,16 @@ class Model(ABC):
         """The lobes of a material with values in NumPy, for directions wi, (N,) each."""
 
     @abstractmethod
-    def over_wavelengths(self, material: Material, places: Any, variance: type[Variance], context: Context) -> Any:
-        """A material with values at wavelengths, for those of rays; None where it is prepared at every point."""
+    def over_wavelengths(
+        self,
+        material: Material,
+        spectral: Callable[[], Material],
+        places: Any,
+        variance: type[Variance],
+        context: Context,
+    ) -> Any:
+        """A uniform material for the wavelengths of rays, by its values at `places` on the spectrum, which `spectral`
+        gives; None where it is prepared at every point."""
 
     @abstractmethod
     def textured(

@@ -88,7 +88,9 @@ def of(mi: Any, binding: Binding, model: Model, variance: type[Variance], before
                 return textured.at(values(si, active), _places(mi, si) if mi.is_spectral else None)
 
             return Bodies(from_tables, True, textured.balanced, textured)
-    elif solved := model.over_wavelengths(binding.at_wavelengths(nm), places, variance, context):
+    elif solved := model.over_wavelengths(
+        binding.uniform_material(), partial(binding.at_wavelengths, nm), places, variance, context
+    ):
         solved = settled(solved)
         return Bodies(lambda si, active: solved.at(values(si, active), _places(mi, si)), True, solved.symmetric)
     else:

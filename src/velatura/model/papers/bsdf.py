@@ -21,7 +21,7 @@ from velatura.model.papers.adding import Lobe, lobes
 from velatura.model.papers.diffuse_base import Base, under, with_means
 from velatura.model.papers.lobe_merging import merged
 from velatura.model.papers.prepare import Prepared, prepare
-from velatura.model.variance import Roughness, Variance, variance_kind
+from velatura.model.variance import Variance, variance_kind
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
@@ -218,9 +218,9 @@ def scattered(stack: Lobed, wi: Direction) -> Scattered:
     reflected_below, passed_below = stack.lobes_below(turned)
     assert passed is not None and passed_below is not None
     eta = ops.select(from_above, stack.eta, 1 / stack.eta)
-    through = _chosen(from_above, passed, passed_below)
+    through = ops.select_record(from_above, passed, passed_below)
     through = replace(through, energy=ops.select(refracted(turned, eta)[2] > 0, through.energy, 0.0))
-    reflected = [_chosen(from_above, a, b) for a, b in zip(reflected, reflected_below)]
+    reflected = [ops.select_record(from_above, a, b) for a, b in zip(reflected, reflected_below)]
     return Scattered(reflected, None, through, eta)
 
 
@@ -261,7 +261,7 @@ def exchangeable(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Sequence[L
     reflected, passed = stack.lobes_above(seen)
     reflected_below, _ = stack.lobes_below(half)
     assert passed is not None
-    return [_chosen(wi[2] > 0, a, b) for a, b in zip(reflected, reflected_below)], passed
+    return [ops.select_record(wi[2] > 0, a, b) for a, b in zip(reflected, reflected_below)], passed
 
 
 def _lobes(prepared: Prepared, w: Direction) -> tuple[list[Lobe], Lobe]:
@@ -291,13 +291,3 @@ def _pair_below(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Direction, 
 
 def _down(w: Direction) -> Direction:
     return w[0], w[1], -w[2]
-
-
-def _chosen(where: Value, a: Lobe, b: Lobe) -> Lobe:
-    """The lobe a where a condition holds, else b; of one kind."""
-    assert type(a.variance) is type(b.variance)
-    variance = type(a.variance)(
-        *(ops.select(where, p, q) for p, q in zip(vars(a.variance).values(), vars(b.variance).values()))
-    )
-    roughness = Roughness(*(ops.select(where, p, q) for p, q in zip(a.roughness, b.roughness)))
-    return Lobe(ops.select(where, a.energy, b.energy), variance, roughness)

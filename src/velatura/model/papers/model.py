@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -59,7 +60,14 @@ class PaperModel(Model):
 
         return statistics.added(material, self, wi)
 
-    def over_wavelengths(self, material: Material, places: Any, variance: type[Variance], context: Context) -> None:
+    def over_wavelengths(
+        self,
+        material: Material,
+        spectral: Callable[[], Material],
+        places: Any,
+        variance: type[Variance],
+        context: Context,
+    ) -> None:
         return None
 
     def textured(

@@ -11,12 +11,11 @@ samples are those of the forward form.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any
 
 from velatura import ops
-from velatura.films.reflectance import InterfaceFilms
 from velatura.model.base import ALL, Query
 from velatura.model.directions import select_direction, upright
 from velatura.model.roughness_maps import RoughnessMap
@@ -242,13 +241,13 @@ class Solved:
             return self.above.seen(wi), 1.0
         turned = upright(wi, wi)
         where = wi[2] > 0
-        columns = select(where, self.above.at(turned), self.below.at(turned))
+        columns = ops.select_record(where, self.above.at(turned), self.below.at(turned))
         side = replace(
             self.above,
             shapes=tuple(_either(where, a, b) for a, b in zip(self.above.shapes, self.below.shapes)),
-            polynomial=select(where, self.above.polynomial, self.below.polynomial),
-            samples=select(where, self.above.samples, self.below.samples),
-            transmission=select(where, self.above.transmission, self.below.transmission),
+            polynomial=ops.select_record(where, self.above.polynomial, self.below.polynomial),
+            samples=ops.select_record(where, self.above.samples, self.below.samples),
+            transmission=ops.select_record(where, self.above.transmission, self.below.transmission),
         )
         return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
 
@@ -361,9 +360,11 @@ def _either(where: Value, a: Shape, b: Shape) -> Shape:
     assert a.facets and b.facets
     facets = _of_either(where, a.facets, b.facets)
     if a.first is None and b.first is None:
-        return Shape(a.interface, select(where, a.n, b.n), facets, a.n_first, None)
+        return Shape(a.interface, ops.select_record(where, a.n, b.n), facets, a.n_first, None)
     first = _of_either(where, a.first, b.first)
-    return Shape(a.interface, select(where, a.n, b.n), facets, select(where, a.n_first, b.n_first), first)
+    return Shape(
+        a.interface, ops.select_record(where, a.n, b.n), facets, ops.select_record(where, a.n_first, b.n_first), first
+    )
 
 
 def _of_either(where: Value, a: SmoothInterface | None, b: SmoothInterface | None) -> SmoothInterface:
@@ -374,20 +375,3 @@ def _of_either(where: Value, a: SmoothInterface | None, b: SmoothInterface | Non
         ops.select(where, getattr(a, name) if a else 1.0, getattr(b, name) if b else 1.0) for name in ("eta", "n12")
     )
     return replace(some, eta=eta, n12=n12, films=ops.select_record(where, *(x.films if x else None for x in (a, b))))
-
-
-def select(where: Value, a: Any, b: Any) -> Any:
-    """Records of values, value by value; what is known of a record holds where it does of both."""
-    if isinstance(a, InterfaceFilms) or isinstance(b, InterfaceFilms):
-        return ops.select_record(where, a, b)
-    if is_dataclass(a) and not isinstance(a, type):
-        return type(a)(*(select(where, getattr(a, f.name), getattr(b, f.name)) for f in fields(a)))
-    if isinstance(a, tuple) and hasattr(a, "_fields"):
-        return type(a)(*(select(where, x, y) for x, y in zip(a, b)))
-    if isinstance(a, (list, tuple)):
-        return type(a)(select(where, x, y) for x, y in zip(a, b))
-    if isinstance(a, bool) and isinstance(b, bool):
-        return a and b
-    if a is None or (isinstance(a, float) and isinstance(b, float) and a == b):
-        return a
-    return ops.select(where, a, b)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -67,11 +68,16 @@ class SolvedModel(Model):
         return statistics.solved_lobes(material, self, wi)
 
     def over_wavelengths(
-        self, material: Material, places: Any, variance: type[Variance], context: Context
+        self,
+        material: Material,
+        spectral: Callable[[], Material],
+        places: Any,
+        variance: type[Variance],
+        context: Context,
     ) -> Spectra | None:
         from velatura.model.solved import spectra
 
-        return spectra.solve(material, places, self, variance, context) if _is_solved(material) else None
+        return spectra.solve(spectral(), places, self, variance, context) if _is_solved(material) else None
 
     def textured(
         self, material: Material, ranges: Any, symbolic: Any, variance: type[Variance], context: Context, known: Any

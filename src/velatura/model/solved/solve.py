@@ -119,25 +119,6 @@ class SolvedSide:
         return replace(self, columns=columns)
 
 
-@dataclass(frozen=True)
-class _Light:
-    """Energies (..., C, M) of the parts of a side at the directions of a grid, as `Energies` has them."""
-
-    solved: Energies
-    lobes: Array
-    veils: Array
-    rest: Array
-    straight: Array
-    bounced: Array
-    passed: Array
-
-    @classmethod
-    def of(cls, solved: Energies, count: int) -> _Light:
-        """Energies of the first `count` directions."""
-        names = "lobes", "veils", "rest", "straight", "bounced", "passed"
-        return cls(solved, *(getattr(solved, name)[..., :count] for name in names))
-
-
 class _Lobe(NamedTuple):
     """A lobe that is drawn, and its width at the directions of a grid."""
 
@@ -289,7 +270,7 @@ class Solver:
         forward = transmission if self.model.form == "forward" else None
         return SolvedSide(folded.unfolded(columns), numbers, self._colours(clipped), edged, forward)
 
-    def _light(self, material: Material, layout: Layout, folded: Folded) -> tuple[_Light, Remainder]:
+    def _light(self, material: Material, layout: Layout, folded: Folded) -> tuple[Energies, Remainder]:
         """Solve for the energies of all parts, and fit the remainder's polynomial."""
         solved = energies(
             material,
@@ -303,9 +284,9 @@ class Solver:
         )
         albedos = (solved.lobes.sum(axis=0) + solved.veils.sum(axis=0) + solved.rest)[:, folded.count :]
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
-        return _Light.of(solved, folded.count), Remainder(*(x[:, None] for x in vars(polynomial).values()))
+        return solved.first(folded.count), Remainder(*(x[:, None] for x in vars(polynomial).values()))
 
-    def _lobes(self, material: Material, layout: Layout, folded: Folded, light: _Light) -> list[_Lobe]:
+    def _lobes(self, material: Material, layout: Layout, folded: Folded, light: Energies) -> list[_Lobe]:
         """Work out the widths of lobes and veils."""
         found, energy = parts(material), np.array([ops.mean(each) for each in light.lobes])
         tensors = widths.tensors(found, folded.cosine, folded.phi, energy)
@@ -318,7 +299,7 @@ class Solver:
         return [_Lobe(shape, tensor(spec)) for shape, spec in zip(shapes, layout.lobes)]
 
     def _hand_over(
-        self, layout: Layout, folded: Folded, light: _Light, lobes: Sequence[_Lobe], whole: Array
+        self, layout: Layout, folded: Folded, light: Energies, lobes: Sequence[_Lobe], whole: Array
     ) -> tuple[list[_Weighed], Array]:
         """Divide energies of lobes by their integrals; the remainder takes what light it can, by which a lobe would be
         too bright, and has the energy that is returned. `whole` is its albedo without a scale."""
@@ -342,7 +323,7 @@ class Solver:
         material: Material,
         layout: Layout,
         folded: Folded,
-        light: _Light,
+        light: Energies,
         wanted: Sequence[Demand],
         transmission: Transmission | None,
     ) -> tuple[Array, Parts | None]:
@@ -359,7 +340,7 @@ class Solver:
             facets = wanted[0]
             reflected = Demand(*(np.concatenate([0 * x[:1], x[1:]]) for x in reflected))
         met = [*(None if each.veil else each.interface for each in layout.lobes), None]
-        *diffuse, peak = folded.around(_passing(transmission, light.solved, folded.at_cosines[2]))
+        *diffuse, peak = folded.around(_passing(transmission, light, folded.at_cosines[2]))
         energy = light.straight, light.bounced, light.passed
         passes, shares = combined.parts(transmission, folded.directions, *energy, reflected, met, facets, diffuse, peak)
         passes = _evenly(passes, least)

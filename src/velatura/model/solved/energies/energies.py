@@ -79,6 +79,11 @@ class Energies:
     again: Array
     nodes: Nodes
 
+    def first(self, count: int) -> Energies:
+        """The energies of the first beams alone."""
+        of_beams = "lobes", "veils", "rest", "straight", "bounced", "passed"
+        return replace(self, **{name: getattr(self, name)[..., :count] for name in of_beams})
+
 
 def energies(
     material: Material,

@@ -52,6 +52,14 @@ class Index:
         ring2 = n * n - 1
         return cls(n, 1 / n, ring2, ops.sqrt(ops.maximum(ring2, 0.0)), denser)
 
+    @staticmethod
+    def selected(where: Value, a: Index, b: Index) -> Index:
+        """The index a where a condition holds, else b; denser if both are."""
+        n, inverse, ring2, ring = (
+            ops.select(where, getattr(a, x), getattr(b, x)) for x in ("n", "inverse", "ring2", "ring")
+        )
+        return Index(n, inverse, ring2, ring, a.denser and b.denser)
+
     @property
     def is_outside(self) -> bool:
         """Whether it is known to be that of the medium outside."""
@@ -142,7 +150,7 @@ def sample(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> Directio
 def either(where: Value, a: RefractedLobe, b: RefractedLobe) -> RefractedLobe:
     """A lobe to `sample`: that of a where a condition holds, else of b."""
     roughness = Roughness(*(ops.select(where, x, y) for x, y in zip(a.roughness, b.roughness)))
-    return RefractedLobe(1.0, roughness, _chosen(where, a.n, b.n))
+    return RefractedLobe(1.0, roughness, ops.select_record(where, Index.of(a.n), Index.of(b.n)))
 
 
 def integral(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> Value:
@@ -264,14 +272,3 @@ def _out_of_frame(lobe: RefractedLobe, w: Direction) -> Direction:
 
 def _is_straight(roughness: Roughness) -> bool:
     return isinstance(roughness.rotation, float) and roughness.rotation == 0.0
-
-
-def _chosen(where: Value, a: Value, b: Value) -> Value:
-    """One of two indices."""
-    if a is b:
-        return a
-    a, b = Index.of(a), Index.of(b)
-    n, inverse, ring2, ring = (
-        ops.select(where, getattr(a, x), getattr(b, x)) for x in ("n", "inverse", "ring2", "ring")
-    )
-    return Index(n, inverse, ring2, ring, a.denser and b.denser)

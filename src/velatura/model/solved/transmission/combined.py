@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model.directions import select_direction
 from velatura.model.solved import sample_allocation
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.remainder import EVEN
@@ -179,19 +180,14 @@ def sample(transmission: Transmission, of: Parts, wi: Direction, u: Value, u1: V
     wo = direct.sample(transmission, wi, ops.minimum(ops.divide(u, probability), BELOW_ONE), u1, u2)
     lobe = internal_reflections.bounced(transmission, wi)
     if lobe:
-        wo = _chosen(u < probability, wo, _down(refracted_lobe.sample(lobe, i, u1, u2)))
+        wo = select_direction(u < probability, wo, _down(refracted_lobe.sample(lobe, i, u1, u2)))
     again = ops.clip(ops.divide(u - begin, 1 - begin), 0.0, BELOW_ONE)
     scattered = _down(
         internal_reflections.sample_rest(internal_reflections.rest(transmission, wi, of.numbers), i, again, u1, u2)
     )
-    return _chosen(u < begin, wo, scattered)
+    return select_direction(u < begin, wo, scattered)
 
 
 def _down(w: Direction) -> Direction:
     """A direction turned down; one that lies below the surface already is lost."""
     return w[0], w[1], -ops.maximum(w[2], 0.0)
-
-
-def _chosen(where: Value, a: Direction, b: Direction) -> Direction:
-    x, y, z = (ops.select(where, p, q) for p, q in zip(a, b))
-    return x, y, z
