@@ -156,7 +156,6 @@ class Model(ABC):
     def statistics(self, material: Material, wi: Direction) -> StackLobes:
         """The lobes of a material with values in NumPy, for directions wi, (N,) each."""
 
-    @abstractmethod
     def over_wavelengths(
         self,
         material: Material,
@@ -166,14 +165,16 @@ class Model(ABC):
         context: Context,
     ) -> Any:
         """A uniform material for the wavelengths of rays, by its values at `places` on the spectrum, which `spectral`
-        gives; None where it is prepared at every point."""
+        gives; None, unless a model says otherwise, where it is prepared at every point."""
+        return None
 
-    @abstractmethod
     def textured(
         self, material: Material, ranges: Any, symbolic: Any, variance: type[Variance], context: Context, known: Any
     ) -> Any:
         """A material with textures of values in `ranges`, and `symbolic` inputs for what is differentiated, tabulated
-        over them; None where it is prepared at every point. What `known` has in common is used again."""
+        over them; None, unless a model says otherwise, where it is prepared at every point. What `known` has in common
+        is used again."""
+        return None
 
     @property
     @abstractmethod

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from velatura.model.base import SWITCHES, Body, Model
 from velatura.optics.ggx import Direction
@@ -59,18 +58,3 @@ class PaperModel(Model):
         from velatura.model.papers import statistics
 
         return statistics.added(material, self, wi)
-
-    def over_wavelengths(
-        self,
-        material: Material,
-        spectral: Callable[[], Material],
-        places: Any,
-        variance: type[Variance],
-        context: Context,
-    ) -> None:
-        return None
-
-    def textured(
-        self, material: Material, ranges: Any, symbolic: Any, variance: type[Variance], context: Context, known: Any
-    ) -> None:
-        return None
