@@ -170,6 +170,18 @@ def llvm_command() -> str:
 
 
 @functools.cache
+def llvm() -> ModuleType | None:
+    """Dr.Jit's arrays on LLVM, without gradients; None where Mitsuba or LLVM is missing or too old."""
+    try:
+        require_llvm()
+    except MissingTool:
+        return None
+    import drjit.llvm
+
+    return drjit.llvm
+
+
+@functools.cache
 def _llvm_works() -> bool:
     version = llvm_version()
     if version is None or version[0] >= TRUSTED_LLVM:

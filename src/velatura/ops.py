@@ -108,12 +108,18 @@ class Unrolled:
 
 class _Numpy(Unrolled):
     exp, log, power, sin, cos = np.exp, np.log, np.power, np.sin, np.cos
-    arctan2, absolute, minimum, maximum = np.arctan2, np.abs, np.minimum, np.maximum
+    arctan2, absolute, minimum, maximum, floor = np.arctan2, np.abs, np.minimum, np.maximum, np.floor
     select = staticmethod(np.where)
 
     @staticmethod
     def sqrt(x: Value) -> Value:
         return np.sqrt(np.maximum(x, 0))
+
+    @staticmethod
+    def log_gamma(x: Value) -> Value:
+        from scipy.special import gammaln
+
+        return gammaln(x)
 
     @staticmethod
     def mean(x: Value) -> Value:
@@ -154,7 +160,7 @@ class _DrJit(Unrolled):
 
         self.exp, self.log, self.sin, self.cos = dr.exp, dr.log, dr.sin, dr.cos
         self.power, self.arctan2, self.absolute = dr.power, dr.atan2, dr.abs
-        self.select = dr.select
+        self.select, self.floor, self.log_gamma = dr.select, dr.floor, dr.lgamma
         self._dr = dr
 
     # Of `dr.maximum`, a processor makes four instructions to pass NaN on, and one of this; where both are the same, the
@@ -337,6 +343,15 @@ def arctan2(y: Value, x: Value) -> Value:
 
 def absolute(x: Value) -> Value:
     return _dialect(x).absolute(x)
+
+
+def floor(x: Value) -> Value:
+    return _dialect(x).floor(x)
+
+
+def log_gamma(x: Value) -> Value:
+    """Logarithm of the gamma function."""
+    return _dialect(x).log_gamma(x)
 
 
 def minimum(a: Value, b: Value) -> Value:

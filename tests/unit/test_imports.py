@@ -26,7 +26,7 @@ MAY_IMPORT = {
     "pictures": "",
     "stack": "readers",
     "optics": "ops",
-    "renderer": "stack optics ops",
+    "renderer": "stack optics ops kernel",
     "films": "stack optics ops renderer",
     "tables": "optics ops renderer",
     "model": "stack optics tables ops renderer films",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -94,7 +93,7 @@ def _contents(stack: Stack, made: Shader, model: Model, coarse: bool = False) ->
     tabulated = _tabulated(made)
     if tabulated is None:
         return {**given, "solution": None}
-    found = tabulated.solve(stack, coarse, _lately(made.key))
+    found = tabulated.solve(stack, coarse)
     return {**given, "solution": {name: array(x) for name, x in vars(found).items()}}
 
 
@@ -134,12 +133,6 @@ def pattern(stack: Stack, stretched: bool) -> Stack:
 @functools.lru_cache(64)
 def _made(stack: Stack, model: Model) -> Shader:
     return shader(stack, model, values="uniforms")
-
-
-@functools.lru_cache(KEPT)
-def _lately(key: str) -> dict[Hashable, Any]:
-    """What was made of the layers of the last material of a shader: few of them change from one to the next."""
-    return {}
 
 
 def tables(key: str) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, pi
 from typing import Any, TypeAlias
@@ -94,6 +94,11 @@ class Coated(ColourTable, InterfaceFilms):
     @property
     def absorbs(self) -> bool:
         return False
+
+    @property
+    def key(self) -> Hashable:
+        """Equal for films that reflect alike, and are not of a texture."""
+        return type(self), self.rarer, self.n12, self.data.tobytes()
 
     def reading(self, flat: Any) -> Coated:
         """The same films with values of Dr.Jit, flat; differentiable."""

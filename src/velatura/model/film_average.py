@@ -55,7 +55,7 @@ def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverag
     first = [of_first_events(facets, p, samples, often) for facets in each]
     kept, absorbed, blocked = (np.array(x) for x in zip(*first))
     if often:
-        walked = np.array([shares_of_films(facets, {}, p) for facets in each[::WALKED]])
+        walked = np.array([shares_of_films(facets, p) for facets in each[::WALKED]])
         place = np.arange(len(y)) / WALKED
         before = np.minimum(place.astype(int), len(walked) - 2)
         upper = (place - before)[:, None, None, None]

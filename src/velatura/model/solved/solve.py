@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ from velatura.model.smooth_interface import SmoothInterface, smooth_interfaces
 from velatura.model.solved import reciprocal_balance, sample_allocation
 from velatura.model.solved.bsdf import ENERGY_EPS, ROOTS, Shape, Side, Solved
 from velatura.model.solved.columns import Columns, Declaration
-from velatura.model.solved.energies.adding import Made, Part, interfaces, parts
+from velatura.model.solved.energies.adding import Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
 from velatura.model.solved.grid import COS_MIN, Folded, Grid
 from velatura.model.solved.lobes import refracted_lobe, remainder, widths
@@ -140,7 +140,7 @@ class Solver:
 
     `shape` is that of the grid on which a renderer has the columns. `samples` are those of `reciprocal_balance`;
     `normals` are those of facets, and of lobes that are integrated, None for as many as usual, or as are asked for by
-    `finely`. Operators that materials share are `made` once.
+    `finely`.
     """
 
     model: Model
@@ -152,7 +152,6 @@ class Solver:
     samples: int | None = None
     normals: int | None = None
     finely: bool = False
-    made: Made = field(default_factory=dict)
 
     @classmethod
     def of(cls, model: Model, variance: type[Variance], context: Context, material: Material | None = None) -> Solver:
@@ -278,7 +277,6 @@ class Solver:
             np.concatenate([folded.phi, 0 * INCIDENCES]),
             self.tables if self.model.microsurface else None,
             widths.nearly_straight,
-            self.made,
             samples=self.normals or (FINELY[0] if self.finely else SAMPLES),
             like=layout.indices,
         )

@@ -7,7 +7,7 @@ constant ones are numbers in the code.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from math import pi
@@ -23,7 +23,6 @@ from velatura.model.context import Context, at_a_point
 from velatura.model.solved import rotation_frame, solve
 from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import Columns
-from velatura.model.solved.energies.adding import Made
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.rotation_frame import Frame, Turned
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
@@ -124,14 +123,12 @@ class SolvedLookUp(LookUp):
     def _turned_back(self, w: Direction) -> Direction:
         return w if self.angle is None else ggx.rotate(w, self.angle)
 
-    def solve(self, stack: Stack, coarse: bool = False, lately: Made | None = None) -> SolvedContents:
-        """A stack of this kind. It takes from `lately` what the one before it has made of layers, and leaves there what
-        it has. A `coarse` one is quicker, and is for light from above alone: that from below has the same columns
-        where a program reads one side at a time."""
-        made = _Made(lately or {})
+    def solve(self, stack: Stack, coarse: bool = False) -> SolvedContents:
+        """A stack of this kind. A `coarse` one is quicker, and is for light from above alone: that from below has the
+        same columns where a program reads one side at a time."""
         numbers, frame = _numbers(stack)
         material = frame.back(numbers)
-        solver = replace(self.solver, variance=frame.kind(self.solver.variance), made=made)
+        solver = replace(self.solver, variance=frame.kind(self.solver.variance))
         if coarse:
             cosines, normals = COARSE
             solver = replace(solver, grid=replace(solver.grid, cosines=cosines), normals=normals)
@@ -143,11 +140,7 @@ class SolvedLookUp(LookUp):
             found = solver.solve(material, own)
         texels = _texture(_rows(solver, found), self.places, self.groups, self.nodes)
         degrees = None if self.angle is None else frame.degrees(numbers)
-        solved = SolvedContents(texels, _remainders(found), _layout_numbers(solver, material, own, degrees))
-        if lately is not None:
-            lately.clear()
-            lately.update(made)
-        return solved
+        return SolvedContents(texels, _remainders(found), _layout_numbers(solver, material, own, degrees))
 
 
 def tabulated(stack: Stack, material: Material, model: Model, variance: type[Variance], general: bool) -> SolvedLookUp:
@@ -250,21 +243,6 @@ def _placed(side: Side, rows: Array | None) -> tuple[Sequence[Group], Sequence[i
         groups += [Group(name, begin, texels)] if texels else []
         begin += texels
     return groups, [x if x is not None else places[k] for k, x in zip(first, constants)]
-
-
-class _Made(dict[Hashable, Any]):
-    """Results that a solve has made, or has taken from those made `before`."""
-
-    def __init__(self, before: Made) -> None:
-        super().__init__()
-        self.before = before.copy()
-
-    def __contains__(self, key: object) -> bool:
-        return super().__contains__(key) or key in self.before
-
-    def __missing__(self, key: Hashable) -> Any:
-        found = self[key] = self.before[key]
-        return found
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.films.of_material import films_of
-from velatura.model.solved.energies.interfaces import Facets, Setting, colours, interface
+from velatura.films.tables import Coated
+from velatura.model.solved.energies.interfaces import KEPT, Facets, Setting, colours, interface
 from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.stack import InterfaceValues, Material, MediumValues
@@ -35,7 +37,6 @@ class Lambert:
 
 
 Part = Facets | Slab | Lambert
-Made = dict[Hashable, tuple[Layer, Layer]]
 
 
 @dataclass(frozen=True)
@@ -70,10 +71,9 @@ def leaving(stack: Sequence[Layer], setting: Setting) -> Leaving:
     return Leaving(tuple(reflected), d, straight, setting)
 
 
-def layers(found: Sequence[Part], setting: Setting, made: Made | None = None) -> list[tuple[Layer, Layer]]:
-    """What each layer does to light, where facets are met once, and as the setting says; all are `made` once."""
-    made = {} if made is None else made
-    return [_layer(part, of, made) for part, of in zip(found, settings(found, setting))]
+def layers(found: Sequence[Part], setting: Setting) -> list[tuple[Layer, Layer]]:
+    """What each layer does to light, where facets are met once, and as the setting says."""
+    return [_layer(part, of) for part, of in zip(found, settings(found, setting))]
 
 
 def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
@@ -82,16 +82,19 @@ def settings(found: Sequence[Part], setting: Setting) -> list[Setting]:
     return [setting.dark if any(ends[:i]) else setting for i in range(len(found))]
 
 
-def _layer(part: Part, setting: Setting, made: Made) -> tuple[Layer, Layer]:
-    numbers = (None if x is None else np.asarray(x).tobytes() for x in vars(part).values())
-    key = type(part), *numbers, setting.key
-    if key not in made:
+def _layer(part: Part, setting: Setting) -> tuple[Layer, Layer]:
+    """A layer, kept for other materials that have one like it."""
+
+    def make() -> tuple[Layer, Layer]:
         if isinstance(part, Facets):
-            made[key] = interface(part, setting)
-        else:
-            alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
-            made[key] = alike, alike
-    return made[key]
+            return interface(part, setting)
+        alike = medium(part, setting) if isinstance(part, Slab) else _lambert(part, setting)
+        return alike, alike
+
+    def key(value: Any) -> Hashable:
+        return value.key if isinstance(value, Coated) else None if value is None else np.asarray(value).tobytes()
+
+    return KEPT.once((type(part), *map(key, vars(part).values()), setting.key), make)
 
 
 def _lambert(part: Lambert, setting: Setting) -> Layer:

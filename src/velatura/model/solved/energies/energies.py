@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from velatura.model.solved.energies.adding import (
     Lambert,
     Leaving,
-    Made,
     Part,
     indices,
     interfaces,
@@ -91,7 +90,6 @@ def energies(
     phi: Array,
     often: Tables | None,
     forward: Straight,
-    made: Made | None = None,
     incidences: Array = INCIDENCES,
     samples: int = SAMPLES,
     like: Sequence[float] | None = None,
@@ -99,11 +97,10 @@ def energies(
     """Energies for beams at cosines and azimuths (M,).
 
     `material` has NumPy's values. With the tables of multiple scattering facets are met often; `forward` is what goes
-    into veils. `made` keeps what materials may share. The remainder is known at the cosines `incidences`, (I,); without
+    into veils. The remainder is known at the cosines `incidences`, (I,); without
     any, lobes are all that is worked out, which is quicker. `samples` are normals for light from each node, and of each
     beam; as many nodes are taken as for media of indices `like` those of the material.
     """
-    made = {} if made is None else made
     everything = _ended(parts(material))
     brushed = any(facets.alpha_u != facets.alpha_v for facets in interfaces(everything))
     azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
@@ -111,11 +108,11 @@ def energies(
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
     nodes = Nodes.of(indices(everything), NODES, like)
     basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES if len(incidences) else 1)
-    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often, made)
+    setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often)
 
     # Sum up the systems
     scatters = any(isinstance(part, Slab) and part.tau_s.any() for part in everything)
-    each = layers(everything, setting, made)
+    each = layers(everything, setting)
     full = leaving([last for _, last in each], setting)
 
     def system(found: Sequence[Part], as_set: bool = False) -> Leaving:
@@ -149,7 +146,7 @@ def energies(
     rest = np.maximum(reflected - (lobes + veils).sum(axis=0), 0)
     count = np.size(cos_theta)
     if brushed and len(incidences):
-        by_node = _of_isotropic(material, rest[:, count:], often, forward, made, incidences, samples, like)
+        by_node = _of_isotropic(material, rest[:, count:], often, forward, incidences, samples, like)
     else:
         lights = (
             total.columns - _sum(of_lobes(kept)).columns,
@@ -216,7 +213,6 @@ def _of_isotropic(
     energy: Array,
     often: Tables | None,
     forward: Straight,
-    made: Made,
     incidences: Array,
     *numbers: Any,
 ) -> tuple[Array, ...]:
@@ -224,7 +220,7 @@ def _of_isotropic(
     the energy that it has on average over azimuths.
     """
     stand_in = replace(material, layers=tuple(_isotropic(each) for each in material.layers))
-    found = energies(stand_in, incidences, 0 * incidences, often, forward, made, incidences, *numbers)
+    found = energies(stand_in, incidences, 0 * incidences, often, forward, incidences, *numbers)
     mean = energy.reshape(len(energy), len(AZIMUTHS), -1).mean(axis=1)
     # Columns that cancel out are rounding
     size = np.abs(found.remainder).sum(axis=2).max(axis=1)

@@ -8,33 +8,38 @@ tables of multiple scattering say.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from velatura import ops, tables
 from velatura.films.reflectance import dielectric_between, dielectric_passing
 from velatura.films.tables import Coated
 from velatura.model.solved.energies.modes import TINY, Basis, Light
 from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.ops import Value
 from velatura.optics import fresnel, ggx
+from velatura.optics.ggx import Direction
+from velatura.renderer import compiled
+from velatura.renderer.kept import Kept
 from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import InterfaceValues
 from velatura.tables import Tables, coordinates
 from velatura.tables.microsurface_walks import shares_in_the_end
 
 Array = NDArray[np.floating]
+T = TypeVar("T")
 
 # Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
 # often, and where such light is lost
 STRAIGHT = {True: 0.09, False: 0.01}
 GRAZING = 1e-4  # least cosine of light that meets an interface
+LEVEL = float(np.sqrt(1 - GRAZING**2))  # its sine
 ALPHA_MIN = 1e-3
-BLOCK = 1 << 15  # samples at a time
+KEPT = Kept(64 << 20)  # layers, and what they are made of
 BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
 DIGITS = 9  # of lengths of momentum that are alike
 SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
@@ -150,87 +155,139 @@ class Facets:
 
 
 @dataclass(frozen=True)
-class _Events:
-    """What first events make of light: reflected and refracted samples, by colour, and what they block of either.
+class _Shares:
+    """Shares (C, sources) of light at first events: reflected (`kept`), refracted (`passed`), what masking blocks of
+    either, and what it would block (1, sources) if all were reflected."""
 
-    Weights are (C, sources, samples), for all ways to mask light, one after the other. Shares (C, sources) are those of
-    the last way: what is reflected (`kept`), what they block, and what they would if they reflected all (`whole`).
-    """
-
-    reflected: Light
-    refracted: Light | None
     kept: Array
+    passed: Array
     blocked_reflected: Array
     blocked_refracted: Array
     whole: Array
 
+    @classmethod
+    def of(cls, facets: Facets, p: Array, samples: int, often: bool) -> _Shares:
+        """Shares of light of lengths p that meets facets without axes, once or often, by samples."""
+        lengths, places = np.unique(p, return_inverse=True)
+        events = _Events(facets, (often,))
 
-def _events(facets: Facets, p: Array, psi: Array, samples: int, ways: Sequence[bool]) -> _Events:
-    """First events for light of momenta of length p at azimuths psi (sources,), in the frame of the interface's axes.
+        def totals(*values: Any) -> tuple[list[list[Value]], list[Value]]:
+            lights, others = events(*values)
+            return [], [*(weight for light in lights for weight in light.weights), *others]
 
-    Momenta are of the direction of travel, which a mirror leaves alone. `ways` says whether masking is correlated with
-    the height of facets, as what follows needs (Heitz et al. 2016); otherwise it is separable.
+        of_lengths = lengths, 0 * lengths
+        _, found = compiled.over(totals, of_lengths, fibonacci(samples), events.numbers(samples), not facets.films)
+        kept, others = np.split(found[:, places], [events.colours])
+        passed, others = np.split(others, [0 if facets.opaque else events.colours])
+        return cls.beside(facets, kept, passed if len(passed) else 0 * kept, others)
+
+    @classmethod
+    def beside(cls, facets: Facets, kept: Array, passed: Array, others: Array) -> _Shares:
+        """Shares that `_Events` has besides its light: (L, sources)."""
+        *blocked, whole = np.split(others, [len(kept), len(others) - 1][: 1 if facets.opaque else 2])
+        return cls(kept, passed, blocked[0], 0 * kept if facets.opaque else blocked[1], whole)
+
+
+@dataclass(frozen=True)
+class _Events:
+    """First events: light that facets reflect, and refract, weighted for each of the ways to mask it, by colour; and
+    the shares of `_Shares` that the last way blocks.
+
+    `ways` says whether masking is correlated with the height of facets, as what follows needs (Heitz et al. 2016);
+    otherwise it is separable.
     """
-    n = float(ops.mean(facets.above))
-    alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
-    u_1, u_2 = fibonacci(samples)
-    sin = np.minimum(p / n, np.sqrt(1 - GRAZING**2))[:, None]
-    # Light comes from wi, and travels to -wi
-    wi = (-sin * np.cos(psi)[:, None], -sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin))
-    # The same normals from all sides where facets have no axes, with azimuths from the plane of incidence; else about
-    # the normal, where light has no side; and with a steady change between
-    turns = max(1 - facets.brushed / BRUSHED, 0) * psi[:, None] / (2 * np.pi)
-    h = ggx.sample_visible(wi, *alpha, (u_2 + turns) % 1, u_1[None])
-    cosine = np.minimum(ggx.dot(wi, h), 1.0)
-    share = 1 / u_1.size
 
-    def escape(w: tuple[Array, Array, Array], out: Array, through: bool, often: bool) -> Array:
-        towards = (w[0], w[1], np.abs(w[2]))
-        if often:
-            there, here = _smith(towards, alpha), _smith(wi, alpha)
-            both = (
-                np.exp(gammaln(2 + here) + gammaln(1 + there) - gammaln(2 + here + there))
-                if through
-                else (1 + here) / (1 + here + there)
-            )
-        else:
-            both = ggx.masking(towards, *alpha)
-        if through:
-            both = both + facets.straight(ways[-1]) * (1 - both)
-        return np.where(out, both, 0)
+    facets: Facets
+    ways: tuple[bool, ...]
 
-    def divided(w: tuple[Array, Array, Array], n: float, shares: Array, kept: Sequence[Array]) -> tuple[Light, Array]:
-        light = Light(n * w[0], n * w[1], np.concatenate([shares * each for each in kept]))
-        return light, (shares * (1 - kept[-1])).sum(axis=-1)
+    @cached_property
+    def colours(self) -> int:
+        """Channels of reflectances, 1 where all are alike."""
+        return len(self.facets.reflectance(np.ones(1)))
 
-    o, (reflectance, passing) = ggx.reflect(wi, h), facets.shares(cosine)
-    kept = [escape(o, o[2] > 0, False, often) for often in ways]
-    whole = (1 - kept[-1]).sum(axis=-1)[None] * share
-    reflected, blocked = divided(o, n, reflectance * share, kept)
-    back = reflected.weight[-len(blocked) :].sum(axis=-1)
-    if facets.below is None or facets.k is not None:
-        return _Events(reflected, None, back, blocked, np.zeros_like(blocked), whole)
-    below = float(ops.mean(facets.below))
-    eta = below / n
-    along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
-    t = along * h[0] - wi[0] / eta, along * h[1] - wi[1] / eta, along * h[2] - wi[2] / eta
-    kept = [escape(t, t[2] < 0, True, often) for often in ways]
-    refracted, not_refracted = divided(t, below, passing * share, kept)
-    return _Events(reflected, refracted, back, blocked, not_refracted, whole)
+    def numbers(self, samples: int) -> list[float]:
+        """All numbers, as `__call__` reads them."""
+        facets, n = self.facets, float(ops.mean(self.facets.above))
+        alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
+        # The same normals from all sides where facets have no axes, with azimuths from the plane of incidence; else
+        # about the normal, where light has no side; and with a steady change between
+        turns = max(1 - facets.brushed / BRUSHED, 0) / (2 * np.pi)
+        eta = 1.0 if facets.opaque or facets.below is None else float(ops.mean(facets.below)) / n
+        indices = (np.broadcast_to(x / facets.above, self.colours) for x in (facets.below, facets.k) if x is not None)
+        straight = facets.straight(self.ways[-1])
+        return [n, *alpha, turns, eta, straight, 1 / len(fibonacci(samples)[0]), *np.concatenate([*indices, []])]
+
+    def __call__(
+        self, sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
+    ) -> tuple[list[Light], list[Value]]:
+        """Events of light of momenta of length p at azimuths psi, in the frame of the interface's axes.
+
+        Momenta are of the direction of travel, which a mirror leaves alone.
+        """
+        (p, psi), (u_1, u_2) = sources, samples
+        n, alpha_u, alpha_v, turns, eta, straight, share, *colours = numbers
+        alpha = alpha_u, alpha_v
+        sin = ops.minimum(p / n, LEVEL)
+        # Light comes from wi, and travels to -wi
+        wi = -sin * ops.cos(psi), -sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
+        h = ggx.sample_visible(wi, *alpha, u_2 + turns * psi, u_1)
+        cosine = ops.minimum(ggx.dot(wi, h), 1.0)
+        o, here = ggx.reflect(wi, h), _smith(wi, alpha)
+        reflectance, passing = self._divided(cosine, eta, colours)
+        kept = [ops.select(o[2] > 0, self._escape(o, here, alpha, often), 0.0) for often in self.ways]
+        lights = [Light(n * o[0], n * o[1], [r * share * each for each in kept for r in reflectance])]
+        blocked = 1 - kept[-1]
+        others = [r * share * blocked for r in reflectance]
+        if not self.facets.opaque:
+            along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
+            x, y, z = (along * facing - towards / eta for facing, towards in zip(h, wi))
+            through = []
+            for often in self.ways:
+                both = self._escape((x, y, z), here, alpha, often, through=True)
+                through.append(ops.select(z < 0, both + straight * (1 - both), 0.0))
+            below = n * eta
+            lights.append(Light(below * x, below * y, [t * share * each for each in through for t in passing]))
+            others += [t * share * (1 - through[-1]) for t in passing]
+        return lights, [*others, blocked * share]
+
+    def _divided(self, cosine: Value, eta: Value, colours: Sequence[Value]) -> tuple[list[Value], list[Value]]:
+        """Shares that facets reflect, and let pass, by colour."""
+        facets, count = self.facets, self.colours
+        if facets.films:
+            reflectance, passing = facets.shares(cosine)
+            return list(reflectance), list(passing)
+        if facets.below is None:
+            return [1.0], []
+        if facets.opaque:
+            return [fresnel.conductor(cosine, *index) for index in zip(colours[:count], colours[count:])], []
+        cos_t = fresnel.cos_transmitted(cosine, eta)
+        found = [fresnel.dielectric_between(cosine, cos_t, index) for index in colours]
+        return found, [1 - each for each in found]
+
+    def _escape(
+        self, w: Direction, here: Value, alpha: tuple[Value, Value], often: bool, through: bool = False
+    ) -> Value:
+        """Share of light that leaves towards w, or -w, past other facets."""
+        towards = w[0], w[1], ops.absolute(w[2])
+        if not often:
+            return ggx.masking(towards, *alpha)
+        there = _smith(towards, alpha)
+        if not through:
+            return (1 + here) / (1 + here + there)
+        return ops.exp(ops.log_gamma(2 + here) + ops.log_gamma(1 + there) - ops.log_gamma(2 + here + there))
 
 
-def _smith(w: tuple[Array, Array, Array], alpha: tuple[float, float]) -> Array:
+def _smith(w: Direction, alpha: tuple[Value, Value]) -> Value:
     """Smith's Lambda."""
     x, y = alpha[0] * w[0], alpha[1] * w[1]
-    z = np.maximum(w[2], GRAZING * 0.1)
-    return 0.5 * (np.sqrt(1 + (x * x + y * y) / (z * z)) - 1)
+    z = ops.maximum(w[2], GRAZING * 0.1)
+    return 0.5 * (ops.sqrt(1 + (x * x + y * y) / (z * z)) - 1)
 
 
 @dataclass(frozen=True)
 class Setting:
     """How light is described: its basis, beams of momenta of length p at azimuths phi (M,), and how finely facets are
-    sampled. With the tables of multiple scattering facets are met often, else once. What is `made` of interfaces is
-    kept for others.
+    sampled. With the tables of multiple scattering facets are met often, else once.
     """
 
     basis: Basis
@@ -238,7 +295,6 @@ class Setting:
     phi: Array
     samples: int
     often: Tables | None = None
-    made: dict[Hashable, Any] = field(default_factory=dict)
 
     @property
     def ways(self) -> list[bool]:
@@ -247,9 +303,14 @@ class Setting:
 
     @property
     def key(self) -> Hashable:
-        """All that it is, but for the tables."""
-        known = type(self.basis), self.basis.nodes, self.samples, self.often is None
-        return *known, self.p.tobytes(), self.phi.tobytes()
+        """All that it is."""
+        return self.basis, self.samples, self.often, self.p.tobytes(), self.phi.tobytes()
+
+    def kept(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What is made of light in this basis, but for the ends of its nodes, once for all of one key."""
+        basis = self.basis
+        described = type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), basis.nodes.cells
+        return KEPT.once((key, described, self.samples, self.often), make)
 
     @property
     def dark(self) -> Setting:
@@ -313,14 +374,11 @@ class _Blocked:
 @dataclass(frozen=True)
 class _Met:
     """First events of all sources: what they reflect and refract, deposited (C, modes, N, sources) for all ways to mask
-    light; of the last one what is reflected of all light, and what they block, (C, sources) as of `_Events`."""
+    light, and their shares."""
 
     reflected: Array
     refracted: Array | None
-    kept: Array
-    blocked_reflected: Array
-    blocked_refracted: Array
-    whole: Array
+    shares: _Shares
 
     @classmethod
     def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
@@ -331,30 +389,21 @@ class _Met:
         momenta = facets.above, facets.below, facets.k, p, nodes.ends
         key = (
             *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in momenta),
-            *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes(), setting.samples, *setting.ways),
-            *((facets.films.rarer, facets.films.data.tobytes()) if facets.films else ()),
-            *(type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), nodes.cells),
+            *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes()),
+            facets.films and facets.films.key,
         )
-        if key not in setting.made:
-            setting.made[key] = cls._of(facets, p, psi, setting)
-        return setting.made[key]
+        return setting.kept(key, lambda: cls._of(facets, p, psi, setting))
 
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
-        """Meetings in blocks of sources that a processor's cache holds."""
-        size = max(BLOCK // setting.samples, 1)
-
-        def met(first: int) -> _Met:
-            each, basis = slice(first, first + size), setting.basis
-            found = _events(facets, p[each], psi[each], setting.samples, setting.ways)
-            light = None if facets.final else found.refracted
-            refracted = None if light is None else basis.deposited(light)
-            blocked = found.blocked_reflected, found.blocked_refracted, found.whole
-            return cls(basis.deposited(found.reflected), refracted, found.kept, *blocked)
-
-        every = [vars(met(first)).values() for first in range(0, max(len(p), 1), size)]
-        whole: list[Any] = [None if each[0] is None else np.concatenate(each, axis=-1) for each in zip(*every)]
-        return cls(*whole)
+        events = _Events(facets, tuple(setting.ways))
+        lights, others = setting.basis.deposited(
+            events, p, psi, setting.samples, events.numbers(setting.samples), compilable=not facets.films
+        )
+        # Stencils keep the energy
+        totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]
+        shares = _Shares.beside(facets, totals[0], 0 * totals[0] if facets.opaque else totals[1], others)
+        return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares)
 
     def _around(self, places: NDArray[np.integer], psi: Array, basis: Basis) -> _Met:
         """The sources of numbers `places`, which isotropic facets met at the azimuth 0, at others."""
@@ -362,8 +411,7 @@ class _Met:
             None if x is None else basis.around(x[..., places], psi) for x in (self.reflected, self.refracted)
         )
         assert reflected is not None
-        blocked = self.blocked_reflected[:, places], self.blocked_refracted[:, places], self.whole[:, places]
-        return _Met(reflected, refracted, self.kept[:, places], *blocked)
+        return _Met(reflected, refracted, _Shares(*(x[:, places] for x in vars(self.shares).values())))
 
 
 @dataclass(frozen=True)
@@ -400,7 +448,7 @@ class _Side:
         weights = np.maximum(basis.nodes.weights(n), 0)
         blocked = []
         sines = np.minimum(basis.nodes.p / n, 1), np.minimum(setting.p / n, 1)
-        shares = [_again_shares(facets, setting, q, met) for q, met in ((p, at_nodes), (setting.p, of_beams))]
+        shares = [_again_shares(facets, setting, q, met.shares) for q, met in ((p, at_nodes), (setting.p, of_beams))]
         for nodes, beams in zip(*shares):
             rows = basis.rows(nodes, turn)
             emitted = rows * weights
@@ -421,7 +469,7 @@ def _again(taken: _Blocked, there: _Blocked, facets: Facets, setting: Setting) -
     return Operator.of(nodes, beams)
 
 
-def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> tuple[Array, Array]:
+def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Shares) -> tuple[Array, Array]:
     """Shares (C, sources) of light of lengths p that first events block and that in the end is reflected, or passes.
 
     Of blocked light, it is reflected in the share that an isotropic interface of the mean roughness reflects: by the
@@ -433,7 +481,7 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> t
         return events.whole, np.zeros_like(events.whole)
     blocked: Array = events.whole if facets.opaque else events.blocked_reflected + events.blocked_refracted
     if facets.films is not None:
-        reflected, passed = shares_of_films(facets, setting.made, p)
+        reflected, passed = shares_of_films(facets, p)
         return blocked * reflected, blocked * passed
     mean = _mean_alpha(facets)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
@@ -443,9 +491,9 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: _Met) -> t
     else:
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
     found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean)))
-    stand_in: _Met | _Events = events
+    stand_in = events
     if facets.alpha_u != facets.alpha_v:
-        stand_in = _events(replace(facets, alpha_u=mean, alpha_v=mean), p, 0 * p, setting.samples, [True])
+        stand_in = _Shares.of(replace(facets, alpha_u=mean, alpha_v=mean), p, setting.samples, True)
     often, once = found.reshape(len(stand_in.blocked_reflected), -1), stand_in.kept
     met: Array
     little: Array
@@ -464,32 +512,34 @@ def _mean_alpha(facets: Facets) -> float:
     return float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
 
 
-def shares_of_films(facets: Facets, made: dict[Hashable, Any], p: Array) -> tuple[Array, Array]:
+def shares_of_films(facets: Facets, p: Array) -> tuple[Array, Array]:
     """Shares (C, sources) of blocked light of lengths p that films reflect, and let pass, in the end, by walks, since
     no table has them."""
     mean = _mean_alpha(facets)
     assert facets.below is not None and facets.films
-    numbers = facets.above, facets.below, facets.k, facets.films.data
-    key = mean, facets.films.rarer, *(None if x is None else x.tobytes() for x in numbers)
     # Walk in directions that crowd where shares bend
     places = (np.arange(WALKED) + 0.5) / WALKED
     critical = np.arcsin(float(ops.mean(facets.below) / ops.mean(facets.above))) if facets.is_exit else None
-    if key not in made:
+
+    def walked() -> tuple[Array, Array]:
         eta = None if facets.opaque else float(ops.mean(facets.below) / ops.mean(facets.above))
         cosines = coordinates.to_cosine(places) if critical is None else coordinates.to_angle(places, critical)
         alpha = np.full(WALKED, mean)
-        made[key] = shares_in_the_end(facets.shares, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
+        return shares_in_the_end(facets.shares, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
+
+    numbers = (None if x is None else x.tobytes() for x in (facets.above, facets.below, facets.k))
+    found = KEPT.once((shares_of_films, mean, facets.films.key, *numbers), walked)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
     at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
-    reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in made[key])
+    reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in found)
     return reflected, passed
 
 
 def of_first_events(facets: Facets, p: Array, samples: int, often: bool) -> tuple[Array, Array, Array]:
     """Shares (C, N) of light of lengths p that facets with films reflect when they are first met, that films of a
     dielectric absorb, and that meets others then."""
-    events = _events(facets, p, 0 * p, samples, [often])
-    if events.refracted is None:
-        return events.kept, 0 * events.kept, events.whole
-    blocked = events.blocked_reflected + events.blocked_refracted
-    return events.kept, 1 - events.kept - events.refracted.weight.sum(axis=-1) - blocked, blocked
+    shares = _Shares.of(facets, p, samples, often)
+    if facets.opaque:
+        return shares.kept, 0 * shares.kept, shares.whole
+    blocked = shares.blocked_reflected + shares.blocked_refracted
+    return shares.kept, 1 - shares.kept - shares.passed - blocked, blocked

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
 from velatura.model.solved.energies.interfaces import Setting, colours, scaled
 from velatura.model.solved.energies.modes import TINY, Light
 from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.ops import Value
 from velatura.optics import phase
 from velatura.renderer.low_discrepancy import fibonacci
 from velatura.stack import MediumValues
@@ -22,6 +25,7 @@ THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go 
 EVENTS = 600
 G_MAX = 0.999  # asymmetry of light that turns by less than nodes resolve
 COS_MIN = 0.01  # light that travels flatter is taken to travel so
+STEEP = float(np.sqrt(1 - COS_MIN**2))  # its sine
 
 
 @dataclass(frozen=True)
@@ -76,24 +80,11 @@ def _thin(slab: Slab, depth: Array, setting: Setting) -> tuple[Operator, Operato
     basis = setting.basis
     p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
     sources = ((p, psi), (setting.p, basis.relative(setting.phi, 0.0)))
-    shares = [albedo * (1 - kept(q)) for q, _ in sources]
-    found = []
-    # Colours share the directions that they scatter into, where they share g
-    alike = len(set(slab.g.tolist())) == 1
-    for channels in [slice(None)] if alike else [slice(c, c + 1) for c in range(len(slab.g))]:
-        nodes, beams = (
-            _scattered(slab.n, float(slab.g[channels][0]), *source, share[channels if len(share) > 1 else slice(None)])
-            for source, share in zip(sources, shares)
-        )
-        found.append(
-            [
-                Operator.of(basis.operators(basis.deposited(a), 0.0), basis.columns(basis.deposited(b), 0.0))
-                for a, b in zip(nodes, beams)
-            ]
-        )
+    shares = [(albedo * (1 - kept(q)))[:, None, None] for q, _ in sources]
+    nodes, beams = (_scattered(slab, *source, setting) for source in sources)
     up, down = (
-        Operator.of(np.concatenate([x.nodes for x in each]), np.concatenate([x.columns for x in each]))
-        for each in zip(*found)
+        Operator.of(basis.operators(a * shares[0], 0.0), basis.columns(b * shares[1], 0.0))
+        for a, b in zip(nodes, beams)
     )
     return up, scaled(kept, setting) + down
 
@@ -104,11 +95,26 @@ def _kept(slab: Slab, depth: Array, p: Array) -> Array:
     return np.asarray(np.exp(-depth[:, None] / cosine))
 
 
-def _scattered(n: float, g: float, p: Array, psi: Array, share: Array) -> tuple[Light, Light]:
-    """Light that is scattered up, and down, of light that travels down."""
-    u_1, u_2 = fibonacci(EVENTS)
-    sin = np.minimum(p / n, np.sqrt(1 - COS_MIN**2))[:, None]
-    w = sin * np.cos(psi)[:, None], sin * np.sin(psi)[:, None], np.sqrt(1 - sin * sin)
-    x, y, z = phase.deflect(w, phase.sample_henyey_greenstein(g, u_1), 2 * np.pi * u_2)
-    up, down = (Light(n * x, n * y, share[:, :, None] * (there / u_1.size)) for there in (z <= 0, z > 0))
-    return up, down
+def _scattered(slab: Slab, p: Array, psi: Array, setting: Setting) -> tuple[Array, ...]:
+    """Light that is scattered up, and down, of light of one unit that travels down, (G, modes, N, S), for the
+    asymmetry of each colour, or 1 for all; kept for other media."""
+    # Colours share the directions that they scatter into, where they share g
+    alike = len(set(slab.g.tolist())) == 1
+
+    def scattered(g: float) -> list[Array]:
+        numbers = slab.n, g, 1 / len(fibonacci(EVENTS)[0])
+        key = _scattered, *numbers, p.tobytes(), psi.tobytes(), setting.basis.nodes.ends
+        return setting.kept(key, lambda: setting.basis.deposited(_events, p, psi, EVENTS, numbers)[0])
+
+    each = map(scattered, (slab.g[:1] if alike else slab.g).tolist())
+    return tuple(np.concatenate(lights) for lights in zip(*each))
+
+
+def _events(
+    sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
+) -> tuple[list[Light], list[Value]]:
+    (p, psi), (u_1, u_2), (n, g, share) = sources, samples, numbers
+    sin = ops.minimum(p / n, STEEP)
+    w = sin * ops.cos(psi), sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
+    x, y, z = phase.deflect(w, phase.sample_henyey_greenstein(g, u_1), 2 * pi * u_2)
+    return [Light(n * x, n * y, [ops.select(there, share, 0.0)]) for there in (z <= 0, z > 0)], []

@@ -8,29 +8,37 @@ distinguish a direction from its opposite.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from velatura.model.solved.energies.nodes import Nodes
+from velatura import ops
+from velatura.model.solved.energies.nodes import STENCIL, Nodes
+from velatura.ops import Value
+from velatura.renderer import compiled
+from velatura.renderer.low_discrepancy import fibonacci
 
 Array = NDArray[np.floating]
 
-ROOT = np.sqrt(2)
+ROOT = float(np.sqrt(2))
 TINY = np.finfo(float).tiny
 SHORT = 1e-150  # least length of momentum that has an azimuth
 
 
-@dataclass(frozen=True)
-class Light:
-    """Samples of light: components of their momentum (sources, samples), and weights (C, sources, samples)."""
+class Light(NamedTuple):
+    """Samples of light: components of their momentum, and weights."""
 
-    x: Array
-    y: Array
-    weight: Array
+    x: Value
+    y: Value
+    weights: Sequence[Value]
+
+
+#: Of sources (p, psi), samples of a lattice and numbers: light, and values that are summed up
+Scatter = Callable[[Sequence[Value], Sequence[Value], Sequence[Value]], tuple[Sequence[Light], Sequence[Value]]]
 
 
 class Basis(ABC):
@@ -54,8 +62,51 @@ class Basis(ABC):
         """Azimuths of beams from the first axis of an interface."""
 
     @abstractmethod
-    def deposited(self, light: Light) -> Array:
-        """Sums over the samples of each source, (C, modes, N, sources)."""
+    def angular(self, cosine: Value, sine: Value) -> list[Value]:
+        """The modes at an azimuth."""
+
+    @property
+    @abstractmethod
+    def odd(self) -> list[bool]:
+        """Whether modes change sign in half a turn."""
+
+    def deposited(
+        self, scatter: Scatter, p: Array, psi: Array, samples: int, numbers: Sequence[float], compilable: bool = True
+    ) -> tuple[list[Array], Array]:
+        """Sums over the samples of sources of lengths p at azimuths psi (S,): of each light the K weights by mode and
+        node, (K, modes, N, S), and of other values, (L, S)."""
+        parts = self.nodes.numbers
+        count = len(parts)
+
+        def function(
+            sources: Sequence[Value], lattice: Sequence[Value], values: Sequence[Value]
+        ) -> tuple[list[list[Value]], Sequence[Value]]:
+            lights, others = scatter(sources, lattice, values[count:])
+            groups = []
+            for light in lights:
+                length, cosine, sine = _polar(light)
+                first, shares = self.nodes.stencil(length, values[:count])
+                modes = self.angular(cosine, sine)
+                groups += [[first], shares, [weight * mode for weight in light.weights for mode in modes]]
+            return groups, others
+
+        found, others = compiled.over(function, (p, psi), fibonacci(samples), [*parts, *numbers], compilable)
+        return [self._sums(*found[k : k + 3]) for k in range(0, len(found), 3)], others
+
+    def _sums(self, first: Array, shares: Array, weights: Array) -> Array:
+        """Sums of weights (S, samples, K) by node, for stencils that begin at nodes `first`."""
+        sources, samples, count = weights.shape
+        index = first.astype(np.int32) + np.arange(STENCIL, dtype=np.int32)
+        # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
+        index[index < 0] = self.nodes.count
+        rows = index * np.int32(sources) + np.arange(sources, dtype=np.int32)[:, None, None]
+        shape = (self.nodes.count + 1) * sources, sources * samples
+        entries = shares.ravel(), rows.ravel(), np.arange(0, shares.size + 1, STENCIL, dtype=np.int32)
+        found = (csc_array(entries, shape) @ weights.reshape(-1, count)).T
+        found = found.reshape(count // len(self.odd), len(self.odd), self.nodes.count + 1, sources)
+        sign = np.where(self.odd, -1, 1)[:, None]
+        found[:, :, 1] += sign * found[:, :, -1]
+        return np.asarray(found[:, :, :-1])
 
     @abstractmethod
     def around(self, light: Array, psi: Array) -> Array:
@@ -110,10 +161,12 @@ class Relative(Basis):
     def relative(self, phi: Array, rotation: float) -> Array:
         return np.zeros_like(phi)
 
-    def deposited(self, light: Light) -> Array:
-        length, cosine, _ = _polar(light)
-        angular = [np.ones_like(cosine), cosine, 2 * cosine * cosine - 1][: self.count]
-        return _deposited(self.nodes, light, length, angular, [m % 2 == 1 for m in range(self.count)])
+    def angular(self, cosine: Value, sine: Value) -> list[Value]:
+        return [1.0, cosine, 2 * cosine * cosine - 1][: self.count]
+
+    @property
+    def odd(self) -> list[bool]:
+        return [m % 2 == 1 for m in range(self.count)]
 
     def around(self, light: Array, psi: Array) -> Array:
         return light
@@ -169,15 +222,17 @@ class Even(Basis):
     def azimuths(self) -> Array:  # type: ignore[override]
         return (np.arange(self.quarter) + 0.5) * np.pi / (2 * self.quarter)
 
-    def deposited(self, light: Light) -> Array:
-        length, cosine, sine = _polar(light)
-        turn = [cosine * cosine - sine * sine, 2 * cosine * sine]
+    def angular(self, cosine: Value, sine: Value) -> list[Value]:
+        turn = cosine * cosine - sine * sine, 2 * cosine * sine
         waves = [turn]
         for _ in self.orders[1:]:
             c, s = waves[-1]
-            waves.append([c * turn[0] - s * turn[1], c * turn[1] + s * turn[0]])
-        angular = [np.ones_like(cosine), *(ROOT * part for wave in waves for part in wave)]
-        return _deposited(self.nodes, light, length, angular, [False] * self.modes)
+            waves.append((c * turn[0] - s * turn[1], c * turn[1] + s * turn[0]))
+        return [1.0, *(ROOT * part for wave in waves for part in wave)]
+
+    @property
+    def odd(self) -> list[bool]:
+        return [False] * self.modes
 
     def around(self, light: Array, psi: Array) -> Array:
         found = [light[:, 0]]
@@ -232,27 +287,8 @@ class Even(Basis):
         return found
 
 
-def _polar(light: Light) -> tuple[Array, Array, Array]:
+def _polar(light: Light) -> tuple[Value, Value, Value]:
     """Lengths of momenta, and cosine and sine of their azimuths."""
-    length = np.sqrt(light.x * light.x + light.y * light.y)
-    scale = 1 / np.maximum(length, SHORT)
+    length = ops.sqrt(light.x * light.x + light.y * light.y)
+    scale = 1 / ops.maximum(length, SHORT)
     return length, light.x * scale, light.y * scale
-
-
-def _deposited(nodes: Nodes, light: Light, length: Array, angular: Sequence[Array], odd: Sequence[bool]) -> Array:
-    """Sums over the samples of each source, (C, modes, N, sources)."""
-    sources, samples = length.shape
-    index, shares = nodes.stencils(length)
-    # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
-    rows = index * np.int32(sources) + np.arange(sources, dtype=np.int32)[:, None, None]
-    shape = (nodes.count + 1) * sources, sources * samples
-    entries = shares.ravel(), rows.ravel(), np.arange(0, shares.size + 1, shares.shape[-1], dtype=np.int32)
-    weights = np.empty((sources, samples, len(light.weight), len(angular)))
-    for c, each in enumerate(light.weight):
-        for m, values in enumerate(angular):
-            np.multiply(each, values, out=weights[..., c, m])
-    found = (csc_array(entries, shape) @ weights.reshape(shape[1], len(light.weight) * len(angular))).T
-    found = found.reshape(len(light.weight), len(angular), nodes.count + 1, sources)
-    sign = np.where(odd, -1, 1)[:, None]
-    found[:, :, 1] += sign * found[:, :, -1]
-    return found[:, :, :-1]

@@ -15,6 +15,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
+from velatura.ops import Value
+
 Array = NDArray[np.floating]
 
 CLOSE = 1.04  # ratio of indices that share an end
@@ -74,31 +77,43 @@ class Nodes:
     def stencils(self, p: Array) -> tuple[NDArray[np.integer], Array]:
         """Nodes (..., 4) that light of length p goes to, and its shares; that of number `count` is node 1 on the far
         side of 0."""
-        ends, cells = np.array(self.ends), np.array(self.cells)
-        # In many samples and few parts, the ends that light lies beyond are faster counted than searched
-        part = np.zeros(np.shape(p), np.intp)
-        for end in self.ends[1:-1]:
-            part += p > end
+        first, shares = self.stencil(p, self.numbers)
+        index = np.asarray(first).astype(np.int32)[..., None] + np.arange(STENCIL, dtype=np.int32)
+        return np.where(index < 0, self.count, index), np.stack(shares, axis=-1)
 
-        def of_part(values: Array) -> Array:
-            return values[0] if len(cells) == 1 else values.take(part, mode="clip")
+    @cached_property
+    def numbers(self) -> list[float]:
+        """What `stencil` reads: the inner ends, and of each part the square of its beginning, the inverse of its length
+        in squares, its cells for each radian, its last cell, the first and the last one that a stencil begins at, and
+        the number of its first node."""
+        squares, cells = np.square(self.ends), np.array(self.cells, float)
+        lowest = np.r_[-1, np.zeros(len(cells) - 1)]
+        before = np.r_[0, np.cumsum(cells)[:-1]]
+        parts = squares[:-1], 1 / np.diff(squares), 2 / np.pi * cells, cells - 1, lowest, cells - STENCIL + 1, before
+        return [*self.ends[1:-1], *np.concatenate(parts).tolist()]
 
-        squares = ends * ends
-        share = np.clip((p * p - of_part(squares[:-1])) * of_part(1 / np.diff(squares)), 0, 1)
-        u = np.arcsin(np.sqrt(share)) * of_part(2 / np.pi * cells)
-        lowest, highest = np.r_[-1, np.zeros(len(cells) - 1)], cells - STENCIL + 1.0
-        start = np.clip(np.floor(np.minimum(u, of_part(cells - 1.0))) - 1, of_part(lowest), of_part(highest))
+    def stencil(self, p: Value, numbers: Sequence[Value]) -> tuple[Value, list[Value]]:
+        """The first of the nodes that light of length p goes to, from -1, and its shares, by `numbers`, on any dialect.
+
+        Lagrange's polynomials of four nodes.
+        """
+        count = len(self.cells)
+        ends, parts = numbers[: count - 1], numbers[count - 1 :]
+        beyond = [p > end for end in ends]
+
+        def of_part(k: int) -> Value:
+            found, *others = parts[k * count : (k + 1) * count]
+            for there, value in zip(beyond, others):
+                found = ops.select(there, value, found)
+            return found
+
+        share = ops.clip((p * p - of_part(0)) * of_part(1), 0.0, 1.0)
+        u = ops.arctan2(ops.sqrt(share), ops.sqrt(1 - share)) * of_part(2)
+        start = ops.clip(ops.floor(ops.minimum(u, of_part(3))) - 1, of_part(4), of_part(5))
         t = u - start
         t_1, t_2, t_3 = t - 1, t - 2, t - 3
         outer, inner = t_2 * t_3 / 6, t * t_1 / 2
-        shares, index = np.empty((*np.shape(p), STENCIL)), np.empty((*np.shape(p), STENCIL), np.int32)
-        for k, each in enumerate((-t_1 * outer, 3 * t * outer, -inner * t_3, inner * t_2 / 3)):
-            shares[..., k] = each
-        first = start.astype(np.int32) + of_part(np.r_[0, np.cumsum(cells)[:-1]].astype(np.int32))
-        for k in range(STENCIL):
-            index[..., k] = first + np.int32(k)
-        index[..., 0] = np.where(first < 0, self.count, first)
-        return index, shares
+        return start + of_part(6), [-t_1 * outer, 3 * t * outer, -inner * t_3, inner * t_2 / 3]
 
     def weights(self, n: float) -> Array:
         """Integrals over p^2 in [0, n^2] of the functions that light is shared by, (N,)."""
