@@ -6,7 +6,11 @@ function, and then a third of NumPy's time. So kernels follow once `MANY` values
 
 from __future__ import annotations
 
+import copy
+import itertools
 from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass
+from types import MethodType
 from typing import Any
 
 import numpy as np
@@ -19,7 +23,7 @@ Array = NDArray[Any]
 Groups = Sequence[Sequence[Value]]
 
 #: Of sources, samples and numbers: groups of values, and values that are summed up over the samples
-Function = Callable[[Sequence[Value], Sequence[Value], Sequence[Value]], tuple[Groups, Sequence[Value]]]
+Function = Callable[[Sequence[Value], Sequence[Value], Any], tuple[Groups, Sequence[Value]]]
 
 MANY = 4_000_000  # values, about a second's
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
@@ -32,13 +36,16 @@ def over(
     function: Function,
     sources: Sequence[Array],
     samples: Sequence[Array],
-    numbers: Sequence[float],
-    compilable: bool = True,
+    numbers: Any,
 ) -> tuple[list[Array], Array]:
     """Values of a function of each source (S,) and each sample (N,): of each group of K values (S, N, K), and sums over
-    the samples (L, S). One that is not `compilable` reads other arrays of NumPy."""
+    the samples (L, S).
+
+    `numbers` are a list, a tuple or a record, of others, of numbers, and of colours (C, 1). 0.0 and 1.0, and what is no
+    number, belong to the kind of function. It runs by NumPy alone if other objects are among them.
+    """
     global _asked
-    module = kernel.llvm() if compilable and len(sources[0]) and _asked > MANY else None
+    module = kernel.llvm() if len(sources[0]) and _asked > MANY and not _foreign(numbers) else None
     count = len(samples[0])
     size = max((COMPILED_BLOCK if module else BLOCK) // count, 1)
     found = []
@@ -56,28 +63,30 @@ def over(
 
 
 def _plain(
-    function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Sequence[float]
+    function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any
 ) -> tuple[list[Array], Array]:
     groups, sums = function([x[:, None] for x in sources], samples, numbers)
     shape = len(sources[0]), len(samples[0])
     found = []
-    for group in groups:
+    for group in map(_channels, groups):
         each = np.empty((*shape, len(group)))
         for k, value in enumerate(group):
             each[..., k] = value
         found.append(each)
-    return found, np.array([np.broadcast_to(value, shape).sum(axis=1) for value in sums])
+    return found, np.array([np.broadcast_to(value, shape).sum(axis=1) for value in _channels(sums)])
 
 
 def _compiled(
-    module: Any, function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Sequence[float]
+    module: Any, function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any
 ) -> tuple[list[Array], Array]:
     """One kernel for all values: numbers are read from an array, so that others need no kernel of their own."""
     import drjit as dr
 
     number, integer = module.Float64, module.UInt32
     shape = len(sources[0]), len(samples[0])
-    given = number(np.array([shape[1], *numbers]))
+    flat: list[float] = []
+    _mapped(numbers, flat.append)
+    given = number(np.array([shape[1], *flat]))
 
     def read(values: Any, place: Any) -> Any:
         return dr.gather(number, values, place)
@@ -87,13 +96,65 @@ def _compiled(
     count = integer(read(given, integer(0)))
     source = place // count
     sample = place - source * count
+    places = itertools.count(1)
     groups, sums = function(
         [read(number(x), source) for x in sources],
         [read(number(x), sample) for x in samples],
-        [read(given, integer(k + 1)) for k in range(len(numbers))],
+        _mapped(numbers, lambda _: read(given, integer(next(places))), module.ArrayXf64),
     )
     whole = dr.zeros(number, size)
-    found = [[number(value) + whole for value in group] for group in [*groups, sums]]
+    found = [[number(value) + whole for value in _channels(group)] for group in [*groups, sums]]
     dr.eval(found)
     *arrays, totals = ([x.numpy().reshape(shape) for x in group] for group in found)
-    return [np.stack(each, axis=-1) for each in arrays], np.array([x.sum(axis=1) for x in totals])
+    stacked = [each[0][..., None] if len(each) == 1 else np.stack(each, axis=-1) for each in arrays]
+    return stacked, np.array([x.sum(axis=1) for x in totals])
+
+
+def _channels(group: Sequence[Value]) -> list[Value]:
+    """Numbers, and channels of colours, which are arrays with one axis more."""
+    found: list[Value] = []
+    for value in group:
+        own = (
+            np.ndim(value) > 2
+            if isinstance(value, float | np.ndarray)
+            else hasattr(value, "__len__") and _nested(value)
+        )
+        found += list(value) if own else [value]
+    return found
+
+
+def _nested(value: Any) -> bool:
+    import drjit as dr
+
+    return bool(dr.depth_v(value) > 1)
+
+
+def _mapped(value: Any, number: Callable[[float], Any], colour: Callable[[list[Any]], Any] = list) -> Any:
+    """The value with all of its numbers, and its colours, replaced."""
+    if isinstance(value, list | tuple):
+        each = [_mapped(x, number, colour) for x in value]
+        return type(value)(*each) if hasattr(value, "_fields") else type(value)(each)
+    if is_dataclass(value) and not isinstance(value, type):
+        found = copy.copy(value)
+        for x in fields(value):
+            object.__setattr__(found, x.name, _mapped(getattr(value, x.name), number, colour))
+        return found
+    if isinstance(value, MethodType):
+        return getattr(_mapped(value.__self__, number, colour), value.__name__)
+    if isinstance(value, np.ndarray) and value.size > 1:
+        return colour([number(float(x)) for x in value.ravel()])
+    if isinstance(value, float | np.floating | np.ndarray):
+        plain = float(np.asarray(value).item())
+        return plain if plain in (0, 1) else number(plain)
+    return value
+
+
+def _foreign(value: Any) -> bool:
+    """Whether a value has objects that kernels cannot read."""
+    if isinstance(value, list | tuple):
+        return any(map(_foreign, value))
+    if is_dataclass(value) and not isinstance(value, type):
+        return any(_foreign(getattr(value, x.name)) for x in fields(value))
+    if isinstance(value, MethodType):
+        return _foreign(value.__self__)
+    return not isinstance(value, float | int | np.floating | np.ndarray | type(None))

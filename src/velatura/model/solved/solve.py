@@ -251,7 +251,7 @@ class Solver:
         drawn, rest = self._hand_over(layout, folded, light, lobes, whole)
         scale = _scale(rest, whole)
         wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
-        transmission = self.transmission(_slim(material), layout)
+        transmission = self.transmission(_uncoloured(material, np.float32), layout)
         shares, passes = self._allocate(material, layout, folded, light, wanted, transmission)
         columns = Columns(
             [self._colours(each.weight) for each in drawn],
@@ -293,7 +293,7 @@ class Solver:
             own = tensors[spec.interface]
             return widths.veil(found, spec.interface, folded.cosine, own) if spec.veil else own
 
-        shapes = shapes_of(smooth_interfaces(_slim(material)), layout.lobes)
+        shapes = shapes_of(smooth_interfaces(_uncoloured(material)), layout.lobes)
         return [_Lobe(shape, tensor(spec)) for shape, spec in zip(shapes, layout.lobes)]
 
     def _hand_over(
@@ -520,14 +520,14 @@ def _reflects_all(found: Sequence[Part]) -> bool:
     return any(np.min(below / above) * np.mean(above) < 1 for above, below in glass)
 
 
-def _slim(material: Material) -> Material:
-    """The material in float32, grey colours as one channel: what integrals need."""
+def _uncoloured(material: Material, kind: type = float) -> Material:
+    """The material with grey colours as one channel: what integrals need; those of what passes in float32."""
 
-    def slim(colour: Array) -> Array:
+    def channels(colour: Array) -> Array:
         alike = (colour == colour[0]).all()
-        return np.asarray(colour[:1] if alike else colour, np.float32)
+        return np.asarray(colour[:1] if alike else colour, kind)
 
-    return material.each(lambda _, value: slim(value) if np.ndim(value) else value)
+    return material.each(lambda _, value: channels(value) if np.ndim(value) else value)
 
 
 def _clipped(polynomial: Remainder, wi: Direction) -> tuple[Array, Array]:

@@ -176,7 +176,7 @@ class _Shares:
             return [], [*(weight for light in lights for weight in light.weights), *others]
 
         of_lengths = lengths, 0 * lengths
-        _, found = compiled.over(totals, of_lengths, fibonacci(samples), events.numbers(samples), not facets.films)
+        _, found = compiled.over(totals, of_lengths, fibonacci(samples), events.numbers(samples))
         kept, others = np.split(found[:, places], [events.colours])
         passed, others = np.split(others, [0 if facets.opaque else events.colours])
         return cls.beside(facets, kept, passed if len(passed) else 0 * kept, others)
@@ -205,8 +205,8 @@ class _Events:
         """Channels of reflectances, 1 where all are alike."""
         return len(self.facets.reflectance(np.ones(1)))
 
-    def numbers(self, samples: int) -> list[float]:
-        """All numbers, as `__call__` reads them."""
+    def numbers(self, samples: int) -> list[Any]:
+        """All numbers, and films, as `__call__` reads them."""
         facets, n = self.facets, float(ops.mean(self.facets.above))
         alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
         # The same normals from all sides where facets have no axes, with azimuths from the plane of incidence; else
@@ -215,7 +215,16 @@ class _Events:
         eta = 1.0 if facets.opaque or facets.below is None else float(ops.mean(facets.below)) / n
         indices = (np.broadcast_to(x / facets.above, self.colours) for x in (facets.below, facets.k) if x is not None)
         straight = facets.straight(self.ways[-1])
-        return [n, *alpha, turns, eta, straight, 1 / len(fibonacci(samples)[0]), *np.concatenate([*indices, []])]
+        return [
+            n,
+            *alpha,
+            turns,
+            eta,
+            straight,
+            1 / len(fibonacci(samples)[0]),
+            *np.concatenate([*indices, []]),
+            facets.films,
+        ]
 
     def __call__(
         self, sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
@@ -225,7 +234,7 @@ class _Events:
         Momenta are of the direction of travel, which a mirror leaves alone.
         """
         (p, psi), (u_1, u_2) = sources, samples
-        n, alpha_u, alpha_v, turns, eta, straight, share, *colours = numbers
+        n, alpha_u, alpha_v, turns, eta, straight, share, *colours, _ = numbers
         alpha = alpha_u, alpha_v
         sin = ops.minimum(p / n, LEVEL)
         # Light comes from wi, and travels to -wi
@@ -397,9 +406,7 @@ class _Met:
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
         events = _Events(facets, tuple(setting.ways))
-        lights, others = setting.basis.deposited(
-            events, p, psi, setting.samples, events.numbers(setting.samples), compilable=not facets.films
-        )
+        lights, others = setting.basis.deposited(events, p, psi, setting.samples, events.numbers(setting.samples))
         # Stencils keep the energy
         totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]
         shares = _Shares.beside(facets, totals[0], 0 * totals[0] if facets.opaque else totals[1], others)

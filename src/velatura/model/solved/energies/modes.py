@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ class Basis(ABC):
         """Whether modes change sign in half a turn."""
 
     def deposited(
-        self, scatter: Scatter, p: Array, psi: Array, samples: int, numbers: Sequence[float], compilable: bool = True
+        self, scatter: Scatter, p: Array, psi: Array, samples: int, numbers: Sequence[Any]
     ) -> tuple[list[Array], Array]:
         """Sums over the samples of sources of lengths p at azimuths psi (S,): of each light the K weights by mode and
         node, (K, modes, N, S), and of other values, (L, S)."""
@@ -90,16 +90,16 @@ class Basis(ABC):
                 groups += [[first], shares, [weight * mode for weight in light.weights for mode in modes]]
             return groups, others
 
-        found, others = compiled.over(function, (p, psi), fibonacci(samples), [*parts, *numbers], compilable)
+        found, others = compiled.over(function, (p, psi), fibonacci(samples), [*parts, *numbers])
         return [self._sums(*found[k : k + 3]) for k in range(0, len(found), 3)], others
 
     def _sums(self, first: Array, shares: Array, weights: Array) -> Array:
         """Sums of weights (S, samples, K) by node, for stencils that begin at nodes `first`."""
         sources, samples, count = weights.shape
-        index = first.astype(np.int32) + np.arange(STENCIL, dtype=np.int32)
+        node, source = first[..., 0].astype(np.int32), np.arange(sources, dtype=np.int32)[:, None]
         # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
-        index[index < 0] = self.nodes.count
-        rows = index * np.int32(sources) + np.arange(sources, dtype=np.int32)[:, None, None]
+        rows = (node * np.int32(sources) + source)[..., None] + np.int32(sources) * np.arange(STENCIL, dtype=np.int32)
+        rows[..., 0] += np.where(node < 0, np.int32((self.nodes.count + 1) * sources), 0)
         shape = (self.nodes.count + 1) * sources, sources * samples
         entries = shares.ravel(), rows.ravel(), np.arange(0, shares.size + 1, STENCIL, dtype=np.int32)
         found = (csc_array(entries, shape) @ weights.reshape(-1, count)).T

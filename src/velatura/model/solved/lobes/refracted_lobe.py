@@ -12,23 +12,26 @@ roughnesses, and G1(w) / w_z, which is finite at grazing directions. Indices are
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import pi
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model.variance import ALPHA_MIN, Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.renderer import low_discrepancy
+from velatura.renderer import compiled, low_discrepancy
+
+Array = NDArray[np.floating]
 
 COS_MIN = 1e-3  # times the index inside; what refraction does not reach meets the interface at this one
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
 SPARSE = 3  # of so many normals one, for weights
-BLOCK = 1 << 16  # normals at a time, which a processor's cache holds
 
 Reflectance = Callable[[Value], Value]
 
@@ -156,59 +159,82 @@ def either(where: Value, a: RefractedLobe, b: RefractedLobe) -> RefractedLobe:
 def integral(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> Value:
     """Albedo of a lobe in NumPy, (N,), or (C, N) of a colour, for directions wi and its roughness, (N,) each.
 
-    A mean over visible normals on a lattice of a Fibonacci number of them, in single precision; within .3 % on average.
+    A mean over visible normals on a lattice of a Fibonacci number of them; within .3 % on average.
     """
-    return lobe.weight * integrals(lobe, wi, normals)[0]
+    directions, numbers = _split(lobe, wi)
+    return lobe.weight * _mean(
+        compiled.over(_values, directions, low_discrepancy.fibonacci(normals), numbers)[1], normals
+    )
 
 
 def integrals(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> tuple[Value, Value, Value]:
     """Mean of the weights of samples, and of their squares, and the largest one, as `integral`, for a weight of 1."""
-    count, size = len(wi[2]), max(BLOCK // normals, 1)
-    blocks = [
-        _integrals(replace(lobe, n=_single(Index.of(lobe.n).n), roughness=Roughness(*roughness)), (x, y, z), normals)
-        for x, y, z, *roughness in (
-            [_single(value, slice(k, k + size)) for value in (*wi, *lobe.roughness)] for k in range(0, count, size)
-        )
-    ]
-    mean, squares, largest = (np.concatenate(each, axis=-1) for each in zip(*blocks))
-    return mean, squares, largest
+    directions, numbers = _split(lobe, wi)
+    u1, u2 = low_discrepancy.fibonacci(normals)
+    _, sums = compiled.over(_values, directions, (u1, u2), numbers)
+    few = u1[::SPARSE], u2[::SPARSE]
+    (weights,), squares = compiled.over(_weights, directions, few, numbers)
+    largest = np.moveaxis(weights.max(axis=1), -1, 0)
+    return _mean(sums, len(u1)), _mean(squares, len(few[0])), largest if len(largest) > 1 else largest[0]
 
 
-def _integrals(lobe: RefractedLobe, wi: Direction, normals: int) -> tuple[Value, Value, Value]:
-    """Means of `integrals` for columns of directions (N, 1)."""
-    u1, u2 = (u.astype(np.float32) for u in low_discrepancy.fibonacci(normals))
+def _mean(sums: Array, count: int) -> Array:
+    return (sums if len(sums) > 1 else sums[0]) / count
+
+
+def _split(lobe: RefractedLobe, wi: Direction) -> tuple[list[Array], list[Any]]:
+    """Numbers of each direction, and those of a lobe for all."""
+    numbers = [*wi, *lobe.roughness]
+    varying = [x for x in numbers if np.ndim(x)]
+    return varying, [[None if np.ndim(x) else x for x in numbers], Index.of(lobe.n), lobe.facets, lobe.leaving]
+
+
+def _joined(directions: Sequence[Value], numbers: Any) -> tuple[RefractedLobe, Direction]:
+    fixed, n, facets, leaving = numbers
+    varying = iter(directions)
+    x, y, z, *roughness = (next(varying) if value is None else value for value in fixed)
+    return RefractedLobe(1.0, Roughness(*roughness), n, facets, leaving), (x, y, z)
+
+
+def _values(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> tuple[list[Any], list[Value]]:
+    return [], [_sampled(*_joined(directions, numbers), *lattice)[0]]
+
+
+def _weights(directions: Sequence[Value], lattice: Sequence[Value], numbers: Any) -> tuple[list[Any], list[Value]]:
+    lobe, wi = _joined(directions, numbers)
+    value, i, o = _sampled(lobe, wi, *lattice)
+    alpha_u, alpha_v, n, _ = _inside(lobe, wi)
+    weights = value
+    if not n.is_outside:
+        # The light from outside the cone is spread over samples
+        squares = alpha_u * alpha_u, alpha_v * alpha_v, (alpha_u * alpha_v) * (alpha_u * alpha_v)
+        p2 = ops.maximum(o[0] * o[0] + o[1] * o[1], ops.TINY)
+        near = 0.5 * _facing(_squares((i[0] + o[0], i[1] + o[1], i[2] + o[2])), squares)
+        far = n.ring * o[2] * _facing(_squares(_far(i, (o[0], o[1]), p2, n)[0]), squares)
+        weights = value * (near / (near + ops.maximum(far, 0.0)))
+    return [[weights]], [weights * value]
+
+
+def _sampled(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> tuple[Value, Direction, Direction]:
+    """Weight of a sample from wi, its momentum inside, and that of the sample."""
     alpha_u, alpha_v, n, i = _inside(lobe, wi)
     # Azimuths from the plane of incidence: the same normals for any axes of a round lobe
-    if np.any(i[1]):
-        u1 = (u1 + np.arctan2(i[1], i[0]) / (2 * np.pi)) % 1
-    h = ggx.sample_visible(i, alpha_u, alpha_v, u1, u2)
+    h = ggx.sample_visible(i, alpha_u, alpha_v, u1 + ops.arctan2(i[1], i[0]) * (0.5 / pi), u2)
     o = ggx.reflect(i, h)
     p2 = o[0] * o[0] + o[1] * o[1]
     value = ops.select(p2 < 1, ggx.masking(o, alpha_u, alpha_v), 0.0)
-    # Of reflectances, colours are the leading axis, and light the last one
     if lobe.facets:
-        value = value * _flat(lobe.facets, ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0) ** 2)
+        cosine = ops.clip(ggx.dot(i, h) * n.inverse, 0.0, 1.0)
+        value = value * _flat(lobe.facets, cosine * cosine)
     if lobe.leaving:
         value = value * _flat(lobe.leaving, ops.sqrt(1 - p2))
-    few = value[..., ::SPARSE]
-    weights = few
-    if not n.is_outside:
-        # The light from outside the cone is spread over samples
-        x, y, z, p2 = (each[..., ::SPARSE] for each in (*o, p2))
-        squares = alpha_u * alpha_u, alpha_v * alpha_v, (alpha_u * alpha_v) ** 2
-        near = 0.5 * _facing(_squares((i[0] + x, i[1] + y, i[2] + z)), squares)
-        far = n.ring * z * _facing(_squares(_far(i, (x, y), ops.maximum(p2, ops.TINY), n)[0]), squares)
-        weights = few * near / (near + ops.maximum(far, 0.0))
-    return np.mean(value, axis=-1, dtype=float), np.mean(weights * few, axis=-1, dtype=float), np.max(weights, axis=-1)
-
-
-def _single(x: Value, part: slice = slice(None)) -> Value:
-    """A number, or part of an array as a column."""
-    return float(x) if np.ndim(x) == 0 else np.asarray(x[part], np.float32)[:, None]
+    return value, i, o
 
 
 def _flat(reflectance: Reflectance, cosine: Value) -> Value:
-    """A reflectance at an array of cosines (N, M)."""
+    """A reflectance at cosines; at an array of NumPy (N, M), with colours as the leading axis."""
+    if not isinstance(cosine, np.ndarray):
+        return reflectance(cosine)
     found = reflectance(cosine.ravel())
     return found.reshape(*found.shape[:-1], *cosine.shape) if np.ndim(found) else found
 
