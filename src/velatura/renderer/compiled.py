@@ -41,8 +41,8 @@ def over(
     """Values of a function of each source (S,) and each sample (N,): of each group of K values (S, N, K), and sums over
     the samples (L, S).
 
-    `numbers` are a list, a tuple or a record, of others, of numbers, and of colours (C, 1). 0.0 and 1.0, and what is no
-    number, belong to the kind of function. It runs by NumPy alone if other objects are among them.
+    `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (C, 1, ...). What is no number, and
+    0.0 and 1.0, belong to the kind of function. It runs by NumPy alone if other objects are among them.
     """
     global _asked
     module = kernel.llvm() if len(sources[0]) and _asked > MANY and not _foreign(numbers) else None
@@ -157,4 +157,6 @@ def _foreign(value: Any) -> bool:
         return any(_foreign(getattr(value, x.name)) for x in fields(value))
     if isinstance(value, MethodType):
         return _foreign(value.__self__)
-    return not isinstance(value, float | int | np.floating | np.ndarray | type(None))
+    if isinstance(value, np.ndarray):
+        return value.ndim == 1 and value.size > 1
+    return not isinstance(value, float | int | np.floating | type(None))

@@ -26,8 +26,9 @@ from velatura.model.solved.energies.adding import Part
 from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
+from velatura.model.solved.lobes.refracted_lobe import Reflectance, RefractedLobe
 from velatura.model.variance import ALPHA_MIN, Roughness
+from velatura.ops import Value
 from velatura.optics import fresnel
 
 Array = NDArray[np.floating]
@@ -152,12 +153,12 @@ class _Coat:
     def contrast(self) -> float:
         return abs(float(np.log(self.n_below / self.n)))
 
-    def leaving(self, cos_theta: Array) -> Array:
+    @property
+    def leaving(self) -> Reflectance:
         """Share that it lets pass, at cosines outside."""
-        cosine = _cosine(cos_theta, self.n)
-        if self.facets.films is not None:
-            return np.asarray(ops.mean(self.facets.passing(cosine)))
-        return np.asarray(1 - fresnel.dielectric(cosine, self.n_below / self.n))
+        if self.facets.films is None:
+            return _Outlet(self.n, self.n_below / self.n)
+        return lambda cos_theta: np.asarray(ops.mean(self.facets.passing(_cosine(cos_theta, self.n))))
 
     def moved(self) -> Tensor:
         """Displacement of momentum in a refraction."""
@@ -166,6 +167,27 @@ class _Coat:
             for cos2 in _steeper(self.cosine, np.sqrt(self.tensor.xx), STEEPNESS)
         )
         return self.tensor.stretched(np.abs(x), np.abs(y))
+
+
+@dataclass(frozen=True)
+class _Outlet:
+    """Share of light that a dielectric of relative index eta below a medium of index n lets out, at cosines outside."""
+
+    n: float
+    eta: float
+
+    def __call__(self, cos_theta: Value) -> Value:
+        return 1 - fresnel.dielectric(_cosine(cos_theta, self.n), self.eta)
+
+
+@dataclass(frozen=True)
+class _Facet:
+    """Reflectance of a dielectric of relative index eta, by the square of the cosine."""
+
+    eta: float
+
+    def __call__(self, cos2: Value) -> Value:
+        return fresnel.dielectric(ops.sqrt(cos2), self.eta)
 
 
 def stepped(steps: Sequence[float], least: float = LEAST_STEP) -> list[int]:
@@ -248,12 +270,10 @@ def features(
         assert part.below is not None
         below = float(ops.mean(part.below)) / n
 
-        def facets(cos2: Array) -> Array:
-            c = np.sqrt(cos2)
-            if part.films is not None:
-                return np.asarray(ops.mean(part.reflectance(c)))
-            return np.asarray(fresnel.dielectric(c, below))
+        def coated(cos2: Array) -> Array:
+            return np.asarray(ops.mean(part.reflectance(np.sqrt(cos2))))
 
+        facets = _Facet(below) if part.films is None else coated
         both = refracted_lobe.integral(replace(lobe, facets=facets), wi, COARSE)
         reflected = both / np.maximum(let_out, 1e-9)
         expected = both * ops.mean(share)
@@ -330,9 +350,9 @@ def _of_event(g: float) -> float:
     return float(0.5 * np.arccos((1 + g * g - chord * chord) / (2 * g)))
 
 
-def _cosine(cos_theta: Array, n: float) -> Array:
+def _cosine(cos_theta: Value, n: Value) -> Value:
     """Inside, by Snell's law."""
-    return np.asarray(np.sqrt(np.maximum(1 - (1 - cos_theta * cos_theta) / (n * n), COS_MIN**2)))
+    return ops.sqrt(1 - (1 - cos_theta * cos_theta) / (n * n), COS_MIN**2)
 
 
 def _steeper(cosine: Array, width: Array, steepness: Sequence[float]) -> list[Array]:
