@@ -28,6 +28,7 @@ Function = Callable[[Sequence[Value], Sequence[Value], Any], tuple[Groups, Seque
 MANY = 4_000_000  # values, about a second's
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COMPILED_BLOCK = 1 << 18
+COLOURS = 3
 
 _asked = 0  # values so far
 
@@ -38,35 +39,39 @@ def over(
     samples: Sequence[Array],
     numbers: Any,
 ) -> tuple[list[Array], Array]:
-    """Values of a function of each source (S,) and each sample (N,): of each group of K values (S, N, K), and sums over
-    the samples (L, S).
+    """Values of a function of each source (S,) and each sample (N,), or its own (S, N): of each group of K values
+    (S, N, K), and sums over the samples (L, S).
 
-    `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (C, 1, ...). What is no number, and
+    `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (3, 1, ...). What is no number, and
     0.0 and 1.0, belong to the kind of function. It runs by NumPy alone if other objects are among them.
     """
     global _asked
     module = kernel.llvm() if len(sources[0]) and _asked > MANY and not _foreign(numbers) else None
-    count = len(samples[0])
+    count = samples[0].shape[-1]
     size = max((COMPILED_BLOCK if module else BLOCK) // count, 1)
     found = []
     for first in range(0, max(len(sources[0]), 1), size):
-        some = [x[first : first + size] for x in sources]
+        some, own = [x[first : first + size] for x in sources], [_part(x, first, size) for x in samples]
         if module is None:
-            found.append(_plain(function, some, samples, numbers))
+            found.append(_plain(function, some, own, numbers))
             _asked += len(some[0]) * count
         else:
-            found.append(_compiled(module, function, some, samples, numbers))
+            found.append(_compiled(module, function, some, own, numbers))
     groups, sums = zip(*found)
     if len(found) == 1:
         return groups[0], sums[0]
     return [np.concatenate(each) for each in zip(*groups)], np.concatenate(sums, axis=-1)
 
 
+def _part(samples: Array, first: int, size: int) -> Array:
+    return samples[first : first + size] if samples.ndim > 1 else samples
+
+
 def _plain(
     function: Function, sources: Sequence[Array], samples: Sequence[Array], numbers: Any
 ) -> tuple[list[Array], Array]:
     groups, sums = function([x[:, None] for x in sources], samples, numbers)
-    shape = len(sources[0]), len(samples[0])
+    shape = len(sources[0]), samples[0].shape[-1]
     found = []
     for group in map(_channels, groups):
         each = np.empty((*shape, len(group)))
@@ -83,7 +88,7 @@ def _compiled(
     import drjit as dr
 
     number, integer = module.Float64, module.UInt32
-    shape = len(sources[0]), len(samples[0])
+    shape = len(sources[0]), samples[0].shape[-1]
     flat: list[float] = []
     _mapped(numbers, flat.append)
     given = number(np.array([shape[1], *flat]))
@@ -99,8 +104,8 @@ def _compiled(
     places = itertools.count(1)
     groups, sums = function(
         [read(number(x), source) for x in sources],
-        [read(number(x), sample) for x in samples],
-        _mapped(numbers, lambda _: read(given, integer(next(places))), module.ArrayXf64),
+        [number(x.ravel()) if x.ndim > 1 else read(number(x), sample) for x in samples],
+        _mapped(numbers, lambda _: read(given, integer(next(places))), module.Array3f64),
     )
     whole = dr.zeros(number, size)
     found = [[number(value) + whole for value in _channels(group)] for group in [*groups, sums]]
@@ -158,5 +163,5 @@ def _foreign(value: Any) -> bool:
     if isinstance(value, MethodType):
         return _foreign(value.__self__)
     if isinstance(value, np.ndarray):
-        return value.ndim == 1 and value.size > 1
+        return value.size > 1 and (value.ndim == 1 or value.size != COLOURS)
     return not isinstance(value, float | int | np.floating | type(None))

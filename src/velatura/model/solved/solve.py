@@ -251,7 +251,7 @@ class Solver:
         drawn, rest = self._hand_over(layout, folded, light, lobes, whole)
         scale = _scale(rest, whole)
         wanted = [*(each.wanted for each in drawn), Demand.of(rest + ENERGY_EPS, rest, scale * folded.around(peak))]
-        transmission = self.transmission(_uncoloured(material, np.float32), layout)
+        transmission = self.transmission(_uncoloured(material), layout)
         shares, passes = self._allocate(material, layout, folded, light, wanted, transmission)
         columns = Columns(
             [self._colours(each.weight) for each in drawn],
@@ -520,12 +520,12 @@ def _reflects_all(found: Sequence[Part]) -> bool:
     return any(np.min(below / above) * np.mean(above) < 1 for above, below in glass)
 
 
-def _uncoloured(material: Material, kind: type = float) -> Material:
-    """The material with grey colours as one channel: what integrals need; those of what passes in float32."""
+def _uncoloured(material: Material) -> Material:
+    """The material with grey colours as one channel: what integrals need."""
 
     def channels(colour: Array) -> Array:
         alike = (colour == colour[0]).all()
-        return np.asarray(colour[:1] if alike else colour, kind)
+        return np.asarray(colour[:1] if alike else colour, float)
 
     return material.each(lambda _, value: channels(value) if np.ndim(value) else value)
 

@@ -43,7 +43,7 @@ from velatura.model.variance import ALPHA_MIN, Covariance, Isotropic, Roughness,
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
-from velatura.renderer import low_discrepancy
+from velatura.renderer import compiled, low_discrepancy
 from velatura.stack import InterfaceValues, Material, MediumValues
 from velatura.stack.chain import chain
 
@@ -54,7 +54,6 @@ FLAT = 1e-7  # step of momentum at steep facets, at least
 COS_MIN = 0.02  # in slabs that light crosses, and in those that it cannot enter
 GRAZING = 1e-4  # cosine outside
 NODES = (16, 24)  # of the quadrature
-BLOCK = 1 << 15  # of them at a time, which a processor's cache holds
 EDGE = 0.98  # of the disc of momenta that can leave, where light from beyond it is looked for
 WEIGHT_MIN = 1e-12  # squared width that decides the shares where no interface has any
 
@@ -479,15 +478,6 @@ def integrals(
     By quadrature on rays of p_o from p_i, or from the point next to it that can leave, with nodes that crowd as the
     tails of GGX do; their numbers are those along a ray, and of rays.
     """
-    size = max(BLOCK // (nodes[0] * nodes[1]), 1)
-    blocks = [tuple(x[k : k + size] for x in wi) for k in range(0, len(wi[2]), size)]
-    energy, squares, share = zip(*(_integrals(transmission, (x, y, z), nodes) for x, y, z in blocks))
-    return np.concatenate(energy, axis=-1), np.concatenate(squares, axis=-1), np.concatenate(share)
-
-
-def _integrals(
-    transmission: Transmission, wi: tuple[Array, Array, Array], nodes: tuple[int, int]
-) -> tuple[Array, Array, Array]:
     n = transmission.indices
     i = entered(transmission, wi)
     widths = [
@@ -520,15 +510,19 @@ def _integrals(
     x, y = (p[0] + r * ray[0]) / n_out, (p[1] + r * ray[1]) / n_out
     z = np.sqrt(np.maximum(1 - x * x - y * y, 1e-12))
     area = area / (n_out * n_out * z)
-    # What depends on wi alone is worked out once for all of its rays
-    flat = len(x), -1
-    i_x, i_y, i_z = (w.astype(np.float32)[:, None] for w in wi)
-    o_x, o_y, o_z = (w.reshape(flat).astype(np.float32) for w in (x, y, -z))
-    value, density = _eval_pdf(_wider(transmission), (i_x, i_y, i_z), (o_x, o_y, o_z), True)
-    area = area.reshape(flat)
-    value = value if np.ndim(value) > 2 else value[None]
-    squares = np.sum(value * area * ops.divide(value, density), axis=-1)
-    return np.sum(value * area, axis=-1), squares, np.sum(density * area, axis=-1)
+    directions = [each.reshape(len(x), -1) for each in (x, y, -z, area)]
+    _, found = compiled.over(_passed, wi, directions, _wider(transmission))
+    *energy, passes = found
+    count = len(energy) // 2
+    return np.array(energy[:count]), np.array(energy[count:]), passes
+
+
+def _passed(
+    wi: Sequence[Value], directions: Sequence[Value], transmission: Transmission
+) -> tuple[list[list[Value]], list[Value]]:
+    x, y, z, area = directions
+    value, density = _eval_pdf(transmission, (wi[0], wi[1], wi[2]), (x, y, z), True)
+    return [], [value * area, value * area * ops.divide(value, density), density * area]
 
 
 def _wider(values: Any) -> Any:
