@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from walks import FOLDER, HALVES, arguments, chosen, every
 
 from velatura import tables
+from velatura.model.rough_interface import Facets
 from velatura.model.solved.energies.adding import parts
 from velatura.model.solved.energies.energies import INCIDENCES, energies
-from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.lobes import refracted_lobe, remainder, widths
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.solved.lobes.remainder import Remainder

@@ -27,7 +27,7 @@ OF_DEFAULT = {
             '    films: Annotated[tuple[Film, ...], Films("thin films on it, from the top")] = ()\n',
         ),
     ],
-    "model/solved/energies/interfaces.py": [
+    "model/rough_interface.py": [
         ("    films: Coated | None = None\n", "    films: Coated | None = None\n    dust: float = 0.0\n"),
         ("angle, films=films or None)", "angle, films=films or None, dust=float(layer.dust))"),
         (

@@ -8,6 +8,7 @@ import pytest
 
 import velatura as vt
 from velatura import ops
+from velatura.model.rough_interface import KEPT
 from velatura.renderer import compiled
 from velatura.renderer.kept import Kept
 
@@ -78,8 +79,7 @@ def test_lobes_are_the_same_by_numpy_and_by_kernels(monkeypatch: pytest.MonkeyPa
     found = []
     for many in (1 << 60, -1):
         monkeypatch.setattr(compiled, "MANY", many)
-        monkeypatch.setattr("velatura.model.solved.energies.interfaces.KEPT", Kept(0))
-        monkeypatch.setattr("velatura.model.solved.energies.adding.KEPT", Kept(0))
+        KEPT.clear()
         lobes = [vt.lobes(stack, [1.0, 0.5, 0.1], 0.3) for stack in stacks]
         found.append([(each.energy, each.alpha) for each in lobes])
     for (energy, alpha), (compiled_energy, compiled_alpha) in zip(*found):

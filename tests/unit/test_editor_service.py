@@ -19,8 +19,7 @@ from velatura.editor.service import VERBS
 from velatura.errors import InvalidInput, MissingTool
 from velatura.exports import FORMATS, export
 from velatura.model import MODELS
-from velatura.model.solved.energies import adding, interfaces
-from velatura.renderer.kept import Kept
+from velatura.model.rough_interface import KEPT
 from velatura.scenes import OBJECTS
 from velatura.stack import Film, Interface, Stack, loads, preset, presets
 from velatura.stack.layers import LAYERS, entry_name
@@ -196,7 +195,7 @@ def test_what_is_dragged_is_solved_for_light_from_above() -> None:
         assert np.array_equal(above, below) is alike
 
 
-def test_a_drag_takes_over_the_layers_that_it_leaves_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drag_takes_over_the_layers_that_it_leaves_alone() -> None:
     """The same answers as without."""
 
     def dragged(alpha: float) -> np.ndarray:
@@ -205,9 +204,8 @@ def test_a_drag_takes_over_the_layers_that_it_leaves_alone(monkeypatch: pytest.M
 
     alphas = (0.1, 0.15, 0.2)
     answers = [dragged(alpha) for alpha in alphas]
-    monkeypatch.setattr(interfaces, "KEPT", Kept(0))
-    monkeypatch.setattr(adding, "KEPT", Kept(0))
     for alpha, answer in zip(alphas, answers):
+        KEPT.clear()
         assert dragged(alpha) == pytest.approx(answer, abs=1e-6)
 
 

@@ -173,6 +173,20 @@ def test_no_more_than_two_files_import_each_other_in_a_circle() -> None:
     assert not [names for names in circles if len(names) > 2]
 
 
+def test_the_rooms_of_the_models_know_no_other_room() -> None:
+    """What stands at the door of `model` imports no room, but for the registry, which has every engine."""
+    rooms = [path.name for path in (SOURCE / "model").iterdir() if (path / "__init__.py").exists()]
+    offences = [
+        (str(path), name)
+        for path in FILES
+        if part_of(path) == "model" and path.name != "registry.py"
+        for name, _ in imports(path)
+        for room in rooms
+        if f"{name}.".startswith(f"velatura.model.{room}.") and SOURCE / "model" / room not in path.parents
+    ]
+    assert len(rooms) > 1 and not offences
+
+
 @pytest.mark.parametrize("library", RENDERER)
 def test_the_renderer_is_imported_inside_functions_of_few(library: str) -> None:
     uses = [(part_of(path), at_import) for path in FILES for name, at_import in imports(path) if _is(name, library)]

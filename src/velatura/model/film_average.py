@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from velatura import ops
 from velatura.films.tables import Coated, ColourTable
 from velatura.ops import Value
 from velatura.tables import coordinates
+
+if TYPE_CHECKING:
+    from velatura.model.rough_interface import Array, Facets
 
 NODES = (65, 33)  # over direction and roughness
 SAMPLES, SAMPLES_INSIDE = 377, 610  # of normals
@@ -39,7 +43,7 @@ class FilmAverage(ColourTable):
 def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverage:
     """The average of an interface whose facets are met once or often; made once. A `coarse` one is quicker, for what
     moves."""
-    from velatura.model.solved.energies.interfaces import Facets, of_first_events, shares_of_films
+    from velatura.model.rough_interface import Facets, shares_of_films  # slow to import
 
     opaque, n12 = films.n12 is None, films.n12 or 1.0
     critical = None if opaque or n12 >= 1 else float(np.arcsin(n12))
@@ -52,7 +56,7 @@ def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverag
         Facets(one, below, one if opaque else None, alpha, alpha, films=films)
         for alpha in coordinates.to_roughness(y).tolist()
     ]
-    first = [of_first_events(facets, p, samples, often) for facets in each]
+    first = [_at_first(facets, p, samples, often) for facets in each]
     kept, absorbed, blocked = (np.array(x) for x in zip(*first))
     if often:
         walked = np.array([shares_of_films(facets, p) for facets in each[::WALKED]])
@@ -68,3 +72,15 @@ def film_average(films: Coated, often: bool, coarse: bool = False) -> FilmAverag
         even = np.meshgrid(*(np.linspace(0, 1, n) for n in NODES), indexing="ij")
         found = np.stack(ops.interpolate(ColourTable(found), *(each.ravel() for each in even)), axis=-1)
     return FilmAverage(found.reshape(*NODES, -1).copy(), channels, critical)
+
+
+def _at_first(facets: Facets, p: Array, samples: int, often: bool) -> tuple[Array, Array, Array]:
+    """Shares (C, N) of light of lengths p that facets with films reflect when they are first met, that films of a
+    dielectric absorb, and that meets others then."""
+    from velatura.model.rough_interface import FirstShares
+
+    shares = FirstShares.of(facets, p, samples, often)
+    if facets.opaque:
+        return shares.kept, 0 * shares.kept, shares.whole
+    blocked = shares.blocked_reflected + shares.blocked_refracted
+    return shares.kept, 1 - shares.kept - shares.passed - blocked, blocked

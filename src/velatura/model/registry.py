@@ -44,7 +44,11 @@ MODELS: tuple[Model, ...] = (
         medium="weighted",
         lobes="three",
     ),
-    SolvedModel("velatura", reflectance="fgd-multi"),
+    SolvedModel(
+        "velatura",
+        reflectance="fgd-multi",
+        near=PaperModel("velatura", reflectance="fgd-multi", tir="off"),
+    ),
 )
 
 DEFAULT = "velatura"

@@ -39,6 +39,12 @@ class Kept:
                 self._size -= freed
         return made
 
+    def clear(self) -> None:
+        """Forget all of them."""
+        with self._lock:
+            self._found.clear()
+            self._size = 0
+
 
 def _size(value: Any) -> int:
     """Bytes of all arrays in a tuple, a list or a record."""

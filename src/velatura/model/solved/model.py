@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from velatura.model.base import SWITCHES, Body, Model
-from velatura.model.papers.model import PaperModel
 from velatura.optics.ggx import Direction
 
 if TYPE_CHECKING:
@@ -24,12 +23,16 @@ REFLECTANCES = "fgd", "fgd-multi"
 @dataclass(frozen=True)
 class SolvedModel(Model):
     """Adding on nodes of tangential momentum (docs/explanation/model.md). It is calibrated for one value of each switch
-    but the reflectance and the form."""
+    but the reflectance and the form.
+
+    `near` is the model in closed form that stands in for it, whose switches follow its own.
+    """
 
     closed_form: ClassVar[bool] = False
 
     name: str
     reflectance: str
+    near: Model
     form: str = "forward"
     tir: str = field(default="published", init=False)
     map: str = field(default="belcour", init=False)
@@ -40,15 +43,15 @@ class SolvedModel(Model):
     lobes: str = field(default="all", init=False)
 
     @property
-    def surrogate(self) -> PaperModel:
-        return PaperModel(self.name, self.reflectance, tir="off", form=self.form)
+    def surrogate(self) -> Model:
+        return self.near.with_switches(reflectance=self.reflectance, form=self.form)
 
     @property
-    def without_tir(self) -> PaperModel:
-        return self.surrogate
+    def without_tir(self) -> Model:
+        return self.surrogate.without_tir
 
     @property
-    def pointwise(self) -> PaperModel:
+    def pointwise(self) -> Model:
         return self.surrogate.with_switches(reflectance="fresnel")
 
     def allowed(self, key: str) -> tuple[str, ...]:

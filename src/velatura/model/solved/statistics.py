@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from velatura import tables
 from velatura.model.base import Model
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes, nearer_axis, with_axes_named
+from velatura.model.rough_interface import Facets
 from velatura.model.roughness_maps import MAPS
 from velatura.model.smooth_interface import smooth_interfaces
 from velatura.model.solved import equivalent_roughness
 from velatura.model.solved.bsdf import Shape
 from velatura.model.solved.energies.adding import Part, parts
 from velatura.model.solved.energies.energies import Energies, energies
-from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.lobes import refracted_lobe, widths
 from velatura.model.solved.rotation_frame import Frame

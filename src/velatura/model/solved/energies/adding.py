@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.films.of_material import films_of
 from velatura.films.tables import Coated
-from velatura.model.solved.energies.interfaces import KEPT, Facets, Setting, colours, interface
+from velatura.model.rough_interface import KEPT, Facets, colours
+from velatura.model.solved.energies.interfaces import Setting, interface
 from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.stack import InterfaceValues, Material, MediumValues

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.model.rough_interface import Facets
 from velatura.model.solved.energies.adding import (
     Lambert,
     Leaving,
@@ -28,7 +29,7 @@ from velatura.model.solved.energies.adding import (
     parts,
     settings,
 )
-from velatura.model.solved.energies.interfaces import Facets, Setting
+from velatura.model.solved.energies.interfaces import Setting
 from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.modes import TINY, Basis, Even, Relative
 from velatura.model.solved.energies.nodes import Nodes

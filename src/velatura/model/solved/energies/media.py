@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.solved.energies.interfaces import Setting, colours, scaled
-from velatura.model.solved.energies.modes import TINY, Light
+from velatura.model.rough_interface import Light, colours
+from velatura.model.solved.energies.interfaces import Setting, scaled
+from velatura.model.solved.energies.modes import TINY
 from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.ops import Value
 from velatura.optics import phase

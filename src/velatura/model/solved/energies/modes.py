@@ -8,15 +8,16 @@ distinguish a direction from its opposite.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
 from velatura import ops
+from velatura.model.rough_interface import Light, Scatter
 from velatura.model.solved.energies.nodes import STENCIL, Nodes
 from velatura.ops import Value
 from velatura.renderer import compiled
@@ -27,18 +28,6 @@ Array = NDArray[np.floating]
 ROOT = float(np.sqrt(2))
 TINY = np.finfo(float).tiny
 SHORT = 1e-150  # least length of momentum that has an azimuth
-
-
-class Light(NamedTuple):
-    """Samples of light: components of their momentum, and weights."""
-
-    x: Value
-    y: Value
-    weights: Sequence[Value]
-
-
-#: Of sources (p, psi), samples of a lattice and numbers: light, and values that are summed up
-Scatter = Callable[[Sequence[Value], Sequence[Value], Sequence[Value]], tuple[Sequence[Light], Sequence[Value]]]
 
 
 class Basis(ABC):

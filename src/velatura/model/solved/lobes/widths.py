@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model.rough_interface import Facets
 from velatura.model.solved.energies.adding import Part
-from velatura.model.solved.energies.interfaces import Facets
 from velatura.model.solved.energies.media import Slab
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import Reflectance, RefractedLobe

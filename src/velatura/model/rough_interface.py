@@ -1,0 +1,324 @@
+"""Rough interfaces in numbers: their facets, and what these do to light that meets them first.
+
+Light meets visible normals on a lattice. Light that the facets block meets others; where films lie on these, walks say
+what becomes of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from velatura import ops
+from velatura.films.reflectance import dielectric_between, dielectric_passing
+from velatura.films.tables import Coated
+from velatura.ops import Value
+from velatura.optics import fresnel, ggx
+from velatura.optics.ggx import Direction
+from velatura.renderer import compiled
+from velatura.renderer.kept import Kept
+from velatura.renderer.low_discrepancy import fibonacci
+from velatura.stack import InterfaceValues
+from velatura.tables import coordinates
+from velatura.tables.microsurface_walks import shares_in_the_end
+
+Array = NDArray[np.floating]
+
+# Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
+# often, and where such light is lost
+STRAIGHT = {True: 0.09, False: 0.01}
+GRAZING = 1e-4  # least cosine of light that meets an interface
+LEVEL = float(np.sqrt(1 - GRAZING**2))  # its sine
+ALPHA_MIN = 1e-3
+BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
+WALKED = 16  # directions of walks between facets with films
+PATHS = 2048  # from each
+KEPT = Kept(64 << 20)  # layers, and what they are made of
+
+
+def colours(value: Any) -> Array:
+    """A colour of shape (3,), or (1,) where all are alike."""
+    flat = np.asarray(value, float).reshape(-1)
+    return flat[:1] if (flat == flat[0]).all() else flat
+
+
+@dataclass(frozen=True)
+class Facets:
+    """An interface between indices `above` and `below`, by colour (C,); `k` is None for a dielectric, and `below` too
+    for a mirror. Roughnesses, and a rotation in radians. `final` says that nothing sends back what it lets through.
+    `films` are thin films on it.
+    """
+
+    above: Array
+    below: Array | None
+    k: Array | None
+    alpha_u: float
+    alpha_v: float
+    rotation: float = 0.0
+    final: bool = False
+    films: Coated | None = None
+
+    @classmethod
+    def of(cls, layer: InterfaceValues, above: Any, outside: float, films: Coated | None) -> Facets:
+        """An interface of NumPy's values below an index `above`, with indices relative to the `outside`."""
+        below = None if layer.kind == "mirror" else colours(layer.eta) / outside
+        k = colours(layer.k) / outside if layer.kind == "conductor" else None
+        alpha, angle = (float(layer.alpha_u), float(layer.alpha_v)), float(np.radians(layer.rotation))
+        return cls(colours(above) / outside, below, k, *alpha, angle, films=films or None)
+
+    @property
+    def opaque(self) -> bool:
+        return self.below is None or self.k is not None
+
+    @property
+    def is_exit(self) -> bool:
+        """Whether it may reflect all light, of a denser medium above."""
+        return not self.opaque and self.below is not None and bool(ops.mean(self.below) < ops.mean(self.above))
+
+    @property
+    def brushed(self) -> float:
+        """0 for isotropic facets, towards 1 for those that are long along an axis."""
+        return 1 - min(self.alpha_u, self.alpha_v) / max(self.alpha_u, self.alpha_v, ALPHA_MIN)
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether it changes no direction."""
+        stepless = not self.opaque and bool((self.above == self.below).all())
+        return max(self.alpha_u, self.alpha_v) < ALPHA_MIN or stepless
+
+    @property
+    def step(self) -> float:
+        """Step of the logarithm of the index, for light that it lets through."""
+        if self.below is None or self.opaque:
+            return 0.0
+        return float(abs(np.log(ops.mean(self.below) / ops.mean(self.above))))
+
+    def straight(self, often: bool) -> float:
+        """Share of refracted light that meets further facets and still passes: a small step hardly turns it."""
+        return float(np.exp(-self.step / STRAIGHT[often]))
+
+    def smooth(self, p: Array, transmitted: bool) -> Array:
+        """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
+        n = float(ops.mean(self.above))
+        cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, GRAZING**2))
+        return self.passing(cosine) if transmitted else self.reflectance(cosine)
+
+    def reversed(self) -> Facets:
+        assert self.below is not None
+        films = self.films and self.films.reversed()
+        return Facets(self.below, self.above, None, self.alpha_u, self.alpha_v, self.rotation, False, films)
+
+    def reflectance(self, cosine: Array) -> Array:
+        """Fresnel reflectance (C, ...) of facets."""
+        if self.below is None:
+            return np.ones((1, *np.shape(cosine)))
+        if self.k is None:
+            return np.asarray(dielectric_between(self.films, *self._between(cosine)))
+        shape = (-1, *(1,) * np.ndim(cosine))
+        eta = (self.below / self.above).reshape(shape)
+        if self.films is not None:
+            return np.asarray(self.films.at(cosine, eta))
+        return np.asarray(fresnel.conductor(cosine, eta, (self.k / self.above).reshape(shape)))
+
+    def passing(self, cosine: Array) -> Array:
+        """Share (C, ...) of light that facets let pass."""
+        if self.opaque:
+            return np.zeros((1, *np.shape(cosine)))
+        return np.asarray(dielectric_passing(self.films, *self._between(cosine)))
+
+    def shares(self, cosine: Array, outside: Array | np.bool_ = np.True_) -> tuple[Array, Array]:
+        """Shares (C, ...) of light that facets reflect, and let pass; with films also of light from below, where it is
+        not `outside`."""
+        if self.films is None or self.opaque:
+            return self.reflectance(cosine), self.passing(cosine)
+        return self.films.shares(outside, *self._between(cosine, outside))
+
+    def _between(self, cosine: Array, outside: Array | np.bool_ = np.True_) -> tuple[Array, Array, Array]:
+        """Cosines on both sides of a facet of a dielectric, and the relative index by colour."""
+        assert self.below is not None
+        n12 = float(ops.mean(self.below) / ops.mean(self.above))
+        cos_t = fresnel.cos_transmitted(cosine, np.where(outside, n12, 1 / n12))
+        return cosine, np.asarray(cos_t), (self.below / self.above).reshape(-1, *(1,) * np.ndim(cosine))
+
+
+class Light(NamedTuple):
+    """Samples of light: components of their momentum, and weights."""
+
+    x: Value
+    y: Value
+    weights: Sequence[Value]
+
+
+#: Of sources (p, psi), samples of a lattice and numbers: light, and values that are summed up
+Scatter = Callable[[Sequence[Value], Sequence[Value], Sequence[Value]], tuple[Sequence[Light], Sequence[Value]]]
+
+
+@dataclass(frozen=True)
+class FirstShares:
+    """Shares (C, sources) of light at first events: reflected (`kept`), refracted (`passed`), what masking blocks of
+    either, and what it would block (1, sources) if all were reflected."""
+
+    kept: Array
+    passed: Array
+    blocked_reflected: Array
+    blocked_refracted: Array
+    whole: Array
+
+    @classmethod
+    def of(cls, facets: Facets, p: Array, samples: int, often: bool) -> FirstShares:
+        """Shares of light of lengths p that meets facets without axes, once or often, by samples."""
+        lengths, places = np.unique(p, return_inverse=True)
+        events = FirstEvents(facets, (often,))
+
+        def totals(*values: Any) -> tuple[list[list[Value]], list[Value]]:
+            lights, others = events(*values)
+            return [], [*(weight for light in lights for weight in light.weights), *others]
+
+        of_lengths = lengths, 0 * lengths
+        _, found = compiled.over(totals, of_lengths, fibonacci(samples), events.numbers(samples))
+        kept, others = np.split(found[:, places], [events.colours])
+        passed, others = np.split(others, [0 if facets.opaque else events.colours])
+        return cls.beside(facets, kept, passed if len(passed) else 0 * kept, others)
+
+    @classmethod
+    def beside(cls, facets: Facets, kept: Array, passed: Array, others: Array) -> FirstShares:
+        """Shares that `FirstEvents` has besides its light: (L, sources)."""
+        *blocked, whole = np.split(others, [len(kept), len(others) - 1][: 1 if facets.opaque else 2])
+        return cls(kept, passed, blocked[0], 0 * kept if facets.opaque else blocked[1], whole)
+
+
+@dataclass(frozen=True)
+class FirstEvents:
+    """First events: light that facets reflect, and refract, weighted for each of the ways to mask it, by colour; and
+    the shares of `FirstShares` that the last way blocks.
+
+    `ways` says whether masking is correlated with the height of facets, as what follows needs (Heitz et al. 2016);
+    otherwise it is separable.
+    """
+
+    facets: Facets
+    ways: tuple[bool, ...]
+
+    @cached_property
+    def colours(self) -> int:
+        """Channels of reflectances, 1 where all are alike."""
+        return len(self.facets.reflectance(np.ones(1)))
+
+    def numbers(self, samples: int) -> list[Any]:
+        """All numbers, and films, as `__call__` reads them."""
+        facets, n = self.facets, float(ops.mean(self.facets.above))
+        alpha = max(facets.alpha_u, ALPHA_MIN), max(facets.alpha_v, ALPHA_MIN)
+        # The same normals from all sides where facets have no axes, with azimuths from the plane of incidence; else
+        # about the normal, where light has no side; and with a steady change between
+        turns = max(1 - facets.brushed / BRUSHED, 0) / (2 * np.pi)
+        eta = 1.0 if facets.opaque or facets.below is None else float(ops.mean(facets.below)) / n
+        indices = (np.broadcast_to(x / facets.above, self.colours) for x in (facets.below, facets.k) if x is not None)
+        straight = facets.straight(self.ways[-1])
+        return [
+            n,
+            *alpha,
+            turns,
+            eta,
+            straight,
+            1 / len(fibonacci(samples)[0]),
+            *np.concatenate([*indices, []]),
+            facets.films,
+        ]
+
+    def __call__(
+        self, sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
+    ) -> tuple[list[Light], list[Value]]:
+        """Events of light of momenta of length p at azimuths psi, in the frame of the interface's axes.
+
+        Momenta are of the direction of travel, which a mirror leaves alone.
+        """
+        (p, psi), (u_1, u_2) = sources, samples
+        n, alpha_u, alpha_v, turns, eta, straight, share, *colours, _ = numbers
+        alpha = alpha_u, alpha_v
+        sin = ops.minimum(p / n, LEVEL)
+        # Light comes from wi, and travels to -wi
+        wi = -sin * ops.cos(psi), -sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
+        h = ggx.sample_visible(wi, *alpha, u_2 + turns * psi, u_1)
+        cosine = ops.minimum(ggx.dot(wi, h), 1.0)
+        o, here = ggx.reflect(wi, h), _smith(wi, alpha)
+        reflectance, passing = self._divided(cosine, eta, colours)
+        kept = [ops.select(o[2] > 0, self._escape(o, here, alpha, often), 0.0) for often in self.ways]
+        lights = [Light(n * o[0], n * o[1], [r * share * each for each in kept for r in reflectance])]
+        blocked = 1 - kept[-1]
+        others = [r * share * blocked for r in reflectance]
+        if not self.facets.opaque:
+            along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
+            x, y, z = (along * facing - towards / eta for facing, towards in zip(h, wi))
+            through = []
+            for often in self.ways:
+                both = self._escape((x, y, z), here, alpha, often, through=True)
+                through.append(ops.select(z < 0, both + straight * (1 - both), 0.0))
+            below = n * eta
+            lights.append(Light(below * x, below * y, [t * share * each for each in through for t in passing]))
+            others += [t * share * (1 - through[-1]) for t in passing]
+        return lights, [*others, blocked * share]
+
+    def _divided(self, cosine: Value, eta: Value, colours: Sequence[Value]) -> tuple[list[Value], list[Value]]:
+        """Shares that facets reflect, and let pass, by colour."""
+        facets, count = self.facets, self.colours
+        if facets.films:
+            reflectance, passing = facets.shares(cosine)
+            return list(reflectance), list(passing)
+        if facets.below is None:
+            return [1.0], []
+        if facets.opaque:
+            return [fresnel.conductor(cosine, *index) for index in zip(colours[:count], colours[count:])], []
+        cos_t = fresnel.cos_transmitted(cosine, eta)
+        found = [fresnel.dielectric_between(cosine, cos_t, index) for index in colours]
+        return found, [1 - each for each in found]
+
+    def _escape(
+        self, w: Direction, here: Value, alpha: tuple[Value, Value], often: bool, through: bool = False
+    ) -> Value:
+        """Share of light that leaves towards w, or -w, past other facets."""
+        towards = w[0], w[1], ops.absolute(w[2])
+        if not often:
+            return ggx.masking(towards, *alpha)
+        there = _smith(towards, alpha)
+        if not through:
+            return (1 + here) / (1 + here + there)
+        return ops.exp(ops.log_gamma(2 + here) + ops.log_gamma(1 + there) - ops.log_gamma(2 + here + there))
+
+
+def _smith(w: Direction, alpha: tuple[Value, Value]) -> Value:
+    """Smith's Lambda."""
+    x, y = alpha[0] * w[0], alpha[1] * w[1]
+    z = ops.maximum(w[2], GRAZING * 0.1)
+    return 0.5 * (ops.sqrt(1 + (x * x + y * y) / (z * z)) - 1)
+
+
+def mean_alpha(facets: Facets) -> float:
+    return float(np.clip(0.5 * (facets.alpha_u + facets.alpha_v), ALPHA_MIN, 1))
+
+
+def shares_of_films(facets: Facets, p: Array) -> tuple[Array, Array]:
+    """Shares (C, sources) of blocked light of lengths p that films reflect, and let pass, in the end, by walks, since
+    no table has them."""
+    mean = mean_alpha(facets)
+    assert facets.below is not None and facets.films
+    # Walk in directions that crowd where shares bend
+    places = (np.arange(WALKED) + 0.5) / WALKED
+    critical = np.arcsin(float(ops.mean(facets.below) / ops.mean(facets.above))) if facets.is_exit else None
+
+    def walked() -> tuple[Array, Array]:
+        eta = None if facets.opaque else float(ops.mean(facets.below) / ops.mean(facets.above))
+        cosines = coordinates.to_cosine(places) if critical is None else coordinates.to_angle(places, critical)
+        alpha = np.full(WALKED, mean)
+        return shares_in_the_end(facets.shares, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
+
+    numbers = (None if x is None else x.tobytes() for x in (facets.above, facets.below, facets.k))
+    found = KEPT.once((shares_of_films, mean, facets.films.key, *numbers), walked)
+    cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
+    at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
+    reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in found)
+    return reflected, passed
