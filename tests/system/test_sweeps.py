@@ -220,6 +220,53 @@ def test_a_point_that_ends_its_process_is_recorded(tmp_path: Path) -> None:
     assert np.isnan(found.x.values[::2]).all() and np.nansum(found.x.values) == 2
 
 
+@pytest.fixture
+def left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No nanny of dask starts a worker again, as on a busy machine, where it is late."""
+    import distributed
+
+    async def leave(self: distributed.Nanny, exitcode: int) -> None: ...
+
+    monkeypatch.setattr(distributed.Nanny, "_on_worker_exit", leave)
+
+
+def swept_with_a_kill(folder: Path) -> Any:
+    """Four points, of which one ends its process when it is first looked at."""
+    killed = folder / "killed"
+
+    def deadly(stack: vt.Stack, seed: int) -> dict[str, float]:
+        if stack.flat()["layer0_alpha_u"] == 0.3 and not killed.exists():
+            killed.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return {"x": 1.0}
+
+    space = vt.Space(material="bare-gold", vary={"layer0_alpha": {"values": [0.1, 0.2, 0.3, 0.4]}})
+    found = vt.sweep(space, deadly, store=folder / "a.zarr", workers=1, chunk=1)
+    assert killed.exists()
+    return found.x.values.tolist()
+
+
+@pytest.mark.usefixtures("left")
+def test_a_process_that_dask_gives_up_is_started_again(tmp_path: Path) -> None:
+    import dask
+    import distributed  # noqa: F401  (has the configuration that is changed)
+
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1s"}):
+        assert swept_with_a_kill(tmp_path) == [1.0] * 4
+
+
+@pytest.mark.usefixtures("left")
+def test_a_sweep_without_processes_ends_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Expected: an error where no process starts again; then the rest by the same call."""
+    from velatura.sweeps import engines
+
+    with monkeypatch.context() as patched:
+        patched.setattr(engines, "ABSENT", 1.0)
+        with pytest.raises(vt.VelaturaError, match=r"a\.zarr: the executor broke down .* with \d of 4 points stored"):
+            swept_with_a_kill(tmp_path)
+    assert swept_with_a_kill(tmp_path) == [1.0] * 4
+
+
 def test_jobs_of_submitit_are_an_executor(tmp_path: Path) -> None:
     """Expected: its jobs, processes here as they are jobs of SLURM elsewhere, fill the store."""
     import submitit

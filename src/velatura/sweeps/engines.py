@@ -19,6 +19,8 @@ from velatura.errors import InvalidInput
 REFRESH = 1.0  # seconds after which newly joined workers are counted
 POLL = 0.05  # seconds between looks at tasks that do not report their end
 PATIENCE = 10  # seconds for a scheduler to answer
+START = 60  # seconds for a process of this machine to start
+ABSENT = 2 * START  # seconds without any process, after which a sweep on this machine ends
 
 
 #: Errors of an engine that runs no more: of its own, and of tasks that it takes no more care of.
@@ -32,12 +34,17 @@ class Engine:
         submit: of an executor; returns what has `done`, `result` and `cancel`.
         workers: how many tasks run at once.
         fatal: errors of tasks that end the processes that run them.
+        tend: called while tasks run; starts processes that are lost.
     """
 
     def __init__(
-        self, submit: Callable[..., Any], workers: Callable[[], int], fatal: tuple[type[BaseException], ...] = ()
+        self,
+        submit: Callable[..., Any],
+        workers: Callable[[], int],
+        fatal: tuple[type[BaseException], ...] = (),
+        tend: Callable[[], None] = lambda: None,
     ) -> None:
-        self.submit, self.fatal = submit, fatal
+        self.submit, self.fatal, self._tend = submit, fatal, tend
         self._workers, self._counted, self._looked = workers, 0, -REFRESH
 
     @property
@@ -47,9 +54,15 @@ class Engine:
             self._counted, self._looked = max(self._workers(), 1), time.monotonic()
         return self._counted
 
-    @staticmethod
-    def ended(tasks: Collection[Any]) -> list[Any]:
+    def result(self, task: Any) -> Any:
+        """The result of a task, once it has ended."""
+        while not self.ended((task,)):
+            pass
+        return task.result()
+
+    def ended(self, tasks: Collection[Any]) -> list[Any]:
         """Tasks that have ended, after a wait for the first one, not longer than `REFRESH`."""
+        self._tend()
         if all(isinstance(task, concurrent.futures.Future) for task in tasks):
             first = concurrent.futures.FIRST_COMPLETED
             return list(concurrent.futures.wait(tasks, REFRESH, first).done)
@@ -67,8 +80,9 @@ def engine(executor: Any, workers: int | None) -> Iterator[Engine]:
         InvalidInput: none of these, or no scheduler answers.
     """
     if executor is None:
-        with _local(workers or _cores()) as client:
-            yield _of_client(client)
+        count = workers or _cores()
+        with _local(count) as client:
+            yield _of_client(client, _started_again(client.cluster, count))
     elif isinstance(executor, str):
         with _at(executor) as client:
             yield _of_client(client)
@@ -100,9 +114,31 @@ def _local(workers: int) -> Iterator[Any]:
                 memory_limit=None,
                 dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
+                death_timeout=START,
             )
             stack.enter_context(cluster)
         yield stack.enter_context(Client(cluster))
+
+
+def _started_again(cluster: Any, count: int) -> Callable[[], None]:
+    """Starts processes that the cluster has given up: it does so for good with those that a busy machine starts again
+    too late (`distributed.deploy.lost-worker-timeout`).
+
+    What is returned raises BrokenExecutor once there has been none for `ABSENT` seconds.
+    """
+    seen = time.monotonic()
+
+    def tend() -> None:
+        nonlocal seen
+        present = len(cluster.scheduler_info["workers"])
+        if present:
+            seen = time.monotonic()
+        elif time.monotonic() > seen + ABSENT:
+            raise concurrent.futures.BrokenExecutor(f"no process has started for {ABSENT} s")
+        if present < count:
+            cluster.scale(count)
+
+    return tend
 
 
 @contextlib.contextmanager
@@ -144,7 +180,7 @@ def _silent(logger: logging.Logger) -> Iterator[None]:
         logger.setLevel(before)
 
 
-def _of_client(client: Any) -> Engine:
+def _of_client(client: Any, tend: Callable[[], None] = lambda: None) -> Engine:
     from distributed.scheduler import KilledWorker
 
     executor = client.get_executor(pure=False)
@@ -157,7 +193,7 @@ def _of_client(client: Any) -> Engine:
     def workers() -> int:
         return sum(client.nthreads().values())
 
-    return Engine(submit, workers, (KilledWorker,))
+    return Engine(submit, workers, (KilledWorker,), tend)
 
 
 def _or_broken(asked: Callable[..., Any]) -> Callable[..., Any]:

@@ -142,7 +142,7 @@ def _alone(runs: Engine, packed: bytes, number: int) -> work.Answered:
     """What a point gives that may end its process; one that ends while others begin is asked again."""
     for _ in range(ATTEMPTS):
         try:
-            (answer,) = runs.submit(work.look, packed, (number,)).result()
+            (answer,) = runs.result(runs.submit(work.look, packed, (number,)))
         except runs.fatal:
             continue
         found: work.Answered = answer
