@@ -39,7 +39,9 @@ def at(cos_theta: float, count: int = 1) -> Direction:
 
 
 @pytest.mark.parametrize(
-    "stack", [ROUGH, PANE, milk(0.9, 1), milk(0.2, 3)], ids=["rough", "pane", "forwards", "diffuse"]
+    "stack",
+    [ROUGH, PANE, milk(0.9, 1), milk(0.5, 1.5), milk(0.2, 3)],
+    ids=["rough", "pane", "forwards", "diffuse in part", "diffuse"],
 )
 def test_the_rest_has_the_energy_and_the_share_of_its_densities(stack: vt.Stack) -> None:
     """Sampled, against the quadrature of the energy and a mean of the density over the sphere: within 5 standard
@@ -62,6 +64,20 @@ def test_the_rest_has_the_energy_and_the_share_of_its_densities(stack: vt.Stack)
         _, density = internal_reflections.eval_pdf_rest(found, i, (r * np.cos(phi), r * np.sin(phi), z))
         share = 2 * np.pi * density
         assert abs(share.mean() - np.mean(o[2] > 0)) < 5 * share.std() / np.sqrt(count) + 0.005
+
+
+def test_scattering_becomes_diffuse_without_a_jump() -> None:
+    """By depth, and by direction: the share of diffuse light changes by less than a hundredth where depth and cosine
+    change by a thousandth, and has all values."""
+    depths, shares = np.geomspace(0.3, 30, 4600), []
+    for depth in depths:
+        shares.append(float(np.mean(internal_reflections.rest(passage_of(milk(0.6, depth)), at(0.7)).diffuse)))
+    assert shares[0] == 0 and shares[-1] > 0.999
+    assert np.diff(shares).max() < 0.01 and np.diff(shares).min() >= 0
+    cosine = np.linspace(0.1, 1, 900)
+    wi = np.sqrt(1 - cosine**2), 0 * cosine, cosine
+    around = np.asarray(internal_reflections.rest(passage_of(milk(0.6, 2)), wi).diffuse)
+    assert np.ptp(around) > 0.1 and np.abs(np.diff(around)).max() < 0.01
 
 
 def test_light_that_bounces_is_about_the_direction_that_light_goes_on_in() -> None:

@@ -45,7 +45,7 @@ from velatura.optics.ggx import Direction
 BOUNCES = 0.3  # of the two faces of the slab that light bounces in
 COS_MIN = 0.22  # at which slabs are crossed, for widths
 ALPHA_MAX = 1.5
-DIFFUSE = 0.75  # roughness of scattering that is diffuse
+DIFFUSE = 0.5, 0.9  # roughness from which scattering is diffuse in part, and as a whole
 FAR = 1e3  # index
 THIN = 1e-4  # optical depth of scattering that no light meets twice
 NO_LOBE = 1e-6  # asymmetry
@@ -107,7 +107,8 @@ def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = E
     i = entered(transmission, wi)
     scattering = [(slab, cosine) for slab, cosine in zip(transmission.slabs, i.bounded) if not is_none(slab.scattering)]
     alpha = _turned(scattering)
-    diffuse = ops.select(alpha < DIFFUSE, 0.0, 1.0)
+    # Without a jump, which would be seen between directions, and in gradients
+    diffuse = ops.clip((alpha - DIFFUSE[0]) / (DIFFUSE[1] - DIFFUSE[0]), 0.0, 1.0)
     width = type(transmission.refractions[0].width).uniform(WIDTHS.variance(alpha))
     return Rest(_lobe(transmission, i, transmission.scattered, width), diffuse, reached, numbers)
 
@@ -188,7 +189,7 @@ def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value
 
 def sample_rest(found: Rest, i: Direction, u: Value, u1: Value, u2: Value) -> Direction:
     """A direction, in the frame of `seen_below`, from uniform numbers."""
-    even = found.samples.sample(i, u, u1, u2)
+    even = found.samples.sample(i, ops.clip(ops.divide(u, found.diffuse), 0.0, 1.0), u1, u2)
     x, y = found.bound * even[0], found.bound * even[1]
     even = x, y, ops.sqrt(1 - x * x - y * y)
     if not found.lobe:
