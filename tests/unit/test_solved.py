@@ -13,6 +13,7 @@ from velatura.model.solved.bsdf import Solved
 from velatura.model.solved.energies.energies import energies
 from velatura.model.solved.lobes.widths import nearly_straight
 from velatura.model.variance import variance_kind
+from velatura.optics import fresnel
 from velatura.stack import Interface, Material, MaterialLike, Medium, Stack
 
 PRESETS = ("coated-rough-metal", "varnished-paint", "scattering-medium-over-gold", "three-dielectrics-over-metal",
@@ -192,3 +193,15 @@ def test_shares_of_samples_sum_up_to_1_between_the_nodes() -> None:
     of = below.seen((np.sqrt(1 - cosine**2), 0 * cosine, cosine))
     assert of.columns.passes
     np.testing.assert_allclose(sum(of.chances) + of.columns.passes.share, 1, atol=1e-6)
+
+
+def test_light_from_inside_passes_as_fresnel_says_beside_the_critical_angle() -> None:
+    """Of smooth glass, where weights are interpolated between directions that light passes from and others: within .03
+    of the incident light for cosines from .03 above the critical one on."""
+    _, found = body(Stack([Interface(eta=1.43), Interface(eta=1.43, alpha=0.5)]))
+    for cosine in np.sqrt(1 - 1.43**-2) + np.array([0.03, 0.035, 0.05, 0.1]):
+        x, y, z = from_cosine(float(cosine), 0.3)
+        wo, _ = found.sample((x, y, -z), *uniform(1))
+        value, density = found.eval_pdf((x, y, -z), wo, POWER)
+        weight = np.where(density > 0, value / np.where(density > 0, density, 1), 0) * (wo[2] > 0)
+        assert abs(weight.mean() - (1 - fresnel.dielectric(float(cosine), 1 / 1.43))) < 0.03

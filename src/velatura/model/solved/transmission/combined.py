@@ -32,6 +32,7 @@ MAX_GAIN = 2.0  # energy over integral
 LEAST = 0.05  # share of samples of what passes that are scattered, for what all others miss
 UNLIKE = 1.5  # weight over its mean, of samples that go straight through, for which more are drawn
 PASSES_MIN = 0.05  # share of facets that let light pass, where samples are shared
+LITTLE = 3e-3  # energy that passes straight through, which hardly says how much brighter it is than its integral
 BELOW_ONE = 1 - 2**-24
 
 Array = NDArray[np.floating]
@@ -98,7 +99,8 @@ def parts(
     # Divide energies by integrals, and hand over what they lack
     of_straight, squares, passes = direct.integrals(transmission, wi)
     of_bounced = refracted_lobe.integral(lobe, i) if lobe else np.zeros_like(of_straight)
-    weight_straight = np.minimum(ops.divide(straight, of_straight), MAX_GAIN)
+    # Weights are interpolated: where next to nothing passes, as beyond a critical angle, that of the facets alone
+    weight_straight = np.minimum((straight + LITTLE) / (of_straight + LITTLE), MAX_GAIN)
     bounces = np.maximum(bounces + straight - weight_straight * of_straight, 0)
     # A kind of stack may have a lobe that this one has not
     weight_bounced = np.minimum(ops.divide(bounces, of_bounced), MAX_GAIN) * bool(lobe)
