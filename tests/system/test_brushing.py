@@ -70,3 +70,30 @@ def test_a_field_is_finite_at_its_centre_and_without_texture_coordinates() -> No
     assert np.isfinite(value(Brushing(brushing="radial"), si, [0, 0.1, 1], [0, 0, 1])).all()
     si = seen({"type": "rectangle"}, [[0.0, 0.0], [1e-20, 0.0]])
     assert np.isfinite(value(Brushing(brushing="radial"), si, [0, 0.1, 1], [0, 0, 1])).all()
+
+
+@pytest.mark.parametrize(
+    ("layers", "value"),
+    [
+        ([Interface(eta=1.49), Interface(eta=(2.5, 2.1, 2.6), k=0.7, alpha=0.54)], "layer1_alpha_v"),
+        ([Interface(eta=1.43), Interface(eta=1.43, alpha=0.53)], "layer1_alpha_v"),
+    ],
+    ids=["coated metal", "glass"],
+)
+def test_light_does_not_jump_where_a_round_interface_becomes_brushed(layers: list[Any], value: str) -> None:
+    """Expected: light that is reflected, and that passes, from either side, within .004 of itself where one roughness
+    changes by 1e-4. Light is of directions that the round one draws."""
+    stack, count = Stack(layers), 4096
+    round_, brushed_ = vt.bsdf(stack), vt.bsdf(stack.replace(**{value: 1.0001 * stack.flat()[value]}))
+    rng, context = np.random.default_rng(3), mi.BSDFContext()
+    for up in (1.0, -1.0) if stack.transmits else (1.0,):
+        si = dr.zeros(mi.SurfaceInteraction3f, count)
+        z, phi = rng.uniform(0.1, 1, count), rng.uniform(0, 2 * np.pi, count)
+        si.wi = mi.Vector3f(np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), up * z)
+        u = rng.random((3, count))
+        drawn, _ = round_.sample(context, si, mi.Float(u[0]), mi.Point2f(u[1:]))
+        share = dr.select(drawn.pdf > 0, 1 / (count * dr.maximum(drawn.pdf, 1e-6)), 0)
+        before, after = (np.array(dr.mean(x.eval(context, si, drawn.wo)) * share) for x in (round_, brushed_))
+        reflected = np.array(drawn.wo.z) * up > 0
+        for side in (reflected, ~reflected) if stack.transmits else (reflected,):
+            assert abs(after[side].sum() - before[side].sum()) < 4e-3 * before[side].sum()

@@ -20,7 +20,7 @@ from velatura.stack import InterfaceValues, Material
 
 Array = NDArray[np.floating]
 
-COSINES = {True: 32, False: 20}  # where all interfaces are isotropic, or some sharply brushed; and for others
+COSINES = 32  # as many for isotropic interfaces as for others, so that light does not jump between them
 AZIMUTHS = {False: 12, True: 24}  # in half a turn, where some are brushed, and where some sharply so
 SHARP = 8.0  # roughness across over that along, beyond which inner lobes turn within few degrees
 COS_MIN = 1e-3
@@ -39,7 +39,7 @@ class Grid:
     def of(cls, isotropic: bool, material: Material | None = None) -> Grid:
         """The grid of a material of numbers, or None for any of those of tables."""
         sharp = material is not None and any(map(_is_sharp, material.interfaces))
-        return cls(isotropic, COSINES[isotropic or sharp], AZIMUTHS[sharp])
+        return cls(isotropic, COSINES, AZIMUTHS[sharp])
 
     @property
     def nodes(self) -> Array:
