@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from fuzzing.stacks import BASES, random_stack, textured
 
 from velatura import MODELS
 from velatura.model.registry import named
+from velatura.stack import Interface, Stack
 
 
 @pytest.mark.parametrize("form", ["forward", "symmetric"])
@@ -63,3 +65,25 @@ def test_the_bsdf_of_a_textured_stack(tmp_path: Path, form: str, base: str) -> N
     rng = np.random.default_rng(3)
     stack = textured(random_stack(rng, most=1, base=base), rng, str(image))
     assert not plugin.tried(stack, named("bati2021", form=form), rng)
+
+
+@pytest.mark.parametrize(
+    ("light", "gradient", "kind"),
+    [
+        (lambda x: 1 + 0.5 * x, 0.5, ""),
+        (lambda x: 1 + 0.5 * x, 2.0, "gradient of alpha_u is no difference"),
+        (lambda x: 1 + 0.5 * x, np.nan, "gradient is not finite"),
+        (lambda x: 1 + 5 * (x - 1) ** 2 + 0.5 * x, 0.9, ""),  # curved, on one side of the difference
+        (lambda x: 1 + 9 * max(x - 1, 0), 0.2, ""),
+        (lambda x: 1 + 9 * max(x - 1, 0), -3.0, "gradient of alpha_u is no difference"),
+        (lambda x: 1 + 0.5 * x + 0.01 * (x == 1), 2.0, "light jumps at a value of alpha_u"),
+    ],
+    ids=["linear", "wrong", "not finite", "curved", "kink", "beside a kink", "jump"],
+)
+def test_gradients_are_judged_beside_curvature_kinks_and_jumps(
+    light: Callable[[float], float], gradient: float, kind: str
+) -> None:
+    """By light of a known slope."""
+    at = next(at for at, _ in Stack([Interface(conductor="mirror", alpha=0.2)]).values() if at.role == "alpha_u")
+    found = [name for name, _ in gradients.judged(at, gradient, light, (0.94, 1.06), light(1.0))]
+    assert found == [kind] * bool(kind)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import velatura as vt
 from fuzzing import Failure
 from fuzzing.stacks import random_stack
 from velatura import kernel
 from velatura.renderer.differentiated import RELATIVE, RELATIVES, STEPS
+from velatura.stack import Address
+
+Array = NDArray[np.floating]
 
 MOST = 4  # values of a stack that are tried
 SAMPLES = 4096
@@ -59,7 +64,8 @@ def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
     def light(bsdf: Any) -> Any:
         return dr.sum(dr.mean(bsdf.eval(context, si, drawn.wo)) * share)
 
-    whole, found = float(light(bsdf)[0]), []
+    whole = float(light(bsdf)[0])
+    found: list[tuple[str, str]] = []
     for at in chosen:
         x, scale = given[at], mi.Float(1)
         dr.enable_grad(scale)
@@ -67,18 +73,51 @@ def _found(stack: vt.Stack, rng: np.random.Generator) -> list[tuple[str, str]]:
         parameters.update()
         dr.backward(light(bsdf), flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
         gradient = float(dr.grad(scale)[0])
+
+        def scaled(by: float, at: Address = at, x: Array = x) -> float:
+            parameters[at.name] = (mi.Color3f if len(x) > 1 else mi.Float)((by * x).tolist())
+            parameters.update()
+            return float(light(bsdf)[0])
+
         step = max(RELATIVES.get(at.role, RELATIVE), STEPS.get(at.role, 0) / float(np.abs(x).max()))
         low, high = at.declared.within
-        scales = max(1 - step, low / x.max()), min(1 + step, high / x.max())
-        ends = []
-        for end in (*scales, 1):
-            parameters[at.name] = (mi.Color3f if len(x) > 1 else mi.Float)((end * x).tolist())
-            parameters.update()
-            ends.append(float(light(bsdf)[0]))
-        difference, expected = (scales[1] - scales[0]) * gradient, ends[1] - ends[0]
-        detail = f"{at.name}: {difference:.4g} over the step, expected {expected:.4g} of {whole:.4g}"
-        if not np.isfinite(gradient):
-            found.append(("gradient is not finite", detail))
-        elif abs(difference - expected) > OFF * abs(expected) + UNEVEN * whole:
-            found.append((f"gradient of {at.key} is no difference", detail))
+        found += judged(at, gradient, scaled, (max(1 - step, low / x.max()), min(1 + step, high / x.max())), whole)
+        scaled(1)
     return found
+
+
+def judged(
+    at: Address, gradient: float, light: Callable[[float], float], ends: tuple[float, float], whole: float
+) -> Iterator[tuple[str, str]]:
+    """What is wrong with a gradient by the scale of a value, and with the light between two scales.
+
+    Half of the step shows whether light is curved or has a kink, where a gradient is between the slopes of both sides,
+    or jumps, which is an error of the light.
+    """
+    low, high = map(light, ends)
+    over = ends[1] - ends[0]
+    detail = f"{at.name}: {over * gradient:.4g} over the step, expected {high - low:.4g} of {whole:.4g}"
+    if not np.isfinite(gradient):
+        yield "gradient is not finite", detail
+        return
+    if abs(over * gradient - (high - low)) <= OFF * abs(high - low) + UNEVEN * whole:
+        return
+    # A bound of the value leaves one side alone
+    sides = [(end, 0.5 * (1 + end), value) for end, value in zip(ends, (low, high)) if end != 1]
+    halves = [light(half) for _, half, _ in sides]
+    if len(sides) == 2:
+        near, far = np.mean(halves), 0.5 * (low + high)
+        jumps = np.array([2 * near - far, (4 * near - far) / 3]) - whole  # without a kink, and without a curvature
+        if np.abs(jumps).min() > UNEVEN * whole and jumps.prod() > 0:
+            yield (
+                f"light jumps at a value of {at.key}",
+                f"{at.name}: by {jumps[np.abs(jumps).argmin()]:.4g} of {whole:.4g}",
+            )
+            return
+    slopes = [
+        (y - whole) / (by - 1) for (end, half, far), near in zip(sides, halves) for by, y in ((end, far), (half, near))
+    ]
+    least, most = over * min(slopes), over * max(slopes)
+    margin = OFF * max(abs(least), abs(most)) + UNEVEN * whole
+    if not least - margin <= over * gradient <= most + margin:
+        yield f"gradient of {at.key} is no difference", f"{detail}; slopes of both sides {least:.4g} to {most:.4g}"
