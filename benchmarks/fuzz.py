@@ -12,6 +12,7 @@ files      mutated material files: refused in one line that names the file, or e
 imports    likewise files of other programs, tables, spectra and textures; in bounded time and memory
 targets    mutated target files: refused in one line, or for a part solved, or refused with a reason
 commands   mutated command lines and input files: no traceback, a known status, nothing written or lost on refusal
+wishes     random wishes to coat, simplify, explore and fit, hostile numbers among them: as commands
 plans      mutated plans of sweeps: refused in one line that names the file, or their points have stacks
 candidates hostile functions and files in the benchmark: refused in one line, or scored; the truth stays as it is
 
@@ -51,6 +52,7 @@ from fuzzing import (
     plugin,
     scalar,
     targets,
+    wishes,
 )
 
 # The whole count, and how many are tried before the processes are new ones: they keep every program that they compile
@@ -64,6 +66,7 @@ PROGRAMS: dict[str, tuple[Trial, int, int]] = {
     "imports": (imports.trial, 15_000, 1_000),
     "targets": (targets.trial, 5_000, 500),
     "commands": (commands.trial, 500, 100),
+    "wishes": (wishes.trial, 800, 100),
     "plans": (plans.trial, 1_000, 500),
     "candidates": (candidates.trial, 2_000, 500),
 }

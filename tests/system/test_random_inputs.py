@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from fuzzing import candidates, commands, files, imports, plans, targets
+import pytest
+from fuzzing import candidates, commands, files, imports, plans, targets, wishes
 
 
 def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
@@ -41,3 +42,10 @@ def test_any_command_line_ends_in_one_line_and_loses_nothing() -> None:
     """No traceback, exit status 0 to 3; nothing is written on refusal, and no file that was there is changed."""
     rng = np.random.default_rng(1)
     assert not [failure for _ in range(25) for failure in commands.trial(rng)]
+
+
+@pytest.mark.parametrize("verb", wishes.WISHES)
+def test_any_wish_ends_in_an_answer_or_one_line(verb: str) -> None:
+    """As command lines do."""
+    rng = np.random.default_rng(1)
+    assert not [failure for _ in range(3) for failure in wishes.tried(verb, rng)]

@@ -76,9 +76,10 @@ def test_the_bsdf_of_a_textured_stack(tmp_path: Path, form: str, base: str) -> N
         (lambda x: 1 + 5 * (x - 1) ** 2 + 0.5 * x, 0.9, ""),  # curved, on one side of the difference
         (lambda x: 1 + 9 * max(x - 1, 0), 0.2, ""),
         (lambda x: 1 + 9 * max(x - 1, 0), -3.0, "gradient of alpha_u is no difference"),
-        (lambda x: 1 + 0.5 * x + 0.01 * (x == 1), 2.0, "light jumps at a value of alpha_u"),
+        (lambda x: 9 * max(x - 1, 0) ** 0.5, 50.0, ""),  # as reflected light of an interface without a step
+        (lambda x: 1 + 0.5 * x + 0.02 * (x == 1), 2.0, "light jumps at a value of alpha_u"),
     ],
-    ids=["linear", "wrong", "not finite", "curved", "kink", "beside a kink", "jump"],
+    ids=["linear", "wrong", "not finite", "curved", "kink", "beside a kink", "root", "jump"],
 )
 def test_gradients_are_judged_beside_curvature_kinks_and_jumps(
     light: Callable[[float], float], gradient: float, kind: str

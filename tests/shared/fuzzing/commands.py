@@ -24,7 +24,7 @@ from fuzzing.stacks import random_stack
 from velatura import cli
 from velatura.stack import dumps
 
-LIMIT_S = 120
+LIMIT_S, CLOCK = 60, 20  # seconds of the processor, and how many times that by the clock, for a busy machine
 PROCESSES = 0.1  # share of command lines that run as a process of their own
 
 MATERIAL = """\
@@ -258,22 +258,28 @@ def _limited() -> Iterator[None]:
     def stop(number: int, frame: FrameType | None) -> None:
         raise TimeoutError(f"not done after {LIMIT_S} s")
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(LIMIT_S)
+    timers = {signal.ITIMER_PROF: (signal.SIGPROF, LIMIT_S), signal.ITIMER_REAL: (signal.SIGALRM, CLOCK * LIMIT_S)}
+    before = {number: signal.signal(number, stop) for number, _ in timers.values()}
+    for timer, (_, seconds) in timers.items():
+        signal.setitimer(timer, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        for timer in timers:
+            signal.setitimer(timer, 0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _run_process(line: list[str], environment: dict[str, str], redirection: str) -> tuple[int, str, str]:
     shell = ["bash", "-c", f'"$@" {redirection}', "bash", sys.executable, "-m", "velatura", *line]
     kept = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
     try:
-        done = subprocess.run(shell, env={**kept, **environment}, capture_output=True, timeout=LIMIT_S, check=False)
+        done = subprocess.run(
+            shell, env={**kept, **environment}, capture_output=True, timeout=CLOCK * LIMIT_S, check=False
+        )
     except subprocess.TimeoutExpired:
-        return 124, "", f"not done after {LIMIT_S} s"
+        return 124, "", f"not done after {CLOCK * LIMIT_S} s"
     except (ValueError, OSError) as error:  # a word that no process can be given
         return 2, "", f"velatura: {error}\n"
     return done.returncode, done.stdout.decode("utf-8", "replace"), done.stderr.decode("utf-8", "replace")

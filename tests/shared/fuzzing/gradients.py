@@ -21,6 +21,7 @@ MOST = 4  # values of a stack that are tried
 SAMPLES = 4096
 SMOOTH = 0.01  # roughness of stacks that are not tried
 OFF = 0.1  # of a difference, by which a gradient may be off
+CLOSE, STAYS = 0.01, 0.25  # share of a step, and of the light that changes over the whole one, where light jumps
 UNEVEN = 2e-3  # of the light, by which values of either end may be off
 
 
@@ -91,8 +92,8 @@ def judged(
 ) -> Iterator[tuple[str, str]]:
     """What is wrong with a gradient by the scale of a value, and with the light between two scales.
 
-    Half of the step shows whether light is curved or has a kink, where a gradient is between the slopes of both sides,
-    or jumps, which is an error of the light.
+    Where it is no difference, light may be curved or have a kink: a gradient is between the slopes of both sides, over
+    the step and half of it. Or light jumps, which is an error of its own: of a change a share stays over a small step.
     """
     low, high = map(light, ends)
     over = ends[1] - ends[0]
@@ -102,21 +103,16 @@ def judged(
         return
     if abs(over * gradient - (high - low)) <= OFF * abs(high - low) + UNEVEN * whole:
         return
-    # A bound of the value leaves one side alone
-    sides = [(end, 0.5 * (1 + end), value) for end, value in zip(ends, (low, high)) if end != 1]
-    halves = [light(half) for _, half, _ in sides]
-    if len(sides) == 2:
-        near, far = np.mean(halves), 0.5 * (low + high)
-        jumps = np.array([2 * near - far, (4 * near - far) / 3]) - whole  # without a kink, and without a curvature
-        if np.abs(jumps).min() > UNEVEN * whole and jumps.prod() > 0:
-            yield (
-                f"light jumps at a value of {at.key}",
-                f"{at.name}: by {jumps[np.abs(jumps).argmin()]:.4g} of {whole:.4g}",
-            )
+    slopes = []
+    for end, far in zip(ends, (low, high)):
+        if end == 1:  # a bound of the value leaves one side alone
+            continue
+        half, close = 0.5 * (end - 1), CLOSE * (end - 1)
+        jump = light(1 + close) - whole
+        if abs(jump) > max(UNEVEN * whole, STAYS * abs(far - whole)):
+            yield f"light jumps at a value of {at.key}", f"{at.name}: by {jump:.4g} of {whole:.4g}"
             return
-    slopes = [
-        (y - whole) / (by - 1) for (end, half, far), near in zip(sides, halves) for by, y in ((end, far), (half, near))
-    ]
+        slopes += [(far - whole) / (end - 1), (light(1 + half) - whole) / half]
     least, most = over * min(slopes), over * max(slopes)
     margin = OFF * max(abs(least), abs(most)) + UNEVEN * whole
     if not least - margin <= over * gradient <= most + margin:
