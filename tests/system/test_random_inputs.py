@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from fuzzing import candidates, commands, files, imports, plans, targets, wishes
+
+from velatura import cli
 
 
 def test_any_file_is_refused_in_one_line_or_read_back_equal() -> None:
@@ -49,3 +53,14 @@ def test_any_wish_ends_in_an_answer_or_one_line(verb: str) -> None:
     """As command lines do."""
     rng = np.random.default_rng(1)
     assert not [failure for _ in range(3) for failure in wishes.tried(verb, rng)]
+
+
+def test_a_command_line_that_takes_too_long_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def endless(*arguments: Any, **options: Any) -> None:
+        while True:
+            pass
+
+    monkeypatch.setattr(commands, "LIMIT_S", 0.2)
+    monkeypatch.setattr(cli, "app", endless)
+    (failure,) = commands.tried(["presets"], commands.INPUTS)
+    assert failure.kind == "traceback" and "not done" in failure.detail

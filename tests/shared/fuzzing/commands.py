@@ -117,6 +117,10 @@ ENVIRONMENTS: tuple[dict[str, str], ...] = (
 REDIRECTIONS = ("", "", ">/dev/full", ">&-", "2>&-", "<&-", "| head -c 10 >/dev/null; exit ${PIPESTATUS[0]}")
 
 
+class _Late(Exception):
+    """The end of a command line that takes too long; no OSError, which the command line reports in one line."""
+
+
 def trial(rng: np.random.Generator) -> list[Failure]:
     """A command line with a few words changed, or an input file."""
     line = str(rng.choice(COMMANDS.strip().splitlines())).split()
@@ -256,7 +260,7 @@ def _run(line: list[str]) -> tuple[int, str, str]:
 @contextlib.contextmanager
 def _limited() -> Iterator[None]:
     def stop(number: int, frame: FrameType | None) -> None:
-        raise TimeoutError(f"not done after {LIMIT_S} s")
+        raise _Late(f"not done after {LIMIT_S} s")
 
     timers = {signal.ITIMER_PROF: (signal.SIGPROF, LIMIT_S), signal.ITIMER_REAL: (signal.SIGALRM, CLOCK * LIMIT_S)}
     before = {number: signal.signal(number, stop) for number, _ in timers.values()}
