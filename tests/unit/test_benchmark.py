@@ -7,7 +7,6 @@ import json
 from itertools import chain
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 from fuzzing import candidates as hostile
@@ -69,6 +68,8 @@ def test_a_smooth_stack_sends_light_to_the_centre() -> None:
 
 def test_stacks_follow_from_the_seed_and_keep_the_schema() -> None:
     """Expected: what the command draws is what is shipped, 10 of each kind, and valid by a validator of schemas."""
+    import jsonschema  # takes a second, which every worker of the tests would pay
+
     found = json.loads((stacks.DATA / "stacks.json").read_text())
     schema = json.loads((stacks.DATA / "schema.json").read_text())
     jsonschema.Draft202012Validator.check_schema(schema)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -103,7 +104,8 @@ def part_of(path: Path) -> str:
     return path.relative_to(SOURCE).parts[0].removesuffix(".py")
 
 
-def imports(path: Path, text: str = "", types: bool = True) -> Iterator[tuple[str, bool]]:
+@functools.cache  # reading all sources takes two seconds
+def imports(path: Path, text: str = "", types: bool = True) -> tuple[tuple[str, bool], ...]:
     """Every module that a file imports, by its full name, and whether that happens when the file is imported.
 
     A file that calls `import_module` imports every module that it names in a text. `types`: also what only checkers of
@@ -132,7 +134,7 @@ def imports(path: Path, text: str = "", types: bool = True) -> Iterator[tuple[st
         package = ("velatura", *path.relative_to(SOURCE).parent.parts)
         return ".".join([*package[: len(package) - node.level + 1], *filter(None, [node.module])])
 
-    return visit(tree, True)
+    return tuple(visit(tree, True))
 
 
 def for_type_checkers(node: ast.AST) -> bool:
