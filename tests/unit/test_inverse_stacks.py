@@ -291,6 +291,13 @@ def test_appearance_below_a_coat(name: str, model: Model) -> None:
     assert loads(dumps(coated.stack)) == coated.stack
 
 
+def test_a_lobe_that_no_roughness_gives_below_a_coat_has_a_reason() -> None:
+    """A pane as rough as can be, of which the solution for its roughness does not converge."""
+    bare = Stack([Medium(depth=0.7), Interface(eta=1.694502503943321, alpha=1.0)], exterior=1.33, thin=True)
+    with pytest.raises(NoSolution, match=r"layer 1 \(interface\): cannot keep its appearance under the coat: \w"):
+        coat(bare, 1.13589, 0.554882, keep_appearance=True)
+
+
 @pytest.mark.parametrize("model", [AVERAGED, named("belcour2018"), named("velatura")], ids=lambda m: m.name)
 def test_a_diffuse_base_keeps_its_energy_below_a_coat(model: Model) -> None:
     """Expected: as bright through the coat as without; a white base, which cannot be brighter, stays white."""

@@ -143,7 +143,7 @@ def solve(above: Above, energy: Array, variance: Variance, choice: Choice) -> Fo
             _secant(want_s, read, apart, before),
         )
     missed = 2 * coatings.NEAR if choice.films else MISSED
-    layers = layers.with_margins(model=np.where(layers.feasible & (off > missed), -off, 0.0))
+    layers = layers.with_margins(**{"unmet blur": np.where(layers.feasible & (off > missed), -off, 0.0)})
     return Found(layers, below, lobe.energy, read)
 
 
@@ -185,7 +185,7 @@ def with_index(
         before, s_r = (s_r, read), _secant(s_r, read, apart, before, slope)
     blur = margin(least(s_r), ENOUGH)
     missed = np.where((off > MISSED) & (blur >= 0) & (paired is None), -off, 0.0)
-    return Found(layers.with_margins(blur=blur, model=missed), below, lobe.energy, read)
+    return Found(layers.with_margins(**{"blur": blur, "unmet blur": missed}), below, lobe.energy, read)
 
 
 def _secant(
