@@ -26,6 +26,7 @@ Groups = Sequence[Sequence[Value]]
 Function = Callable[[Sequence[Value], Sequence[Value], Any], tuple[Groups, Sequence[Value]]]
 
 MANY = 4_000_000  # values, about a second's
+LEAST = 15_000  # values at a time: for fewer, a kernel takes longer to describe than NumPy to run
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COMPILED_BLOCK = 1 << 18
 COLOURS = 3
@@ -46,8 +47,9 @@ def over(
     0.0 and 1.0, belong to the kind of function. It runs by NumPy alone if other objects are among them.
     """
     global _asked
-    module = kernel.llvm() if len(sources[0]) and _asked > MANY and not _foreign(numbers) else None
     count = samples[0].shape[-1]
+    worth = _asked > MANY and len(sources[0]) * count > LEAST
+    module = kernel.llvm() if worth and not _foreign(numbers) else None
     size = max((COMPILED_BLOCK if module else BLOCK) // count, 1)
     found = []
     for first in range(0, max(len(sources[0]), 1), size):
