@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
@@ -30,30 +31,42 @@ _ARITHMETIC: dict[str, Callable[..., Any]] = {
 def evaluate(outputs: Sequence[Value], values: Mapping[str, Any]) -> list[Any]:
     """The outputs for values of the inputs: numbers (N,) and colours (3, N); `vt_baked` is what reads a group of texels
     at a place, `vt_films` are tables of films by name."""
-    done: dict[Symbol, Any] = {}
+    return _evaluate(outputs, values, {})
+
+
+def _evaluate(outputs: Sequence[Value], values: Mapping[str, Any], known: Mapping[Symbol, Any]) -> list[Any]:
+    """The outputs, where the values of some symbols are known."""
+    done = dict(known)
 
     def of(x: Operand) -> Any:
         if isinstance(x, Symbol):
             return done[x]
         return np.array(x)[:, None] if isinstance(x, tuple) else x
 
-    order = in_order(outputs)
-    within = inside(order)
+    order, within = _order(tuple(x for x in outputs if isinstance(x, Symbol)))
     for symbol in order:
+        if symbol in done:
+            continue
         if symbol.kind == "loop":
-            done[symbol] = _looped(symbol, values)
+            done[symbol] = _looped(symbol, values, done)
         elif within[symbol] <= values.keys():
             done[symbol] = _evaluated(symbol, [of(x) for x in symbol.args], values)
     return [of(operand(x)) for x in outputs]
 
 
-def _looped(loop: Symbol, values: Mapping[str, Any]) -> list[Any]:
+@functools.lru_cache  # a loop has the same order every time
+def _order(symbols: tuple[Symbol, ...]) -> tuple[list[Symbol], dict[Symbol, frozenset[str]]]:
+    order = in_order(symbols)
+    return order, inside(order)
+
+
+def _looped(loop: Symbol, values: Mapping[str, Any], known: Mapping[Symbol, Any]) -> list[Any]:
     bound, nodes, times = loop.detail
     if nodes:
-        return [x for node in nodes for x in evaluate(loop.args, {**values, bound[0]: node})]
-    state = evaluate(loop.args[: len(bound)], values)
+        return [x for node in nodes for x in _evaluate(loop.args, {**values, bound[0]: node}, known)]
+    state = _evaluate(loop.args[: len(bound)], values, known)
     for _ in range(times):
-        state = evaluate(loop.args[len(bound) :], {**values, **dict(zip(bound, state))})
+        state = _evaluate(loop.args[len(bound) :], {**values, **dict(zip(bound, state))}, known)
     return state
 
 
