@@ -39,6 +39,7 @@ export class Viewport {
   thumbnails;
   ready; // when all is compiled that no material changes
 
+  #standing = []; // parts of the object
   #services;
   #onError;
   #listeners = new Set(); // to the camera
@@ -266,6 +267,7 @@ export class Viewport {
     this.loader = new Loader(device, this.#services);
     this.gbuffer = new GBuffer(device);
     this.stage = new Stage(device);
+    this.#standing = [];
     this.screen = new Screen(device);
     this.slots = Object.fromEntries(SLOTS.map((name) => [name, new Slot(device, this.loader)]));
     this.coming = null;
@@ -299,7 +301,10 @@ export class Viewport {
 
   #placeObject() {
     const { parts, name } = this.sources;
-    const scene = buildScene(parts.filter(({ role }) => stands(role, name)));
+    const standing = parts.filter(({ role }) => stands(role, name));
+    if (standing.length === this.#standing.length && standing.every((part, i) => part === this.#standing[i])) return;
+    this.#standing = standing;
+    const scene = buildScene(standing);
     this.gbuffer.setScene(scene);
     this.stage.setObject(scene);
     this.#moved();
