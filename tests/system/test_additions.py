@@ -35,6 +35,12 @@ OF_DEFAULT = {
             "    def reflectance(self, cosine: Array) -> Array:\n"
             "        return (1 - self.dust) * self.clean(cosine)\n\n    def clean(self, cosine",
         ),
+        (
+            "    def _divided(self, cosine",
+            "    def _divided(self, *light):\n        reflected, passing = self._clean(*light)\n"
+            "        return [(1 - self.facets.dust) * each for each in reflected], passing\n\n"
+            "    def _clean(self, cosine",
+        ),
     ],
     "model/smooth_interface.py": [
         (

@@ -6,8 +6,8 @@ what becomes of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -35,6 +35,7 @@ STRAIGHT = {True: 0.09, False: 0.01}
 GRAZING = 1e-4  # least cosine of light that meets an interface
 LEVEL = float(np.sqrt(1 - GRAZING**2))  # its sine
 ALPHA_MIN = 1e-3
+DIGITS = 9  # of indices that are alike
 BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
 WALKED = 16  # directions of walks between facets with films
 PATHS = 2048  # from each
@@ -70,6 +71,16 @@ class Facets:
         k = colours(layer.k) / outside if layer.kind == "conductor" else None
         alpha, angle = (float(layer.alpha_u), float(layer.alpha_v)), float(np.radians(layer.rotation))
         return cls(colours(above) / outside, below, k, *alpha, angle, films=films or None)
+
+    def key(self, unit: float = 1.0) -> Hashable:
+        """All values, with indices as multiples of a unit: equal for facets that act alike."""
+
+        def of(value: Any) -> Hashable:
+            if isinstance(value, Coated):
+                return value.key
+            return np.round(value / unit, DIGITS).tobytes() if isinstance(value, np.ndarray) else value
+
+        return tuple(map(of, vars(self).values()))
 
     @property
     def opaque(self) -> bool:
@@ -316,8 +327,8 @@ def shares_of_films(facets: Facets, p: Array) -> tuple[Array, Array]:
         alpha = np.full(WALKED, mean)
         return shares_in_the_end(facets.shares, eta, np.asarray(cosines), alpha, PATHS, facets.straight(True))
 
-    numbers = (None if x is None else x.tobytes() for x in (facets.above, facets.below, facets.k))
-    found = KEPT.once((shares_of_films, mean, facets.films.key, *numbers), walked)
+    alike = replace(facets, alpha_u=mean, alpha_v=mean, rotation=0.0)
+    found = KEPT.once((shares_of_films, alike.key()), walked)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, 0))
     at = coordinates.from_cosine(cosine) if critical is None else coordinates.from_angle(cosine, critical)
     reflected, passed = (np.array([np.interp(at, places, each) for each in share]) for share in found)

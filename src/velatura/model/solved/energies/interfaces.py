@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from velatura import ops, tables
 from velatura.model.rough_interface import (
+    DIGITS,
     GRAZING,
     KEPT,
     Facets,
@@ -32,7 +33,6 @@ from velatura.tables import Tables
 Array = NDArray[np.floating]
 T = TypeVar("T")
 
-DIGITS = 9  # of lengths of momentum that are alike
 SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
 OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
@@ -140,12 +140,9 @@ class _Met:
         basis, nodes = setting.basis, setting.basis.nodes
         if facets.alpha_u == facets.alpha_v and (lengths := np.unique(p)).shape < p.shape:
             return cls.of(facets, lengths, 0 * lengths, setting)._around(np.searchsorted(lengths, p), psi, basis)
-        momenta = facets.above, facets.below, facets.k, p, nodes.ends
-        key = (
-            *(None if x is None else np.round(np.asarray(x) / nodes.ends[-1], DIGITS).tobytes() for x in momenta),
-            *(facets.alpha_u, facets.alpha_v, facets.final, psi.tobytes()),
-            facets.films and facets.films.key,
-        )
+        unit = nodes.ends[-1]
+        momenta = (np.round(np.asarray(x) / unit, DIGITS).tobytes() for x in (p, nodes.ends))
+        key = facets.key(unit), *momenta, psi.tobytes()
         return setting.kept(key, lambda: cls._of(facets, p, psi, setting))
 
     @classmethod
