@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import random
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from editor import Visit
 
 import velatura as vt
@@ -154,7 +156,7 @@ class Hands:
             return
         self._fail("a message without a cause", said)
         for key, value in drawn.items():
-            if value != vt_json(wanted[key]):
+            if not alike(value, vt_json(wanted[key])):
                 self._fail(f"{key} of the picture", [str(body)[:2000]])
 
     def _undoes(self) -> None:
@@ -194,6 +196,18 @@ class Hands:
         self.outcome.failures += [
             f"{what}: {detail} (after {len(self.outcome.edits)} edits: {last})" for detail in details
         ]
+
+
+def alike(value: Any, wanted: Any) -> bool:
+    """Whether values are equal, arrays to single precision: another process may work them out in another order."""
+    if not isinstance(value, dict) or not isinstance(wanted, dict):
+        return bool(value == wanted)
+    if value.keys() != wanted.keys():
+        return False
+    if value.keys() != {"dtype", "shape", "data"}:
+        return all(alike(entry, wanted[key]) for key, entry in value.items())
+    found, expected = (np.frombuffer(base64.b64decode(x["data"]), x["dtype"]) for x in (value, wanted))
+    return value["shape"] == wanted["shape"] and np.allclose(found, expected, rtol=1e-5, atol=1e-6)
 
 
 def vt_json(value: Any) -> Any:
