@@ -389,6 +389,7 @@ def test_dragging_never_compiles(visit: Open) -> None:
         """() => {
           const { viewport } = window.velatura;
           window.compiled = 0;
+          viewport.prepare = async () => {}; // looking ahead compiles what may come, at any time
           const { setMaterial } = viewport;
           viewport.setMaterial = (...given) => (window.compiled++, setMaterial.apply(viewport, given));
           const { gl } = viewport.device;
