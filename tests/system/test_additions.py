@@ -75,9 +75,9 @@ OF_OTHERS = {
     ],
     "plugins/weidlich_wilkie.py": [
         (
-            "def _reflectance(layer",
-            "def _reflectance(layer, n, cosine):\n"
-            "    return (1 - layer.dust) * _clean(layer, n, cosine)\n\n\ndef _clean(layer",
+            "def _reflectance(meeting",
+            "def _reflectance(meeting, cosine):\n"
+            "    return (1 - meeting.layer.dust) * _clean(meeting, cosine)\n\n\ndef _clean(meeting",
         ),
     ],
 }

@@ -132,3 +132,13 @@ def test_it_computes_with_floats_too() -> None:
     wi, wo = direction(0.8, 0.3), direction(0.7, 3.2)
     by_hand = plugin.evaluate(Material.of(stack, as_described), tuple(wi), tuple(wo))
     np.testing.assert_allclose(value_and_density(material(stack), wi, wo)[0], by_hand, rtol=1e-4)
+
+
+def test_a_pane_reflects_at_its_last_interface_what_the_index_outside_says() -> None:
+    """A thin pane has the exterior below it, as a solid that ends in an interface to that index."""
+    layers = [Interface(eta=1.5, alpha=0.2), Interface(eta=1.5, alpha=0.1)]
+    wi, wo = direction(0.8, 0.3), direction(0.7, 3.2)
+    pane = value_and_density(material(Stack(layers, thin=True)), wi, wo)
+    solid = value_and_density(material(Stack([layers[0], Interface(eta=1.0, alpha=0.1)])), wi, wo)
+    np.testing.assert_allclose(pane[0], solid[0], rtol=1e-6)
+    assert pane[1] == pytest.approx(solid[1])

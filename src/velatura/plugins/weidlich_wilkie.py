@@ -17,6 +17,8 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues, refuse_films
+from velatura.stack.chain import Meeting, chain
+from velatura.stack.layers import LayerValues
 
 ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 EXCEPTIONS = frozenset({"lossless"})  # laws of `velatura.checks`: light that is reflected twice, or passes, is lost
@@ -94,11 +96,12 @@ def evaluate(material: Material, wi: Direction, wo: Direction, asked: Sequence[i
     `asked` are the surfaces whose light is asked for, by their place in the stack; None for all.
     """
     h = ggx.normalize((wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]))
-    i, o, n = wi, wo, material.exterior
+    i, o = wi, wo
     asked = range(len(material.layers)) if asked is None else asked
     total: Value = 0.0
     passed: Value = 1.0
-    for k, layer in enumerate(material.layers):
+    for k, meeting in enumerate(chain(material)):
+        layer = meeting.layer
         # Absorb on both ways through a medium
         if isinstance(layer, MediumValues):
             passed = passed * _absorbed(layer, ops.divide(1.0, i[2]) + ops.divide(1.0, o[2]))
@@ -108,7 +111,7 @@ def evaluate(material: Material, wi: Direction, wo: Direction, asked: Sequence[i
             break
         # Reflect at an interface
         alpha_u, alpha_v, turned_i, turned_o, turned_h = _in_frame(layer, i, o, h)
-        reflectance = _reflectance(layer, n, ops.maximum(ggx.dot(i, h), 0.0))
+        reflectance = _reflectance(meeting, ops.maximum(ggx.dot(i, h), 0.0))
         g = ggx.masking(turned_i, alpha_u, alpha_v) * ggx.masking(turned_o, alpha_u, alpha_v)
         lobe = ops.divide(ggx.ndf(turned_h, alpha_u, alpha_v) * g, 4 * ops.maximum(i[2] * o[2], 0.0))
         total = total + passed * reflectance * lobe * float(k in asked)
@@ -117,8 +120,8 @@ def evaluate(material: Material, wi: Direction, wo: Direction, asked: Sequence[i
         # Pass it twice; what other facets shadow is not lost inside
         transmittance = 1 - reflectance
         passed = passed * transmittance * ((1 - g) + transmittance * g)
-        eta = ops.mean(layer.eta / n)
-        i, o, n = _refracted(i, h, eta), _refracted(o, h, eta), layer.eta
+        eta = ops.mean(meeting.below / meeting.above)
+        i, o = _refracted(i, h, eta), _refracted(o, h, eta)
         passed = ops.select((i[2] > 0) & (o[2] > 0), passed, 0.0)
     return total * wo[2]
 
@@ -175,20 +178,20 @@ def _shares(material: Material, asked: Sequence[int]) -> Iterator[tuple[int, Val
 def _energies(material: Material, cosine: Value) -> dict[int, Value]:
     """Energy reflected by every surface, a colour, by its place: that of a stack of smooth ones."""
     energies: dict[int, Value] = {}
-    n, left = material.exterior, 1.0
-    for k, layer in enumerate(material.layers):
+    left: Value = 1.0
+    for k, meeting in enumerate(chain(material)):
+        layer = meeting.layer
         if isinstance(layer, MediumValues):
             left = left * _absorbed(layer, 2 * ops.divide(1.0, cosine))
             continue
         if isinstance(layer, DiffuseValues):
             energies[k] = left * layer.albedo
             break
-        reflectance = _reflectance(layer, n, cosine)
+        reflectance = _reflectance(meeting, cosine)
         energies[k] = left * reflectance
         if layer.kind == "dielectric":
-            eta = ops.mean(layer.eta / n)
-            left, n = left * (1 - reflectance) * (1 - reflectance), layer.eta
-            cosine = fresnel.cos_transmitted(cosine, eta)
+            left = left * (1 - reflectance) * (1 - reflectance)
+            cosine = fresnel.cos_transmitted(cosine, ops.mean(meeting.below / meeting.above))
     return energies
 
 
@@ -197,12 +200,15 @@ def _absorbed(layer: MediumValues, ways: Value) -> Value:
     return ops.exp(-layer.sigma_a * layer.depth * ways)
 
 
-def _reflectance(layer: InterfaceValues, n: Value, cosine: Value) -> Value:
+def _reflectance(meeting: Meeting[LayerValues], cosine: Value) -> Value:
+    layer = meeting.layer
+    assert isinstance(layer, InterfaceValues)
     if layer.kind == "mirror":
         return 1.0
+    eta = meeting.below / meeting.above
     if layer.kind == "conductor":
-        return fresnel.conductor(cosine, layer.eta / n, layer.k / n)
-    return fresnel.dielectric(cosine, layer.eta / n)
+        return fresnel.conductor(cosine, eta, layer.k / meeting.above)
+    return fresnel.dielectric(cosine, eta)
 
 
 def _refracted(w: Direction, h: Direction, eta: Value) -> Direction:

@@ -22,6 +22,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
 from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
+from velatura.stack.chain import chain
 from velatura.stack.values import Pair
 
 ALPHA_MIN = 1e-3  # an interface smoother than this along both axes is perfectly smooth
@@ -232,20 +233,16 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
     index: list[Value] = [material.exterior]
     films: list[InterfaceFilms | None] = []
     medium, last = WalkedSlab(), material.layers[-1]
-    for layer, on_it in zip(material.solid().layers, films_of(material)):
+    for meeting in chain(material, films_of(material)):
+        layer = meeting.layer
         if isinstance(layer, MediumValues):
             medium = WalkedSlab(_product(layer.sigma_a, layer.depth), _product(layer.sigma_s, layer.depth), layer.g)
             continue
         slabs.append(medium)
-        films.append(on_it)
+        films.append(meeting.films)
+        index.append(1.0 if meeting.below is None else meeting.below)
         medium = WalkedSlab()
-        if isinstance(layer, DiffuseValues):
-            index.append(1.0)
-            surfaces.append(WalkedSurface(1.0, 1.0, 0.0, False))
-        else:
-            index.append(1.0 if layer.eta is None else layer.eta)
-            matched = layer.kind == "dielectric" and ops.absolute(relative_index(*index[-2:]) - 1) < _MATCHED
-            surfaces.append(_surface(layer, matched))
+        surfaces.append(_surface(layer, *index[-2:]))
     extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
     return WalkedLayers(
         material.kinds[-1],
@@ -285,8 +282,11 @@ def relative_index(n_in: Value, n_out: Value) -> Value:
     return ops.mean(n_out) / ops.mean(n_in)
 
 
-def _surface(layer: InterfaceValues, matched: Value) -> WalkedSurface:
+def _surface(layer: InterfaceValues | DiffuseValues, above: Value, below: Value) -> WalkedSurface:
+    if isinstance(layer, DiffuseValues):
+        return WalkedSurface(1.0, 1.0, 0.0, False)
     u, v, rotation = layer.alpha_u, layer.alpha_v, layer.rotation
+    matched = layer.kind == "dielectric" and ops.absolute(relative_index(above, below) - 1) < _MATCHED
     smooth = (ops.maximum(u, v) < ALPHA_MIN) | matched
     turn = 0.0 if _is_zero(rotation) else rotation * (pi / 180)
     return WalkedSurface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from velatura.errors import InvalidInput
+from velatura.stack.chain import chain
 from velatura.stack.layers import Interface
 from velatura.stack.spectra import Measured, Named, rgb
 from velatura.stack.values import Varying
@@ -17,20 +18,19 @@ STEP_MIN = 1e-3  # least step of the logarithm of the index across a rough inter
 
 def check(stack: Stack) -> None:
     """ValueError, in one line, where an interface with films does not fit its neighbours."""
-    above: Any = stack.exterior
-    for index, layer in enumerate(stack.layers):
-        if not isinstance(layer, Interface):
+    for index, meeting in enumerate(chain(stack)):
+        layer = meeting.layer
+        if not isinstance(layer, Interface) or not layer.films or layer.opaque or layer.alpha == 0:
             continue
-        if layer.films:
-            below = stack.exterior if stack.thin and layer is stack.layers[-1] else layer.eta
-            rough = not layer.opaque and layer.alpha != 0
-            known = not isinstance(above, Varying) and not isinstance(below, Varying)
-            if rough and known and abs(_mean(below) / _mean(above) - 1) < STEP_MIN:
-                raise ValueError(
-                    f"layer {index} (interface): films: between media whose indices differ by less than {STEP_MIN:g} "
-                    "only where alpha is 0"
-                )
-        above = layer.eta
+        indices = meeting.above, meeting.below
+        if any(isinstance(eta, Varying) for eta in indices):
+            continue
+        above, below = map(_mean, indices)
+        if abs(below / above - 1) < STEP_MIN:
+            raise ValueError(
+                f"layer {index} (interface): films: between media whose indices differ by less than {STEP_MIN:g} "
+                "only where alpha is 0"
+            )
 
 
 def _mean(index: Any) -> float:
