@@ -7,6 +7,7 @@ function, and then a third of NumPy's time. So kernels follow once `MANY` values
 from __future__ import annotations
 
 import copy
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
@@ -93,28 +94,36 @@ def _compiled(
     shape = len(sources[0]), samples[0].shape[-1]
     flat: list[float] = []
     _mapped(numbers, flat.append)
-    given = number(np.array([shape[1], *flat]))
+    given = number(np.array([*flat, 0.0]))
 
     def read(values: Any, place: Any) -> Any:
         return dr.gather(number, values, place)
 
-    size = shape[0] * shape[1]
-    place = dr.arange(integer, size)
-    count = integer(read(given, integer(0)))
-    source = place // count
-    sample = place - source * count
-    places = itertools.count(1)
+    source, sample = _places(integer, *shape)
+    places = itertools.count()
     groups, sums = function(
         [read(number(x), source) for x in sources],
         [number(x.ravel()) if x.ndim > 1 else read(number(x), sample) for x in samples],
         _mapped(numbers, lambda _: read(given, integer(next(places))), module.Array3f64),
     )
-    whole = dr.zeros(number, size)
-    found = [[number(value) + whole for value in _channels(group)] for group in [*groups, sums]]
+    size = shape[0] * shape[1]
+
+    def whole(value: Any) -> Any:
+        each = number(value)
+        return each if dr.width(each) == size else each + dr.zeros(number, size)
+
+    found = [[whole(value) for value in _channels(group)] for group in [*groups, sums]]
     dr.eval(found)
     *arrays, totals = ([x.numpy().reshape(shape) for x in group] for group in found)
     stacked = [each[0][..., None] if len(each) == 1 else np.stack(each, axis=-1) for each in arrays]
     return stacked, np.array([x.sum(axis=1) for x in totals])
+
+
+@functools.lru_cache(maxsize=32)
+def _places(integer: Any, sources: int, samples: int) -> tuple[Any, Any]:
+    """The source and the sample of each value; quicker to read than to divide for."""
+    source, sample = np.divmod(np.arange(sources * samples, dtype=np.uint32), np.uint32(samples))
+    return integer(source), integer(sample)
 
 
 def _channels(group: Sequence[Value]) -> list[Value]:

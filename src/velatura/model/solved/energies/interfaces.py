@@ -7,7 +7,7 @@ tables of multiple scattering say.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -146,6 +146,15 @@ class _Met:
         return setting.kept(key, lambda: cls._of(facets, p, psi, setting))
 
     @classmethod
+    def of_each(cls, facets: Facets, sources: Sequence[tuple[Array, Array]], setting: Setting) -> list[_Met]:
+        """First events of groups of sources (p, psi), at once where none depends on the axes of the facets."""
+        if facets.alpha_u != facets.alpha_v:
+            return [cls.of(facets, *each, setting) for each in sources]
+        p, psi = map(np.concatenate, zip(*sources))
+        met, ends = cls.of(facets, p, psi, setting), np.cumsum([len(each) for each, _ in sources])
+        return [met._part(slice(end - len(each), end)) for end, (each, _) in zip(ends, sources)]
+
+    @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
         events = FirstEvents(facets, tuple(setting.ways))
         lights, others = setting.basis.deposited(events, p, psi, setting.samples, events.numbers(setting.samples))
@@ -153,6 +162,12 @@ class _Met:
         totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]
         shares = FirstShares.beside(facets, totals[0], 0 * totals[0] if facets.opaque else totals[1], others)
         return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares)
+
+    def _part(self, sources: slice) -> _Met:
+        """Some of the sources."""
+        reflected, refracted = (None if x is None else x[..., sources] for x in (self.reflected, self.refracted))
+        assert reflected is not None
+        return _Met(reflected, refracted, FirstShares(*(x[:, sources] for x in vars(self.shares).values())))
 
     def _around(self, places: NDArray[np.integer], psi: Array, basis: Basis) -> _Met:
         """The sources of numbers `places`, which isotropic facets met at the azimuth 0, at others."""
@@ -178,8 +193,8 @@ class _Side:
         basis, turn = setting.basis, facets.rotation
         along_axes = replace(facets, rotation=0.0)
         p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
-        at_nodes = _Met.of(along_axes, p, psi, setting)
-        of_beams = _Met.of(along_axes, setting.p, basis.relative(setting.phi, turn), setting)
+        sources = (p, psi), (setting.p, basis.relative(setting.phi, turn))
+        at_nodes, of_beams = _Met.of_each(along_axes, sources, setting)
 
         def operators(nodes: Array | None, beams: Array | None) -> tuple[Operator, Operator]:
             if nodes is None or beams is None:
