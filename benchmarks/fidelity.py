@@ -117,10 +117,11 @@ def textured(stack: Stack, model: Model) -> Any:
     return kernel.load_dict({"type": "layered", "material": dumps(stack, "json"), **switches, **maps})
 
 
-def seen(probe: Probe, incidence: Incidence) -> tuple[Array, Array]:
+def seen(probe: Probe, incidence: Incidence, azimuth: float) -> tuple[Array, Array]:
     """Energies (2, 2, 3, bins, bins) as `Walks.grids` has them, and the weights (n,) of all samples."""
     z = -incidence.cosine if incidence.inside else incidence.cosine
-    wi = (np.sqrt(1 - z * z), 0.0, z)
+    sine = np.sqrt(1 - z * z)
+    wi = (sine * np.cos(azimuth), sine * np.sin(azimuth), z)
     halves, weights = [], []
     for half in range(2):
         u = evenly(SAMPLES, half)
@@ -151,8 +152,10 @@ def compared(kind: Kind, walks: Walks, bsdf: Any) -> list[Record]:
     """Every direction of incidence, and the sides that are looked at."""
     probe, found = probe_of(bsdf), []
     for n, incidence in enumerate(walks.incidences):
-        grids, weights = seen(probe, incidence)
-        modelled, true = (symmetric(walks.stack, incidence.cosine, g) for g in (grids, walks.grids[:, :, :, n]))
+        grids, weights = seen(probe, incidence, kind.azimuth)
+        modelled, true = grids, walks.grids[:, :, :, n]
+        if not kind.azimuth:
+            modelled, true = (symmetric(walks.stack, incidence.cosine, g) for g in (modelled, true))
         spread = float(weights.var() / max(weights.mean(), 1e-9) ** 2)
         for side, name in enumerate(FAINT):
             row = _row(kind, incidence, name)

@@ -5,7 +5,8 @@
 Stacks have 1 to 4 interfaces, of an index in 1.1 to 2.2 and alpha to .55 (one in seven is smooth), over metals,
 mirrors, glass and diffuse bases; what each kind has besides, its function says. Those of the half `fit` are for
 fitting, those of the half `test` never. Light comes from above at cosines 1, .7 and .35, and into solids also from
-inside, at the momenta n sin = 0, .6, .93, 1.04 and 1 + .6 (n - 1). Every stack is a file in YAML, with its walks beside
+inside, at the momenta n sin = 0, .6, .93, 1.04 and 1 + .6 (n - 1). The last four kinds are lit at .9, .5, .2 and .08
+from above alone. Every stack is a file in YAML, with its walks beside
 it as NPZ. What is there already is not walked again.
 """
 
@@ -24,12 +25,26 @@ from rows import parser
 
 import velatura as vt
 from velatura import files
-from velatura.benchmark.random_stacks import clear, cloudy, isotropic, milky, painted, tinted, turned
+from velatura.benchmark.random_stacks import (
+    clear,
+    cloudy,
+    crossed,
+    frosted,
+    isotropic,
+    lacquered,
+    milky,
+    painted,
+    tinted,
+    turned,
+    very_rough,
+)
 from velatura.stack import Material, Stack, as_described, dumps
 
 Array = NDArray[np.floating]
 
 COSINES = (1.0, 0.7, 0.35)
+SLANTED = (0.9, 0.5, 0.2, 0.08)
+ASIDE = 0.2  # radians: mirrored light is on no border of bins
 MOMENTA = (0.0, 0.6, 0.93, 1.04)  # from inside
 DEEP = 0.6  # of the way from the critical angle to grazing
 HALVES = ("fit", "test")
@@ -49,6 +64,8 @@ class Kind:
     draw: Callable[[np.random.Generator, int], Stack]
     often: bool
     passes: bool = False
+    cosines: tuple[float, ...] = COSINES
+    azimuth: float = 0.0  # of the light, from the tangent
 
     def stack(self, seed: int, half: str, number: int) -> Stack:
         """One of its stacks, independent of the others that are drawn."""
@@ -67,6 +84,10 @@ KINDS = (
     Kind("passing, once", clear, False, True),
     Kind("passing, often", clear, True, True),
     Kind("passing scattering, often", milky, True, True),
+    Kind("brushed under lacquer", lacquered, True, False, SLANTED, ASIDE),
+    Kind("crossed brushing", crossed, True, False, SLANTED, ASIDE),
+    Kind("frosted pane", frosted, True, True, SLANTED, ASIDE),
+    Kind("very rough", very_rough, True, True, SLANTED, ASIDE),
 )
 
 # Their walks ---------------------------------------------------------------------------------------------------------
@@ -74,7 +95,7 @@ KINDS = (
 
 @dataclass(frozen=True)
 class Incidence:
-    """A direction that light comes from, in the plane of the tangent: its cosine, and from which side."""
+    """A direction that light comes from, at the azimuth of the kind: its cosine, and from which side."""
 
     cosine: float
     inside: bool
@@ -98,8 +119,8 @@ class Walks:
 
 def incidences(kind: Kind, stack: Stack) -> tuple[Incidence, ...]:
     """Every direction that a stack of that kind is lit from."""
-    found = [Incidence(c, False, float(np.sqrt(1 - c * c))) for c in COSINES]
-    if kind.passes and not stack.thin:
+    found = [Incidence(c, False, float(np.sqrt(1 - c * c))) for c in kind.cosines]
+    if kind.passes and not stack.thin and kind.cosines is COSINES:
         index = Material.of(stack, as_described).below
         momenta = sorted({*MOMENTA, 1 + DEEP * (index - 1)})
         found += [Incidence(float(np.sqrt(1 - (p / index) ** 2)), True, p) for p in momenta]
@@ -113,13 +134,15 @@ def walked(kind: Kind, stack: Stack, paths: int) -> Walks:
     for inside in sorted({i.inside for i in lit}):
         seen = _reversed(stack) if inside else stack
         cosines = [i.cosine for i in lit if i.inside == inside]
-        halves = [vt.reference.distribution(seen, cosines, 0.0, paths // 2, seed, kind.often) for seed in (1, 2)]
+        halves = [
+            vt.reference.distribution(seen, cosines, kind.azimuth, paths // 2, seed, kind.often) for seed in (1, 2)
+        ]
         nothing = np.zeros_like(halves[0].reflected)
         sides.append([[h.reflected, nothing if h.transmitted is None else h.transmitted] for h in halves])
     grids = np.concatenate([np.array(side, np.float32) for side in sides], axis=3)
     if kind.passes:
         return Walks(stack, lit, grids, None)
-    energy = np.array(vt.reference.statistics(stack, COSINES, 0.0, paths, 3, kind.often).energy)
+    energy = np.array(vt.reference.statistics(stack, kind.cosines, kind.azimuth, paths, 3, kind.often).energy)
     return Walks(stack, lit, grids, energy)
 
 

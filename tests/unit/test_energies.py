@@ -219,12 +219,29 @@ def test_brushed_metals_look_alike_from_all_azimuths_about_the_normal(often: boo
     assert np.ptp(alike, axis=0) == pytest.approx(0, abs=5e-4)
 
 
+@pytest.mark.parametrize("often", [False, True], ids=["once", "often"])
+def test_interfaces_that_mirror_light_keep_cosines_from_sines(often: bool) -> None:
+    stack = Stack([Interface(eta=1.5, alpha=[0.05, 0.2]), Interface(**GOLD, alpha=[0.3, 0.06], rotation=90)])
+    found = parts(Material.of(stack))
+    nodes, p = Nodes.of(indices(found), 24), np.sqrt(1 - COSINES**2)
+    total = []
+    for mirrored in (True, False):
+        basis = Even(nodes, (2, 4), 4, mirrored)
+        setting = Setting(basis, p, 0 * p + 0.4, 89, tables.load() if often else None)
+        light = leaving([last for _, last in layers(found, setting)], setting)
+        total.append(sum(light.energy(each) for each in light.reflected))
+    assert Even.of(nodes, [(4.0, 0.0), (5.0, np.pi / 2)]).mirrored and not Even.of(nodes, [(4.0, 0.3)]).mirrored
+    assert total[0] == pytest.approx(total[1], abs=1e-12)
+
+
 # Walks
 
 
 WALKED: dict[str, list[Any]] = {
     "coats": [Interface(eta=1.7, alpha=0.3), Interface(eta=1.3, alpha=0.1), Interface(**GOLD, alpha=0.25)],
     "brushed": [Interface(eta=1.6, alpha=[0.3, 0.1], rotation=35), Interface(**GOLD, alpha=[0.1, 0.3], rotation=80)],
+    "lacquer": [Interface(eta=1.5, alpha=0.18), Interface(eta=0.96, k=6.7, alpha=[0.345, 0.03], rotation=30)],
+    "crossed": [Interface(eta=1.6, alpha=[0.35, 0.04], rotation=20), Interface(**GOLD, alpha=[0.3, 0.04], rotation=95)],
     "varnish": [Interface(eta=1.5, alpha=0.15), Medium(depth=1, sigma_a=0.4), Interface(**GOLD, alpha=0.3)],
     "paint": [COAT, Medium(depth=1, sigma_a=0.3, sigma_s=2.0, g=0.4), Interface(**GOLD, alpha=0.1)],
     "backwards": [COAT, Medium(depth=1, sigma_a=0.1, sigma_s=1.0, g=-0.3), Diffuse(albedo=0.5)],

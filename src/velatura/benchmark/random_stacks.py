@@ -122,3 +122,45 @@ def milky(rng: np.random.Generator, number: int) -> Stack:
     layers: list[Layer] = [coat(rng) for _ in range(2 + number // 2 % 2)]
     layers.insert(int(rng.integers(1, len(layers))), scattering(rng))
     return Stack(layers, thin=bool(number % 2))
+
+
+# Stacks as people make them, where the model is weakest ---------------------------------------------------------------
+
+
+def lacquered(rng: np.random.Generator, number: int) -> Stack:
+    """Brushed metal, three to twelve times as rough across the brushing, under one lacquer, smooth in every second."""
+    long, ratio = float(rng.uniform(0.15, 0.4)), float(rng.uniform(3, 12))
+    lacquer = Interface(eta=float(rng.uniform(1.4, 1.6)), alpha=float(rng.uniform(0.02, 0.2)) if number % 2 else 0.0)
+    return Stack([lacquer, _metal(rng, (long, long / ratio), float(rng.uniform(0, 180)))])
+
+
+def crossed(rng: np.random.Generator, number: int) -> Stack:
+    """Two or three brushed layers, the lowest of metal, each at an angle to the one above."""
+    layers: list[Layer] = []
+    angle = float(rng.uniform(0, 180))
+    for k in range(2 + number % 2):
+        long, ratio = float(rng.uniform(0.15, 0.4)), float(rng.uniform(3, 10))
+        last = k == 1 + number % 2
+        alpha, angle = (long, long / ratio), (angle + float(rng.uniform(45, 135))) % 180
+        eta = float(rng.uniform(1.3, 1.7))
+        layers.append(_metal(rng, alpha, angle) if last else Interface(eta=eta, alpha=alpha, rotation=angle))
+    return Stack(layers)
+
+
+def frosted(rng: np.random.Generator, number: int) -> Stack:
+    """Panes of glass with two rough faces; every third absorbs."""
+    faces = [Interface(eta=float(n), alpha=float(rng.uniform(0.2, 0.6))) for n in (rng.uniform(1.45, 1.6), 1.0)]
+    between = [absorbing(rng)] if number % 3 == 2 else []
+    return Stack([faces[0], *between, faces[1]], thin=True)
+
+
+def very_rough(rng: np.random.Generator, number: int) -> Stack:
+    """Two very rough interfaces: solids and panes in turn."""
+    alphas = rng.uniform(0.6, 1.0, 2)
+    indices = rng.uniform(1.3, 1.7), 1.0 if number % 2 else rng.uniform(1.3, 1.7)
+    return Stack([Interface(eta=float(n), alpha=float(a)) for n, a in zip(indices, alphas)], thin=bool(number % 2))
+
+
+def _metal(rng: np.random.Generator, alpha: tuple[float, float], rotation: float) -> Interface:
+    eta, k = (_colour(rng.uniform(*span, 3)) for span in ((0.2, 2.0), (3.0, 7.0)))
+    return Interface(eta=eta, k=k, alpha=alpha, rotation=rotation)

@@ -22,7 +22,7 @@ from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled
 from velatura.renderer.kept import Kept
-from velatura.renderer.low_discrepancy import fibonacci
+from velatura.renderer.low_discrepancy import STEPS, fibonacci
 from velatura.stack import InterfaceValues
 from velatura.tables import coordinates
 from velatura.tables.microsurface_walks import shares_in_the_end
@@ -95,6 +95,11 @@ class Facets:
     def brushed(self) -> float:
         """0 for isotropic facets, towards 1 for those that are long along an axis."""
         return 1 - min(self.alpha_u, self.alpha_v) / max(self.alpha_u, self.alpha_v, ALPHA_MIN)
+
+    @property
+    def ratio(self) -> float:
+        """The greater of both roughnesses over the lesser."""
+        return max(self.alpha_u, self.alpha_v, ALPHA_MIN) / max(min(self.alpha_u, self.alpha_v), ALPHA_MIN)
 
     @property
     def is_smooth(self) -> bool:
@@ -172,19 +177,22 @@ Scatter = Callable[[Sequence[Value], Sequence[Value], Sequence[Value]], tuple[Se
 @dataclass(frozen=True)
 class FirstShares:
     """Shares (C, sources) of light at first events: reflected (`kept`), refracted (`passed`), what masking blocks of
-    either, and what it would block (1, sources) if all were reflected."""
+    either, and what it would block (1, sources) if all were reflected; and what second events reflect past other facets
+    (`second`), and towards them (`third`), 0 where these are not looked at."""
 
     kept: Array
     passed: Array
     blocked_reflected: Array
     blocked_refracted: Array
     whole: Array
+    second: Array
+    third: Array
 
     @classmethod
-    def of(cls, facets: Facets, p: Array, samples: int, often: bool) -> FirstShares:
+    def of(cls, facets: Facets, p: Array, samples: int, often: bool, again: bool = False) -> FirstShares:
         """Shares of light of lengths p that meets facets without axes, once or often, by samples."""
         lengths, places = np.unique(p, return_inverse=True)
-        events = FirstEvents(facets, (often,))
+        events = FirstEvents(facets, (often,), again)
 
         def totals(*values: Any) -> tuple[list[list[Value]], list[Value]]:
             lights, others = events(*values)
@@ -192,15 +200,19 @@ class FirstShares:
 
         of_lengths = lengths, 0 * lengths
         _, found = compiled.over(totals, of_lengths, fibonacci(samples), events.numbers(samples))
-        kept, others = np.split(found[:, places], [events.colours])
-        passed, others = np.split(others, [0 if facets.opaque else events.colours])
-        return cls.beside(facets, kept, passed if len(passed) else 0 * kept, others)
+        count = events.lights * events.colours
+        lights = found[:count, places].reshape(events.lights, events.colours, len(p))
+        return cls.beside(facets, [*lights], found[count:, places])
 
     @classmethod
-    def beside(cls, facets: Facets, kept: Array, passed: Array, others: Array) -> FirstShares:
-        """Shares that `FirstEvents` has besides its light: (L, sources)."""
-        *blocked, whole = np.split(others, [len(kept), len(others) - 1][: 1 if facets.opaque else 2])
-        return cls(kept, passed, blocked[0], 0 * kept if facets.opaque else blocked[1], whole)
+    def beside(cls, facets: Facets, lights: Sequence[Array], others: Array) -> FirstShares:
+        """Shares of the lights of `FirstEvents`, (C, sources) each, and those that it has besides: (L, sources)."""
+        first, colours, nothing = 1 if facets.opaque else 2, len(lights[0]), 0 * lights[0]
+        kept, passed = (*lights[:first], nothing)[:2]
+        *blocked, rest = np.split(others, [colours * (k + 1) for k in range(first)])
+        second, twice = (lights[first], rest[1:]) if len(lights) > first else (nothing, nothing)
+        reflected, refracted = (*blocked, nothing)[:2]
+        return cls(kept, passed, reflected, refracted, rest[:1], second, twice - second)
 
 
 @dataclass(frozen=True)
@@ -209,16 +221,23 @@ class FirstEvents:
     the shares of `FirstShares` that the last way blocks.
 
     `ways` says whether masking is correlated with the height of facets, as what follows needs (Heitz et al. 2016);
-    otherwise it is separable.
+    otherwise it is separable. With `again`, there is also the light of second events, of what the last
+    way blocks: what is reflected twice, and unless facets are opaque what then passes, and what was refracted at first.
     """
 
     facets: Facets
     ways: tuple[bool, ...]
+    again: bool = False
 
     @cached_property
     def colours(self) -> int:
         """Channels of reflectances, 1 where all are alike."""
         return len(self.facets.reflectance(np.ones(1)))
+
+    @property
+    def lights(self) -> int:
+        """How many lights there are."""
+        return (1 if self.facets.opaque else 2) + (0 if not self.again else 1 if self.facets.opaque else 3)
 
     def numbers(self, samples: int) -> list[Any]:
         """All numbers, and films, as `__call__` reads them."""
@@ -262,9 +281,9 @@ class FirstEvents:
         lights = [Light(n * o[0], n * o[1], [r * share * each for each in kept for r in reflectance])]
         blocked = 1 - kept[-1]
         others = [r * share * blocked for r in reflectance]
+        again, twice = self._second(o, others, u_2 / share, numbers) if self.again else ([], [])
         if not self.facets.opaque:
-            along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
-            x, y, z = (along * facing - towards / eta for facing, towards in zip(h, wi))
+            x, y, z = self._refracted(wi, h, cosine, eta)
             through = []
             for often in self.ways:
                 both = self._escape((x, y, z), here, alpha, often, through=True)
@@ -272,7 +291,38 @@ class FirstEvents:
             below = n * eta
             lights.append(Light(below * x, below * y, [t * share * each for each in through for t in passing]))
             others += [t * share * (1 - through[-1]) for t in passing]
-        return lights, [*others, blocked * share]
+            if self.again:
+                # More facets that turn it there and back leave it as it was
+                on = [ops.select(z < 0, each, 0.0) for each in others[len(passing) :]]
+                again.append(Light(below * x, below * y, on))
+        return [*lights, *again], [*others, blocked * share, *twice]
+
+    def _second(
+        self, travels: Direction, weights: Sequence[Value], number: Value, numbers: Sequence[Value]
+    ) -> tuple[list[Light], list[Value]]:
+        """Light of samples of running numbers that has been reflected, upwards or downwards, and meets another facet:
+        reflected past others, and refracted; and all that is reflected."""
+        n, alpha_u, alpha_v, _, eta, _, _, *colours, _ = numbers
+        u_3, u_4 = (number * step - ops.floor(number * step) for step in STEPS)
+        wi = -travels[0], -travels[1], -travels[2]
+        h = ggx.sample_visible(wi, alpha_u, alpha_v, u_3, u_4)
+        cosine = ops.minimum(ggx.dot(wi, h), 1.0)
+        reflectance, passing = self._divided(cosine, eta, colours)
+        x, y, z = ggx.reflect(wi, h)
+        seen = ops.select(z > 0, ggx.masking((x, y, ops.absolute(z)), alpha_u, alpha_v), 0.0)
+        twice = [r * weight for r, weight in zip(reflectance, weights)]
+        found = [Light(n * x, n * y, [seen * each for each in twice])]
+        if self.facets.opaque:
+            return found, twice
+        x, y, z = self._refracted(wi, h, cosine, eta)
+        through = [ops.select(z < 0, t * weight, 0.0) for t, weight in zip(passing, weights)]
+        return [*found, Light(n * eta * x, n * eta * y, through)], twice
+
+    @staticmethod
+    def _refracted(wi: Direction, h: Direction, cosine: Value, eta: Value) -> Direction:
+        along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
+        x, y, z = (along * facing - towards / eta for facing, towards in zip(h, wi))
+        return x, y, z
 
     def _divided(self, cosine: Value, eta: Value, colours: Sequence[Value]) -> tuple[list[Value], list[Value]]:
         """Shares that facets reflect, and let pass, by colour."""

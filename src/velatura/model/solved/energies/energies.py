@@ -103,12 +103,12 @@ def energies(
     beam; as many nodes are taken as for media of indices `like` those of the material.
     """
     everything = _ended(parts(material))
-    brushed = any(facets.alpha_u != facets.alpha_v for facets in interfaces(everything))
+    brushed = [(facets.ratio, facets.rotation) for facets in interfaces(everything) if facets.alpha_u != facets.alpha_v]
     azimuths = AZIMUTHS if brushed else AZIMUTHS[:1]
     cosines = np.concatenate([cos_theta, np.tile(incidences, len(azimuths))])
     around = np.concatenate([np.broadcast_to(phi, np.shape(cos_theta)), np.repeat(azimuths, len(incidences))])
     nodes = Nodes.of(indices(everything), NODES, like)
-    basis: Basis = Even(nodes) if brushed else Relative(nodes, MODES if len(incidences) else 1)
+    basis: Basis = Even.of(nodes, brushed) if brushed else Relative(nodes, MODES if len(incidences) else 1)
     setting = Setting(basis, np.sqrt(np.maximum(1 - cosines * cosines, 0)), around, samples, often)
 
     # Sum up the systems

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from velatura import ops, tables
 from velatura.model.rough_interface import (
+    ALPHA_MIN,
     DIGITS,
     GRAZING,
     KEPT,
@@ -35,6 +36,8 @@ T = TypeVar("T")
 
 SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
 OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
+BRUSHED = 0.3  # from which repeated light of metals has the directions of second events alone
+TRACE = 1e-12  # of light
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
 
@@ -62,9 +65,7 @@ class Setting:
 
     def kept(self, key: Hashable, make: Callable[[], T]) -> T:
         """What is made of light in this basis, but for the ends of its nodes, once for all of one key."""
-        basis = self.basis
-        described = type(basis), *(value for name, value in vars(basis).items() if name != "nodes"), basis.nodes.cells
-        return KEPT.once((key, described, self.samples, self.often), make)
+        return KEPT.once((key, type(self.basis), self.basis.deposits, self.samples, self.often), make)
 
     @property
     def dark(self) -> Setting:
@@ -90,17 +91,18 @@ def interface(facets: Facets, setting: Setting) -> tuple[Layer, Layer]:
         once, first = (Layer(r, nothing, nothing, nothing) for r in above.r)
         if not above.blocked:
             return once, once
-        return once, replace(first, r=first.r + _again(above.blocked[0], above.blocked[0], facets, setting))
+        to_r = above.blocked[0]
+        return once, replace(first, r=first.r + _again(to_r, to_r, above.second[:1], facets, setting))
     below = _Side.of(facets.reversed(), setting.dark)
     once, first = (Layer(*each) for each in zip(above.r, above.t, below.r, below.t))
     if not (above.blocked and below.blocked):
         return once, once
     (to_r, to_t), (back_to_r, back_to_t) = above.blocked, below.blocked
     return once, Layer(
-        first.r + _again(to_r, to_r, facets, setting),
-        first.t + _again(to_t, back_to_t, facets, setting),
-        first.r_below + _again(back_to_r, back_to_r, facets, setting),
-        first.t_below + _again(back_to_t, to_t, facets, setting),
+        first.r + _again(to_r, to_r, above.second[:1], facets, setting),
+        first.t + _again(to_t, back_to_t, above.second[1:], facets, setting),
+        first.r_below + _again(back_to_r, back_to_r, below.second[:1], facets, setting),
+        first.t_below + _again(back_to_t, to_t, below.second[1:], facets, setting),
     )
 
 
@@ -128,11 +130,12 @@ class _Blocked:
 @dataclass(frozen=True)
 class _Met:
     """First events of all sources: what they reflect and refract, deposited (C, modes, N, sources) for all ways to mask
-    light, and their shares."""
+    light, and their shares; and of brushed interfaces what second events reflect, and let pass."""
 
     reflected: Array
     refracted: Array | None
     shares: FirstShares
+    second: tuple[Array, ...] = ()
 
     @classmethod
     def of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
@@ -156,12 +159,17 @@ class _Met:
 
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
-        events = FirstEvents(facets, tuple(setting.ways))
+        again = facets.brushed > 0 and setting.often is not None
+        events = FirstEvents(facets, tuple(setting.ways), again)
         lights, others = setting.basis.deposited(events, p, psi, setting.samples, events.numbers(setting.samples))
         # Stencils keep the energy
         totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]
-        shares = FirstShares.beside(facets, totals[0], 0 * totals[0] if facets.opaque else totals[1], others)
-        return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares)
+        shares = FirstShares.beside(facets, totals, others)
+        first = 1 if facets.opaque else 2
+        lights, second = lights[:first], lights[first:]
+        if len(second) > 1:
+            second = [second[0], second[1] + second[2]]
+        return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares, tuple(second))
 
     def _part(self, sources: slice) -> _Met:
         """Some of the sources."""
@@ -181,16 +189,19 @@ class _Met:
 @dataclass(frozen=True)
 class _Side:
     """What becomes of light from one side of an interface at first events, with facets met once, and as the setting
-    says; and what the latter block, that in the end is reflected, and that passes.
+    says; what the latter block, that in the end is reflected, and that passes; and of brushed interfaces both with the
+    directions of `second` events.
     """
 
     r: tuple[Operator, Operator]
     t: tuple[Operator, Operator]
     blocked: tuple[_Blocked, _Blocked] | None
+    second: tuple[Operator, ...] = ()
 
     @classmethod
     def of(cls, facets: Facets, setting: Setting) -> _Side:
-        basis, turn = setting.basis, facets.rotation
+        basis = setting.basis
+        turn = 0.0 if facets.alpha_u == facets.alpha_v else facets.rotation
         along_axes = replace(facets, rotation=0.0)
         p, psi = np.tile(basis.nodes.p, len(basis.azimuths)), np.repeat(basis.azimuths, basis.nodes.count)
         sources = (p, psi), (setting.p, basis.relative(setting.phi, turn))
@@ -218,26 +229,43 @@ class _Side:
             emitted = rows * weights
             emitted = emitted / np.maximum(emitted[:, :1].sum(-1, keepdims=True), TINY)
             blocked.append(_Blocked(rows, beams, emitted, sines))
-        return cls(r, t, (blocked[0], blocked[1]))
+        second = []
+        for lights, of in zip(zip(at_nodes.second, of_beams.second), zip(*shares)):
+            # A trace leaves evenly, for sources of which second events reflect, or let pass, nothing
+            even = TRACE * basis.rows(np.ones_like(of[0]), 0.0)[..., None] * weights[:, None] / weights.sum()
+            nodes, beams = (
+                (light + even) * (share / (light + even)[:, 0].sum(axis=1))[:, None, None]
+                for light, share in zip(lights, of)
+            )
+            second.append(Operator.of(basis.operators(nodes, turn), basis.columns(beams, turn)))
+        return cls(r, t, (blocked[0], blocked[1]), tuple(second))
 
 
-def _again(taken: _Blocked, there: _Blocked, facets: Facets, setting: Setting) -> Operator:
+def _again(taken: _Blocked, there: _Blocked, second: Sequence[Operator], facets: Facets, setting: Setting) -> Operator:
     """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
-    turn it, the more of it goes on as it came."""
+    turn it, the more of it goes on as it came. Brushed ones, which keep its momentum along them, send it where their
+    `second` events do."""
+    brushed = min(facets.brushed / BRUSHED, 1) if second else 0.0
+    if brushed == 1:
+        return second[0]
     turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (OPAQUE if facets.opaque else facets.step)
     swing = SWING * float(np.exp(-SWING * turn))  # model.md, Eq. 4
     nodes, beams = (
-        setting.basis.swung(setting.basis.outer(there.emitted, light), swing, there.sines[0], sines)
-        for light, sines in zip((taken.nodes, taken.beams), taken.sines)
+        setting.basis.swung(setting.basis.outer(there.emitted, light), swing, there.sines[0], sines, phi)
+        for light, sines, phi in zip(
+            (taken.nodes, taken.beams), taken.sines, (None, setting.phi[: len(taken.sines[1])])
+        )
     )
-    return Operator.of(nodes, beams)
+    even = Operator.of(nodes, beams)
+    return brushed * second[0] + (1 - brushed) * even if second else even
 
 
 def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShares) -> tuple[Array, Array]:
     """Shares (C, sources) of light of lengths p that first events block and that in the end is reflected, or passes.
 
-    Of blocked light, it is reflected in the share that an isotropic interface of the mean roughness reflects: by the
-    tables over any number of events, less what first events reflect.
+    Of blocked light, isotropic interfaces reflect what the tables have over any number of events, less what first
+    events reflect. Brushed ones stand beside isotropic ones of their mean roughness, and the more they are brushed, of
+    their greater one, since they block light across it.
     """
     known = setting.often
     assert known is not None
@@ -247,17 +275,19 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShare
     if facets.films is not None:
         reflected, passed = shares_of_films(facets, p)
         return blocked * reflected, blocked * passed
-    mean = mean_alpha(facets)
+    across = min(facets.brushed / BRUSHED, 1)
+    alpha = (1 - across) * mean_alpha(facets) + across * max(facets.alpha_u, facets.alpha_v, ALPHA_MIN)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
     ratio = (facets.below / facets.above)[:, None]
     if facets.k is None:
         row = tables.dielectric_row(known, ratio, True, True)
     else:
         row = tables.conductor_row(known, ratio, (facets.k / facets.above)[:, None], True, True)
-    found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, mean)))
+    found = np.asarray(tables.fgd(known, row, cosine, np.full(p.shape, alpha)))
     stand_in = events
-    if facets.alpha_u != facets.alpha_v:
-        stand_in = FirstShares.of(replace(facets, alpha_u=mean, alpha_v=mean), p, setting.samples, True)
+    if across:
+        isotropic = replace(facets, alpha_u=alpha, alpha_v=alpha)
+        stand_in = FirstShares.of(isotropic, p, setting.samples, True, again=True)
     often, once = found.reshape(len(stand_in.blocked_reflected), -1), stand_in.kept
     met: Array
     little: Array
@@ -269,4 +299,19 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShare
     # Little that is blocked has a share that the tables do not resolve
     seen = np.clip((met - BLOCKED[0]) / (BLOCKED[1] - BLOCKED[0]), 0, 1)
     share = seen * np.clip((often - once) / np.maximum(met, BLOCKED[0]), 0, 1) + (1 - seen) * little
-    return blocked * share, np.zeros_like(once) if facets.k is not None else blocked * (1 - share)
+    reflected = blocked * share
+    if across:
+        twice = np.clip(_reflected_again(events, stand_in, met * share), 0, blocked)
+        reflected = (1 - across) * reflected + across * twice
+    return reflected, np.zeros_like(once) if facets.k is not None else blocked - reflected
+
+
+def _reflected_again(brushed: FirstShares, isotropic: FirstShares, known: Array) -> Array:
+    """Share of light that brushed facets block at first and reflect in the end: what second events reflect, and of what
+    goes on from there as much as isotropic facets reflect, of which it is `known`."""
+
+    def on(events: FirstShares) -> Array:
+        return np.asarray(events.third + events.blocked_refracted)
+
+    more = (known - isotropic.second) / np.maximum(on(isotropic), BLOCKED[0])
+    return np.asarray(brushed.second + more * on(brushed))

@@ -8,7 +8,7 @@ distinguish a direction from its opposite.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,8 @@ from velatura.renderer.low_discrepancy import fibonacci
 
 Array = NDArray[np.floating]
 
+RATIOS = (1.5, 3.0, 6.0)  # of two roughnesses, from which one more order of the azimuth is needed
+SQUARE = 1e-6  # of a right angle, within which two axes are at one
 ROOT = float(np.sqrt(2))
 TINY = np.finfo(float).tiny
 SHORT = 1e-150  # least length of momentum that has an azimuth
@@ -40,6 +42,11 @@ class Basis(ABC):
 
     nodes: Nodes
     azimuths: Array
+
+    @property
+    @abstractmethod
+    def deposits(self) -> Hashable:
+        """All that `deposited` depends on, but for the ends of the nodes."""
 
     @property
     @abstractmethod
@@ -117,10 +124,10 @@ class Basis(ABC):
     def outer(self, emitted: Array, taken: Array) -> Array:
         """Matrices that emit as (C, modes, N) what (C, modes, N) takes, or columns for what (C, M) takes of beams."""
 
-    def swung(self, light: Array, swing: float, there: Array, here: Array) -> Array:
-        """Even light (C, families, n, sources) that goes on in the direction that it came in, by the sines `there` (N,)
-        and `here` (sources,): with 1 + swing (s cos(phi) + s^2 cos(2 phi)), s being their product."""
-        return light
+    @abstractmethod
+    def swung(self, light: Array, swing: float, there: Array, here: Array, phi: Array | None = None) -> Array:
+        """Light of `outer` that goes on in the direction that it came in, by the sines `there` (N,) and `here`: with
+        1 + swing (s cos(phi) + s^2 cos(2 phi)), s being their product. Of beams `phi` are the azimuths."""
 
     @abstractmethod
     def diagonal(self, values: Array) -> Array:
@@ -142,6 +149,10 @@ class Relative(Basis):
     count: int = 1
 
     azimuths = np.zeros(1)
+
+    @property
+    def deposits(self) -> Hashable:
+        return self.nodes.cells, self.count
 
     @property
     def size(self) -> int:
@@ -173,7 +184,7 @@ class Relative(Basis):
         found[:, 0] = emitted[:, 0, :, None] * taken.reshape(len(taken), 1, -1)
         return found
 
-    def swung(self, light: Array, swing: float, there: Array, here: Array) -> Array:
+    def swung(self, light: Array, swing: float, there: Array, here: Array, phi: Array | None = None) -> Array:
         both = np.multiply.outer(there, here)
         waves = [0.5 * swing * both**m * light[:, 0] for m in range(1, self.count)]
         return np.stack([light[:, 0], *waves], axis=1)
@@ -187,14 +198,29 @@ class Relative(Basis):
 
 @dataclass(frozen=True)
 class Even(Basis):
-    """Modes 1, sqrt(2) cos(m phi), sqrt(2) sin(m phi) of the azimuth, m = 2, 4, ..., in one family, modes first.
+    """Modes 1, sqrt(2) cos(m phi), sqrt(2) sin(m phi) of the azimuth, m = 2, 4, ..., modes first.
 
+    Where all interfaces mirror light about the tangent (`mirrored`), cosines and sines do not act on one another: two
+    families, the second with a mode that is never lit in the place of the constant. Else they are one.
     Sources meet an interface at azimuths of one quarter of a turn: its axes mirror the others.
     """
 
     nodes: Nodes
     orders: tuple[int, ...] = (2,)
     quarter: int = 3
+    mirrored: bool = False
+
+    @classmethod
+    def of(cls, nodes: Nodes, brushed: Sequence[tuple[float, float]]) -> Even:
+        """The modes for interfaces of such ratios of their roughnesses, at least 1, and rotations."""
+        count = 1 + sum(max(ratio for ratio, _ in brushed) > each for each in RATIOS)
+        turns = [rotation / (np.pi / 2) for _, rotation in brushed]
+        mirrored = bool(np.allclose(turns, np.round(turns), atol=SQUARE))
+        return cls(nodes, tuple(range(2, 2 * count + 1, 2)), count + 2, mirrored)
+
+    @property
+    def deposits(self) -> Hashable:
+        return self.nodes.cells, self.orders, self.quarter
 
     @property
     def modes(self) -> int:
@@ -202,7 +228,7 @@ class Even(Basis):
 
     @property
     def size(self) -> int:
-        return self.modes * self.nodes.count
+        return (1 + len(self.orders) if self.mirrored else self.modes) * self.nodes.count
 
     def relative(self, phi: Array, rotation: float) -> Array:
         return phi - rotation
@@ -232,7 +258,7 @@ class Even(Basis):
 
     def columns(self, light: Array, rotation: float) -> Array:
         found = self._turned(rotation).T @ light.reshape(len(light), self.modes, -1)
-        return found.reshape(len(found), 1, self.modes * self.nodes.count, -1)
+        return self._sorted(found.reshape(len(found), self.modes, self.nodes.count, -1))
 
     def operators(self, light: Array, rotation: float) -> Array:
         n, modes, azimuths = self.nodes.count, self.modes, self.azimuths
@@ -244,7 +270,7 @@ class Even(Basis):
         matrix *= (sine[:, None] == sine)[None, :, None, :, None]
         turn = self._turned(rotation).T
         matrix = turn @ (turn @ matrix.reshape(-1, modes, n * modes * n)).reshape(-1, modes * n, modes, n)
-        return matrix.reshape(-1, 1, modes * n, modes * n)
+        return self._diagonal(matrix.reshape(-1, modes, n, modes, n))
 
     def rows(self, values: Array, rotation: float) -> Array:
         each = values.reshape(len(values), len(self.azimuths), self.nodes.count)
@@ -254,14 +280,49 @@ class Even(Basis):
         return np.asarray(np.einsum("ax,can->cxn", self._turned(rotation), projected))
 
     def outer(self, emitted: Array, taken: Array) -> Array:
-        flat = emitted.reshape(len(emitted), 1, -1, 1)
-        return np.asarray(flat * taken.reshape(len(taken), 1, 1, -1))
+        rows = self._sorted(emitted[..., None])
+        if taken.ndim == 2:
+            return rows * taken[:, None, None]
+        return rows * self._sorted(taken[..., None]).swapaxes(-1, -2)
+
+    def swung(self, light: Array, swing: float, there: Array, here: Array, phi: Array | None = None) -> Array:
+        count, colours = self.nodes.count, len(light)
+        waves = [0.5 * swing * np.multiply.outer(there, here) ** 2 * light[:, 0, :count, : len(here)]] * 2
+        if phi is not None:
+            waves = [ROOT * wave(2 * phi) * each for wave, each in zip((np.cos, np.sin), waves)]
+            lit = np.zeros((colours, self.modes, count, len(here)))
+            lit[:, 1], lit[:, 2] = waves
+            return light + self._sorted(lit)
+        matrix = np.zeros((colours, self.modes, count, self.modes, count))
+        matrix[:, 1, :, 1], matrix[:, 2, :, 2] = waves
+        return light + self._diagonal(matrix)
 
     def diagonal(self, values: Array) -> Array:
-        return np.tile(values, self.modes)[:, None, :, None] * np.eye(self.modes * self.nodes.count)
+        families = 2 if self.mirrored else 1
+        found = np.tile(values, self.size // self.nodes.count)[:, None, :, None] * np.eye(self.size)
+        return np.asarray(np.repeat(found, families, axis=1))
 
     def energy(self, measure: Array) -> Array:
         return np.asarray(measure[:, 0, : self.nodes.count].sum(axis=-2))
+
+    def _sorted(self, light: Array) -> Array:
+        """Light (C, modes, N, M) by family, (C, families, n, M)."""
+        if not self.mirrored:
+            return light.reshape(len(light), 1, self.size, -1)
+        sines = np.concatenate([0 * light[:, :1], light[:, 2::2]], axis=1)
+        found = np.stack([np.concatenate([light[:, :1], light[:, 1::2]], axis=1), sines], axis=1)
+        return found.reshape(len(light), 2, self.size, -1)
+
+    def _diagonal(self, matrix: Array) -> Array:
+        """Matrices (C, modes, N, modes, N) by family, (C, families, n, n)."""
+        if not self.mirrored:
+            return matrix.reshape(len(matrix), 1, self.size, self.size)
+        count, n = 1 + len(self.orders), self.nodes.count
+        found = np.zeros((len(matrix), 2, count, n, count, n))
+        cosines = [0, *range(1, self.modes, 2)]
+        found[:, 0] = matrix[:, cosines][:, :, :, cosines]
+        found[:, 1, 1:, :, 1:] = matrix[:, 2::2, :, 2::2]
+        return found.reshape(len(matrix), 2, self.size, self.size)
 
     def _basis(self, azimuth: Array) -> Array:
         waves = [ROOT * wave(m * azimuth) for m in self.orders for wave in (np.cos, np.sin)]

@@ -17,6 +17,7 @@ Array = NDArray[np.floating]
 
 TRAPPED = 1e-9  # share that is lost at each reflection between layers
 ALONE = 2**18  # multiplications that OpenBLAS leaves to one thread
+LARGE = 100  # rows of a matrix of which it shares the inverse among threads
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Operator:
         return cls(nodes, columns, np.zeros((1, 1, 1, columns.shape[-1])))
 
     def __matmul__(self, first: Operator) -> Operator:
-        nodes, columns = self.nodes @ first.nodes, _product(self.nodes, first.columns)
+        nodes, columns = _product(self.nodes, first.nodes), _product(self.nodes, first.columns)
         if self.columns.shape[-1] and first.columns.shape[-1]:
             return Operator(nodes, columns + self.columns * first.beams, self.beams * first.beams)
         return Operator.of(nodes, columns)
@@ -53,7 +54,7 @@ class Operator:
     def repeated(self, trapped: float = TRAPPED) -> Operator:
         """The sum of all of its powers, (1 - A)^-1, with a share lost each time."""
         # No light reaches what smooth interfaces trap for ever
-        inverse = np.linalg.inv((1 + trapped) * np.eye(self.nodes.shape[-1]) - self.nodes)
+        inverse = _inverse((1 + trapped) * np.eye(self.nodes.shape[-1]) - self.nodes)
         beams = 1 / np.maximum(1 - self.beams, trapped)
         return Operator(inverse, _product(inverse, self.columns) * beams, beams)
 
@@ -65,6 +66,20 @@ def _product(nodes: Array, columns: Array) -> Array:
     if count <= width:
         return np.asarray(nodes @ columns)
     return np.concatenate([nodes @ columns[..., k : k + width] for k in range(0, count, width)], axis=-1)
+
+
+def _inverse(matrix: Array) -> Array:
+    """Inverses, by blocks where LAPACK would share one among threads."""
+    half = matrix.shape[-1] // 2
+    if 2 * half < LARGE:
+        return np.asarray(np.linalg.inv(matrix))
+    (a, b), (c, d) = ((rows[..., :half], rows[..., half:]) for rows in (matrix[..., :half, :], matrix[..., half:, :]))
+    first = _inverse(a)
+    there, back = _product(first, b), _product(c, first)
+    last = _inverse(d - _product(c, there))
+    right = -_product(there, last)
+    upper = np.concatenate([first - _product(right, back), right], axis=-1)
+    return np.concatenate([upper, np.concatenate([-_product(last, back), last], axis=-1)], axis=-2)
 
 
 @dataclass(frozen=True)
