@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
+from velatura.model.solved import monotone_cubic
 from velatura.model.solved.columns import Columns
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.variance import ALPHA_MIN
@@ -102,8 +102,7 @@ class Grid:
 
     def along(self, values: Array, count: int) -> Array:
         """Values at the cosines, (..., cosines), interpolated by splines at as many places."""
-        with np.errstate(over="ignore"):  # of inverse slopes, where values are hardly above 0
-            return np.asarray(PchipInterpolator(self.nodes, values, axis=-1)(np.linspace(0, 1, count)))
+        return monotone_cubic.interpolated(self.nodes, values, np.linspace(0, 1, count))
 
 
 @dataclass(frozen=True)

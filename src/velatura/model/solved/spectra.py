@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from velatura import ops
 from velatura.films.of_material import greatest_optical_thickness_nm
 from velatura.model.base import Body, Model
 from velatura.model.context import Context
 from velatura.model.rough_interface import Facets
+from velatura.model.solved import monotone_cubic
 from velatura.model.solved.columns import Declaration
 from velatura.model.solved.energies.adding import Lambert, Part, parts
 from velatura.model.solved.lobes.remainder import Remainder
@@ -156,7 +156,7 @@ def _flat(side: SolvedSide, solver: Solver, places: Array, nodes: int) -> list[A
 def over_nodes(values: Array, places: Array, nodes: int) -> Array:
     """Values at places on the spectrum, (..., C), interpolated at even nodes, (..., nodes)."""
     places, first = np.unique(places, return_index=True)
-    return np.asarray(PchipInterpolator(places, values[..., first], axis=-1)(np.linspace(0, 1, nodes)))
+    return monotone_cubic.interpolated(places, values[..., first], np.linspace(0, 1, nodes))
 
 
 def _channels(value: Value, chosen: Sequence[int]) -> Value:

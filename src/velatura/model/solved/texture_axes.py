@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from velatura import ops
 from velatura.films import textured as textured_films
+from velatura.model.solved import monotone_cubic
 from velatura.ops import Value
 from velatura.stack import Address, Material
 
@@ -131,6 +131,8 @@ class Axis:
 
     def refined(self, values: Array, axis: int) -> Array:
         """Values at the nodes, at all places."""
+        from scipy.interpolate import CubicSpline  # slow to import
+
         nodes = np.linspace(0, 1, self.count)
         return np.asarray(CubicSpline(nodes, values, axis=axis)(np.linspace(0, 1, self.places)))
 
@@ -163,7 +165,9 @@ class Wavelengths:
 
     def refined(self, values: Array, axis: int) -> Array:
         nodes, first = np.unique(self.nodes, return_index=True)
-        return np.asarray(PchipInterpolator(nodes, values.take(first, axis), axis=axis)(np.linspace(0, 1, self.places)))
+        along = np.moveaxis(values.take(first, axis), axis, -1)
+        places = np.linspace(0, 1, self.places)
+        return np.moveaxis(monotone_cubic.interpolated(nodes, along, places), -1, axis)
 
     def changed(self, x: float | None) -> dict[str, Any]:
         return {name: values if x is None else values[int(x)] for name, values in self.spectra}
