@@ -145,6 +145,16 @@ def bitmap(path: Path, subject: str = "") -> Any:
         raise InvalidInput(f"{subject or f'{path}:'} is no image that Mitsuba can read") from None
 
 
+def numbers(value: Any) -> list[float]:
+    """All numbers of a value of Dr.Jit, NumPy or Python, channel by channel; no kernel is compiled to read them."""
+    import drjit as dr
+    import numpy as np
+
+    value = dr.detach(value)
+    channels = value if dr.is_array_v(value) and dr.depth_v(value) > 1 else [value]
+    return [x for channel in channels for x in np.ravel(np.array(channel, float)).tolist()]
+
+
 # LLVM
 
 

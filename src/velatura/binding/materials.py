@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from velatura import kernel
 from velatura.binding import properties as properties_of
 from velatura.binding.textures import Range
 from velatura.errors import InvalidInput
@@ -101,7 +102,7 @@ class Binding:
         """
         import drjit as dr
 
-        declared, channels = self.addresses[name].declared, _channels(value)
+        declared, channels = self.addresses[name].declared, kernel.numbers(value)
         try:
             for channel in channels:
                 declared.check(channel)
@@ -120,8 +121,8 @@ class Binding:
 
         if not isinstance(value, self.mi.Color3f):
             return value
-        apart = len({channel.index_ad for channel in value}) if dr.grad_enabled(value) else len(set(_channels(value)))
-        return value.x if apart == 1 else value
+        own = [channel.index_ad for channel in value] if dr.grad_enabled(value) else kernel.numbers(value)
+        return value.x if len(set(own)) == 1 else value
 
     def _coatings(self) -> Sequence[Any]:
         """The films on each layer, worked out."""
@@ -258,10 +259,3 @@ class Binding:
         numbers = {value.index_ad: value for value in apart.values() if dr.depth_v(value) == 1}
         apart = {name: numbers[value.index_ad] if dr.depth_v(value) == 1 else value for name, value in apart.items()}
         return self.with_constants().each(lambda address, value: apart.get(address.name, value))
-
-
-def _channels(value: Any) -> list[float]:
-    import drjit as dr
-
-    channels: list[float] = np.ravel(np.array(dr.detach(value), float)).tolist()
-    return channels

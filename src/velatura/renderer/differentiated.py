@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from velatura import kernel
 from velatura.ops import Value
 from velatura.renderer import finite_differences
 from velatura.stack import Address, Material
@@ -69,8 +70,8 @@ def plain(material: Material) -> Material:
     """A material of a renderer's constants with values of NumPy: floats, and colours (C, 1)."""
 
     def value(found: Value, colour: bool) -> Any:
-        channels = np.asarray(found, float).reshape(-1)
-        return channels[:, None] if colour else float(channels[0])
+        channels = np.ravel(found).tolist() if isinstance(found, float | np.ndarray) else kernel.numbers(found)
+        return np.array(channels, float)[:, None] if colour else float(channels[0])
 
     numbers = material.each(lambda address, found: value(found, address.colour)).coated([None] * len(material.layers))
     return numbers if isinstance(material.light, str) else replace(numbers, light=np.ravel(np.array(material.light)))

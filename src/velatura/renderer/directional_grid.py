@@ -147,10 +147,11 @@ def interleaved(flat: Any, shape: tuple[int, ...], number: type | None) -> Curve
     """Functions by a flat array of their values, those of one node after those of another; differentiable."""
     if number is None:
         return Curves(np.reshape(flat, (*shape, -1)), shape)
-    import drjit as dr
+    if not isinstance(flat, np.ndarray):
+        import drjit as dr
 
-    dr.eval(flat)
-    return Curves(packets(flat, dr.width(flat) // prod(shape), sys.modules[number.__module__]), shape)
+        dr.eval(flat)
+    return Curves(packets(flat, len(flat) // prod(shape), sys.modules[number.__module__]), shape)
 
 
 # Azimuths from 0 to pi as 0 to 1, without trigonometry: along the sides of a square instead of a circle

@@ -46,15 +46,13 @@ def variables(values: Sequence[Value]) -> list[DifferentiatedNumber]:
 def differentiable(
     function: Callable[[list[float]], list[Array]], given: Sequence[DifferentiatedNumber], around: Around, number: Any
 ) -> list[Any]:
-    """Flat arrays that a function returns for the numbers of variables, of Dr.Jit's type `number`; differentiable. None
-    keeps NumPy's.
+    """Flat arrays that a function returns for the numbers of variables, of Dr.Jit's type `number`; differentiable.
+    Without variables they are NumPy's.
 
     `around` gives numbers below and above the k-th one, between which the function is taken to be linear.
     """
-    if number is None:
-        return function([])
-    if not given:
-        return [number(aligned(flat)) for flat in function([])]
+    if number is None or not given:
+        return list(function([]))
     import drjit as dr
 
     def floats(values: Sequence[Any]) -> list[float]:
@@ -88,10 +86,10 @@ def differentiable(
     return list(dr.custom(Differences, [variable.number for variable in given]))
 
 
-def numbers(flat: Any, number: type | None) -> list[Any]:
-    """The numbers of a flat array, each by itself."""
-    if number is None:
-        return cast(list[Any], flat.tolist())
+def numbers(flat: Any, number: Any) -> list[Any]:
+    """The numbers of a flat array, each by itself; of Dr.Jit's type `number`, or floats for None."""
+    if isinstance(flat, np.ndarray):
+        return flat.tolist() if number is None else [number(x) for x in flat.tolist()]
     import drjit as dr
 
     return [dr.gather(number, flat, k) for k in range(dr.width(flat))]

@@ -38,7 +38,7 @@ from velatura.optics.ggx import Direction
 from velatura.renderer import directional_grid, finite_differences
 from velatura.renderer.differentiated import Variables
 from velatura.renderer.directional_grid import Packed, Packing, Summed
-from velatura.renderer.packets import WIDTH, aligned
+from velatura.renderer.packets import WIDTH
 from velatura.stack import Address, InterfaceValues, Material
 
 Array = NDArray[np.floating]
@@ -296,8 +296,7 @@ def _tabulated(
         return found
 
     def constants(rows: Array) -> list[list[Value]]:
-        kept = rows.ravel() if context.number is None else context.number(aligned(rows.ravel()))
-        values = context.settle(finite_differences.numbers(kept, context.number))
+        values = context.settle(finite_differences.numbers(rows.ravel(), context.number))
         return [values[k : k + rows.shape[1]] for k in range(0, rows.size, rows.shape[1])]
 
     flat = iter(finite_differences.differentiable(tables, given.given, given.around, context.number))
