@@ -1,7 +1,8 @@
 """Functions of every source and every sample: by NumPy, and compiled by Dr.Jit in a process that asks for many.
 
 A function is written on `velatura.ops`. NumPy begins at once; Dr.Jit takes a tenth of a second for each kind of
-function, and then a third of NumPy's time. So kernels follow once `MANY` values have been worked out without them.
+function, and then a third of NumPy's time. So a kernel follows once `MANY` values of its kind have been worked out
+without it.
 """
 
 from __future__ import annotations
@@ -9,10 +10,11 @@ from __future__ import annotations
 import copy
 import functools
 import itertools
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import fields, is_dataclass
 from types import MethodType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +28,13 @@ Groups = Sequence[Sequence[Value]]
 #: Of sources, samples and numbers: groups of values, and values that are summed up over the samples
 Function = Callable[[Sequence[Value], Sequence[Value], Any], tuple[Groups, Sequence[Value]]]
 
-MANY = 4_000_000  # values, about a second's
+MANY = 500_000  # values of a kind, about as long as a kernel of it takes to compile
 LEAST = 15_000  # values at a time: for fewer, a kernel takes longer to describe than NumPy to run
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COMPILED_BLOCK = 1 << 18
 COLOURS = 3
 
-_asked = 0  # values so far
+_asked: Counter[Hashable] = Counter()  # values so far, by kind
 
 
 def over(
@@ -47,17 +49,18 @@ def over(
     `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (3, 1, ...). What is no number, and
     0.0 and 1.0, belong to the kind of function. It runs by NumPy alone if other objects are among them.
     """
-    global _asked
     count = samples[0].shape[-1]
-    worth = _asked > MANY and len(sources[0]) * count > LEAST
-    module = kernel.llvm() if worth and not _foreign(numbers) else None
+    module = None
+    if len(sources[0]) * count > LEAST and not _foreign(numbers):
+        kind = function.__module__, function.__qualname__, *(x.ndim for x in samples), _kind(numbers)
+        module = kernel.llvm() if _asked[kind] > MANY else None
+        _asked[kind] += 0 if module else len(sources[0]) * count
     size = max((COMPILED_BLOCK if module else BLOCK) // count, 1)
     found = []
     for first in range(0, max(len(sources[0]), 1), size):
         some, own = [x[first : first + size] for x in sources], [_part(x, first, size) for x in samples]
         if module is None:
             found.append(_plain(function, some, own, numbers))
-            _asked += len(some[0]) * count
         else:
             found.append(_compiled(module, function, some, own, numbers))
     groups, sums = zip(*found)
@@ -163,6 +166,22 @@ def _mapped(value: Any, number: Callable[[float], Any], colour: Callable[[list[A
         plain = float(np.asarray(value).item())
         return plain if plain in (0, 1) else number(plain)
     return value
+
+
+def _kind(value: Any) -> Hashable:
+    """What of a value belongs to the kind of function: all but its numbers."""
+    if isinstance(value, list | tuple):
+        return type(value), *map(_kind, value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return type(value), *(_kind(getattr(value, x.name)) for x in fields(value))
+    if isinstance(value, MethodType):
+        return value.__name__, _kind(value.__self__)
+    if isinstance(value, np.ndarray) and value.size > 1:
+        return np.ndarray
+    if isinstance(value, float | np.floating | np.ndarray):
+        plain = float(np.asarray(value).item())
+        return plain if plain in (0, 1) else float
+    return cast(Hashable, value)
 
 
 def _foreign(value: Any) -> bool:
