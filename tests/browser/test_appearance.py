@@ -18,7 +18,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Visit, unexpected
+from editor import Server, Tabs, Visit, unexpected
 
 import velatura as vt
 from velatura.editor import appearance
@@ -33,26 +33,25 @@ OTHER = 1.0  # of 255: what a change of the material makes at least
 NOISE = 4.0  # standard errors
 SIZE = (128, 96)  # pixels of the pictures that are traced
 SAMPLES = 128
+ROOMY = "localStorage['velatura.layout'] ??= '{}'"  # the panel has all the room
+
+
+@pytest.fixture(scope="module")
+def tabs(opened: Any) -> Tabs:
+    return Tabs(opened, viewport={"width": 900, "height": 500}, permissions=["clipboard-read", "clipboard-write"])
 
 
 @pytest.fixture
-def visit(opened: Any, served: Server) -> Iterator[Open]:
+def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
     """Opens pages in a browser without a past, and sees that no console complains."""
-    context = opened.new_context(viewport={"width": 900, "height": 500})
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
-    context.add_init_script("localStorage['velatura.layout'] ??= '{}'")  # the panel has all the room
-    visits: list[Visit] = []
     expected: list[str] = []
 
     def begin(*expecting: str, address: str = "") -> Visit:
         expected.extend(expecting)
-        found = Visit(context.new_page(), address or served.entrance)
-        visits.append(found)
-        return found
+        return tabs.visit(address or served.entrance, ROOMY)
 
     yield begin
-    context.close()
-    assert unexpected(visits, expected) == []
+    assert unexpected(tabs.forget(), expected) == []
 
 
 def open_material(visit: Visit, title: str) -> None:

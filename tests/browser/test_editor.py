@@ -17,7 +17,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Visit, difference, unexpected
+from editor import Server, Tabs, Visit, difference, unexpected
 from fuzzing import hostile
 from fuzzing.hands import Hands
 from matplotlib.image import imsave
@@ -36,26 +36,28 @@ AXE = Path(__file__).parents[1] / "page/node_modules/axe-core/axe.min.js"
 PREVIEWS = "[...velatura.viewport.device.programs.keys()].filter((text) => text.includes('PARTS =')).length"
 
 
+@pytest.fixture(scope="module")
+def tabs(opened: Any) -> Tabs:
+    return Tabs(opened, viewport={"width": 900, "height": 600}, accept_downloads=True)
+
+
 @pytest.fixture
-def visit(opened: Any, served: Server) -> Iterator[Open]:
+def visit(opened: Any, tabs: Tabs, served: Server) -> Iterator[Open]:
     """Opens pages in a browser without a past, and sees that no console complains."""
-    context = opened.new_context(viewport={"width": 900, "height": 600}, accept_downloads=True)
-    visits: list[Visit] = []
     expected: list[str] = []
+    own: list[Tabs] = []
 
     def begin(*expecting: str, script: str = "", **options: Any) -> Visit:
-        nonlocal context
         expected.extend(expecting)
         if options:
-            context.close()
-            context = opened.new_context(**options)
-        page = context.new_page()
-        page.add_init_script(script)
-        visits.append(Visit(page, served.entrance))
-        return visits[-1]
+            own.append(Tabs(opened, **options))
+        return (own or [tabs])[-1].visit(served.entrance, script)
 
     yield begin
-    context.close()
+    visits = tabs.forget()
+    for each in own:
+        visits += each.visits
+        each.context.close()
     assert unexpected(visits, expected) == []
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Visit, difference, unexpected
+from editor import Server, Tabs, Visit, difference, unexpected
 
 import velatura as vt
 from velatura.stack import loads
@@ -39,27 +39,28 @@ layers:
 """
 
 
+@pytest.fixture(scope="module")
+def tabs(opened: Any) -> Tabs:
+    return Tabs(opened, viewport={"width": 900, "height": 600}, permissions=["clipboard-read", "clipboard-write"])
+
+
 @pytest.fixture
-def visit(opened: Any, served: Server) -> Iterator[Open]:
+def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
     """Opens a material in a browser without a past; no console may complain of more than what is expected."""
-    context = opened.new_context(viewport={"width": 900, "height": 600})
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
-    visits: list[Visit] = []
     expected: list[str] = []
 
     def begin(text: str = "", *expecting: str, place: str = "") -> Visit:
         expected.extend(expecting)
-        visits.append(Visit(context.new_page(), place or served.entrance))
+        found = tabs.visit(place or served.entrance)
         if text:
             (served.folder / "films.yaml").write_text(text, encoding="utf-8")
-            visits[-1].page.evaluate("velatura.openFile('films.yaml')")
-            visits[-1].page.wait_for_function("() => velatura.store.get().layers.some(({ keys }) => keys.films)")
-            visits[-1].settled()
-        return visits[-1]
+            found.page.evaluate("velatura.openFile('films.yaml')")
+            found.page.wait_for_function("() => velatura.store.get().layers.some(({ keys }) => keys.films)")
+            found.settled()
+        return found
 
     yield begin
-    context.close()
-    assert unexpected(visits, expected) == []
+    assert unexpected(tabs.forget(), expected) == []
 
 
 def choose_model(page: Visit, title: str) -> None:

@@ -18,7 +18,7 @@ from typing import Any
 import chromium
 import numpy as np
 import pytest
-from editor import Server, Visit, require_fresh_page
+from editor import Server, Tabs, Visit, require_fresh_page, unexpected
 from fuzzing import hostile
 from hosted import hosted
 
@@ -53,30 +53,42 @@ def address(folder: Path) -> Iterator[str]:
         yield found
 
 
-@pytest.fixture
-def requests() -> list[str]:
-    """All that pages have asked the network for."""
-    return []
-
-
-@pytest.fixture
-def visit(opened: Any, address: str, served: Server, requests: list[str]) -> Iterator[Open]:
-    """Opens the folder's page, or the server's, in a browser without a past; no console may complain."""
-    context = opened.new_context(viewport={"width": 900, "height": 600})
-    context.grant_permissions(["clipboard-read", "clipboard-write"])
+@pytest.fixture(scope="module")
+def tabs(opened: Any, address: str, served: Server) -> Tabs:
+    """Of a browser that reaches no other address."""
+    made = Tabs(opened, viewport={"width": 900, "height": 600}, permissions=["clipboard-read", "clipboard-write"])
     allowed = address, served.address
-    context.route("**/*", lambda route: route.continue_() if route.request.url.startswith(allowed) else route.abort())
-    visits: list[Visit] = []
+
+    def guard(route: Any) -> None:
+        route.continue_() if route.request.url.startswith(allowed) else route.abort()
+
+    made.context.route("**/*", guard)
+    return made
+
+
+@pytest.fixture
+def requests(tabs: Tabs) -> Iterator[list[str]]:
+    """All that pages have asked the network for."""
+    found: list[str] = []
+
+    def listen(request: Any) -> None:
+        found.append(request.url)
+
+    tabs.context.on("request", listen)
+    yield found
+    tabs.context.remove_listener("request", listen)
+
+
+@pytest.fixture
+def visit(tabs: Tabs, address: str, served: Server, requests: list[str]) -> Iterator[Open]:
+    """Opens the folder's page, or the server's, in a browser without a past; no console may complain."""
 
     def begin(place: str = "") -> Visit:
-        page = context.new_page()
-        page.on("request", lambda request: requests.append(request.url))
-        visits.append(Visit(page, place or address))
-        return visits[-1]
+        return tabs.visit(place or address)
 
     yield begin
-    context.close()
-    assert [text for found in visits for text in found.complaints] == []
+    assert unexpected(tabs.forget(), ()) == []
+    allowed = address, served.address
     assert [url for url in requests if not url.startswith((*allowed, "data:", "ws://127.0.0.1"))] == []
 
 
@@ -177,9 +189,7 @@ def stranger(opened: Any, folder: Path) -> Iterator[Visit]:
         context = opened.new_context(viewport={"width": 900, "height": 600}, accept_downloads=True)
         context.grant_permissions(["clipboard-read", "clipboard-write"])
         context.route(f"**/{offline.SESSION}", session)
-        page = context.new_page()
-        page.add_init_script(hostile.WATCH)
-        visit = Visit(page, address)
+        visit = Visit(context.new_page(), address, hostile.WATCH)
         yield visit
         context.close()
         assert visit.complaints == []

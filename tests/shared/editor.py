@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
+from urllib.parse import urlsplit
 
 import chromium
 import numpy as np
@@ -90,16 +91,33 @@ class Visit:
 
     open: ClassVar[list[Visit]] = []  # all that were begun
 
-    def __init__(self, page: Any, address: str) -> None:
+    def __init__(self, page: Any, address: str, script: str = "") -> None:
+        """`script` runs in each document of the visit before its own code does."""
         self.open.append(self)
         self.page = page
         page.set_default_timeout(90_000)  # clicks, too, wait for shaders that the processor compiles
         self.complaints: list[str] = []
-        page.add_init_script(EVERYTHING_OPEN)
-        page.on("console", self._listen)
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self._listeners = {"console": self._listen, "pageerror": lambda error: self.complaints.append(str(error))}
+        for event, listener in self._listeners.items():
+            page.on(event, listener)
+        self._devtools = page.context.new_cdp_session(page)
+        self._devtools.send("Page.enable")
+        first = self._before("sessionStorage.clear()")
+        self._before(f"{script};{EVERYTHING_OPEN}")
         page.goto(address)
+        self._devtools.send("Page.removeScriptToEvaluateOnNewDocument", first)
         self.ready()
+
+    def _before(self, script: str) -> Any:
+        return self._devtools.send("Page.addScriptToEvaluateOnNewDocument", {"source": script})
+
+    def leave(self) -> None:
+        """End the visit, and leave the page for another one."""
+        if self.page.is_closed():
+            return
+        for event, listener in self._listeners.items():
+            self.page.remove_listener(event, listener)
+        self._devtools.detach()  # with all scripts
 
     def _listen(self, message: Any) -> None:
         if message.type == "error":
@@ -145,6 +163,43 @@ class Visit:
             }"""
         )
         return np.reshape(pixels, (48, 64, 4))[..., :3].astype(float)
+
+
+class Tabs:
+    """Tabs of a browser without a past, for one test after another.
+
+    The first tab of each test is the same: it is ready in half of the time, since its process has compiled the page.
+    """
+
+    def __init__(self, browser: Any, **options: Any) -> None:
+        self.context = browser.new_context(**options)
+        self.visits: list[Visit] = []
+
+    def visit(self, address: str, script: str = "") -> Visit:
+        """Open an address, in the kept tab unless this test has opened one already."""
+        free = [] if self.visits else self.context.pages
+        self.visits.append(Visit(free[0] if free else self.context.new_page(), address, script))
+        return self.visits[-1]
+
+    def forget(self) -> list[Visit]:
+        """Close all tabs but one, and forget all; returns the visits that have ended."""
+        ended, self.visits = self.visits, []
+        for visit in ended:
+            visit.leave()
+        if pages := self.context.pages:
+            kept, *others = pages
+            origins = {f"{at.scheme}://{at.netloc}" for at in (urlsplit(page.url) for page in pages)}
+            for page in others:
+                page.close()
+            kept.goto("about:blank")
+            kept.mouse.move(0, 0)
+            devtools = self.context.new_cdp_session(kept)
+            for origin in origins:
+                devtools.send("Storage.clearDataForOrigin", {"origin": origin, "storageTypes": "all"})
+            devtools.send("Network.clearBrowserCache")
+            devtools.detach()
+        self.context.clear_cookies()
+        return ended
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> float:
