@@ -9,11 +9,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import velatura as vt
+from velatura import inverse
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -35,6 +37,25 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "bright.yaml").write_text("lobes:\n  - {energy: 0.6}\n")
     (tmp_path / "coated.yaml").write_text(COATED)
     return tmp_path
+
+
+@pytest.fixture
+def solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One answer to one question, which commands print in two forms."""
+    for name in ("alternatives", "coat", "simplify"):
+        monkeypatch.setattr(inverse, name, once(getattr(inverse, name)))
+
+
+def once(function: Callable[..., Any]) -> Callable[..., Any]:
+    known: dict[str, Any] = {}
+
+    def ask(*arguments: Any, **switches: Any) -> Any:
+        key = repr((arguments, switches))
+        if key not in known:
+            known[key] = function(*arguments, **switches)
+        return known[key]
+
+    return ask
 
 
 def files(folder: Path) -> set[str]:
@@ -184,7 +205,7 @@ def test_a_coat_that_keeps_the_appearance(run: Run, folder: Path, model: str, de
     assert files(folder) == {"kept.yaml"}
 
 
-def test_a_coat_too_rough_to_keep_says_what_is_lost(run: Run, folder: Path) -> None:
+def test_a_coat_too_rough_to_keep_says_what_is_lost(run: Run, folder: Path, solved_once: None) -> None:
     """Expected: the nearest material, with a line for each layer; the coat's own lobe has a row, as in JSON."""
     arguments = ("coat", "coated.yaml", "--alpha", "0.5", "--keep-appearance")
     status, out, err = run(*arguments, "-o", "rough.yaml")
@@ -198,7 +219,7 @@ def test_a_coat_too_rough_to_keep_says_what_is_lost(run: Run, folder: Path) -> N
     assert files(folder) == {"rough.yaml"}
 
 
-def test_an_answer_names_its_model(run: Run, folder: Path) -> None:
+def test_an_answer_names_its_model(run: Run, folder: Path, solved_once: None) -> None:
     """Expected: one line, for the model that renders and for another; always in JSON."""
     lines = {
         "velatura": "Holds for velatura, which renders.",
