@@ -96,6 +96,7 @@ def _lines(samples: Array, low: float, high: float) -> Array:
     tail = middle + scales * (samples - middle)
     tail = tail[(tail > low) & (tail < high)]
     even = np.linspace(low, high, max(len(samples), 2))
-    lines = np.quantile(np.concatenate([samples, tail, even]), np.linspace(0, 1, CELLS * NODES + 1))
+    ordered = np.sort(np.concatenate([samples, tail, even]))  # quicker than to select so many quantiles
+    lines = np.interp(np.linspace(0, len(ordered) - 1, CELLS * NODES + 1), np.arange(len(ordered)), ordered)
     lines[0], lines[-1] = low, high
     return lines
