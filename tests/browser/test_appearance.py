@@ -32,7 +32,7 @@ SAME = 0.5  # of 255: mean difference of previews of one material
 OTHER = 1.0  # of 255: what a change of the material makes at least
 NOISE = 4.0  # standard errors
 SIZE = (128, 96)  # pixels of the pictures that are traced
-SAMPLES = 128
+SAMPLES = 32
 ROOMY = "localStorage['velatura.layout'] ??= '{}'"  # the panel has all the room
 
 
