@@ -12,10 +12,13 @@ from fuzzing.imports import tensors
 
 from velatura.errors import InvalidInput
 from velatura.inverse import Directions, ReflectanceTable, fit, fit_target, load_table, simplify, table_of
-from velatura.inverse.fitting.simplify import _merged, _turned, compared
-from velatura.model import Model, named
+from velatura.inverse.fitting import angles, descent
+from velatura.inverse.fitting.simplify import _merged, _of_sets, _turned, compared
+from velatura.model import Model, named, variance_kind
+from velatura.model.base import Query
+from velatura.model.context import Context
 from velatura.model.registry import stack_lobes
-from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, load, loads
+from velatura.stack import Diffuse, Interface, Material, Medium, Stack, dumps, load, loads
 
 AVERAGED = named("bati2021")
 COATED = Stack(
@@ -121,6 +124,54 @@ def test_more_interfaces_are_never_worse() -> None:
     two, one = (simplify(stack, count, "velatura") for count in (2, 1))
     assert two.error < 0.2 * one.error
     assert two.error == two.errors[0] and len(two.stack.interfaces) == 2
+
+
+def test_a_descent_reads_a_solved_model_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rationale: a brushed stack takes a tenth of a second to solve, and has a dozen values. Expected: as many readings
+    as are stated at most, and the roughness of the table."""
+    read, readings = angles.read, []
+
+    def counted(*arguments: Any) -> Any:
+        readings.append(arguments)
+        return read(*arguments)
+
+    true = Stack([Interface(eta=1.5, alpha=(0.1, 0.2))])
+    model = named("velatura")
+    table = table_of(true, Directions.about_lobes(True), model)
+    monkeypatch.setattr(angles, "read", counted)
+    end = descent.Descent(table, true.replace(layer0_alpha_u=0.15, layer0_eta=1.4), model, 4.0).run()
+    assert 3 < len(readings) <= 1 + descent.ALONE * 3
+    assert end.stack.interfaces[0].alpha == pytest.approx((0.1, 0.2), rel=1e-2)
+
+
+def test_what_a_solved_model_reflects_is_read_for_the_directions_that_are_lit_alone() -> None:
+    """Expected: energies of the lobes' statistics; values of the renderer's BSDF, interpolated between directions."""
+    stack = Stack(
+        [Interface(eta=1.5, alpha=(0.2, 0.4), rotation=20), Medium(sigma_a=0.2), Interface(eta=1.8, alpha=0.3)]
+    )
+    model, material, at = named("velatura"), Material.of(stack), Directions.about_lobes(True)
+    value, energy = angles.read(material, at, model)
+    lobes = model.statistics(material.solid(), tuple(at.lit))
+    assert np.abs(sum(lobes.energy) + lobes.remainder - energy).max() < 1e-6
+    body = model.body(material, variance_kind(material), Context())
+    drawn, _ = body.eval_pdf(tuple(at.wi), tuple(at.wo), Query(transmission=False))
+    assert np.abs(value - drawn).max() < 5e-3 * np.max(drawn)
+
+
+def test_few_sets_of_many_interfaces_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 924 sets of six interfaces of twelve. Expected: the interfaces with a step of the index."""
+    stack = Stack([Interface(eta=1 + 0.2 * (n // 2), alpha=0.05 * n) for n in range(12)])
+    table = table_of(stack, Directions.about_lobes(False), AVERAGED, with_energy=True)
+    residuals, compared = descent.Descent.residuals, list[np.ndarray]()
+
+    def counted(own: descent.Descent, x: np.ndarray) -> np.ndarray:
+        compared.append(x)
+        return residuals(own, x)
+
+    monkeypatch.setattr(descent.Descent, "residuals", counted)
+    closest = _of_sets(stack, 6, table, AVERAGED, 4.0)[0]
+    assert len(compared) < 200
+    assert len({layer.eta for layer in closest.interfaces} - {1.0}) >= 4
 
 
 def test_what_is_simplified_keeps_its_brushing() -> None:

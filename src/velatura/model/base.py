@@ -152,6 +152,15 @@ class Model(ABC):
     def body(self, material: Material, variance: type[Variance], context: Context) -> Body:
         """The BSDF of a material with constants of a renderer."""
 
+    def lit(self, material: Material, wi: Direction) -> Callable[[Any], Body]:
+        """What is reflected of light from directions wi, (M,) each, by a material with values of NumPy: the body for
+        those of given numbers, (N,)."""
+        from velatura.model.context import Context
+        from velatura.model.variance import variance_kind
+
+        found = self.body(material, variance_kind(material), Context())
+        return lambda which: found
+
     @abstractmethod
     def statistics(self, material: Material, wi: Direction) -> StackLobes:
         """The lobes of a material with values in NumPy, for directions wi, (N,) each."""

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura.inverse.lobes.partial_stack import Array, take
-from velatura.model import Model, named, variance_kind
+from velatura.model import Model, named
 from velatura.model.base import Query
-from velatura.model.context import Context
 from velatura.model.papers import bsdf, mixture
 from velatura.ops import Value
 from velatura.stack import Material, MaterialLike, load
@@ -153,12 +152,14 @@ def table_of(
 
 def read(material: Material, directions: Directions, model: Model) -> tuple[Value, Value]:
     """Reflected radiance and energy, like `radiance`, of a material with values of NumPy by any model."""
-    seen = model.body(material, variance_kind(material), Context())
-    if isinstance(seen, bsdf.Lobed):
-        return radiance(seen, directions)
+    lit = tuple(directions.lit)
+    seen = model.lit(material, lit)
+    every = seen(np.arange(len(lit[0])))
+    if isinstance(every, bsdf.Lobed):
+        return radiance(every, directions)
     reflected = Query(transmission=False)
-    value, _ = seen.eval_pdf(tuple(directions.wi), tuple(directions.wo), reflected)
-    return value, seen.albedo(tuple(directions.lit), reflected)
+    value, _ = seen(directions.which).eval_pdf(tuple(directions.wi), tuple(directions.wo), reflected)
+    return value, every.albedo(lit, reflected)
 
 
 def radiance(seen: bsdf.Lobed, directions: Directions) -> tuple[Value, Value]:

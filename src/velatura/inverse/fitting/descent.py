@@ -16,11 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.inverse.fitting import angles
 from velatura.inverse.fitting.angles import ReflectanceTable, radiance
 from velatura.inverse.lobes.interface import conductor_extinction
 from velatura.inverse.lobes.partial_stack import CLEAR, Array, written
+from velatura.inverse.local.approach import bounded_step
 from velatura.model import Model, named, variance_kind
 from velatura.model.papers import bsdf
 from velatura.model.variance import ALPHA_MIN
@@ -42,10 +44,14 @@ from velatura.stack.values import THICKEST_NM
 
 STEP, STRIDE = 1e-5, 1e-3  # of a value, to see how a model changes: in closed form, and solved anew for each value
 MAPPED = 3  # readings by a model without a closed form, between descents of the one that stands in for it
-LAST = 6  # rounds of its own descent, from the closest end
-ALONE = 20  # rounds of its own descent, from a start that is close
-# Of a descent the rounds, and the relative change in a round where it ends: also where a model is solved anew
-ROUNDS, TOLERANCE, COARSE = 100, 1e-9, 1e-5
+# Readings of its own descent, from the closest end, and from a start that is close, for each value that changes
+LAST, ALONE = 3, 5
+MOST = 70  # of these readings
+# Rounds of a descent in closed form, of one that stands in for another model, and for how many values these are
+ROUNDS, STANDING, FEW_VALUES = 100, 25, 16
+TOLERANCE = 1e-9  # relative change in a round where it ends
+DAMPED, DAMPINGS = 1e-3, 3  # share of the slopes that damps steps at first, and tenfold ones that are tried
+SLOW, COARSE = 0.02, 1e-4  # shares of the cost that a step gains, below which slopes are differences again, or it ends
 CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
 DEPTH_MAX = 10.0  # of a medium
 THINNEST_NM, OUTSIDE = 1.0, 1e3  # of a film, and errors where there is no material
@@ -192,7 +198,8 @@ def descended(
     coated = [start for start in map(load, starts) if any(start.films)]
     ends = [Descent(table, start, model, eta_max, darkest, films=films).run(ALONE) for start in coated]
     bare = [start for start in map(load, starts) if not any(start.films)]
-    ends += [Descent(table, start, model.surrogate, eta_max, darkest).run().of(model) for start in bare]
+    rounds = ROUNDS if model.closed_form else STANDING
+    ends += [Descent(table, start, model.surrogate, eta_max, darkest).run(rounds=rounds).of(model) for start in bare]
     ends.sort(key=lambda end: end.cost)
     if ends and not model.closed_form and not any(ends[0].descent.start.films):
         ends[0] = ends[0].descent.run(LAST)
@@ -234,7 +241,7 @@ class End:
         end = self
         for _ in range(MAPPED):
             near, own = end.afresh(end.descent.model), end.afresh(model)
-            end = replace(near.descent, gap=own.residuals - near.residuals).run()
+            end = replace(near.descent, gap=own.residuals - near.residuals).run(rounds=STANDING)
         return end.afresh(model)
 
     def afresh(self, model: Model) -> End:
@@ -375,8 +382,14 @@ class Descent:
         x = np.array([free.coordinate(self._first(free)) for free in self.free])
         return End(self, x, self.residuals(x[None])[0])
 
-    def run(self, rounds: int = ROUNDS) -> End:
-        """The end of the descent, after a number of rounds at most."""
+    def run(self, readings: int = ALONE, rounds: int = ROUNDS) -> End:
+        """The end of the descent, after a number of rounds at most, or, where one point is read at a time, of readings
+        for each value, MOST at most."""
+        best = self._by_secants(min(readings * len(self.free), MOST)) if self.slow else self._by_rounds(rounds)
+        return replace(best, x=self._smaller_first(best.x))
+
+    def _by_rounds(self, rounds: int) -> End:
+        """The end that many points at once lead to: fewer rounds where there are many values."""
         from scipy.optimize import least_squares
 
         bounds = np.transpose([free.bounds for free in self.free])
@@ -388,15 +401,44 @@ class Descent:
                 np.clip(first.x, bounds[0] + inset, bounds[1] - inset),
                 jac=self.jacobian,
                 bounds=bounds,
-                x_scale=np.maximum(0.1 * (bounds[1] - bounds[0]), 1e-3),
+                x_scale=self._scale,
                 xtol=TOLERANCE,
-                ftol=TOLERANCE if self.model.closed_form else COARSE,
+                ftol=TOLERANCE,
                 gtol=None,
-                max_nfev=rounds,
+                max_nfev=max(rounds * FEW_VALUES // max(len(self.free), FEW_VALUES), 2),
             )
         # Keep the start where the descent has gained nothing
-        best = first if first.cost <= found.cost else End(self, found.x, found.fun)
-        return replace(best, x=self._smaller_first(best.x))
+        return first if first.cost <= found.cost else End(self, found.x, found.fun)
+
+    def _by_secants(self, readings: int) -> End:
+        """The nearest point that is read, by damped steps (Levenberg, Marquardt).
+
+        Their slopes are differences of the model, and then follow from each reading (Broyden's method), until steps
+        gain little.
+        """
+        best, size = self.start_end, self._scale
+        low, high = np.transpose([free.bounds for free in self.free])
+        slopes, fresh, damping, tried = np.empty(0), False, DAMPED, 0
+        while readings > (0 if len(slopes) else len(size)):
+            if not len(slopes):
+                slopes, fresh, readings = self._differences(best) * size, True, readings - len(size)
+            x, largest = best.x, np.linalg.norm(slopes, axis=0).max()
+            # Steps see no more of the residuals than the slopes span
+            span, own = np.linalg.qr(slopes)
+            ahead = -span.T @ best.residuals, damping * largest, (low - x) / size, (high - x) / size
+            step = bounded_step(own, *ahead)
+            end = End(self, np.clip(x + step * size, low, high), np.empty(0))
+            end, readings = replace(end, residuals=self.residuals(end.x[None])[0]), readings - 1
+            missed = end.residuals - best.residuals - slopes @ step
+            slopes = slopes + np.outer(missed, ops.divide(step, step @ step))
+            gained = 1 - end.cost / max(best.cost, ops.TINY)
+            best, damping, tried = (end, damping / 10, 0) if gained > 0 else (best, 10 * damping, tried + 1)
+            if gained < (COARSE if fresh else SLOW) and tried in (0, DAMPINGS):
+                if fresh:
+                    break
+                slopes, tried = np.empty(0), 0
+            fresh = fresh and gained <= 0
+        return best
 
     def residuals(self, x: Array) -> Array:
         """Residuals at P points x (P, free), (P, 3 N): `missed`, and the gap."""
@@ -446,15 +488,22 @@ class Descent:
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals, (3 N, free)."""
-        if not self.slow:
-            steps = STEP * np.eye(len(x))
-            ahead, behind = np.split(self.residuals(np.concatenate([x + steps, x - steps])), 2)
-            return ((ahead - behind) / (2 * STEP)).T
-        # To one side, within the bounds
+        if self.slow:
+            return self._differences(End(self, x, self.residuals(x[None])[0]))
+        steps = STEP * np.eye(len(x))
+        ahead, behind = np.split(self.residuals(np.concatenate([x + steps, x - steps])), 2)
+        return ((ahead - behind) / (2 * STEP)).T
+
+    def _differences(self, end: End) -> Array:
+        """The same at a point that is read, to one side, within the bounds."""
         high = np.array([free.bounds[1] for free in self.free])
-        stride = np.where(x + STRIDE > high, -STRIDE, STRIDE)
-        found = self.residuals(np.concatenate([x[None], x + np.diag(stride)]))
-        return ((found[1:] - found[0]) / stride[:, None]).T
+        stride = np.where(end.x + STRIDE > high, -STRIDE, STRIDE)
+        return ((self.residuals(end.x + np.diag(stride)) - end.residuals) / stride[:, None]).T
+
+    @property
+    def _scale(self) -> Array:
+        """Units of coordinates."""
+        return np.maximum(0.1 * np.ptp([free.bounds for free in self.free], axis=1), 1e-3)
 
     def values(self, x: Array) -> Array:
         """The values of points (P, free), a metal's k among them."""

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from math import comb
 
 import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.inverse.fitting import angles
 from velatura.inverse.fitting.angles import Directions, ReflectanceTable
-from velatura.inverse.fitting.descent import ALONE, ROUNDS, Descent, End, Fit, descended, fit
+from velatura.inverse.fitting.descent import Descent, End, Fit, descended, fit
 from velatura.inverse.invert import alternatives, model_of
 from velatura.inverse.lobes.partial_stack import written
 from velatura.inverse.lobes.target import Target, read
@@ -38,7 +39,8 @@ STARTS = 4
 BRUSHED, BRUSHING = (22.5, 67.5, 112.5, 157.5), 1.5  # degrees, and by which ratios, fits of brushed samples start
 DARKEST = -0.5  # share of a conductor's reflectance, with which its k is 0: a base may be darker than any metal
 GAINED = 0.99  # share of the squares of errors below which another interface gains something
-TRIED = 3  # sets of interfaces from which simplification descends
+TRIED, SETS = 3, 20  # sets of interfaces from which simplification descends, and that are all compared
+FEWER = 2  # how many interfaces less are tried, too
 
 
 def fit_target(
@@ -113,7 +115,7 @@ def simplify(
     along = next((layer.rotation for layer in Material.of(stack).interfaces if layer.alpha_u != layer.alpha_v), 0.0)
     straight = _turned(stack, -along)
     table = compared(straight, chosen)
-    best, *_ = ends = _simplest(straight, interfaces, table, chosen, eta_max)
+    best, *_ = ends = _simplest(straight, interfaces, table, chosen, eta_max, max(interfaces - FEWER, 1))
     found = angles.table_of(best.stack, table.directions, chosen, with_energy=True)
     errors, by_angle = [end.error for end in ends], angles.report(table, found)
     return Fit(_turned(best.stack, along), chosen, best.error, by_angle, errors, energies=angles.energies(table, found))
@@ -125,29 +127,53 @@ def compared(stack: Stack, model: Model) -> ReflectanceTable:
     return angles.table_of(stack, Directions.about_lobes(turned), model, with_energy=True)
 
 
-def _simplest(stack: Stack, interfaces: int, table: ReflectanceTable, model: Model, eta_max: float) -> list[End]:
+def _simplest(
+    stack: Stack, interfaces: int, table: ReflectanceTable, model: Model, eta_max: float, least: int
+) -> list[End]:
     """The ends of descents from the sets of interfaces that are closest before any change, the closest first.
 
-    Where one interface less comes as close, a descent begins at that stack with another interface, without effect; if
-    it gains nothing either, that stack is the closest.
+    Where one interface less comes as close, down to the least number, a descent begins at that stack with another
+    interface, without effect; if it gains nothing either, that stack is the closest.
     """
-    count, opaque, closed = len(stack.interfaces), stack.interfaces[-1].opaque, model.closed_form
+    closed = model.closed_form
 
     def itself(start: Stack) -> End:
-        return Descent(table, start, model, eta_max, DARKEST, films=False).run(ROUNDS if closed else ALONE)
+        return Descent(table, start, model, eta_max, DARKEST, films=False).run()
 
-    sets = [kept for kept in combinations(range(count), interfaces) if not opaque or kept[-1] == count - 1]
-    starts = [_of_some(stack, kept) for kept in sets]
-    starts = _closest(table, starts, model, eta_max, TRIED if closed else 1)
+    starts = _of_sets(stack, interfaces, table, model, eta_max)
     found = descended(table, starts, model, eta_max, DARKEST, films=False)
     # A model that is slow also descends by itself: the one that stands in for it leads far away from a close start
     found += [] if closed else [itself(start) for start in starts if not any(start.films)]
-    if interfaces > 1:
-        fewer = _simplest(stack, interfaces - 1, table, model, eta_max)[0]
+    if interfaces > least:
+        fewer = _simplest(stack, interfaces - 1, table, model, eta_max, least)[0]
         if fewer.cost <= min(end.cost for end in found):
             more = itself(_with_one_more(fewer.stack))
             found.append(more if more.cost < GAINED * fewer.cost else fewer)
     return sorted(found, key=lambda end: end.cost)
+
+
+def _of_sets(stack: Stack, interfaces: int, table: ReflectanceTable, model: Model, eta_max: float) -> list[Stack]:
+    """The stacks of some interfaces, an opaque last one among them, that are closest before any change.
+
+    Where there are many sets, those that lack one interface of the closest sets of one more, by the nearest model in
+    closed form.
+    """
+    count = len(stack.interfaces)
+    sets = [tuple(range(count))]
+    free = count - stack.interfaces[-1].opaque
+
+    def closest(sets: Sequence[tuple[int, ...]], model: Model, tried: int) -> list[tuple[int, ...]]:
+        starts = [_of_some(stack, kept) for kept in sets]
+        costs = [Descent(table, start, model, eta_max).start_end.cost for start in starts]
+        return [sets[n] for n in np.argsort(costs, kind="stable")[:tried]]
+
+    if comb(free, count - interfaces) <= SETS:
+        sets = [tuple(kept) for kept in combinations(range(count), interfaces) if count - free <= kept.count(count - 1)]
+    else:
+        for _ in range(count - interfaces):
+            fewer = [tuple(k for k in kept if k != out) for kept in sets for out in kept if out < free]
+            sets = closest(list(dict.fromkeys(fewer)), model.surrogate, TRIED)
+    return [_of_some(stack, kept) for kept in closest(sets, model, TRIED if model.closed_form else 1)]
 
 
 def _with_one_more(stack: Stack) -> Stack:

@@ -104,9 +104,10 @@ class Side:
 
     def seen(self, w: Direction) -> SideView:
         """What light from a direction above sees."""
-        return self._seen(w, self.at(w))
+        return self.given(w, self.at(w))
 
-    def _seen(self, w: Direction, columns: Columns) -> SideView:
+    def given(self, w: Direction, columns: Columns) -> SideView:
+        """What light from a direction above sees, by the columns for it."""
         every = zip(self.shapes, columns.weights, columns.roughness)
         lobes = [shape.lobe(weight, self.kind(*numbers).roughness(ROOTS)) for shape, weight, numbers in every]
         # The axes of isotropic interfaces lie in the plane of incidence
@@ -249,7 +250,7 @@ class Solved:
             samples=ops.select_record(where, self.above.samples, self.below.samples),
             transmission=ops.select_record(where, self.above.transmission, self.below.transmission),
         )
-        return side._seen(turned, columns), ops.select(where, self.eta, 1 / self.eta)
+        return side.given(turned, columns), ops.select(where, self.eta, 1 / self.eta)
 
     def albedo(self, wi: Direction, asked: Query = ALL) -> Value:
         """Energy of the queried parts, a colour."""

@@ -28,7 +28,8 @@ Array = NDArray[np.floating]
 
 SAMPLES = 4 * 377  # of a lobe; four times a Fibonacci number
 STEPS = 12  # of the search for a roughness
-ENOUGH = 1e-7  # change of a roughness at which it ends
+ENOUGH = 1e-7  # relative change of a roughness, or a median, at which it ends
+SLOPES = 0.2, 1.5  # of the logarithm of a median, by that of the roughness
 ALPHA_LIMITS = 1e-4, 1.0
 ROUND = 1e-4  # difference of variances, of their sum, below which a lobe hardly has axes
 COS_MIN = 1e-6  # of sums of directions
@@ -94,18 +95,24 @@ def roughness(samples: Samples, axis: Array | None = None) -> Roughness:
 def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
     """Roughnesses (2, N) of GGX reflections of wi, (N,) each, in their frame, whose medians are `target`.
 
-    Medians grow almost in proportion to the roughness, so Newton's step is that of the median.
+    Medians grow almost in proportion to the roughness, so that the first step is that of the median; secants follow.
     """
     u1, u2 = _lattice(azimuth)
     wi = _columns(wi)
-    alpha = np.clip(target, *ALPHA_LIMITS)
+    alpha, slope = np.clip(target, *ALPHA_LIMITS), np.ones_like(target)
+    before: tuple[Array, Array] | None = None
     for _ in range(STEPS):
         u, v = alpha[..., None]
         h = ggx.sample_visible(wi, u, v, u1, u2)
         weight = ggx.masking(ggx.reflect(wi, h), u, v)
-        scale = np.array([_step(w / h[2], weight, m) for w, m in zip(h[:2], target)])
-        alpha = np.clip(alpha / scale, *ALPHA_LIMITS)
-        if np.all(np.abs(scale - 1) < ENOUGH):
+        off = np.log([_step(w / h[2], weight, m) for w, m in zip(h[:2], target)])
+        if before is not None:
+            change = np.log(alpha / before[0])
+            seen = np.clip((off - before[1]) / np.where(change == 0, 1.0, change), *SLOPES)
+            slope = np.where(change == 0, slope, seen)
+        before = alpha, off
+        alpha = np.clip(alpha * np.exp(-off / slope), *ALPHA_LIMITS)
+        if np.all(np.abs(alpha - before[0]) < ENOUGH * alpha):
             break
     return alpha
 
@@ -128,7 +135,10 @@ def _median(x: Array, weight: Array) -> Array:
     x = np.abs(x)
     median = np.exp(ops.divide(np.sum(weight * np.log(x + ops.TINY), axis=-1), np.sum(weight, axis=-1)))
     for _ in range(STEPS):
-        median = median * _step(x, weight, median)
+        step = _step(x, weight, median)
+        median = median * step
+        if np.all(np.abs(step - 1) < ENOUGH):
+            break
     return np.asarray(median)
 
 

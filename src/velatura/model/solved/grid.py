@@ -183,17 +183,51 @@ class Folded:
             return self.everywhere(values)
 
         found = Columns(*(each(x) for x in vars(columns).values()))
-        if self.grid.isotropic:
-            return found
         sign = np.tile(np.where(self.mirrored, -1, 1), self.grid.cosines)
-        c, s = np.cos(self.grid.phi), np.sin(self.grid.phi)
+        return found if self.grid.isotropic else _of_material(found, self.grid.phi, sign)
 
-        def turned(xx: Array, xy: Array, yy: Array) -> tuple[Array, ...]:
-            mixed = 2 * c * s * sign * xy
-            across = c * s * (xx - yy) + (c * c - s * s) * sign * xy
-            return c * c * xx - mixed + s * s * yy, across, s * s * xx + mixed + c * c * yy
 
-        return replace(found, roughness=[turned(*matrix) for matrix in found.roughness])
+@dataclass(frozen=True)
+class Listed:
+    """A list of directions (M,), each by itself, in place of those of a grid."""
+
+    isotropic: bool
+    directions: tuple[Array, Array, Array]
+
+    @property
+    def count(self) -> int:
+        return len(self.cosine)
+
+    @property
+    def cosine(self) -> Array:
+        return np.maximum(self.directions[2], COS_MIN)
+
+    @property
+    def phi(self) -> Array:
+        return np.asarray(np.arctan2(self.directions[1], self.directions[0]))
+
+    @property
+    def at_cosines(self) -> tuple[Array, Array, Array]:
+        return self.directions
+
+    def around(self, values: Array) -> Array:
+        return values
+
+    def unfolded(self, columns: Columns) -> Columns:
+        return columns if self.isotropic else _of_material(columns, self.phi, np.ones(1))
+
+
+def _of_material(columns: Columns, phi: Array, sign: Array) -> Columns:
+    """Columns with matrices of the frame of the plane of incidence at azimuths phi, or of its mirror image where the
+    sign is -1, in that of the material."""
+    c, s = np.cos(phi), np.sin(phi)
+
+    def turned(xx: Array, xy: Array, yy: Array) -> tuple[Array, ...]:
+        mixed = 2 * c * s * sign * xy
+        across = c * s * (xx - yy) + (c * c - s * s) * sign * xy
+        return c * c * xx - mixed + s * s * yy, across, s * s * xx + mixed + c * c * yy
+
+    return replace(columns, roughness=[turned(*matrix) for matrix in columns.roughness])
 
 
 def _is_sharp(interface: InterfaceValues) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import radians
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from velatura.model.base import SWITCHES, Body, Model
@@ -64,6 +65,20 @@ class SolvedModel(Model):
             return self.pointwise.body(material, variance, context)
         frame = rotation_frame.frame(material)
         return frame.turned(solve.solve(frame.back(material), self, frame.kind(variance), context), material)
+
+    def lit(self, material: Material, wi: Direction) -> Callable[[Any], Body]:
+        if self.form != "forward" or not _is_solved(material):
+            return super().lit(material, wi)
+        from velatura.model.context import Context
+        from velatura.model.solved import rotation_frame, solve
+        from velatura.model.variance import variance_kind
+        from velatura.optics import ggx
+
+        frame = rotation_frame.frame(material)
+        inside, kind = ggx.rotate(wi, radians(frame.degrees(material))), frame.kind(variance_kind(material))
+        straight = solve.plain(frame.back(material).solid())
+        found = solve.Solver.of(self, kind, Context(), straight).lit(straight, inside)
+        return lambda which: frame.turned(found.body(which), material)
 
     def statistics(self, material: Material, wi: Direction) -> StackLobes:
         from velatura.model.solved import statistics

@@ -20,7 +20,7 @@ from velatura.model.solved.bsdf import ENERGY_EPS, ROOTS, Shape, Side, Solved
 from velatura.model.solved.columns import Columns, Declaration
 from velatura.model.solved.energies.adding import Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
-from velatura.model.solved.grid import COS_MIN, Folded, Grid
+from velatura.model.solved.grid import COS_MIN, Folded, Grid, Listed
 from velatura.model.solved.lobes import refracted_lobe, remainder, widths
 from velatura.model.solved.lobes.refracted_lobe import Index
 from velatura.model.solved.lobes.remainder import Remainder
@@ -119,6 +119,29 @@ class SolvedSide:
         return replace(self, columns=columns)
 
 
+@dataclass(frozen=True)
+class Lit:
+    """A side, and its columns for a list of directions wi, (M,) each."""
+
+    side: Side
+    columns: Columns
+    wi: Direction
+
+    def body(self, which: NDArray[np.integer]) -> Solved:
+        """The side as a BSDF for light from the directions of numbers `which` alone."""
+
+        def taken(value: Any) -> Any:
+            if isinstance(value, (list, tuple)):
+                return type(value)(map(taken, value))
+            if isinstance(value, Parts):
+                return Parts(*map(taken, vars(value).values()))
+            return value if np.ndim(value) == 0 else value[..., which]
+
+        columns = Columns(*map(taken, vars(self.columns).values()))
+        x, y, z = map(taken, self.wi)
+        return Solved(self.side, None, 1.0, False, (self.side.given((x, y, z), columns), 1.0))
+
+
 class _Lobe(NamedTuple):
     """A lobe that is drawn, and its width at the directions of a grid."""
 
@@ -196,7 +219,7 @@ class Solver:
 
     def solve(self, material: Material, layouts: Sequence[Layout]) -> list[SolvedSide]:
         """A material with values of NumPy, each side."""
-        found = [self._side(*each) for each in zip(sides(material), layouts)]
+        found = [self._side(seen, layout, Folded.of(self.grid, seen)) for seen, layout in zip(sides(material), layouts)]
         if self.model.form == "forward":
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
@@ -241,9 +264,16 @@ class Solver:
             return Solved(made[0], None, 1.0, symmetric)
         return Solved(made[0], made[1], ops.mean(material.below) / ops.mean(material.exterior), symmetric)
 
-    def _side(self, material: Material, layout: Layout) -> SolvedSide:
-        """A side of a material at the directions of the grid, in the order of the physics."""
-        folded = Folded.of(self.grid, material)
+    def lit(self, material: Material, wi: Direction) -> Lit:
+        """The upper side of a material of NumPy's values, solved for light from directions wi, (M,) each, alone."""
+        (layout, *_), upper = self.layouts([material]), sides(material)[0]
+        found = self._side(upper, layout, Listed(self.isotropic, wi))
+        polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(found.polynomial).values()))
+        context = Context(colour=_stacked, tables=self.tables)
+        return Lit(self.side(upper, layout, None, polynomial, context), found.columns, wi)
+
+    def _side(self, material: Material, layout: Layout, folded: Folded | Listed) -> SolvedSide:
+        """A side of a material at some directions, in the order of the physics."""
         light, polynomial = self._light(material, layout, folded)
         lobes = self._lobes(material, layout, folded, light)
         clipped, peak = _clipped(polynomial, folded.at_cosines)
@@ -269,7 +299,7 @@ class Solver:
         forward = transmission if self.model.form == "forward" else None
         return SolvedSide(folded.unfolded(columns), numbers, self._colours(clipped), edged, forward)
 
-    def _light(self, material: Material, layout: Layout, folded: Folded) -> tuple[Energies, Remainder]:
+    def _light(self, material: Material, layout: Layout, folded: Folded | Listed) -> tuple[Energies, Remainder]:
         """Solve for the energies of all parts, and fit the remainder's polynomial."""
         solved = energies(
             material,
@@ -284,7 +314,7 @@ class Solver:
         polynomial = remainder.fit(solved.nodes, solved.remainder, INCIDENCES, albedos)
         return solved.first(folded.count), Remainder(*(x[:, None] for x in vars(polynomial).values()))
 
-    def _lobes(self, material: Material, layout: Layout, folded: Folded, light: Energies) -> list[_Lobe]:
+    def _lobes(self, material: Material, layout: Layout, folded: Folded | Listed, light: Energies) -> list[_Lobe]:
         """Work out the widths of lobes and veils."""
         found, energy = parts(material), np.array([ops.mean(each) for each in light.lobes])
         tensors = widths.tensors(found, folded.cosine, folded.phi, energy)
@@ -297,7 +327,7 @@ class Solver:
         return [_Lobe(shape, tensor(spec)) for shape, spec in zip(shapes, layout.lobes)]
 
     def _hand_over(
-        self, layout: Layout, folded: Folded, light: Energies, lobes: Sequence[_Lobe], whole: Array
+        self, layout: Layout, folded: Folded | Listed, light: Energies, lobes: Sequence[_Lobe], whole: Array
     ) -> tuple[list[_Weighed], Array]:
         """Divide energies of lobes by their integrals; the remainder takes what light it can, by which a lobe would be
         too bright, and has the energy that is returned. `whole` is its albedo without a scale."""
@@ -320,7 +350,7 @@ class Solver:
         self,
         material: Material,
         layout: Layout,
-        folded: Folded,
+        folded: Folded | Listed,
         light: Energies,
         wanted: Sequence[Demand],
         transmission: Transmission | None,
