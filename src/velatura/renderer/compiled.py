@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from velatura import kernel
 from velatura.ops import Value
+from velatura.renderer.packets import aligned
 
 Array = NDArray[Any]
 Groups = Sequence[Sequence[Value]]
@@ -94,10 +95,15 @@ def _compiled(
     import drjit as dr
 
     number, integer = module.Float64, module.UInt32
+
+    def array(values: Any) -> Any:
+        # Arrays at other addresses would have a kernel of their own
+        return number(aligned(np.ravel(values), np.float64))
+
     shape = len(sources[0]), samples[0].shape[-1]
     flat: list[float] = []
     _mapped(numbers, flat.append)
-    given = number(np.array([*flat, 0.0]))
+    given = array([*flat, 0.0])
 
     def read(values: Any, place: Any) -> Any:
         return dr.gather(number, values, place)
@@ -105,8 +111,8 @@ def _compiled(
     source, sample = _places(integer, *shape)
     places = itertools.count()
     groups, sums = function(
-        [read(number(x), source) for x in sources],
-        [number(x.ravel()) if x.ndim > 1 else read(number(x), sample) for x in samples],
+        [read(array(x), source) for x in sources],
+        [array(x) if x.ndim > 1 else read(array(x), sample) for x in samples],
         _mapped(numbers, lambda _: read(given, integer(next(places))), module.Array3f64),
     )
     size = shape[0] * shape[1]
@@ -126,7 +132,7 @@ def _compiled(
 def _places(integer: Any, sources: int, samples: int) -> tuple[Any, Any]:
     """The source and the sample of each value; quicker to read than to divide for."""
     source, sample = np.divmod(np.arange(sources * samples, dtype=np.uint32), np.uint32(samples))
-    return integer(source), integer(sample)
+    return integer(aligned(source, np.uint32)), integer(aligned(sample, np.uint32))
 
 
 def _channels(group: Sequence[Value]) -> list[Value]:

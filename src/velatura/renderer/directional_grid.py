@@ -33,6 +33,10 @@ class Curves:
         found: Packets = self.data
         return found
 
+    def only(self, channels: Sequence[int]) -> Curves:
+        """Some of the functions, of NumPy."""
+        return Curves(self.data[..., channels], self.shape)
+
     def __call__(self, w: Direction, *others: Value) -> list[Value]:
         """Values for a direction, and coordinates from 0 to 1 on axes that come after those of directions."""
         interpolate = ops.interpolate_in_simplices if others else ops.interpolate

@@ -10,7 +10,7 @@ samples are those of the forward form.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any
@@ -93,18 +93,40 @@ class Side:
 
     def at(self, w: Direction) -> Columns:
         """The columns for a direction above."""
-        channels = iter(self.curves(w))
+        found = self.declaration.read(self._values(self.declaration.columns, self.curves(w)))
+        return replace(found, chance=ops.maximum(found.chance, 0.0))
+
+    def _values(self, columns: Iterable[Column], channels: Iterable[Value]) -> list[Value]:
+        """Numbers and colours of columns, by their rows."""
+        rows = iter(channels)
 
         def value(column: Column) -> Value:
-            found = [ops.channel(next(channels), k) for k in range(column.rows(self.colours))]
+            found = [ops.channel(next(rows), k) for k in range(column.rows(self.colours))]
             return self.colour(*found) if column.colour else found[0]
 
-        found = self.declaration.read(map(value, self.declaration.columns))
-        return replace(found, chance=ops.maximum(found.chance, 0.0))
+        return list(map(value, columns))
 
     def seen(self, w: Direction) -> SideView:
         """What light from a direction above sees."""
         return self.given(w, self.at(w))
+
+    def part(self, k: int, w: Direction) -> SideView:
+        """What light from a direction above sees of the reflected part of number k alone, which is the first one. In
+        NumPy."""
+        weight, *roughness = self._only(w, self.declaration.part(k))
+        columns = Columns([weight], [tuple(roughness)], [], [], weight, 0.0, 0.0, None, None)
+        return replace(self, shapes=self.shapes[k : k + 1]).given(w, columns)
+
+    def through(self, w: Direction) -> SideView:
+        """What light from a direction above sees of all that passes. In NumPy."""
+        passes = Parts(*self._only(w, self.declaration.through))
+        return replace(self, shapes=()).given(w, Columns([], [], [], [], 0.0, 0.0, 0.0, passes, None))
+
+    def _only(self, w: Direction, chosen: Sequence[int]) -> list[Value]:
+        """Values of columns of some numbers; others are not read."""
+        columns = self.declaration.columns
+        rows = self.declaration.rows(chosen, self.colours)
+        return self._values([columns[k] for k in chosen], self.curves.only(rows)(w))
 
     def given(self, w: Direction, columns: Columns) -> SideView:
         """What light from a direction above sees, by the columns for it."""

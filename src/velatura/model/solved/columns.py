@@ -52,8 +52,26 @@ class Declaration:
 
     def first_rows(self, name: str, colours: int) -> list[int]:
         """The first row of each column of a name."""
-        begins = accumulate((column.rows(colours) for column in self.columns), initial=0)
-        return [begin for column, begin in zip(self.columns, begins) if column.name == name]
+        return [begin for column, begin in zip(self.columns, self._begins(colours)) if column.name == name]
+
+    def rows(self, chosen: Iterable[int], colours: int) -> list[int]:
+        """All rows of columns of some numbers."""
+        begins = self._begins(colours)
+        return [row for k in chosen for row in range(begins[k], begins[k + 1])]
+
+    def part(self, k: int) -> list[int]:
+        """Numbers of the columns that make the reflected part of number k: weight, and roughness, which the last one,
+        the remainder, has not."""
+        each = self.entries + 1
+        return [each * self.lobes + k, *(range(k * each, k * each + self.entries) if k < self.lobes else ())]
+
+    @property
+    def through(self) -> list[int]:
+        """Numbers of the columns that make what passes."""
+        return [k for k, column in enumerate(self.columns) if column.name.startswith("passed_")]
+
+    def _begins(self, colours: int) -> list[int]:
+        return list(accumulate((column.rows(colours) for column in self.columns), initial=0))
 
     def proportions(self, colours: int) -> list[tuple[int, list[int]]]:
         """The first rows of each energy, and of all else that is in proportion to it."""

@@ -42,6 +42,11 @@ class Grid:
         return cls(isotropic, COSINES, AZIMUTHS[sharp])
 
     @property
+    def coarser(self) -> Grid:
+        """The grid for factors of the symmetric form: of brushed materials they vary by less than their columns."""
+        return self if self.isotropic else Grid(False, self.cosines // 2, self.azimuths // 2)
+
+    @property
     def nodes(self) -> Array:
         return np.linspace(0, 1, self.cosines)
 
@@ -81,16 +86,24 @@ class Grid:
     def spread(self, rows: Array, shape: tuple[int, ...]) -> Array:
         """Values at the nodes, (..., M), interpolated, (..., prod(shape)): by splines over the cosine, by waves over
         the azimuth, which do not fall below 0 where no value does."""
+        x, y, _ = directional_grid.directions(shape, None)
+        return self._spread(rows, shape[0], np.arctan2(y, x).reshape(shape)[0] if len(shape) > 1 else None)
+
+    def refined(self, rows: Array, finer: Grid) -> Array:
+        """Values at the nodes, (..., M), interpolated likewise at those of a finer grid."""
+        if finer == self:
+            return rows
+        return self._spread(rows, finer.cosines, None if self.isotropic else finer.phi[: finer.turns])
+
+    def _spread(self, rows: Array, cosines: int, phi: Array | None) -> Array:
         values = rows.reshape(*rows.shape[:-1], self.cosines, self.turns)
-        if not self.isotropic:
-            x, y, _ = directional_grid.directions(shape, None)
-            phi = np.arctan2(y, x).reshape(shape)[0]
+        if phi is not None:
             order = np.arange(self.turns // 2 + 1)
             both = np.where((order == 0) | (2 * order == self.turns), 1, 2)
             waves = np.fft.rfft(values, axis=-1) / self.turns * both
             least = values.min(axis=-1, keepdims=True)
             values = np.maximum((waves @ np.exp(2j * order[:, None] * phi)).real, np.minimum(least, 0))
-        return self.along(values.swapaxes(-1, -2), shape[0]).swapaxes(-1, -2).reshape(*rows.shape[:-1], -1)
+        return self.along(values.swapaxes(-1, -2), cosines).swapaxes(-1, -2).reshape(*rows.shape[:-1], -1)
 
     def beside(self, rows: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
         """The lesser and the greater of the values at the two cosines beside each place of `spread`, of its shape."""

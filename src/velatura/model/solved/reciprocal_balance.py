@@ -23,8 +23,8 @@ from velatura.renderer import low_discrepancy
 Array = NDArray[np.floating]
 Shares = Callable[[Direction], Sequence[tuple[Array, Array]]]
 
-SAMPLES = {False: 1024, True: 233}  # at each node; fewer where there are many
-MANY = 100
+SAMPLES = {False: 1024, True: 377}  # at each node; fewer where there are many
+MANY = 64
 STEPS = 24
 MOST = 10.0  # times as bright, there and back
 MOST_REST = 4.0  # for the remainder
@@ -66,24 +66,28 @@ def factors(
     samples_of: list[Demand] = []
     refraction: list[tuple[Array, Array]] = []
     for side, other in zip(sides, reversed(sides)):
-        of, at_nodes = side.seen(i), side.seen(wi)
+        at_nodes = side.seen(wi)
         result.append([])
         found = []
         for k, energy in enumerate(at_nodes.energies):
-            wo = of.out_of(of.lobes[k], i, *u[1:]) if k < len(of.lobes) else of.samples.sample(i, *u)
+            of = side.part(k, i)
+            wo = of.out_of(of.lobes[0], i, *u[1:]) if of.lobes else of.samples.sample(i, *u)
             up = wo[0], wo[1], np.maximum(wo[2], 0.0)
-            value = _weight(of.part(k, i, wo), side.seen(up).part(k, up, i)[0], i, wo)
-            most = MOST if k < len(of.lobes) else MOST_REST
+            value = _weight(of.part(0, i, wo), side.part(k, up).part(0, up, i)[0], i, wo)
+            most = MOST if of.lobes else MOST_REST
             reached = list(shares(up))
             result[-1].append(_balanced(kernel(value, reached), energy, most))
             found.append(wanted(value, reached, result[-1][-1], energy))
         samples_of.append(Demand.together(found))
-        if side.transmission and of.columns.passes:
-            wo = combined.sample(side.transmission, of.columns.passes, i, np.minimum(u[0], combined.BELOW_ONE), *u[1:])
+        if side.transmission:
+            of = side.through(i)
+            passes = of.columns.passes
+            assert passes
+            wo = combined.sample(side.transmission, passes, i, np.minimum(u[0], combined.BELOW_ONE), *u[1:])
             down = wo[0], wo[1], np.maximum(-wo[2], 0.0)
             eta = solved.eta if side is solved.above else 1 / solved.eta
-            value, density, _ = exchanged(of, other.seen(down), eta, i, wo)
-            value = np.where(density > 0, ops.divide(value * of.columns.passes.share, density), 0.0)
+            value, density, _ = exchanged(of, other.through(down), eta, i, wo)
+            value = np.where(density > 0, ops.divide(value * passes.share, density), 0.0)
             value = np.where(wo[2] < 0, value, 0.0)
             refraction.append((kernel(value, shares(down)), at_nodes.passed))
     if refraction:

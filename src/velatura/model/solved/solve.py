@@ -223,11 +223,14 @@ class Solver:
         if self.model.form == "forward":
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
-        numbers, folded = self.body(material, found, layouts), Folded.of(self.grid, material)
+        numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser, material)
         factors, wanted = reciprocal_balance.factors(
             numbers, folded.directions, folded.shares, folded.count, self.samples
         )
-        spread = folded.everywhere
+
+        def spread(values: Array) -> Array:
+            return folded.grid.refined(folded.everywhere(values), self.grid)
+
         return [
             side.weighed(list(map(spread, each)), Demand(*map(spread, of)))
             for side, each, of in zip(found, factors, wanted)

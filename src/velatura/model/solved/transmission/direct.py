@@ -29,8 +29,9 @@ import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
 from functools import reduce
+from itertools import accumulate
 from math import pi
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,7 @@ WIDTHS = RoughnessMap(lambda a, _: ops.power(a, EXPONENT), lambda s, _: ops.powe
 Momentum = tuple[Value, Value]
 Passing = Callable[[Value, Value], Value]
 Array = NDArray[np.floating]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -218,9 +220,23 @@ def _crossed(transmission: Transmission, p: Momentum, above: Value, below: Value
     return MomentumInSlabs(p, p2, transmission.indices, cosines, bounded, steps, passes, slabs)
 
 
-def _smooth(crossed: MomentumInSlabs, interfaces: slice, slabs: slice) -> Value:
-    """Share (a colour) of light that passes smooth interfaces and slabs."""
-    return reduce(lambda a, b: a * b, [*crossed.passes[interfaces], *crossed.slabs[slabs]], 1.0)
+def _from_top(values: Sequence[T], join: Callable[[T, T], T]) -> list[T]:
+    """Values joined with all that come before them."""
+    return list(accumulate(values, join))
+
+
+def _from_bottom(values: Sequence[T], join: Callable[[T, T], T]) -> list[T]:
+    """Values joined with all that come after them."""
+    return list(accumulate(reversed(values), join))[::-1]
+
+
+def _smooth_above(crossed: MomentumInSlabs) -> list[Value]:
+    """Share (a colour) of light that passes all smooth interfaces above each one."""
+    return [1.0, *_from_top(crossed.passes[:-1], operator.mul)]
+
+
+def _smooth_below(crossed: MomentumInSlabs) -> list[Value]:
+    return [*_from_bottom(crossed.passes[1:], operator.mul), 1.0]
 
 
 @dataclass(frozen=True)
@@ -232,24 +248,42 @@ class _Component(ops.Named):
     weight: Value
 
 
-def _component(transmission: Transmission, j: int, steps: Sequence[Value], d: Momentum | None = None) -> _Component:
-    """Component j, for the steps that light makes at all interfaces, and the sum d of its moves; None for little. A
-    single interface has its own roughness, and all the weight."""
-    own = transmission.refractions[j]
-    size = ops.maximum(own.sign * steps[j], own.least)
-    if len(steps) == 1:
-        return _Component(size, own.roughness, 1.0)
-    width = own.width
-    for l, (step, other) in enumerate(zip(steps, transmission.refractions)):
-        if l != j:
-            width = width + other.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY) / size, EXPONENT)
-    weights = [_weight(refraction, step) for refraction, step in zip(transmission.refractions, steps)]
-    if d is not None:
-        total = reduce(operator.add, weights)
-        weights = [
-            weight * _tail(refraction, d, total) for weight, refraction in zip(weights, transmission.refractions)
-        ]
-    return _Component(size, width.roughness(WIDTHS), weights[j] / reduce(operator.add, weights))
+def _components(
+    transmission: Transmission,
+    above: Sequence[Value],
+    own: Sequence[Value],
+    below: Sequence[Value],
+    d: Momentum | None = None,
+) -> list[_Component]:
+    """The component of each interface for its `own` step, and those of `above` and `below` that light makes at the
+    interfaces there; d is the sum of its moves, None for little. A single interface has its own roughness, and all the
+    weight."""
+    refractions, last = transmission.refractions, len(own) - 1
+    sizes = [ops.maximum(refraction.sign * step, refraction.least) for refraction, step in zip(refractions, own)]
+    if not last:
+        return [_Component(sizes[0], refractions[0].roughness, 1.0)]
+    widths_above = _from_top([_width(*each) for each in zip(refractions, above)], operator.add)
+    widths_below = _from_bottom([_width(*each) for each in zip(refractions, below)], operator.add)
+    over, at, under = ([_weight(*each) for each in zip(refractions, steps)] for steps in (above, own, below))
+    over_all, under_all = _from_top(over, operator.add), _from_bottom(under, operator.add)
+    tails = [_tail(refraction, d) for refraction in refractions] if d is not None else []
+    found = []
+    for j, (refraction, size) in enumerate(zip(refractions, sizes)):
+        width, scale, weight, total = refraction.width, ops.power(size, -EXPONENT), at[j], at[j]
+        if j:
+            width, total = width + widths_above[j - 1] * scale, over_all[j - 1] + total
+        if j < last:
+            width, total = width + widths_below[j + 1] * scale, total + under_all[j + 1]
+        if tails:
+            weights = [x * tail(total) for x, tail in zip([*over[:j], weight, *under[j + 1 :]], tails)]
+            weight, total = weights[j], reduce(operator.add, weights)
+        found.append(_Component(size, width.roughness(WIDTHS), weight / total))
+    return found
+
+
+def _width(refraction: Refraction, step: Value) -> Variance:
+    """Width of a move of light that makes a step, in the space of `WIDTHS`."""
+    return refraction.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY), EXPONENT)
 
 
 def _weight(refraction: Refraction, step: Value) -> Value:
@@ -258,25 +292,29 @@ def _weight(refraction: Refraction, step: Value) -> Value:
     return width2 + WEIGHT_MIN * refraction.n_1 * refraction.n_2
 
 
-def _tail(refraction: Refraction, d: Momentum, width2: Value) -> Value:
-    """Density of an interface's tail in the direction of d, over that of one that is isotropic; 1 within the width of
-    all."""
+def _tail(refraction: Refraction, d: Momentum) -> Callable[[Value], Value]:
+    """Density of an interface's tail in the direction of d, over that of one that is isotropic, by the square of the
+    width of all; 1 within that."""
     alpha_u, alpha_v, rotation = refraction.roughness
     if isinstance(refraction.width, Isotropic):
-        return 1.0
+        return lambda width2: 1.0
     x, y, _ = _turned((*d, 0.0), rotation)
-    near = (x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v) + width2) / (x * x + y * y + width2)
-    return 1 / (near * near)
+    own, even = x * x * (alpha_v / alpha_u) + y * y * (alpha_u / alpha_v), x * x + y * y
+
+    def density(width2: Value) -> Value:
+        near = (own + width2) / (even + width2)
+        return 1 / (near * near)
+
+    return density
 
 
 def _drawn(transmission: Transmission, i: MomentumInSlabs) -> tuple[list[_Component], list[Value]]:
     """The components as they are sampled, as wide as at p_o = p_i, and their probabilities."""
-    count = len(transmission.refractions)
-    components = [_component(transmission, j, i.steps) for j in range(count)]
-    if count == 1:
+    components = _components(transmission, i.steps, i.steps, i.steps)
+    if len(components) == 1:
         return components, [1.0]
     # Leave out parts that light does not reach; it always reaches the first interface
-    shares = [c.weight * ops.mean(_smooth(i, slice(j), slice(0))) for j, c in enumerate(components)]
+    shares = [c.weight * ops.mean(share) for c, share in zip(components, _smooth_above(i))]
     shares[0] = shares[0] + WEIGHT_MIN
     total = sum(shares[1:], shares[0])
     return components, [share / total for share in shares]
@@ -306,22 +344,27 @@ def _eval_pdf(transmission: Transmission, wi: Direction, wo: Direction, passes: 
     )  # no part reads the cosine on the side of wi and that beyond
     d = o.p[0] - i.p[0], o.p[1] - i.p[1]
     drawn, shares = _drawn(transmission, i)
+    own = [c.n_1 * i.bounded[j] - c.n_2 * o.bounded[j + 1] for j, c in enumerate(transmission.refractions)]
+    components = _components(transmission, i.steps, own, o.steps, d)
+    above, below_all = _smooth_above(i), _smooth_below(o)
+    slabs_above, slabs_below = _from_top(i.slabs, operator.mul), _from_bottom(o.slabs, operator.mul)
+    lowest = _from_bottom(n, ops.minimum)
     value: Value = 0.0
     density: Value = 0.0
-    for j, (refraction, sampled, share) in enumerate(zip(transmission.refractions, drawn, shares)):
+    for j, (refraction, component, sampled, share) in enumerate(
+        zip(transmission.refractions, components, drawn, shares)
+    ):
         with ops.block(f"Pass by a facet of interface {j}"):
-            own = refraction.n_1 * i.bounded[j] - refraction.n_2 * o.bounded[j + 1]
-            component = _component(transmission, j, [*i.steps[:j], own, *o.steps[j + 1 :]], d)
             facet = _facet(refraction, i, o, j, component.step)
             alone = _masking(refraction.roughness, i, j) * _masking(refraction.roughness, o, j + 1)
             turns = _turns(refraction.sign)
-            smooth = _smooth(i, slice(j), slice(j + 1)) * _smooth(o, slice(j + 1, None), slice(j + 1, None))
+            smooth = above[j] * slabs_above[j] * (below_all[j] * slabs_below[j + 1])
             seen = component.weight * _slopes(component.roughness, facet.slope) * ops.select(turns, alone, 1.0)
             value = value + smooth * facet.passes * seen  # model.md, Eq. 9
             visible = ops.mean(facet.passes) * _masking(sampled.roughness, i, j)
             evenly = ops.mean(i.passes[j]) / (component.step * component.step)
             through = _slopes(sampled.roughness, facet.slope) * ops.select(turns, visible, evenly)
-            through = ops.select(o.p2 < _lowest2(n[j + 1 :]), through, 0.0)
+            through = ops.select(o.p2 < lowest[j + 1] * lowest[j + 1], through, 0.0)
         with ops.block("Or be reflected by it"):
             if not passes:
                 through = ops.select(below, through, _reflected(transmission, i, o, j, sampled.roughness))
@@ -380,7 +423,7 @@ class _Facet(ops.Named):
 
 
 def _facet(refraction: Refraction, i: MomentumInSlabs, o: MomentumInSlabs, j: int, step: Value) -> _Facet:
-    """Facet of interface j, for its step as `_component` bounds it."""
+    """Facet of interface j, for its step as `_components` bound it."""
     n_1, n_2, c_1, c_2 = refraction.n_1, refraction.n_2, i.bounded[j], o.bounded[j + 1]
     slope = (o.p[0] - i.p[0]) / step, (o.p[1] - i.p[1]) / step
     v_i = 1 - refraction.sign * (i.p[0] * slope[0] + i.p[1] * slope[1]) / (n_1 * c_1)
