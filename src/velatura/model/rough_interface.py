@@ -36,6 +36,7 @@ GRAZING = 1e-4  # least cosine of light that meets an interface
 LEVEL = float(np.sqrt(1 - GRAZING**2))  # its sine
 ALPHA_MIN = 1e-3
 DIGITS = 9  # of indices that are alike
+LONG = 0.3  # such a difference, from which light keeps its momentum along facets
 BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
 WALKED = 16  # directions of walks between facets with films
 PATHS = 2048  # from each
@@ -95,6 +96,11 @@ class Facets:
     def brushed(self) -> float:
         """0 for isotropic facets, towards 1 for those that are long along an axis."""
         return 1 - min(self.alpha_u, self.alpha_v) / max(self.alpha_u, self.alpha_v, ALPHA_MIN)
+
+    @property
+    def across(self) -> float:
+        """0 for isotropic facets, 1 for those so long that light keeps its momentum along them."""
+        return min(self.brushed / LONG, 1)
 
     @property
     def ratio(self) -> float:

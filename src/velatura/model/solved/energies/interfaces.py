@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
 OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
-BRUSHED = 0.3  # from which repeated light of metals has the directions of second events alone
+KEPT_ON = 0.5  # share of repeated light that passes brushed facets in the directions of second events
 TRACE = 1e-12  # of light
 BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
@@ -159,7 +159,7 @@ class _Met:
 
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
-        again = facets.brushed > 0 and setting.often is not None
+        again = facets.across > 0 and setting.often is not None
         events = FirstEvents(facets, tuple(setting.ways), again)
         lights, others = setting.basis.deposited(events, p, psi, setting.samples, events.numbers(setting.samples))
         # Stencils keep the energy
@@ -243,9 +243,9 @@ class _Side:
 
 def _again(taken: _Blocked, there: _Blocked, second: Sequence[Operator], facets: Facets, setting: Setting) -> Operator:
     """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
-    turn it, the more of it goes on as it came. Brushed ones, which keep its momentum along them, send it where their
-    `second` events do."""
-    brushed = min(facets.brushed / BRUSHED, 1) if second else 0.0
+    turn it, the more of it goes on as it came. Brushed ones, which keep its momentum along them, send what they reflect
+    where their `second` events do, and a share of what passes."""
+    brushed = facets.across * (1.0 if there is taken else KEPT_ON)
     if brushed == 1:
         return second[0]
     turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (OPAQUE if facets.opaque else facets.step)
@@ -257,7 +257,7 @@ def _again(taken: _Blocked, there: _Blocked, second: Sequence[Operator], facets:
         )
     )
     even = Operator.of(nodes, beams)
-    return brushed * second[0] + (1 - brushed) * even if second else even
+    return brushed * second[0] + (1 - brushed) * even if brushed else even
 
 
 def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShares) -> tuple[Array, Array]:
@@ -275,7 +275,7 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShare
     if facets.films is not None:
         reflected, passed = shares_of_films(facets, p)
         return blocked * reflected, blocked * passed
-    across = min(facets.brushed / BRUSHED, 1)
+    across = facets.across
     alpha = (1 - across) * mean_alpha(facets) + across * max(facets.alpha_u, facets.alpha_v, ALPHA_MIN)
     cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
     ratio = (facets.below / facets.above)[:, None]
