@@ -38,7 +38,7 @@ ROOMY = "localStorage['velatura.layout'] ??= '{}'"  # the panel has all the room
 
 @pytest.fixture(scope="module")
 def tabs(opened: Any) -> Tabs:
-    return Tabs(opened, viewport={"width": 900, "height": 500}, permissions=["clipboard-read", "clipboard-write"])
+    return Tabs(opened, (900, 500), permissions=["clipboard-read", "clipboard-write"])
 
 
 @pytest.fixture

@@ -38,7 +38,7 @@ PREVIEWS = "[...velatura.viewport.device.programs.keys()].filter((text) => text.
 
 @pytest.fixture(scope="module")
 def tabs(opened: Any) -> Tabs:
-    return Tabs(opened, viewport={"width": 900, "height": 600}, accept_downloads=True)
+    return Tabs(opened)
 
 
 @pytest.fixture
@@ -47,11 +47,11 @@ def visit(opened: Any, tabs: Tabs, served: Server) -> Iterator[Open]:
     expected: list[str] = []
     own: list[Tabs] = []
 
-    def begin(*expecting: str, script: str = "", **options: Any) -> Visit:
+    def begin(*expecting: str, script: str = "", size: Any = None, scheme: str = "light", **options: Any) -> Visit:
         expected.extend(expecting)
         if options:
             own.append(Tabs(opened, **options))
-        return (own or [tabs])[-1].visit(served.entrance, script)
+        return (own or [tabs])[-1].visit(served.entrance, script, size, scheme)
 
     yield begin
     visits = tabs.forget()
@@ -197,7 +197,7 @@ def test_red_paint_is_built_from_nothing_without_a_message(visit: Open) -> None:
 
 def test_the_tasks_of_an_artist_take_few_steps_and_no_message(visit: Open, served: Server) -> None:
     """Expected: each within so many clicks, keys, drops and fields; the page says nothing wrong at any step."""
-    page = visit(viewport={"width": 900, "height": 600}, permissions=["clipboard-read", "clipboard-write"])
+    page = visit(permissions=["clipboard-read", "clipboard-write"])
     layers, button = page.page.locator(".layer"), lambda name: page.page.get_by_role("button", name=name, exact=True)
     said_wrong: list[str] = []
     steps = 0
@@ -431,7 +431,7 @@ def test_one_more_layer_is_compiled_before_it_is_asked_for(visit: Open) -> None:
 
 def test_the_page_goes_on_while_thirty_interfaces_are_compiled(visit: Open) -> None:
     """Expected: a word for what the picture waits for, and no pause of the page as long as half of the compiling."""
-    page = visit(viewport={"width": 480, "height": 400})
+    page = visit(size=(480, 400))
     page.page.evaluate(
         """() => {
           const watched = (window.watched = {}), place = document.querySelector('.samples');
@@ -822,7 +822,7 @@ def test_light_from_a_file_fills_the_picture(visit: Open) -> None:
 
 
 def test_fingers_turn_the_object_and_bring_it_closer(visit: Open) -> None:
-    page = visit(viewport={"width": 900, "height": 600}, has_touch=True)
+    page = visit(has_touch=True)
     touch = page.page.context.new_cdp_session(page.page)
     box = page.page.locator("canvas").first.bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -1111,7 +1111,7 @@ def test_everything_is_reached_by_keys_and_has_a_name(visit: Open) -> None:
 
 @pytest.mark.parametrize("width", [360, 1280])
 def test_nothing_sticks_out_of_the_window(visit: Open, width: int) -> None:
-    page = visit(viewport={"width": width, "height": 720})
+    page = visit(size=(width, 720))
     assert page.page.evaluate("document.documentElement.scrollWidth") <= width
     picture = page.page.locator("canvas").first.bounding_box()
     panel = page.page.locator(".panel").bounding_box()
@@ -1124,7 +1124,7 @@ def test_nothing_sticks_out_of_the_window(visit: Open, width: int) -> None:
 def test_the_picture_has_most_of_the_window_until_it_is_shared(visit: Open, width: int, height: int) -> None:
     """Expected: half of a wide window, View and Model in sight, and above the values on a narrow one; what is opened
     and dragged is so again after a reload."""
-    page = visit(viewport={"width": width, "height": height}, script="localStorage['velatura.layout'] ??= '{}'")
+    page = visit(size=(width, height), script="localStorage['velatura.layout'] ??= '{}'")
     box = page.page.locator(".picture").bounding_box
     sections = page.page.locator("details.section > summary")
     if width == 480:
@@ -1171,7 +1171,7 @@ def test_the_picture_keeps_its_size_while_all_else_changes(visit: Open) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_serious(visit: Open, scheme: str) -> None:
     """Expected: no serious or critical violation of axe-core's rules, with all parts open and in every dialog."""
-    page = visit(viewport={"width": 1280, "height": 900}, color_scheme=scheme, bypass_csp=True)
+    page = visit(size=(1280, 900), scheme=scheme, bypass_csp=True)
     page.page.add_script_tag(path=AXE)
     found: list[str] = []
 
@@ -1201,7 +1201,7 @@ def test_axe_finds_nothing_serious(visit: Open, scheme: str) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_text_is_readable_in_light_and_dark(visit: Open, scheme: str) -> None:
-    page = visit(color_scheme=scheme)
+    page = visit(size=(1280, 720), scheme=scheme)
     pairs = page.page.evaluate(
         """() => ['.toolbar button', '.parameter .name', '.parameter .unit', '.kind', 'summary'].map((selector) => {
           const element = document.querySelector(selector);

@@ -41,7 +41,7 @@ layers:
 
 @pytest.fixture(scope="module")
 def tabs(opened: Any) -> Tabs:
-    return Tabs(opened, viewport={"width": 900, "height": 600}, permissions=["clipboard-read", "clipboard-write"])
+    return Tabs(opened, permissions=["clipboard-read", "clipboard-write"])
 
 
 @pytest.fixture
@@ -49,9 +49,9 @@ def visit(tabs: Tabs, served: Server) -> Iterator[Open]:
     """Opens a material in a browser without a past; no console may complain of more than what is expected."""
     expected: list[str] = []
 
-    def begin(text: str = "", *expecting: str, place: str = "") -> Visit:
+    def begin(text: str = "", *expecting: str, place: str = "", **options: Any) -> Visit:
         expected.extend(expecting)
-        found = tabs.visit(place or served.entrance)
+        found = tabs.visit(place or served.entrance, **options)
         if text:
             (served.folder / "films.yaml").write_text(text, encoding="utf-8")
             found.page.evaluate("velatura.openFile('films.yaml')")
@@ -222,15 +222,8 @@ def test_what_cannot_be_is_refused_in_words(visit: Open) -> None:
 
 
 @pytest.mark.parametrize(("width", "height", "scheme"), [(1280, 720, "light"), (480, 900, "dark")])
-def test_cards_of_films_are_accessible_and_fit(
-    width: int, height: int, scheme: str, opened: Any, served: Server
-) -> None:
-    (served.folder / "films.yaml").write_text(COATED, encoding="utf-8")
-    context = opened.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
-    page = Visit(context.new_page(), served.entrance)
-    page.page.evaluate("velatura.openFile('films.yaml')")
-    page.page.wait_for_function("() => velatura.store.get().layers.some(({ keys }) => keys.films)")
-    page.settled()
+def test_cards_of_films_are_accessible_and_fit(width: int, height: int, scheme: str, visit: Open) -> None:
+    page = visit(COATED, size=(width, height), scheme=scheme)
     page.page.locator(".film").first.scroll_into_view_if_needed()
     page.page.evaluate(AXE.read_text())
     found = page.page.evaluate("axe.run(document.querySelector('.layers')).then(({ violations }) => violations)")
@@ -240,8 +233,6 @@ def test_cards_of_films_are_accessible_and_fit(
       return card && box.width && (box.right > card.right + 1 || box.left < card.left - 1);
     }).map(({ outerHTML }) => outerHTML.slice(0, 90))"""
     assert page.page.evaluate(sticking) == []
-    context.close()
-    assert page.complaints == []
 
 
 def test_lobes_of_a_material_with_films_are_dragged(visit: Open) -> None:

@@ -21,13 +21,12 @@ PRESET = "coated-gold"
 
 
 class Look(editor.Visit):
-    """A visit that does not wait for the picture, but for the plots; they need not share the machine with paths."""
+    """A visit that does not wait for the picture, but for the plots."""
 
     begun: dict[str, list[float]] | None = None  # what the plots read at first
 
     def ready(self) -> None:
         self.page.wait_for_selector(".inspector .legend", timeout=60_000)
-        self.page.evaluate("velatura.viewport.setBudget({ samples: 0 })")
 
 
 @pytest.fixture(scope="module")

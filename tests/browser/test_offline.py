@@ -56,7 +56,7 @@ def address(folder: Path) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def tabs(opened: Any, address: str, served: Server) -> Tabs:
     """Of a browser that reaches no other address."""
-    made = Tabs(opened, viewport={"width": 900, "height": 600}, permissions=["clipboard-read", "clipboard-write"])
+    made = Tabs(opened, permissions=["clipboard-read", "clipboard-write"])
     allowed = address, served.address
 
     def guard(route: Any) -> None:

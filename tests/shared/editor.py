@@ -85,6 +85,18 @@ def _environment() -> dict[str, str]:
 EVERYTHING_OPEN = """localStorage['velatura.layout'] ??=
   JSON.stringify({ form: 1, value: { look: true, view: true, model: true } })"""
 
+# No paths are traced, however late a busy machine gets to the page: previews are the same every time
+PREVIEWS_ALONE = """{
+  let editor;
+  Object.defineProperty(window, 'velatura', {
+    get: () => editor,
+    set(mounted) {
+      editor = mounted;
+      editor.viewport?.setBudget({ samples: 0 });
+    },
+  });
+}"""
+
 
 class Visit:
     """A page of the editor, with what its console has complained about; a slow machine has its time."""
@@ -103,7 +115,7 @@ class Visit:
         self._devtools = page.context.new_cdp_session(page)
         self._devtools.send("Page.enable")
         first = self._before("sessionStorage.clear()")
-        self._before(f"{script};{EVERYTHING_OPEN}")
+        self._before(f"{script};{EVERYTHING_OPEN};{PREVIEWS_ALONE}")
         page.goto(address)
         self._devtools.send("Page.removeScriptToEvaluateOnNewDocument", first)
         self.ready()
@@ -124,9 +136,8 @@ class Visit:
             self.complaints.append(message.text)
 
     def ready(self) -> None:
-        """Wait until there is a picture; from then on the preview alone is drawn, which is the same every time."""
+        """Wait until there is a picture."""
         self.page.wait_for_function("() => window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
-        self.page.evaluate("window.velatura.viewport.setBudget({ samples: 0 })")
 
     def told(self) -> str:
         """The state of the page, for the report of a failed test."""
@@ -171,14 +182,21 @@ class Tabs:
     The first tab of each test is the same: it is ready in half of the time, since its process has compiled the page.
     """
 
-    def __init__(self, browser: Any, **options: Any) -> None:
+    def __init__(self, browser: Any, size: tuple[int, int] = (900, 600), **options: Any) -> None:
         self.context = browser.new_context(**options)
+        self.size = size
         self.visits: list[Visit] = []
 
-    def visit(self, address: str, script: str = "") -> Visit:
+    def visit(
+        self, address: str, script: str = "", size: tuple[int, int] | None = None, scheme: str = "light"
+    ) -> Visit:
         """Open an address, in the kept tab unless this test has opened one already."""
         free = [] if self.visits else self.context.pages
-        self.visits.append(Visit(free[0] if free else self.context.new_page(), address, script))
+        page = free[0] if free else self.context.new_page()
+        width, height = size or self.size
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=scheme)
+        self.visits.append(Visit(page, address, script))
         return self.visits[-1]
 
     def forget(self) -> list[Visit]:
