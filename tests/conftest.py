@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from hypothesis import settings
 
+from velatura import kernel
 from velatura.cli import main
 
 # Draw the same examples every time, however long a busy machine takes over them
@@ -15,6 +16,14 @@ settings.register_profile("velatura", deadline=None, derandomize=True)
 settings.load_profile("velatura")
 
 Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def one_thread() -> Iterator[None]:
+    """One thread of Dr.Jit, since others that wait for the next of many small kernels take time from other workers."""
+    with kernel.threads_restored():
+        kernel.use_threads(1)
+        yield
 
 
 @pytest.fixture

@@ -27,6 +27,8 @@ from velatura.reference import plugin as reference
 mi: Any = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 Run = Callable[..., tuple[int, str, str]]
 DOCS = Path(__file__).parents[2] / "docs" / "explanation" / "laws.md"
 

@@ -20,6 +20,8 @@ from velatura.stack import Material
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 SIX = (
     "coated-gold",
     "frosted-metal",

@@ -15,6 +15,8 @@ from velatura import MODELS
 from velatura.model.registry import named
 from velatura.stack import Interface, Stack
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 
 @pytest.mark.parametrize("form", ["forward", "symmetric"])
 @pytest.mark.parametrize("model", [model.name for model in MODELS])

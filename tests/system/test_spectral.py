@@ -20,6 +20,8 @@ from velatura.stack import spectra
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 NAMED = ("coated-gold", "frosted-glass", "varnished-paint")
 WI, WO = (0.5, 0.2, 0.8), (-0.45, -0.25, 0.75)
 RAYS = ((400.0, 450.0, 500.0, 550.0), (600.0, 650.0, 700.0, 750.0))

@@ -13,6 +13,8 @@ from velatura import kernel
 mi = kernel.mitsuba("llvm_ad_rgb")
 import drjit as dr  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 GLASS = vt.Stack([vt.Interface(eta=1.5)])
 PANE = vt.Stack([vt.Interface(eta=1.5), vt.Interface(eta=1.5)], thin=True)
 ROUGH = vt.Stack([vt.Interface(eta=1.5, alpha=0.02)])

@@ -22,6 +22,8 @@ from velatura.model.roughness_maps import MAPS
 from velatura.model.variance import Covariance, Roughness
 from velatura.stack import Interface, Medium, Stack, presets
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 EXACT = 1e-6  # of energies and variances, at normal incidence
 MODELS = ("bati2021", "belcour2018", "velatura")
 COATED = {

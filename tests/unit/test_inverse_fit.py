@@ -20,6 +20,8 @@ from velatura.model.context import Context
 from velatura.model.registry import stack_lobes
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack, dumps, load, loads
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 AVERAGED = named("bati2021")
 COATED = Stack(
     [

@@ -22,6 +22,8 @@ from velatura.inverse.reasons import REASONS
 from velatura.model import named
 from velatura.stack import Medium, Stack
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 MODEL = named("velatura")
 COAT: dict[str, Any] = {"energy": 0.04, "alpha": 0.0}
 METAL: dict[str, Any] = {"energy": (0.5, 0.35, 0.2), "alpha": 0.2, "base": "conductor"}

@@ -35,6 +35,8 @@ from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Medium, Stack, dumps, loads, preset
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 #: By directional albedo there is no stack: 2e-5 of variance is missing.
 INFEASIBLE = ("21 left",)
 
