@@ -33,16 +33,19 @@ def numbers(where: object = None) -> Any:
     return [wave, wave.at, 0.25, 1.0]
 
 
+def by_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "MANY", -1)
+    monkeypatch.setattr(compiled, "LEAST", 0)
+
+
 SOURCES = [np.linspace(0.1, 1.0, 7)]
 SAMPLES = [np.linspace(0.0, 1.0, 5)]
 
 
 def test_kernels_and_numpy_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = []
-    for many in (1 << 60, -1):
-        monkeypatch.setattr(compiled, "MANY", many)
-        found.append(compiled.over(function, SOURCES, SAMPLES, numbers()))
-    (groups, sums), (compiled_groups, compiled_sums) = found
+    groups, sums = compiled.over(function, SOURCES, SAMPLES, numbers())
+    by_kernels(monkeypatch)
+    compiled_groups, compiled_sums = compiled.over(function, SOURCES, SAMPLES, numbers())
     assert [x.shape for x in groups] == [(7, 5, 2), (7, 5, 1)] and sums.shape == (4, 7)
     for plain, kernel in zip([*groups, sums], [*compiled_groups, compiled_sums]):
         assert kernel == pytest.approx(plain, abs=1e-12)
@@ -55,30 +58,33 @@ def test_objects_that_no_kernel_reads_run_by_numpy(monkeypatch: pytest.MonkeyPat
     def refused(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(compiled, "MANY", -1)
+    by_kernels(monkeypatch)
     monkeypatch.setattr(compiled, "_compiled", refused)
     groups, _ = compiled.over(function, SOURCES, SAMPLES, numbers(object()))
     assert groups[0].shape == (7, 5, 2)
 
 
-def test_another_number_needs_no_other_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_number_or_address_needs_no_other_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
     import drjit as dr
 
-    def kernels(shift: float) -> set[Any]:
+    def kernels(shift: float, place: int) -> set[Any]:
+        held = np.empty(16 + SOURCES[0].size)[place : place + SOURCES[0].size]
+        held[:] = SOURCES[0]
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-            compiled.over(function, SOURCES, SAMPLES, [*numbers()[:2], shift, 1.0])
+            compiled.over(function, [held], SAMPLES, [*numbers()[:2], shift, 1.0])
             return {each["hash"] for each in dr.kernel_history([dr.KernelType.JIT])}
 
     vt.bsdf(vt.load("coated-gold"))
-    monkeypatch.setattr(compiled, "MANY", -1)
-    assert kernels(0.3) == kernels(0.6)
+    by_kernels(monkeypatch)
+    first = kernels(0.3, 0)
+    assert first and all(kernels(0.6, place) == first for place in range(9))
 
 
 def test_lobes_are_the_same_by_numpy_and_by_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     stacks = [vt.load(name) for name in ("coated-gold", "pearl-lacquer", "frosted-glass")]
     found = []
-    for many in (1 << 60, -1):
-        monkeypatch.setattr(compiled, "MANY", many)
+    for kernels in (False, True):
+        by_kernels(monkeypatch) if kernels else monkeypatch.setattr(compiled, "MANY", 1 << 60)
         KEPT.clear()
         lobes = [vt.lobes(stack, [1.0, 0.5, 0.1], 0.3) for stack in stacks]
         found.append([(each.energy, each.alpha) for each in lobes])

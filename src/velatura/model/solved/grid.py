@@ -41,10 +41,12 @@ class Grid:
         sharp = material is not None and any(map(_is_sharp, material.interfaces))
         return cls(isotropic, COSINES, AZIMUTHS[sharp])
 
-    @property
-    def coarser(self) -> Grid:
-        """The grid for factors of the symmetric form: of brushed materials they vary by less than their columns."""
-        return self if self.isotropic else Grid(False, self.cosines // 2, self.azimuths // 2)
+    def coarser(self, material: Material) -> Grid:
+        """The grid for factors of the symmetric form, which vary by less than columns where interfaces are brushed, but
+        bend about critical angles of glass."""
+        if self.isotropic:
+            return self
+        return replace(self, cosines=self.cosines // (1 if material.transmits else 2), azimuths=self.azimuths // 2)
 
     @property
     def nodes(self) -> Array:

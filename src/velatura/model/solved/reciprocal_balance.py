@@ -23,8 +23,7 @@ from velatura.renderer import low_discrepancy
 Array = NDArray[np.floating]
 Shares = Callable[[Direction], Sequence[tuple[Array, Array]]]
 
-SAMPLES = {False: 1024, True: 377}  # at each node; fewer where there are many
-MANY = 64
+SAMPLES = {0: 1024, 64: 377, 100: 233}  # at each node, where there are more than so many
 STEPS = 24
 MOST = 10.0  # times as bright, there and back
 MOST_REST = 4.0  # for the remainder
@@ -40,7 +39,7 @@ def factors(
     `solved` is that of NumPy in the symmetric form, with the weights of the forward form; `shares` interpolates between
     the nodes; `samples` are those at each node, None for as many as a single material may take.
     """
-    samples = samples or SAMPLES[count > MANY]
+    samples = samples or next(each for least, each in reversed(SAMPLES.items()) if count > least)
     i = tuple(low_discrepancy.repeated(x, samples) for x in wi)
     u = low_discrepancy.at_nodes(count, samples, None)
     nodes = np.repeat(np.arange(count), samples)

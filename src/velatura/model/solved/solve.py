@@ -223,7 +223,7 @@ class Solver:
         if self.model.form == "forward":
             return found
         found = [replace(each, columns=replace(each.columns, scale=0 * each.columns.scale + 1)) for each in found]
-        numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser, material)
+        numbers, folded = self.body(material, found, layouts), Folded.of(self.grid.coarser(material), material)
         factors, wanted = reciprocal_balance.factors(
             numbers, folded.directions, folded.shares, folded.count, self.samples
         )
