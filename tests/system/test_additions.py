@@ -1,4 +1,5 @@
-"""What CONTRIBUTING says of additions, tried: a parameter and an engine are added to a copy of the package.
+"""What CONTRIBUTING says of additions, tried: a parameter, two kinds of layers and an engine are added to a copy of the
+package.
 
 The files that an addition takes are counted by the rows of CONTRIBUTING; a file too few, and the copy does not read it.
 """
@@ -145,6 +146,106 @@ def test_a_parameter_takes_six_files_in_all(copy: Path, tmp_path: Path) -> None:
     assert len({**OF_DEFAULT, **OF_OTHERS}) == 6
     models = [model.name for model in velatura.MODELS]
     run(changed(copy, tmp_path, OF_DEFAULT, OF_OTHERS), TRIED + RENDERED, *models)
+
+
+# A colour filter by its absorbance, as data sheets have it, and a base of dots of two albedos
+KINDS = {
+    "stack/layers.py": [
+        (
+            "class LayerRecord(Record):",
+            """@dataclass(frozen=True)
+class FilterValues(SlabValues):
+    kind: ClassVar[Kind] = "filter"
+    g: ClassVar[float] = 0.0
+    tau_s: ClassVar[float] = 0.0
+    absorbance: Any
+
+    @property
+    def tau_a(self) -> Any:
+        return 2.302585093 * self.absorbance
+
+
+@dataclass(frozen=True)
+class DotsValues(BaseValues):
+    kind: ClassVar[Kind] = "dots"
+    ink: Any
+    paper: Any
+    coverage: Any
+
+    @property
+    def albedo(self) -> Any:
+        return self.coverage * self.ink + (1 - self.coverage) * self.paper
+
+
+class LayerRecord(Record):""",
+        ),
+        (
+            "Layer: TypeAlias = Interface | Medium | Diffuse\n",
+            """class Filter(LayerRecord):
+    record = FilterValues
+    lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"filter": ()}
+    surface = False
+    title = "colour filter"
+
+    absorbance: Annotated[float | RGB | Spectrum | Texture, Colour("decadic, along the normal", low=0)] = 0.1
+
+
+class Dots(LayerRecord):
+    record = DotsValues
+    lacks: ClassVar[Mapping[Kind, tuple[str, ...]]] = {"dots": ()}
+    opaque_kinds = frozenset({"dots"})
+    surface = True
+    title = "halftone"
+
+    ink: Annotated[float | RGB | Spectrum | Texture, Colour("albedo of the ink", low=0, high=1)] = 0.05
+    paper: Annotated[float | RGB | Spectrum | Texture, Colour("albedo of the paper", low=0, high=1)] = 0.8
+    coverage: Annotated[float | Texture, Scalar("share of the surface under ink", low=0, high=1)] = 0.5
+
+
+Layer: TypeAlias = Interface | Medium | Diffuse | Filter | Dots
+""",
+        ),
+        ('"diffuse": Diffuse}', '"diffuse": Diffuse, "filter": Filter, "dots": Dots}'),
+        (', "medium", "diffuse"]', ', "medium", "diffuse", "filter", "dots"]'),
+    ],
+    "stack/__init__.py": [("    DiffuseValues,\n", "    DiffuseValues,\n    Dots,\n    Filter,\n")],
+    "__init__.py": [('        "Diffuse",\n', '        "Diffuse",\n        "Dots",\n        "Filter",\n')],
+}
+OF_KINDS = """
+import sys
+import numpy as np
+import velatura as vt
+from velatura import kernel
+from velatura.stack import json_schema, parameter_table
+
+coat, metal = vt.Interface(eta=1.5, alpha=0.1), vt.Interface(eta=0.2, k=3.0, alpha=0.1)
+filtered, printed = (
+    [vt.Stack([coat, vt.Medium(sigma_a=2.302585093), metal]), vt.Stack([coat, vt.Filter(absorbance=1.0), metal])],
+    [vt.Stack([coat, vt.Diffuse(albedo=0.35)]), vt.Stack([coat, vt.Dots(ink=0.1, paper=0.6, coverage=0.5)])],
+)
+mi = kernel.mitsuba()
+si = mi.SurfaceInteraction3f()
+si.wi = mi.Vector3f(0.6, 0, 0.8)
+for old, new in (filtered, printed):
+    assert vt.Stack.from_dict(new.to_dict()) == new == vt.Stack.from_flat(None, new.flat())
+    for model in sys.argv[1:]:
+        of_old, of_new = (vt.lobes(stack, 0.7, model=model) for stack in (old, new))
+        np.testing.assert_allclose(of_new.energy, of_old.energy, atol=1e-12)
+    walked = [vt.reference.statistics(stack, 0.8, paths=10_000).energy for stack in (old, new)]
+    np.testing.assert_allclose(walked[1], walked[0], rtol=1e-4)
+    for model in (sys.argv[-1], "weidlich_wilkie"):
+        light = [vt.bsdf(stack, model).eval(mi.BSDFContext(), si, mi.Vector3f(-0.6, 0, 0.8)) for stack in (old, new)]
+        np.testing.assert_allclose(light[1], light[0], rtol=1e-4)
+    assert vt.export(new, to="glsl").text
+    vt.export(new, to="openpbr")
+text = parameter_table()
+assert "| filter | `absorbance`" in text and "| dots | `coverage`" in text and "dots" in str(json_schema())
+"""
+
+
+def test_kinds_of_layers_take_three_files_but_for_the_page(copy: Path, tmp_path: Path) -> None:
+    assert len(KINDS) == 3
+    run(changed(copy, tmp_path, KINDS), OF_KINDS, *[model.name for model in velatura.MODELS])
 
 
 ENGINE = '''

@@ -66,7 +66,7 @@ class Order(NamedTuple):
     @property
     def stack(self) -> Stack:
         """One with values. Raises InvalidInput where layers cannot lie in this order."""
-        return Stack.from_dict({"layers": [_EXAMPLES[kind] for kind in self.kinds], "thin": self.thin})
+        return Stack.from_dict({"layers": [_EXAMPLES.get(kind, {kind: {}}) for kind in self.kinds], "thin": self.thin})
 
     @classmethod
     def of(cls, stack: Stack) -> Order:
@@ -74,12 +74,10 @@ class Order(NamedTuple):
         return cls(stack.kinds, brushed, stack.thin)
 
 
-_EXAMPLES: dict[str, Answer] = {
+_EXAMPLES: dict[str, Answer] = {  # of kinds that are not written by their own name
     "dielectric": {"interface": {"eta": 1.5}},
     "conductor": {"interface": {"eta": 1.5, "k": 1.0}},
     "mirror": {"interface": {"conductor": "mirror"}},
-    "medium": {"medium": {}},
-    "diffuse": {"diffuse": {}},
 }
 
 

@@ -16,7 +16,7 @@ from velatura.binding import Binding, plugin_class
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
-from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues, refuse_films
+from velatura.stack import BaseValues, InterfaceValues, Material, SlabValues, refuse_films
 from velatura.stack.chain import Meeting, chain
 from velatura.stack.layers import LayerValues
 
@@ -103,10 +103,10 @@ def evaluate(material: Material, wi: Direction, wo: Direction, asked: Sequence[i
     for k, meeting in enumerate(chain(material)):
         layer = meeting.layer
         # Absorb on both ways through a medium
-        if isinstance(layer, MediumValues):
+        if isinstance(layer, SlabValues):
             passed = passed * _absorbed(layer, ops.divide(1.0, i[2]) + ops.divide(1.0, o[2]))
             continue
-        if isinstance(layer, DiffuseValues):
+        if isinstance(layer, BaseValues):
             total = total + passed * layer.albedo * ((k in asked) / pi)
             break
         # Reflect at an interface
@@ -181,10 +181,10 @@ def _energies(material: Material, cosine: Value) -> dict[int, Value]:
     left: Value = 1.0
     for k, meeting in enumerate(chain(material)):
         layer = meeting.layer
-        if isinstance(layer, MediumValues):
+        if isinstance(layer, SlabValues):
             left = left * _absorbed(layer, 2 * ops.divide(1.0, cosine))
             continue
-        if isinstance(layer, DiffuseValues):
+        if isinstance(layer, BaseValues):
             energies[k] = left * layer.albedo
             break
         reflectance = _reflectance(meeting, cosine)
@@ -195,9 +195,9 @@ def _energies(material: Material, cosine: Value) -> dict[int, Value]:
     return energies
 
 
-def _absorbed(layer: MediumValues, ways: Value) -> Value:
+def _absorbed(layer: SlabValues, ways: Value) -> Value:
     """Transmittance of a medium there and back; `ways` is the sum of both ways, in depths."""
-    return ops.exp(-layer.sigma_a * layer.depth * ways)
+    return ops.exp(-layer.tau_a * ways)
 
 
 def _reflectance(meeting: Meeting[LayerValues], cosine: Value) -> Value:

@@ -14,7 +14,7 @@ from velatura.model.lobe_statistics import StackLobes
 from velatura.model.variance import Isotropic
 from velatura.optics import fresnel
 from velatura.programs.surface import Coat, Surface
-from velatura.stack import RGB, InterfaceValues, Material, MediumValues
+from velatura.stack import RGB, InterfaceValues, Material, SlabValues
 
 Array: TypeAlias = NDArray[np.floating]
 Facets: TypeAlias = tuple[float, float, float]  # alpha along two axes, and the radians from the tangent to the first
@@ -146,7 +146,7 @@ def _clear(seen: StackLobes, eta_1: float, film: tuple[float, float] | None) -> 
 
 
 def _scatters(material: Material) -> bool:
-    return any(isinstance(layer, MediumValues) and layer.spreads for layer in material.layers)
+    return any(isinstance(layer, SlabValues) and layer.spreads for layer in material.layers)
 
 
 def _facets(seen: StackLobes, k: int) -> Facets:
@@ -178,7 +178,7 @@ def _film(interfaces: list[InterfaceValues]) -> tuple[float, float] | None:
 
 def _absorbed(material: Material) -> Array:
     """Transmittance of all media, for light that crosses them twice without scattering."""
-    depth = sum((m.sigma_a * m.depth for m in material.layers if isinstance(m, MediumValues)), np.zeros((3, 1)))
+    depth = sum((m.tau_a for m in material.layers if isinstance(m, SlabValues)), np.zeros((3, 1)))
     return np.asarray(np.exp(-2 * np.broadcast_to(depth, (3, 1))[:, 0]))
 
 

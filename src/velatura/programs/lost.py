@@ -8,7 +8,7 @@ import numpy as np
 
 from velatura.programs.from_stack import Described
 from velatura.programs.program import Program
-from velatura.stack import InterfaceValues, MediumValues
+from velatura.stack import InterfaceValues, SlabValues
 
 TURNED = 0.5  # degrees
 
@@ -17,7 +17,7 @@ def lost(stack: Described, program: Program) -> Iterator[str]:
     """A line for each property that is left out or replaced; layers are counted from the top, from 0."""
     layers = stack.material.layers
     interfaces = [(n, each) for n, each in enumerate(layers) if isinstance(each, InterfaceValues)]
-    surfaces = [n for n, layer in enumerate(layers) if not isinstance(layer, MediumValues)]
+    surfaces = [n for n, layer in enumerate(layers) if not isinstance(layer, SlabValues)]
     if np.max(np.abs(np.asarray(stack.material.exterior) - 1)) > 1e-6:
         yield "exterior: indices are taken relative to it, so that the material stands in air"
     coated = len(interfaces) > 1 and interfaces[0][1].kind == "dielectric"
@@ -27,7 +27,7 @@ def lost(stack: Described, program: Program) -> Iterator[str]:
         coat = coated and n == interfaces[0][0]
         yield from (f"layer {n}: {what}" for what in _of_interface(each, coat, program))
     for n, layer in enumerate(layers):
-        if isinstance(layer, MediumValues):
+        if isinstance(layer, SlabValues):
             yield from (f"layer {n}: {what}" for what in _of_medium(layer, program))
     if stack.thin and not program.pane:
         yield "transmission: light is refracted as into a solid, and does not leave a pane"
@@ -51,10 +51,10 @@ def _of_interface(each: InterfaceValues, coat: bool, program: Program) -> Iterat
         yield "thin films are replaced by one film on the base"
 
 
-def _of_medium(each: MediumValues, program: Program) -> Iterator[str]:
-    if np.any(np.asarray(each.sigma_s) * each.depth > 0):
+def _of_medium(each: SlabValues, program: Program) -> Iterator[str]:
+    if np.any(each.tau_s > 0):
         yield "scattering is part of the base's colour"
-    if np.any(np.asarray(each.sigma_a) * each.depth > 0):
+    if np.any(each.tau_a > 0):
         if not program.coat_colour:
             yield "absorption is part of the base's colour, at all angles alike"
         elif not program.coat_depth:

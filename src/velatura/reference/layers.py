@@ -21,7 +21,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.optics.polarisation import Mueller, Polarisation, complement, mueller
-from velatura.stack import Address, DiffuseValues, InterfaceValues, Material, MediumValues, srgb_sensitivity
+from velatura.stack import Address, BaseValues, InterfaceValues, Material, SlabValues, srgb_sensitivity
 from velatura.stack.chain import chain
 from velatura.stack.values import Pair
 
@@ -235,8 +235,8 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
     medium, last = WalkedSlab(), material.layers[-1]
     for meeting in chain(material, films_of(material)):
         layer = meeting.layer
-        if isinstance(layer, MediumValues):
-            medium = WalkedSlab(_product(layer.sigma_a, layer.depth), _product(layer.sigma_s, layer.depth), layer.g)
+        if isinstance(layer, SlabValues):
+            medium = WalkedSlab(layer.tau_a, layer.tau_s, layer.g)
             continue
         slabs.append(medium)
         films.append(meeting.films)
@@ -245,12 +245,12 @@ def from_material(material: Material, microsurface: bool) -> WalkedLayers:
         surfaces.append(_surface(layer, *index[-2:]))
     extinction = last.k if isinstance(last, InterfaceValues) and last.k is not None else 0.0
     return WalkedLayers(
-        material.kinds[-1],
+        "diffuse" if isinstance(last, BaseValues) else last.kind,
         tuple(surfaces),
         (*slabs, WalkedSlab()),
         tuple(index),
         extinction,
-        last.albedo if isinstance(last, DiffuseValues) else 0.0,
+        last.albedo if isinstance(last, BaseValues) else 0.0,
         microsurface,
         tuple(films),
     )
@@ -282,18 +282,14 @@ def relative_index(n_in: Value, n_out: Value) -> Value:
     return ops.mean(n_out) / ops.mean(n_in)
 
 
-def _surface(layer: InterfaceValues | DiffuseValues, above: Value, below: Value) -> WalkedSurface:
-    if isinstance(layer, DiffuseValues):
+def _surface(layer: InterfaceValues | BaseValues, above: Value, below: Value) -> WalkedSurface:
+    if isinstance(layer, BaseValues):
         return WalkedSurface(1.0, 1.0, 0.0, False)
     u, v, rotation = layer.alpha_u, layer.alpha_v, layer.rotation
     matched = layer.kind == "dielectric" and ops.absolute(relative_index(above, below) - 1) < _MATCHED
     smooth = (ops.maximum(u, v) < ALPHA_MIN) | matched
     turn = 0.0 if _is_zero(rotation) else rotation * (pi / 180)
     return WalkedSurface(ops.maximum(u, ALPHA_MIN), ops.maximum(v, ALPHA_MIN), turn, smooth)
-
-
-def _product(a: Value, b: Value) -> Value:
-    return 0.0 if _is_zero(a) or _is_zero(b) else a * b
 
 
 def _is_zero(x: Value) -> bool:

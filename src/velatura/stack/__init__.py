@@ -5,6 +5,7 @@ from velatura.stack.describe import json_schema, parameter_table
 from velatura.stack.flat_names import Address, addressed
 from velatura.stack.io import MaterialLike, dumps, load, loads, preset, presets, save
 from velatura.stack.layers import (
+    BaseValues,
     Diffuse,
     DiffuseValues,
     FilmValues,
@@ -15,6 +16,7 @@ from velatura.stack.layers import (
     LayerValues,
     Medium,
     MediumValues,
+    SlabValues,
     Value,
 )
 from velatura.stack.material import Material, as_described, number
@@ -34,6 +36,7 @@ from velatura.stack.values import RGB, Brushing, Film, Spectrum, Texture, Varyin
 __all__ = [
     "RGB",
     "Address",
+    "BaseValues",
     "Brushing",
     "Diffuse",
     "DiffuseValues",
@@ -50,6 +53,7 @@ __all__ = [
     "Medium",
     "MediumValues",
     "Named",
+    "SlabValues",
     "Spectrum",
     "Stack",
     "Texture",

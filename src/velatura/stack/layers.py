@@ -6,6 +6,7 @@ it is to its neighbours. Files, flat names, `--set`, plugins, textures, schema a
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
@@ -68,9 +69,33 @@ class InterfaceValues:
         return not (is_zero(self.alpha_u) and is_zero(self.alpha_v))
 
 
+class SlabValues(ABC):
+    """What lies between two surfaces, as models read it: its optical depths along the normal (colours), and its
+    asymmetry `g`, the mean cosine of the scattering angle.
+    """
+
+    kind: ClassVar[Kind]
+    g: Any
+
+    @property
+    @abstractmethod
+    def tau_a(self) -> Any:
+        """Optical depth of absorption."""
+
+    @property
+    @abstractmethod
+    def tau_s(self) -> Any:
+        """Optical depth of scattering."""
+
+    @property
+    def spreads(self) -> bool:
+        """Whether it spreads light over directions; what is not known to be 0 does."""
+        return not is_zero(self.tau_s)
+
+
 @dataclass(frozen=True)
-class MediumValues:
-    """A medium: thickness, coefficients per unit of length, and the mean cosine of the scattering angle."""
+class MediumValues(SlabValues):
+    """A homogeneous medium: thickness, coefficients per unit of length, and asymmetry."""
 
     kind: ClassVar[Kind] = "medium"
     depth: Any
@@ -79,21 +104,31 @@ class MediumValues:
     g: Any
 
     @property
-    def spreads(self) -> bool:
-        """Whether it spreads light over directions; what is not known to be 0 does."""
-        return not is_zero(self.sigma_s)
+    def tau_a(self) -> Any:
+        return _product(self.sigma_a, self.depth)
+
+    @property
+    def tau_s(self) -> Any:
+        return _product(self.sigma_s, self.depth)
 
 
-@dataclass(frozen=True)
-class DiffuseValues:
-    """A diffuse base, by its albedo."""
+class BaseValues(ABC):
+    """An ideally diffuse base, as models read it, by its `albedo` (a colour)."""
 
-    kind: ClassVar[Kind] = "diffuse"
+    kind: ClassVar[Kind]
     spreads: ClassVar[bool] = True
     albedo: Any
 
 
-LayerValues: TypeAlias = InterfaceValues | MediumValues | DiffuseValues
+@dataclass(frozen=True)
+class DiffuseValues(BaseValues):
+    """A diffuse base of a given albedo."""
+
+    kind: ClassVar[Kind] = "diffuse"
+    albedo: Any
+
+
+LayerValues: TypeAlias = InterfaceValues | SlabValues | BaseValues
 
 
 def is_zero(value: object) -> bool:
@@ -103,6 +138,11 @@ def is_zero(value: object) -> bool:
     import numpy as np  # slow to import, and most stacks have numbers alone
 
     return isinstance(value, np.ndarray) and not value.any()
+
+
+def _product(a: Any, b: Any) -> Any:
+    """The product; a factor that is known to be 0 keeps the other one out of recorded code."""
+    return 0.0 if any(isinstance(x, float) and x == 0 for x in (a, b)) else a * b
 
 
 #: Indices of a mirror under films, which absorbs less than 1e-6 of light.

@@ -131,7 +131,7 @@ class Material:
     def with_layer(self, n: int, **values: Value) -> Material:
         """The material with values of its n-th layer changed."""
         layers = list(self.layers)
-        layers[n] = replace(layers[n], **values)
+        layers[n] = replace(layers[n], **values)  # type: ignore[type-var]  # all kinds of values are dataclasses
         return replace(self, layers=tuple(layers))
 
     def solid(self) -> Material:

@@ -16,7 +16,7 @@ from velatura.errors import InvalidInput
 from velatura.model import DEFAULT
 from velatura.model.registry import stack_lobes
 from velatura.optics.directions import directions
-from velatura.stack import InterfaceValues, Material, MediumValues, Stack
+from velatura.stack import InterfaceValues, Material, SlabValues, Stack
 
 Array = NDArray[Any]
 Answer: TypeAlias = dict[str, tuple[tuple[str, ...], Array]]
@@ -211,8 +211,8 @@ def inverse(stack: Stack, seed: int, model: str = DEFAULT, **switches: str) -> A
     found = stack_lobes(solution.stack, 1.0, 0.0, model, **switches)
     layers = Material.of(solution.stack).layers
     surfaces = [layer for layer in layers if isinstance(layer, InterfaceValues)]
-    above = [before if isinstance(before, MediumValues) else None for before, layer in zip((None, *layers), layers)]
-    tau = [m.depth * m.sigma_a if m else 0.0 for m, layer in zip(above, layers) if isinstance(layer, InterfaceValues)]
+    above = [before if isinstance(before, SlabValues) else None for before, layer in zip((None, *layers), layers)]
+    tau = [m.tau_a if m else 0.0 for m, layer in zip(above, layers) if isinstance(layer, InterfaceValues)]
     coloured, along = ("interface", "colour"), ("interface", "axis")
     return {
         "asked_energy": (coloured, np.array(asked.energy)[..., 0]),

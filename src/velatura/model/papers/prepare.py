@@ -21,7 +21,7 @@ from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.variance import Roughness, Variance, variance_kind
 from velatura.ops import Value
 from velatura.optics import fresnel
-from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
+from velatura.stack import BaseValues, InterfaceValues, Material, SlabValues
 from velatura.stack.chain import Meeting, chain
 from velatura.tables import Average, Row, Tables
 
@@ -107,17 +107,17 @@ def prepare(
                 n = n * ops.mean(layer.eta / above)
                 n_leaving = ops.mean(above / layer.eta)
                 ops.names(n_leaving=n_leaving)
-        elif isinstance(layer, DiffuseValues):
+        elif isinstance(layer, BaseValues):
             base = PreparedBase(layer.albedo, n)
         else:
             layers.append(_medium(layer))
     return Prepared(model, tuple(layers), variance, MAPS[model.map], context.tables, base)
 
 
-def _medium(layer: MediumValues) -> PreparedMedium:
+def _medium(layer: SlabValues) -> PreparedMedium:
     with ops.block("Scattered light stays in the lobe only where it goes forwards (model of Belcour 2018, 4.4)"):
-        tau_s = layer.sigma_s * layer.depth
-    return PreparedMedium(layer.sigma_a * layer.depth + tau_s, tau_s, layer.g)
+        tau_s = layer.tau_s
+    return PreparedMedium(layer.tau_a + tau_s, tau_s, layer.g)
 
 
 def _interface(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from velatura.model.base import SWITCHES, Body, Model
 from velatura.optics.ggx import Direction
+from velatura.stack import BaseValues
 
 if TYPE_CHECKING:
     from velatura.model.context import Context
@@ -115,4 +116,4 @@ def _is_solved(material: Material) -> bool:
 
 
 def _is_bare(material: Material) -> bool:
-    return material.kinds == ("diffuse",)
+    return isinstance(material.layers[0], BaseValues)

@@ -37,7 +37,7 @@ from velatura.renderer import directional_grid, finite_differences, low_discrepa
 from velatura.renderer.differentiated import Variables
 from velatura.renderer.differentiated import plain as plain
 from velatura.renderer.directional_grid import Packing
-from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.tables import Tables
 
 Array = NDArray[np.floating]
@@ -537,7 +537,7 @@ def _cloudy(material: Material) -> set[int]:
     found, above = set(), 0
     for layer in material.layers:
         above += isinstance(layer, InterfaceValues)
-        if isinstance(layer, MediumValues) and np.any(layer.sigma_s * layer.depth > 0):
+        if isinstance(layer, SlabValues) and np.any(layer.tau_s > 0):
             found.add(above)
     return found
 
@@ -610,8 +610,8 @@ def _veiled(material: Material) -> set[int]:
     veiled: set[int] = set()
     above, k = False, 0
     for layer in material.layers:
-        if isinstance(layer, MediumValues):
-            events = max(map(widths.nearly_straight, np.ravel(layer.g).tolist())) * np.max(layer.sigma_s * layer.depth)
+        if isinstance(layer, SlabValues):
+            events = max(map(widths.nearly_straight, np.ravel(layer.g).tolist())) * np.max(layer.tau_s)
             above = above or bool(events > VEIL_MIN)
         elif isinstance(layer, InterfaceValues):
             veiled |= {k} if above else set()

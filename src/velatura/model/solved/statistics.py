@@ -26,7 +26,7 @@ from velatura.model.solved.transmission import combined, direct
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance, variance_kind
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
-from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.stack import InterfaceValues, Material, SlabValues
 
 Array = NDArray[np.floating]
 
@@ -99,7 +99,7 @@ def _without_steps(material: Material) -> list[int]:
     Not of one that ends a medium; and one layer stays.
     """
     found, above = [], material.exterior
-    ends_medium = any(isinstance(layer, MediumValues) for layer in material.layers[-2:-1])
+    ends_medium = any(isinstance(layer, SlabValues) for layer in material.layers[-2:-1])
     for place, layer in enumerate(material.layers[: -1 if ends_medium else None]):
         if isinstance(layer, InterfaceValues) and layer.kind == "dielectric":
             if np.all(layer.eta == above) and not layer.films:

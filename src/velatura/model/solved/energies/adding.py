@@ -23,7 +23,7 @@ from velatura.model.rough_interface import KEPT, Facets, colours
 from velatura.model.solved.energies.interfaces import Setting, interface
 from velatura.model.solved.energies.media import Slab, medium
 from velatura.model.solved.energies.operators import Layer, Operator
-from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
 Array = NDArray[np.floating]
@@ -121,7 +121,7 @@ def parts(material: Material, straight: Callable[[float], float] | None = None) 
             found.append(Facets.of(meeting.layer, meeting.above, outside, meeting.films))
             continue
         n = float(ops.mean(colours(meeting.above) / outside))
-        if isinstance(meeting.layer, MediumValues):
+        if isinstance(meeting.layer, SlabValues):
             found.append(Slab.of(meeting.layer, n, straight))
         else:
             found.append(Lambert(n, colours(meeting.layer.albedo)))

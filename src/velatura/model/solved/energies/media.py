@@ -18,7 +18,7 @@ from velatura.model.solved.energies.operators import Layer, Operator
 from velatura.ops import Value
 from velatura.optics import phase
 from velatura.renderer.low_discrepancy import fibonacci
-from velatura.stack import MediumValues
+from velatura.stack import SlabValues
 
 Array = NDArray[np.floating]
 
@@ -44,10 +44,9 @@ class Slab:
     straight: Array | None = None
 
     @classmethod
-    def of(cls, layer: MediumValues, n: float, straight: Callable[[float], float] | None) -> Slab:
+    def of(cls, layer: SlabValues, n: float, straight: Callable[[float], float] | None) -> Slab:
         """A medium of NumPy's values; `straight` gives the share that goes straight on by the asymmetry g."""
-        tau_a, tau_s = (colours(layer.depth * sigma) for sigma in (layer.sigma_a, layer.sigma_s))
-        g = colours(layer.g)
+        tau_a, tau_s, g = (colours(x) for x in (layer.tau_a, layer.tau_s, layer.g))
         return cls(n, tau_a, tau_s, g, None if straight is None else np.array([straight(x) for x in g]))
 
 

@@ -45,7 +45,7 @@ from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled, low_discrepancy
-from velatura.stack import InterfaceValues, Material, MediumValues
+from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
 EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
@@ -143,10 +143,10 @@ def transmission(
     slabs = [Slab()]
     for meeting in chain(material.solid(), films_of(material)):
         layer = meeting.layer
-        if isinstance(layer, MediumValues):
-            tau_s = layer.sigma_s * layer.depth
+        if isinstance(layer, SlabValues):
+            tau_s = layer.tau_s
             clear = is_none(tau_s) if cloudy is None else len(refractions) not in cloudy
-            slabs[-1] = Slab(layer.sigma_a * layer.depth + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
+            slabs[-1] = Slab(layer.tau_a + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
         refractions.append(_crossing(layer, meeting.above, n, kind, meeting.films))
