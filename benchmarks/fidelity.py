@@ -1,7 +1,7 @@
 """How far the light of a model is from random walks, by kind of stack: where it goes, how much, how noisy samples are.
 
     python benchmarks/fidelity.py [--model velatura] [--form forward] [--half fit] [--kind NAME]... [--stacks 12]
-        [--paths 1000000] [--seed 0] [--truth FOLDER] [--textured] [--json FILE]
+        [--paths 1000000] [--seed 0] [--truth FOLDER] [--textured] [--json FILE] [--fitted NAME=VALUE]...
 
 Stacks and walks are those of `walks.py`; FOLDER keeps them (`walks`). The model is asked through its plugin, as a
 renderer asks it: directions are sampled, so that lobes of any width are resolved. Models whose reflectance averages

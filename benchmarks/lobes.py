@@ -1,6 +1,7 @@
 """How far lobes in their own media and the remainder are from random walks, by kind of stack, without a renderer.
 
     python benchmarks/lobes.py [--half fit] [--kind NAME]... [--stacks 12] [--paths 1000000] [--seed 0] [--truth FOLDER]
+        [--fitted NAME=VALUE]...
 
 Walks are those of `walks.py`, of stacks that are lit from above and let no light pass. Energies are those of
 `velatura.model.solved.energies`, widths those of `velatura.model.solved.lobes.widths`. Columns, means over stacks and

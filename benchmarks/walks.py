@@ -13,6 +13,7 @@ it as NPZ. What is there already is not walked again.
 from __future__ import annotations
 
 import argparse
+from ast import literal_eval
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,7 @@ from velatura.benchmark.random_stacks import (
     turned,
     very_rough,
 )
+from velatura.model import fitted
 from velatura.stack import Material, Stack, as_described, dumps
 
 Array = NDArray[np.floating]
@@ -190,7 +192,18 @@ def arguments(about: str | None, **options: Any) -> argparse.ArgumentParser:
     given = {"stacks": (STACKS, "of each kind"), "paths": (PATHS, "of each direction"), "seed": 0, **options}
     program = parser(about, **given)
     program.add_argument("--kind", action="append", choices=[kind.name for kind in KINDS], help="one or more; else all")
+    program.add_argument(
+        "--fitted", action="append", type=_fitted, metavar="NAME=VALUE", help="of velatura.model.fitted"
+    )
     return program
+
+
+def _fitted(text: str) -> None:
+    """Give a fitted constant another value."""
+    name, _, value = text.partition("=")
+    if not hasattr(fitted, name):
+        raise argparse.ArgumentTypeError(f"unknown constant {name!r}")
+    setattr(fitted, name, literal_eval(value))
 
 
 def main() -> None:

@@ -16,7 +16,8 @@ from velatura.inverse.lobes.interface import DENSER, RARER
 from velatura.inverse.lobes.partial_stack import Layers
 from velatura.inverse.local.dragged import DraggedStack
 from velatura.model import named
-from velatura.model.variance import ALPHA_MIN, Isotropic, Roughness
+from velatura.model.guards import ALPHA_MIN
+from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
 from velatura.stack import Diffuse, Interface, Material, Medium, Stack
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.model.variance import ALPHA_MIN
+from velatura.model.guards import ALPHA_MIN
 from velatura.reference import WalkedLobe
 
 Array = NDArray[np.floating]

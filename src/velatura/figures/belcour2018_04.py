@@ -14,7 +14,8 @@ import numpy as np
 
 from velatura.figures import Progress, canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, along, bounce, equivalent, uniform
-from velatura.model.roughness_maps import ALPHA_MAX, MAPS
+from velatura.model.guards import MAPPED_ALPHA_MAX
+from velatura.model.roughness_maps import MAPS
 
 FIRST = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 SECOND = tuple(np.linspace(0, 1, 41).round(3).tolist())
@@ -56,7 +57,7 @@ def compute(
 
 def _sum(name: str, a: float, b: float) -> Any:
     f = MAPS[name].variance
-    return f(np.float64(min(a, ALPHA_MAX))) + f(np.float64(min(b, ALPHA_MAX)))
+    return f(np.float64(min(a, MAPPED_ALPHA_MAX))) + f(np.float64(min(b, MAPPED_ALPHA_MAX)))
 
 
 def _error(numbers: dict[str, Any], width: str, name: str, low: bool) -> float:

@@ -20,7 +20,8 @@ import numpy as np
 
 from velatura.figures import Progress, both_axes, canvas
 from velatura.figures.bounces import NORMAL, WIDTHS, Array, along, bounce, equivalent, uniform
-from velatura.model.roughness_maps import ALPHA_MAX, MAPS
+from velatura.model.guards import MAPPED_ALPHA_MAX
+from velatura.model.roughness_maps import MAPS
 
 ALPHAS = np.concatenate([np.geomspace(1e-3, 0.1, 24)[:-1], np.linspace(0.1, 1, 31)])
 PAIRS = np.linspace(0.03, 0.51, 17)  # of roughnesses whose two bounces are fitted
@@ -94,12 +95,12 @@ def _fit(pairs: Array, targets: Array, top: float) -> dict[str, Any]:
 
     def misses(constants: Array) -> Array:
         a, b = constants
-        s = sum(np.log(1 + b * t**a / (1 - t**a)) for t in np.minimum([x, y], ALPHA_MAX))
+        s = sum(np.log(1 + b * t**a / (1 - t**a)) for t in np.minimum([x, y], MAPPED_ALPHA_MAX))
         odds = np.exp(s) - 1
         return np.asarray((odds / (odds + b)) ** (1 / a) - z)
 
     def misses_of_power(p: Array) -> Array:
-        s = sum(t**p / (1 - t**p) for t in np.minimum([x, y], ALPHA_MAX))
+        s = sum(t**p / (1 - t**p) for t in np.minimum([x, y], MAPPED_ALPHA_MAX))
         return np.asarray((s / (1 + s)) ** (1 / p) - z)
 
     found = least_squares(misses, [1.3, 1.3], bounds=([0.1, 0.01], [4, 50]))

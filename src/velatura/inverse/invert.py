@@ -16,8 +16,8 @@ from velatura.inverse.lobes.partial_stack import Array
 from velatura.inverse.lobes.target import Target, read
 from velatura.inverse.solution import EFFORTS, Solution, exact, in_closed_form, solutions
 from velatura.model import DEFAULT, Model, named
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.registry import stack_lobes
-from velatura.model.variance import ALPHA_MIN
 from velatura.stack import Diffuse, MaterialLike, Stack, load
 
 DRAWS = 4  # times that alternatives are drawn

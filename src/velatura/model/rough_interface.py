@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.films.reflectance import dielectric_between, dielectric_passing
 from velatura.films.tables import Coated
+from velatura.model import fitted
+from velatura.model.guards import ALPHA_MIN, COS_AT_FACETS_MIN, SIN_AT_FACETS_MAX
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
@@ -29,14 +31,7 @@ from velatura.tables.microsurface_walks import shares_in_the_end
 
 Array = NDArray[np.floating]
 
-# Step of the logarithm of the index that refracted light which meets further facets still passes, where these are met
-# often, and where such light is lost
-STRAIGHT = {True: 0.09, False: 0.01}
-GRAZING = 1e-4  # least cosine of light that meets an interface
-LEVEL = float(np.sqrt(1 - GRAZING**2))  # its sine
-ALPHA_MIN = 1e-3
 DIGITS = 9  # of indices that are alike
-LONG = 0.3  # such a difference, from which light keeps its momentum along facets
 BRUSHED = 0.05  # difference of two roughnesses, as share of the larger, from which normals do not turn with the light
 WALKED = 16  # directions of walks between facets with films
 PATHS = 2048  # from each
@@ -100,7 +95,7 @@ class Facets:
     @property
     def across(self) -> float:
         """0 for isotropic facets, 1 for those so long that light keeps its momentum along them."""
-        return min(self.brushed / LONG, 1)
+        return min(self.brushed / fitted.BRUSHED_FROM, 1)
 
     @property
     def ratio(self) -> float:
@@ -122,12 +117,12 @@ class Facets:
 
     def straight(self, often: bool) -> float:
         """Share of refracted light that meets further facets and still passes: a small step hardly turns it."""
-        return float(np.exp(-self.step / STRAIGHT[often]))
+        return float(np.exp(-self.step / fitted.STRAIGHT_STEP[often]))
 
     def smooth(self, p: Array, transmitted: bool) -> Array:
         """Share (C, ...) of light of momenta p that a smooth interface reflects or transmits."""
         n = float(ops.mean(self.above))
-        cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, GRAZING**2))
+        cosine = np.sqrt(np.maximum(1 - (p / n) ** 2, COS_AT_FACETS_MIN**2))
         return self.passing(cosine) if transmitted else self.reflectance(cosine)
 
     def reversed(self) -> Facets:
@@ -276,7 +271,7 @@ class FirstEvents:
         (p, psi), (u_1, u_2) = sources, samples
         n, alpha_u, alpha_v, turns, eta, straight, share, *colours, _ = numbers
         alpha = alpha_u, alpha_v
-        sin = ops.minimum(p / n, LEVEL)
+        sin = ops.minimum(p / n, SIN_AT_FACETS_MAX)
         # Light comes from wi, and travels to -wi
         wi = -sin * ops.cos(psi), -sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
         h = ggx.sample_visible(wi, *alpha, u_2 + turns * psi, u_1)
@@ -360,7 +355,7 @@ class FirstEvents:
 def _smith(w: Direction, alpha: tuple[Value, Value]) -> Value:
     """Smith's Lambda."""
     x, y = alpha[0] * w[0], alpha[1] * w[1]
-    z = ops.maximum(w[2], GRAZING * 0.1)
+    z = ops.maximum(w[2], COS_AT_FACETS_MIN * 0.1)
     return 0.5 * (ops.sqrt(1 + (x * x + y * y) / (z * z)) - 1)
 
 

@@ -10,11 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from velatura import ops
+from velatura.model.guards import EXPONENT_MAX, MAPPED_ALPHA_MAX, VARIANCE_MAX
 from velatura.ops import Value
-
-ALPHA_MAX = 0.9999
-VARIANCE_MAX = 1e12  # keeps s/(1+s) from inf/inf
-EXPONENT_MAX = 60.0  # whose exponential single precision holds
 
 
 @dataclass(frozen=True)
@@ -29,8 +26,8 @@ class RoughnessMap:
 
     def variance(self, alpha: Value, across: Value | None = None) -> Value:
         """Variance f(alpha) of a roughness alpha >= 0; `across` that along the other axis, None for the same."""
-        along = ops.clip(alpha, ops.TINY, ALPHA_MAX)
-        other = along if across is None else ops.clip(across, ops.TINY, ALPHA_MAX)
+        along = ops.clip(alpha, ops.TINY, MAPPED_ALPHA_MAX)
+        other = along if across is None else ops.clip(across, ops.TINY, MAPPED_ALPHA_MAX)
         return ops.select(alpha > 0, self.forward(along, other), 0.0)
 
     def roughness(self, variance: Value, across: Value | None = None) -> Value:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from velatura import ops
-from velatura.model.roughness_maps import VARIANCE_MAX, RoughnessMap
+from velatura.model.guards import VARIANCE_MAX
+from velatura.model.roughness_maps import RoughnessMap
 from velatura.ops import Value
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 V = TypeVar("V", bound="Variance")
 
-ALPHA_MIN = 1e-3  # lower roughness is evaluated as this
 ALIKE = 2e-7  # difference of two eigenvalues, as share of their mean, that is rounding
 
 

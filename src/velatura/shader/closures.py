@@ -21,10 +21,11 @@ from velatura.model import Model, variance_kind
 from velatura.model.base import Query
 from velatura.model.context import Context, at_a_point
 from velatura.model.directions import upright
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.lobe_statistics import LobeStatistics, StackLobes
 from velatura.model.papers import bsdf
 from velatura.model.roughness_maps import AS_IT_IS
-from velatura.model.variance import ALPHA_MIN, Covariance, Isotropic, PerAxis, Roughness, Variance
+from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.directions import directions

@@ -24,8 +24,8 @@ from velatura.inverse.lobes.interface import conductor_extinction
 from velatura.inverse.lobes.partial_stack import CLEAR, Array, written
 from velatura.inverse.local.approach import bounded_step
 from velatura.model import Model, named, variance_kind
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.papers import bsdf
-from velatura.model.variance import ALPHA_MIN
 from velatura.ops import Value
 from velatura.optics import fresnel
 from velatura.stack import (

@@ -31,9 +31,10 @@ from velatura.inverse.lobes.partial_stack import NORMAL, Array, Layers, named_as
 from velatura.inverse.lobes.target import Target
 from velatura.inverse.reasons import because
 from velatura.model import Model
+from velatura.model.guards import VARIANCE_MAX
 from velatura.model.papers.adding import lobes
 from velatura.model.papers.prepare import prepare
-from velatura.model.roughness_maps import AS_IT_IS, MAPS, VARIANCE_MAX
+from velatura.model.roughness_maps import AS_IT_IS, MAPS
 from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel

@@ -19,6 +19,7 @@ from velatura.model.directions import refracted, select_direction, upright
 from velatura.model.papers import mixture, precomputed_lobes
 from velatura.model.papers.adding import Lobe, lobes
 from velatura.model.papers.diffuse_base import Base, under, with_means
+from velatura.model.papers.guards import COS_OF_HALF_VECTOR_MIN, REFLECTION_SHARE_MIN
 from velatura.model.papers.lobe_merging import merged
 from velatura.model.papers.prepare import Prepared, prepare
 from velatura.model.variance import Variance, variance_kind
@@ -29,8 +30,6 @@ from velatura.stack import Material
 
 MIN_BRANCH_PROBABILITY = 0.1  # of reflection and of transmission, in the symmetric form
 EVEN = 0.1  # share of samples that do not go by energy, in the symmetric form
-GRAZING = 0.05  # cosine
-ROUNDING = 1e-6  # share of samples that reflection gets at least: less than that single precision takes for none
 
 
 @dataclass(frozen=True)
@@ -182,7 +181,7 @@ class Scattered:
             return 1.0
         through = ops.mean(self.transmitted.energy)
         share = ops.divide(through, through + sum(ops.mean(lobe.energy) for lobe in self.reflected))
-        return ops.clip(share, least, 1 - max(least, ROUNDING))
+        return ops.clip(share, least, 1 - max(least, REFLECTION_SHARE_MIN))
 
 
 def body(
@@ -246,7 +245,7 @@ def _beyond(stack: Lobed, i: Direction, eta: Value) -> Direction:
     x, y, z = refracted(i, eta)
     if stack.above.model.form == "forward":
         return x, y, z
-    return ggx.normalize((x, y, ops.maximum(z, GRAZING)))
+    return ggx.normalize((x, y, ops.maximum(z, COS_OF_HALF_VECTOR_MIN)))
 
 
 def exchangeable(stack: Lobed, wi: Direction, wo: Direction) -> tuple[Sequence[Lobe], Lobe | None]:

@@ -18,6 +18,7 @@ from velatura import ops, tables
 from velatura.films.reflectance import Films
 from velatura.model.context import as_it_is
 from velatura.model.papers import operators
+from velatura.model.papers.guards import TRANSMITTANCE_MIN
 from velatura.model.papers.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.ops import Value
 from velatura.optics import fresnel, phase
@@ -29,7 +30,6 @@ Row = Sequence[Value]  # of values at the nodes of a medium
 Media = Sequence[tuple[PreparedMedium, Value]]  # with their optical depths along the normal
 
 SWEEPS = 6  # down the stack and up; what is missing then follows from how fast they converge
-OPAQUE = 1e-3  # transmittance below which light of a node is taken to be totally reflected
 SLOWEST = 0.95  # ratio of the last two sweeps
 # What a node may be worth, and the part of it that may leave: more, of cones that nodes do not resolve, grows in sweeps
 WORTH, LEAVING = 10.0, 3.0
@@ -245,7 +245,10 @@ class _Films:
         """What passes of the light of each node of a medium of index n, over that without films."""
         with_films = self._means(n, self._passing)
         without = self._means(n, lambda c: 1 - fresnel.dielectric_between(c, self._beyond(c), self.eta))
-        return [ops.select(bare > OPAQUE, x / ops.maximum(bare, OPAQUE), 1.0) for x, bare in zip(with_films, without)]
+        return [
+            ops.select(bare > TRANSMITTANCE_MIN, x / ops.maximum(bare, TRANSMITTANCE_MIN), 1.0)
+            for x, bare in zip(with_films, without)
+        ]
 
     def lost(self, n: Value) -> Row:
         """What films absorb of the light of each node of a medium of index n."""

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from math import pi
 
 from velatura import ops
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.papers.adding import Lobe
 from velatura.model.papers.diffuse_base import Base
-from velatura.model.variance import ALPHA_MIN, Roughness
+from velatura.model.variance import Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction

@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from velatura import ops
-from velatura.model.papers.prepare import COS_MIN, Prepared, PreparedInterface, PreparedMedium
+from velatura.model.papers.guards import COS_MIN, G_MIN
+from velatura.model.papers.prepare import Prepared, PreparedInterface, PreparedMedium
 from velatura.model.variance import Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction, masking, rotate
 
 PreparedLayer: TypeAlias = PreparedInterface | PreparedMedium
-
-G_MIN = 1e-3  # keeps the variance of a phase function finite where it scatters evenly
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from velatura.films.tables import Coated
 from velatura.model.base import Model
 from velatura.model.context import Context
 from velatura.model.film_average import film_average
+from velatura.model.papers.guards import COS_MIN
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.variance import Roughness, Variance, variance_kind
@@ -24,8 +25,6 @@ from velatura.optics import fresnel
 from velatura.stack import BaseValues, InterfaceValues, Material, SlabValues
 from velatura.stack.chain import Meeting, chain
 from velatura.tables import Average, Row, Tables
-
-COS_MIN = 1e-4  # keeps ways through media, and Snell's factors, finite at grazing
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from velatura.model.directions import select_direction, upright
 from velatura.model.roughness_maps import RoughnessMap
 from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.solved.columns import Column, Columns, Declaration
+from velatura.model.solved.guards import BELOW_ONE, COS_OF_DIRECTIONS_MIN, ENERGY_EPS
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
 from velatura.model.solved.lobes.remainder import Remainder, Samples
@@ -32,8 +33,6 @@ from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 
-ENERGY_EPS = 1e-9  # energy of a part that is drawn even where it has none
-GRAZING = 1e-6  # cosine
 MAX_SAMPLE_WEIGHT = 2.9  # weight of a sample
 
 
@@ -301,7 +300,7 @@ class Solved:
             wo = select_direction(within, of.out_of(lobe, i, u1, u2), wo)
         if of.transmission is None or drawn.passes is None:
             return wo, 1.0
-        again = ops.clip(ops.divide(u, drawn.share), 0.0, combined.BELOW_ONE)
+        again = ops.clip(ops.divide(u, drawn.share), 0.0, BELOW_ONE)
         through = combined.sample(of.transmission, drawn.passes, i, again, u1, u2)
         wo = select_direction(u < drawn.share, through, (wo[0], wo[1], ops.maximum(wo[2], 0.0)))
         return upright(wo, wi), ops.select(wo[2] < 0, eta, 1.0)
@@ -331,7 +330,7 @@ def eval_pdf(
     """The value and density of `Solved`; `back` is the side of wo, as seen from there, in the symmetric form."""
     i, o, drawn = of.turned(wi, wi), of.turned(wo, wi), of.only(asked)
     i_back, o_back = of.turned(wi, wo), of.turned(wo, wo)
-    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), COS_OF_DIRECTIONS_MIN)
     value: Value = 0.0
     whole: Value = 0.0
     densities: list[Value] = [0.0, 0.0, 0.0]  # of what is asked for; of all, there and back
@@ -374,7 +373,7 @@ def exchanged(of: SideView, back: SideView, eta: Value, wi: Direction, wo: Direc
     assert of.transmission and of.columns.passes and back.transmission and back.columns.passes
     there, density = combined.eval_pdf(of.transmission, replace(of.columns.passes, straight=1.0), i, o)
     other, returned = combined.eval_pdf(back.transmission, replace(back.columns.passes, straight=1.0), o_back, i_back)
-    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), GRAZING)
+    cosines = ops.absolute(wo[2]) / ops.maximum(ops.absolute(wi[2]), COS_OF_DIRECTIONS_MIN)
     return 0.5 * (there + other * (cosines * eta * eta)), density, returned
 
 

@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model.guards import ALPHA_MIN
+from velatura.model.solved.guards import COS_OF_DIRECTIONS_MIN, SAMPLED_ENERGY_MIN, SEARCHED_ALPHA
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
 from velatura.model.solved.transmission import combined, internal_reflections
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
-from velatura.model.variance import ALPHA_MIN, Roughness
+from velatura.model.variance import Roughness
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
 from velatura.renderer import low_discrepancy
@@ -30,10 +32,7 @@ SAMPLES = 4 * 377  # of a lobe; four times a Fibonacci number
 STEPS = 12  # of the search for a roughness
 ENOUGH = 1e-7  # relative change of a roughness, or a median, at which it ends
 SLOPES = 0.2, 1.5  # of the logarithm of a median, by that of the roughness
-ALPHA_LIMITS = 1e-4, 1.0
 ROUND = 1e-4  # difference of variances, of their sum, below which a lobe hardly has axes
-COS_MIN = 1e-6  # of sums of directions
-ENERGY_EPS = 1e-30  # energy
 
 
 @dataclass(frozen=True)
@@ -53,10 +52,10 @@ def of_lobe(lobe: RefractedLobe, wi: Direction) -> Samples:
     """
     u1, u2 = _lattice(_azimuth(wi) - lobe.roughness.rotation)
     i = ggx.rotate(_columns(wi), lobe.roughness.rotation[:, None])
-    wider = np.sqrt(np.maximum(Index.of(lobe.n).ring2 + i[2] * i[2], 0.0)) / np.maximum(i[2], COS_MIN)
+    wider = np.sqrt(np.maximum(Index.of(lobe.n).ring2 + i[2] * i[2], 0.0)) / np.maximum(i[2], COS_OF_DIRECTIONS_MIN)
     u, v = (np.clip(alpha[:, None] * wider, ALPHA_MIN, 1.0) for alpha in lobe.roughness[:2])
     h = ggx.sample_visible(i, u, v, u1, u2)
-    density = ggx.masking(i, u, v) * ggx.ndf(h, u, v) / (4 * np.maximum(i[2], COS_MIN))
+    density = ggx.masking(i, u, v) * ggx.ndf(h, u, v) / (4 * np.maximum(i[2], COS_OF_DIRECTIONS_MIN))
     x, y, z = (w.ravel() for w in ggx.rotate(ggx.reflect(i, h), -lobe.roughness.rotation[:, None]))
     each = replace(lobe, weight=_each(lobe.weight), roughness=Roughness(*map(_each, lobe.roughness)))
     return _weighted(wi, (x, y, z), refracted_lobe.eval_pdf(each, _direction(wi), (x, y, z))[0], density.ravel())
@@ -80,10 +79,12 @@ def together(samples: Sequence[Samples]) -> Samples:
 def roughness(samples: Samples, axis: Array | None = None) -> Roughness:
     """The equivalent roughness, (N,) each; `axis` is the rotation where symmetry gives it."""
     i, o = _columns(samples.wi), samples.wo
-    x, y, z = ggx.normalize((i[0] + o[0], i[1] + o[1], np.maximum(i[2] + o[2], COS_MIN)))
+    x, y, z = ggx.normalize((i[0] + o[0], i[1] + o[1], np.maximum(i[2] + o[2], COS_OF_DIRECTIONS_MIN)))
     # Light of no energy has the shape of its samples
     total = samples.energy.sum(axis=-1, keepdims=True)
-    weight = np.where(total > ENERGY_EPS, samples.energy / np.maximum(total, ENERGY_EPS), 1 / z.shape[-1])
+    weight = np.where(
+        total > SAMPLED_ENERGY_MIN, samples.energy / np.maximum(total, SAMPLED_ENERGY_MIN), 1 / z.shape[-1]
+    )
     azimuth = _azimuth(samples.wi)
     rotation = _axis((x, y, z), weight, azimuth) if axis is None else axis
     x, y, z = ggx.rotate((x, y, z), rotation[:, None])
@@ -99,7 +100,7 @@ def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
     """
     u1, u2 = _lattice(azimuth)
     wi = _columns(wi)
-    alpha, slope = np.clip(target, *ALPHA_LIMITS), np.ones_like(target)
+    alpha, slope = np.clip(target, *SEARCHED_ALPHA), np.ones_like(target)
     before: tuple[Array, Array] | None = None
     for _ in range(STEPS):
         u, v = alpha[..., None]
@@ -111,7 +112,7 @@ def _matching(wi: Direction, azimuth: Array, target: Array) -> Array:
             seen = np.clip((off - before[1]) / np.where(change == 0, 1.0, change), *SLOPES)
             slope = np.where(change == 0, slope, seen)
         before = alpha, off
-        alpha = np.clip(alpha * np.exp(-off / slope), *ALPHA_LIMITS)
+        alpha = np.clip(alpha * np.exp(-off / slope), *SEARCHED_ALPHA)
         if np.all(np.abs(alpha - before[0]) < ENOUGH * alpha):
             break
     return alpha

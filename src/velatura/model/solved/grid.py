@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.solved import monotone_cubic
 from velatura.model.solved.columns import Columns
+from velatura.model.solved.guards import COS_ON_GRID_MIN
 from velatura.model.solved.transmission.combined import Parts
-from velatura.model.variance import ALPHA_MIN
 from velatura.renderer import directional_grid
 from velatura.stack import InterfaceValues, Material
 
@@ -23,7 +24,6 @@ Array = NDArray[np.floating]
 COSINES = 32  # as many for isotropic interfaces as for others, so that light does not jump between them
 AZIMUTHS = {False: 12, True: 24}  # in half a turn, where some are brushed, and where some sharply so
 SHARP = 8.0  # roughness across over that along, beyond which inner lobes turn within few degrees
-COS_MIN = 1e-3
 ALIKE = 1e-6  # steps between azimuths, by which axes may differ
 
 
@@ -62,7 +62,7 @@ class Grid:
 
     @property
     def cosine(self) -> Array:
-        return np.repeat(np.maximum(self.nodes**2, COS_MIN), self.turns)
+        return np.repeat(np.maximum(self.nodes**2, COS_ON_GRID_MIN), self.turns)
 
     @property
     def phi(self) -> Array:
@@ -215,7 +215,7 @@ class Listed:
 
     @property
     def cosine(self) -> Array:
-        return np.maximum(self.directions[2], COS_MIN)
+        return np.maximum(self.directions[2], COS_ON_GRID_MIN)
 
     @property
     def phi(self) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model.solved.bsdf import Solved, exchanged
+from velatura.model.solved.guards import ALBEDO_MIN, BELOW_ONE
 from velatura.model.solved.sample_allocation import Demand
 from velatura.model.solved.transmission import combined
 from velatura.ops import Value
@@ -27,7 +28,6 @@ SAMPLES = {0: 1024, 64: 377, 100: 233}  # at each node, where there are more tha
 STEPS = 24
 MOST = 10.0  # times as bright, there and back
 MOST_REST = 4.0  # for the remainder
-DARK = 1e-6
 
 
 def factors(
@@ -82,7 +82,7 @@ def factors(
             of = side.through(i)
             passes = of.columns.passes
             assert passes
-            wo = combined.sample(side.transmission, passes, i, np.minimum(u[0], combined.BELOW_ONE), *u[1:])
+            wo = combined.sample(side.transmission, passes, i, np.minimum(u[0], BELOW_ONE), *u[1:])
             down = wo[0], wo[1], np.maximum(-wo[2], 0.0)
             eta = solved.eta if side is solved.above else 1 / solved.eta
             value, density, _ = exchanged(of, other.through(down), eta, i, wo)
@@ -123,7 +123,7 @@ def _leaving(kernel: Array, factor: Array) -> Array:
 
 
 def _ratio(energy: Array, light: Array) -> Array:
-    return np.where(light > DARK, np.maximum(energy, 0) / np.maximum(light, DARK), 1.0)
+    return np.where(light > ALBEDO_MIN, np.maximum(energy, 0) / np.maximum(light, ALBEDO_MIN), 1.0)
 
 
 def _bounded(factor: Array, most: float) -> Array:

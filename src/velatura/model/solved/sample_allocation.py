@@ -13,7 +13,7 @@ from velatura import ops
 TARGET_SAMPLE_WEIGHT = 2.7  # weight of samples of a part, where they can be kept so light
 KEPT = 0.7  # of the share by its energy that a part keeps at least
 STEPS = 8  # of halving
-STARGET_SAMPLE_WEIGHT = 2e-3  # share of the energy, of parts whose samples may be cut
+NEGLIGIBLE = 2e-3  # share of the energy, of parts whose samples may be cut
 
 Array = NDArray[np.floating]
 
@@ -49,7 +49,7 @@ def shared(demand: Demand) -> Array:
     `TARGET_SAMPLE_WEIGHT` to each part that is not too slight, as far as they suffice."""
     energy, usual, heaviest = demand
     even = ops.divide(energy, energy.sum(axis=0))
-    counts = np.minimum(even / STARGET_SAMPLE_WEIGHT, 1) / TARGET_SAMPLE_WEIGHT
+    counts = np.minimum(even / NEGLIGIBLE, 1) / TARGET_SAMPLE_WEIGHT
 
     def least(part: Array) -> Array:
         weight = usual + part * np.maximum(heaviest - usual, 0)

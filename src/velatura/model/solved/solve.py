@@ -16,11 +16,12 @@ from velatura.model.base import Model
 from velatura.model.context import Context, channels
 from velatura.model.smooth_interface import SmoothInterface, smooth_interfaces
 from velatura.model.solved import reciprocal_balance, sample_allocation
-from velatura.model.solved.bsdf import ENERGY_EPS, ROOTS, Shape, Side, Solved
+from velatura.model.solved.bsdf import ROOTS, Shape, Side, Solved
 from velatura.model.solved.columns import Columns, Declaration
 from velatura.model.solved.energies.adding import Part, interfaces, parts
 from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energies, energies, media_of
-from velatura.model.solved.grid import COS_MIN, Folded, Grid, Listed
+from velatura.model.solved.grid import Folded, Grid, Listed
+from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder, widths
 from velatura.model.solved.lobes.refracted_lobe import Index
 from velatura.model.solved.lobes.remainder import Remainder
@@ -48,7 +49,6 @@ FINELY = 1597, 4181  # facets, and as NORMALS, for differences, whose error is t
 BETWEEN = {True: 144, False: 89}  # as NORMALS, for each place of a renderer's grid
 NARROW = 0.05  # roughness of lobes whose integrals have edges between directions, as those of interfaces do
 EVENLY = 377  # directions over which the remainder is integrated
-DIM = 1e-6  # albedo of a remainder that is not scaled to its energy
 BRIGHTEST = 4.0  # by how much it is scaled at most
 LITTLE = 0.05  # by which energies are scaled for their colour
 BRIGHTER = 1.5  # at most, where it takes light of lobes
@@ -398,7 +398,7 @@ class Solver:
         chances = declared.chances(self.colours)
         rows[chances] /= rows[chances].sum(axis=0) + left
         if self.model.form == "forward":
-            cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_MIN)
+            cosine = np.maximum(np.linspace(0, 1, self.shape[0]) ** 2, COS_ON_GRID_MIN)
             polynomial = Remainder(*(x[:, None] for x in vars(side.polynomial).values()))
             whole = polynomial.albedo(cosine) + self.grid.along(side.clipped, self.shape[0])
             whole = np.repeat(whole, math.prod(self.shape[1:]), axis=-1)
@@ -470,7 +470,7 @@ class Solver:
         """Roughness of a lobe with the plane of incidence, as it is interpolated."""
         roughness = tensor.roughness(np.zeros_like(tensor.xx))
         if self.isotropic:  # axes lie in the plane of incidence, and across it
-            u, v = (np.minimum(tensor.width(np.array(axis)), widths.ALPHA_MAX) for axis in widths.AXES)
+            u, v = (np.minimum(tensor.width(np.array(axis)), WIDTH_ALPHA_MAX) for axis in widths.AXES)
             roughness = Roughness(u, v, 0.0)
         yield from vars(self.kind.of(roughness, ROOTS)).values()
 
@@ -602,7 +602,7 @@ def _of_cosines(cosine: Array) -> Direction:
 
 def _scale(energy: Array, albedo: Array) -> Array:
     """Factor that brings a remainder of that albedo to that energy."""
-    return np.clip(energy / np.maximum(albedo, DIM), 0, BRIGHTEST)
+    return np.clip(energy / np.maximum(albedo, ALBEDO_MIN), 0, BRIGHTEST)
 
 
 def _veiled(material: Material) -> set[int]:

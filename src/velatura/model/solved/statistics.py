@@ -18,6 +18,7 @@ from velatura.model.solved.bsdf import Shape
 from velatura.model.solved.energies.adding import Part, parts
 from velatura.model.solved.energies.energies import Energies, energies
 from velatura.model.solved.energies.media import Slab
+from velatura.model.solved.guards import ENERGY_EPS
 from velatura.model.solved.lobes import refracted_lobe, widths
 from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.sample_allocation import Demand
@@ -31,7 +32,6 @@ from velatura.stack import InterfaceValues, Material, SlabValues
 Array = NDArray[np.floating]
 
 NONE = np.zeros(0)  # directions at which the remainder, which has no lobe, is known
-DARK = 1e-9  # energy of lobes that have a shape all the same
 
 
 def solved_lobes(material: Material, model: Model, wi: Direction) -> StackLobes:
@@ -141,7 +141,7 @@ def _seen(
 
     def samples(roughness: Roughness, energy: Array) -> equivalent_roughness.Samples:
         lobe = shape.lobe(1.0, roughness)
-        weight = np.maximum(energy, DARK) / np.maximum(refracted_lobe.integral(lobe, wi), DARK)
+        weight = np.maximum(energy, ENERGY_EPS) / np.maximum(refracted_lobe.integral(lobe, wi), ENERGY_EPS)
         return equivalent_roughness.of_lobe(replace(lobe, weight=weight), wi)
 
     light = [samples(own, solved.lobes[k])]
@@ -161,7 +161,9 @@ def _passed(
     if kind is Isotropic:
         wi = np.hypot(wi[0], wi[1]), 0 * wi[1], wi[2]  # alike in all planes
     transmission = direct.transmission(material, kind, layout.stepped, layout.rough, layout.cloudy)
-    straight, bounced, all_ = (np.maximum(energy, DARK) for energy in (solved.straight, solved.bounced, solved.passed))
+    straight, bounced, all_ = (
+        np.maximum(energy, ENERGY_EPS) for energy in (solved.straight, solved.bounced, solved.passed)
+    )
     nothing = np.zeros((0, len(phi)))
     shares, _ = combined.parts(transmission, wi, straight, bounced, all_, Demand(nothing, nothing, nothing))
     samples = equivalent_roughness.of_passed(transmission, shares, wi)

@@ -25,8 +25,9 @@ from velatura.films import textured as textured_films
 from velatura.model.base import Body, Model
 from velatura.model.context import Context, at_a_point
 from velatura.model.solved import solve, texture_axes
-from velatura.model.solved.bsdf import ENERGY_EPS, Side, Solved
+from velatura.model.solved.bsdf import Side, Solved
 from velatura.model.solved.columns import Columns
+from velatura.model.solved.guards import ENERGY_EPS
 from velatura.model.solved.lobes import remainder
 from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.solve import Layout, SolvedSide, Solver

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.model import fitted
 from velatura.model.rough_interface import Facets
 from velatura.model.solved.energies.adding import (
     Lambert,
@@ -31,9 +32,10 @@ from velatura.model.solved.energies.adding import (
 )
 from velatura.model.solved.energies.interfaces import Setting
 from velatura.model.solved.energies.media import Slab, medium
-from velatura.model.solved.energies.modes import TINY, Basis, Even, Relative
+from velatura.model.solved.energies.modes import Basis, Even, Relative
 from velatura.model.solved.energies.nodes import Nodes
 from velatura.model.solved.energies.operators import Operator
+from velatura.model.solved.guards import TINY
 from velatura.stack import InterfaceValues, LayerValues, Material
 from velatura.tables import Tables
 
@@ -44,9 +46,6 @@ SAMPLES = 377  # normals
 MODES = 3  # of the azimuth, of the remainder
 CANCELS = 0.3  # of columns of light: a sum that is less
 INCIDENCES = np.sqrt((np.arange(8) + 0.5) / 8)  # cosines at which the remainder is known
-UNDISTURBED = 0.5  # steps of the logarithm of the index, over which light of repeated facets loses the shape of a lobe
-AGAIN = 1.0  # of light of repeated facets beside that of single ones, that has the shape of a lobe at most
-SMOOTH = 4.0  # power of that minimum
 AZIMUTHS = np.pi * np.arange(4) / 4  # over which it is averaged, where interfaces are brushed
 
 Straight = Callable[[float], float]  # share of scattered light that counts as going straight on, by asymmetry
@@ -191,7 +190,7 @@ def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
     shares, steps = {}, 0.0
     for i, part in enumerate(found):
         if isinstance(part, Facets):
-            shares[i] = float(np.exp(-steps / UNDISTURBED)) * (part.brushed if part.is_exit else 1.0)
+            shares[i] = float(np.exp(-steps / fitted.UNDISTURBED)) * (part.brushed if part.is_exit else 1.0)
             steps += part.step
     return shares
 
@@ -199,9 +198,9 @@ def _undisturbed(found: Sequence[Part]) -> dict[int, float]:
 def _kept(share: float, all_light: Operator, once: Operator, leaving: Leaving) -> Operator:
     """A share of the light of an interface that meets its facets again: no more than a lobe takes, without a kink."""
     again = all_light + -1.0 * once
-    most = AGAIN * np.maximum(leaving.energy(once), TINY) / np.maximum(leaving.energy(again), TINY)
+    most = fitted.AGAIN * np.maximum(leaving.energy(once), TINY) / np.maximum(leaving.energy(again), TINY)
     ratio = np.minimum(most, share) / np.maximum(most, share)
-    kept = (np.minimum(most, share) * (1 + ratio**SMOOTH) ** (-1 / SMOOTH))[:, None, None]
+    kept = (np.minimum(most, share) * (1 + ratio**fitted.AGAIN_POWER) ** (-1 / fitted.AGAIN_POWER))[:, None, None]
     return replace(again, columns=kept * again.columns, beams=kept * again.beams)
 
 

@@ -16,29 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops, tables
-from velatura.model.rough_interface import (
-    ALPHA_MIN,
-    DIGITS,
-    GRAZING,
-    KEPT,
-    Facets,
-    FirstEvents,
-    FirstShares,
-    mean_alpha,
-    shares_of_films,
-)
-from velatura.model.solved.energies.modes import TINY, Basis
+from velatura.model import fitted
+from velatura.model.guards import ALPHA_MIN, COS_AT_FACETS_MIN
+from velatura.model.rough_interface import DIGITS, KEPT, Facets, FirstEvents, FirstShares, mean_alpha, shares_of_films
+from velatura.model.solved.energies.modes import Basis
 from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.model.solved.guards import TINY, TRACE
 from velatura.tables import Tables
 
 Array = NDArray[np.floating]
 T = TypeVar("T")
-
-SWING = 2.6  # how much light of repeated facets goes on in its direction, and how fast that falls as they turn it
-OPAQUE = 1.4  # step of the logarithm of the index that turns as much as a reflection
-KEPT_ON = 0.5  # share of repeated light that passes brushed facets in the directions of second events
-TRACE = 1e-12  # of light
-BLOCKED = (0.004, 0.014)  # shares of blocked light below which, and above which, its share comes from the tables
 
 
 @dataclass(frozen=True)
@@ -245,11 +232,11 @@ def _again(taken: _Blocked, there: _Blocked, second: Sequence[Operator], facets:
     """Light that is blocked at first, and leaves in the directions in which light is blocked `there`: the less facets
     turn it, the more of it goes on as it came. Brushed ones, which keep its momentum along them, send what they reflect
     where their `second` events do, and a share of what passes."""
-    brushed = facets.across * (1.0 if there is taken else KEPT_ON)
+    brushed = facets.across * (1.0 if there is taken else fitted.PASSED_ON)
     if brushed == 1:
         return second[0]
-    turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (OPAQUE if facets.opaque else facets.step)
-    swing = SWING * float(np.exp(-SWING * turn))  # model.md, Eq. 4
+    turn = 0.5 * (facets.alpha_u + facets.alpha_v) * (fitted.OPAQUE_STEP if facets.opaque else facets.step)
+    swing = fitted.SWING * float(np.exp(-fitted.SWING * turn))  # model.md, Eq. 4
     nodes, beams = (
         setting.basis.swung(setting.basis.outer(there.emitted, light), swing, there.sines[0], sines, phi)
         for light, sines, phi in zip(
@@ -277,7 +264,7 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShare
         return blocked * reflected, blocked * passed
     across = facets.across
     alpha = (1 - across) * mean_alpha(facets) + across * max(facets.alpha_u, facets.alpha_v, ALPHA_MIN)
-    cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, GRAZING**2))
+    cosine = np.sqrt(np.maximum(1 - (p / ops.mean(facets.above)) ** 2, COS_AT_FACETS_MIN**2))
     ratio = (facets.below / facets.above)[:, None]
     if facets.k is None:
         row = tables.dielectric_row(known, ratio, True, True)
@@ -293,12 +280,12 @@ def _again_shares(facets: Facets, setting: Setting, p: Array, events: FirstShare
     little: Array
     if facets.k is None:
         met = stand_in.blocked_reflected + stand_in.blocked_refracted
-        little = np.where(ratio < 1, 0.9, 0.15)
+        little = np.where(ratio < 1, *fitted.BLOCKED_IN_THE_END)
     else:
         met, little = stand_in.whole, often * often
     # Little that is blocked has a share that the tables do not resolve
-    seen = np.clip((met - BLOCKED[0]) / (BLOCKED[1] - BLOCKED[0]), 0, 1)
-    share = seen * np.clip((often - once) / np.maximum(met, BLOCKED[0]), 0, 1) + (1 - seen) * little
+    seen = np.clip((met - fitted.BLOCKED[0]) / (fitted.BLOCKED[1] - fitted.BLOCKED[0]), 0, 1)
+    share = seen * np.clip((often - once) / np.maximum(met, fitted.BLOCKED[0]), 0, 1) + (1 - seen) * little
     reflected = blocked * share
     if across:
         twice = np.clip(_reflected_again(events, stand_in, met * share), 0, blocked)
@@ -313,5 +300,5 @@ def _reflected_again(brushed: FirstShares, isotropic: FirstShares, known: Array)
     def on(events: FirstShares) -> Array:
         return np.asarray(events.third + events.blocked_refracted)
 
-    more = (known - isotropic.second) / np.maximum(on(isotropic), BLOCKED[0])
+    more = (known - isotropic.second) / np.maximum(on(isotropic), fitted.BLOCKED[0])
     return np.asarray(brushed.second + more * on(brushed))

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model.rough_interface import Light, colours
 from velatura.model.solved.energies.interfaces import Setting, scaled
-from velatura.model.solved.energies.modes import TINY
 from velatura.model.solved.energies.operators import Layer, Operator
+from velatura.model.solved.guards import COS_IN_MEDIA_MIN, G_MAX, SIN_IN_MEDIA_MAX, TINY
 from velatura.ops import Value
 from velatura.optics import phase
 from velatura.renderer.low_discrepancy import fibonacci
@@ -24,9 +24,6 @@ Array = NDArray[np.floating]
 
 THIN = 1e-4  # depth of the first layer, which scatters once at most: errors go as this depth
 EVENTS = 600
-G_MAX = 0.999  # asymmetry of light that turns by less than nodes resolve
-COS_MIN = 0.01  # light that travels flatter is taken to travel so
-STEEP = float(np.sqrt(1 - COS_MIN**2))  # its sine
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ def _thin(slab: Slab, depth: Array, setting: Setting) -> tuple[Operator, Operato
 
 def _kept(slab: Slab, depth: Array, p: Array) -> Array:
     """Share (C, ...) of light of momenta p that passes a depth (C,); none has more than the medium's index."""
-    cosine = np.sqrt(np.maximum(1 - (p / slab.n) ** 2, COS_MIN**2))
+    cosine = np.sqrt(np.maximum(1 - (p / slab.n) ** 2, COS_IN_MEDIA_MIN**2))
     return np.asarray(np.exp(-depth[:, None] / cosine))
 
 
@@ -114,7 +111,7 @@ def _events(
     sources: Sequence[Value], samples: Sequence[Value], numbers: Sequence[Value]
 ) -> tuple[list[Light], list[Value]]:
     (p, psi), (u_1, u_2), (n, g, share) = sources, samples, numbers
-    sin = ops.minimum(p / n, STEEP)
+    sin = ops.minimum(p / n, SIN_IN_MEDIA_MAX)
     w = sin * ops.cos(psi), sin * ops.sin(psi), ops.sqrt(1 - sin * sin)
     x, y, z = phase.deflect(w, phase.sample_henyey_greenstein(g, u_1), 2 * pi * u_2)
     return [Light(n * x, n * y, [ops.select(there, share, 0.0)]) for there in (z <= 0, z > 0)], []

@@ -19,6 +19,7 @@ from scipy.sparse import csc_array
 from velatura import ops
 from velatura.model.rough_interface import Light, Scatter
 from velatura.model.solved.energies.nodes import STENCIL, Nodes
+from velatura.model.solved.guards import MOMENTUM_MIN
 from velatura.ops import Value
 from velatura.renderer import compiled
 from velatura.renderer.low_discrepancy import fibonacci
@@ -28,8 +29,6 @@ Array = NDArray[np.floating]
 RATIOS = (1.5, 3.0, 6.0)  # of two roughnesses, from which one more order of the azimuth is needed
 SQUARE = 1e-6  # of a right angle, within which two axes are at one
 ROOT = float(np.sqrt(2))
-TINY = np.finfo(float).tiny
-SHORT = 1e-150  # least length of momentum that has an azimuth
 
 
 class Basis(ABC):
@@ -340,5 +339,5 @@ class Even(Basis):
 def _polar(light: Light) -> tuple[Value, Value, Value]:
     """Lengths of momenta, and cosine and sine of their azimuths."""
     length = ops.sqrt(light.x * light.x + light.y * light.y)
-    scale = 1 / ops.maximum(length, SHORT)
+    scale = 1 / ops.maximum(length, MOMENTUM_MIN)
     return length, light.x * scale, light.y * scale

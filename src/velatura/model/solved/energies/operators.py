@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from velatura.model.solved.guards import TRAPPED
+
 Array = NDArray[np.floating]
 
-TRAPPED = 1e-9  # share that is lost at each reflection between layers
 ALONE = 2**18  # multiplications that OpenBLAS leaves to one thread
 LARGE = 100  # rows of a matrix of which it shares the inverse among threads
 

@@ -21,7 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
-from velatura.model.variance import ALPHA_MIN, Roughness
+from velatura.model.guards import ALPHA_MIN
+from velatura.model.solved.guards import COS_INSIDE_MIN
+from velatura.model.variance import Roughness
 from velatura.ops import Value
 from velatura.optics import ggx
 from velatura.optics.ggx import Direction
@@ -29,7 +31,6 @@ from velatura.renderer import compiled, low_discrepancy
 
 Array = NDArray[np.floating]
 
-COS_MIN = 1e-3  # times the index inside; what refraction does not reach meets the interface at this one
 NORMALS = 987  # of the quadrature's lattice; a Fibonacci number
 SPARSE = 3  # of so many normals one, for weights
 
@@ -247,7 +248,7 @@ def _inside(lobe: RefractedLobe, wi: Direction) -> tuple[Value, Value, Index, Di
     if n.is_outside or n.denser:
         return alpha_u, alpha_v, n, (x, y, _height(n, z))
     inverse = 1 / ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY)
-    scale = ops.minimum(n.n * ((1 - 0.5 * COS_MIN * COS_MIN) * inverse), 1.0)
+    scale = ops.minimum(n.n * ((1 - 0.5 * COS_INSIDE_MIN * COS_INSIDE_MIN) * inverse), 1.0)
     height = _height(n, z)
     ops.names(scale=scale, height=height)
     return alpha_u, alpha_v, n, (scale * x, scale * y, height)
@@ -255,14 +256,14 @@ def _inside(lobe: RefractedLobe, wi: Direction) -> tuple[Value, Value, Index, Di
 
 def _height(n: Index, z: Value) -> Value:
     """Height, along the normal, of the momentum inside, of light with a cosine outside."""
-    return ops.maximum(z, COS_MIN) if n.is_outside else ops.sqrt(_height2(n, z), None)
+    return ops.maximum(z, COS_INSIDE_MIN) if n.is_outside else ops.sqrt(_height2(n, z), None)
 
 
 def _height2(n: Index, z: Value) -> Value:
     """Its square."""
     if n.is_outside:
         return _height(n, z) * _height(n, z)
-    return ops.maximum(n.ring2 + z * z, COS_MIN * COS_MIN)
+    return ops.maximum(n.ring2 + z * z, COS_INSIDE_MIN * COS_INSIDE_MIN)
 
 
 def _squares(w: Direction) -> Direction:

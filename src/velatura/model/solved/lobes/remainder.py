@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from velatura import ops
 from velatura.model.solved.energies.nodes import QUADRATURE, Nodes
+from velatura.model.solved.guards import ALBEDO_MIN
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
@@ -30,7 +31,6 @@ MOMENTS = (1.0, 2 / 3, 1 / 15)  # means of u over the projected disc
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # a and b, of C_ab
 EVEN = (1.0, 0.0, 0.0, 0.0, 0.0)  # numbers of light that passes evenly
 EXACT = 3.0  # weight of the energy of a direction beside that of nodes
-DARK = 1e-6  # albedo
 ALIKE = 3e-4  # error of pi f
 LATTICE = 12  # directions along each axis that errors are of
 KEPT = 16  # sets of nodes whose deposits are kept
@@ -163,8 +163,8 @@ def fit(nodes: Nodes, measures: Array, cosines: Array, albedos: Array) -> Remain
 
     numbers = []
     for light, albedo in zip(measures, albedos):
-        weight = even / np.maximum(albedo, DARK)[:, None]
-        exact = EXACT / np.maximum(albedo, DARK)
+        weight = even / np.maximum(albedo, ALBEDO_MIN)[:, None]
+        exact = EXACT / np.maximum(albedo, ALBEDO_MIN)
         seen = light[:, outside].swapaxes(-1, -2)
         rows = np.concatenate([_rows(mean, weight), _rows(energy, exact)])
         target = np.concatenate([(weight * seen[0]).ravel(), exact * light[0].sum(axis=0)])
@@ -184,14 +184,14 @@ def passing(nodes: Nodes, measures: Array, n: float, sines: Array) -> Array:
     """
     leaves, even, deposits, once, twice = _of_nodes(nodes, n)
     energy = measures[0].sum(axis=0)
-    mean, *others = measures[:, leaves] / np.maximum(energy, DARK)
+    mean, *others = measures[:, leaves] / np.maximum(energy, ALBEDO_MIN)
     rows = np.concatenate([even * np.array(deposits), EXACT * np.reshape(MOMENTS, (-1, 1))], axis=1).T
     target = np.concatenate([even[:, None] * mean, np.full((1, len(sines)), EXACT)])
     numbers = [*np.linalg.lstsq(rows, target, rcond=None)[0]]
     for mode, deposit, sine in zip(others, (once, twice), (sines, sines * sines)):
         numbers.append(2 / sine * ((even * even * deposit) @ mode) / np.sum((even * deposit) ** 2))
     numbers += [0 * sines] * (5 - len(numbers))
-    return np.where(energy > DARK, numbers, np.reshape(EVEN, (-1, 1)))
+    return np.where(energy > ALBEDO_MIN, numbers, np.reshape(EVEN, (-1, 1)))
 
 
 def of_few(numbers: Array, most: int) -> tuple[Array, Array] | None:

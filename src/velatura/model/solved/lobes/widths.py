@@ -22,60 +22,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model import fitted
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.rough_interface import Facets
 from velatura.model.solved.energies.adding import Part
 from velatura.model.solved.energies.media import Slab
+from velatura.model.solved.guards import COS_OF_WIDTHS_MIN, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.refracted_lobe import Reflectance, RefractedLobe
-from velatura.model.variance import ALPHA_MIN, Roughness
+from velatura.model.variance import Roughness
 from velatura.ops import Value
 from velatura.optics import fresnel
 
 Array = NDArray[np.floating]
 
-Q = 1.52
-# How cosines grow with roughness, in the plane and across it: of the interfaces above, and of the lobe's own
-STEEPNESS = (9.0, 1.2)
-OWN_STEEPNESS = (0.53, 1.5)
-COS_MIN = 0.01
-ALPHA_MAX = 1.0
 NEARLY_STRAIGHT = 0.2  # radians; by how much light of a veil is turned at most, in one event
 ASYMMETRY_MIN = 0.05  # of media that have a veil
 COARSE = 144  # normals
 AXES = (0.0, 0.5 * np.pi)  # of a tensor
-LARGEST = 1.5  # logarithm of a correction
-SLIGHT = 0.2  # step of the index over the greatest one, that does not count
 LEAST_STEP = 0.02  # of the logarithm of the index, that counts at all
 LEAST_TURN = 1e-3  # step times alpha, of facets that turn light
-FADE = 0.1  # sum of steps of the logarithm of the index below which corrections fade
-# Pairs of features; of their product, what it adds to the logarithm of the width along an axis, and what, times sin^2,
-# it adds to that of the width in the plane and takes from that across it
-CORRECTION: tuple[tuple[tuple[str, str], float, float], ...] = (
-    (("rarer", "lost"), 0.592, -0.27),
-    (("brighter", "size"), -0.152, 0.081),
-    (("size", "size"), 0.000246, 0.00192),
-    (("rough", "rough"), -1.06, 0.657),
-    (("reflected", "rarer"), -1, 2.03),
-    (("size", "rough"), -0.414, 0.357),
-    (("rough", "near"), -4.1, 2.44),
-    (("coats", "falling"), 0.357, 0.0547),
-    (("brighter", "reflected"), 0.412, 1.05),
-    (("1", "rough"), -1.46, -1.01),
-    (("1", "brighter"), -0.354, -1.2),
-    (("brighter", "near"), -0.0709, 0.84),
-    (("brighter", "brighter"), 0.145, 0.103),
-    (("slant", "coats"), 0.00013, -0.328),
-    (("rough", "reflected"), 0.0687, 1.13),
-    (("rough", "rarer"), 1.33, -1.65),
-    (("coats", "rarer"), 0.202, 0.435),
-    (("rough", "index"), 0.595, -0.0434),
-    (("falling", "lost"), 0.171, 0.25),
-    (("brighter", "rarer"), 0.691, -0.571),
-    (("brighter", "coats"), -0.0305, 0.323),
-    (("coats", "coats"), -0.204, 0.18),
-    (("1", "coats"), 0.224, -0.0153),
-    (("1", "reflected"), 0.0243, 0.0415),
-)
 
 
 @dataclass(frozen=True)
@@ -121,12 +87,12 @@ class Tensor:
 
     def roughness(self, phi: Array) -> Roughness:
         """Roughness in the frame of the stack; `phi` is the azimuth of the plane."""
-        u, v = (np.minimum(self.width(self.angle + turn), ALPHA_MAX) for turn in AXES)
+        u, v = (np.minimum(self.width(self.angle + turn), WIDTH_ALPHA_MAX) for turn in AXES)
         return Roughness(u, v, self.angle + phi)
 
     def straight(self) -> Roughness:
         """Roughness in the plane and across it, where these are its axes."""
-        u, v = (np.minimum(self.width(np.asarray(turn)), ALPHA_MAX) for turn in AXES)
+        u, v = (np.minimum(self.width(np.asarray(turn)), WIDTH_ALPHA_MAX) for turn in AXES)
         return Roughness(u, v, 0.0)
 
 
@@ -134,7 +100,7 @@ def _sum(parts: Sequence[Tensor]) -> Tensor:
     """Sum of tensors: powers q of widths add along the axes of the sum of squares."""
     squares = Tensor(*(np.sum([getattr(part, entry) for part in parts], axis=0) for entry in ("xx", "xy", "yy")))
     angle = squares.angle
-    u, v = (np.sum([part.width(angle + turn) ** Q for part in parts], axis=0) ** (1 / Q) for turn in AXES)
+    u, v = (np.sum([part.width(angle + turn) ** fitted.Q for part in parts], axis=0) ** (1 / fitted.Q) for turn in AXES)
     return Tensor.turned(u, v, angle)
 
 
@@ -163,8 +129,8 @@ class _Coat:
     def moved(self) -> Tensor:
         """Displacement of momentum in a refraction."""
         x, y = (
-            np.sqrt(np.maximum(self.n_below**2 - (1 - cos2) * self.n**2, COS_MIN**2)) - self.n * np.sqrt(cos2)
-            for cos2 in _steeper(self.cosine, np.sqrt(self.tensor.xx), STEEPNESS)
+            np.sqrt(np.maximum(self.n_below**2 - (1 - cos2) * self.n**2, COS_OF_WIDTHS_MIN**2)) - self.n * np.sqrt(cos2)
+            for cos2 in _steeper(self.cosine, np.sqrt(self.tensor.xx), fitted.STEEPNESS)
         )
         return self.tensor.stretched(np.abs(x), np.abs(y))
 
@@ -194,7 +160,7 @@ def stepped(steps: Sequence[float], least: float = LEAST_STEP) -> list[int]:
     """Numbers of the interfaces that make a step of the index, for the steps of the logarithm of all: slight ones
     beside greater ones do not count."""
     most = max(steps, default=0.0)
-    return [k for k, step in enumerate(steps) if step > SLIGHT * most] if most > least else []
+    return [k for k, step in enumerate(steps) if step > fitted.SLIGHT_STEP * most] if most > least else []
 
 
 def first_step(steps: Sequence[float]) -> int | None:
@@ -247,7 +213,7 @@ def _first_order(own: Tensor, coats: Sequence[_Coat], n: float, cosine: Array) -
         return _sum([own, *both_ways])  # model.md, Eq. 6
 
     simple = total(cosine, cosine)
-    return total(*(np.sqrt(cos2) for cos2 in _steeper(cosine, np.sqrt(simple.xx), OWN_STEEPNESS)))
+    return total(*(np.sqrt(cos2) for cos2 in _steeper(cosine, np.sqrt(simple.xx), fitted.OWN_STEEPNESS)))
 
 
 def features(
@@ -286,7 +252,7 @@ def features(
         "brighter": np.clip(brighter, -1.5, 2.0),
         "slant": sin2,
         "size": np.log(axes),
-        "coats": 1 - np.minimum(np.array([own.width(first.angle + turn) for turn in AXES]) / axes, 1) ** Q,
+        "coats": 1 - np.minimum(np.array([own.width(first.angle + turn) for turn in AXES]) / axes, 1) ** fitted.Q,
         "rough": moved,
         "falling": np.full_like(sin2, np.log(max(coat.n_below for coat in coats) / n)),
         "index": np.full_like(sin2, n - 1),
@@ -301,12 +267,12 @@ def features(
 def _corrected(first: Tensor, seen: dict[str, Array]) -> Tensor:
     """The tensor with its axes scaled, and then the components in the plane and across it."""
     axes, apart = np.zeros((2, *first.xx.shape)), np.zeros_like(first.xx)
-    for (a, b), along, to_difference in CORRECTION:
+    for (a, b), along, to_difference in fitted.CORRECTION:
         product = np.broadcast_to(seen[a] * seen[b], axes.shape)
         axes = axes + along * product
         apart = apart + to_difference * product.mean(axis=0) * seen["slant"]
-    fading = seen["steps"] / (seen["steps"] + FADE)
-    u, v, x = (np.exp(np.clip(fading * each, -LARGEST, LARGEST)) for each in (*axes, apart))
+    fading = seen["steps"] / (seen["steps"] + fitted.CORRECTION_FADE)
+    u, v, x = (np.exp(np.clip(fading * each, -fitted.CORRECTION_MAX, fitted.CORRECTION_MAX)) for each in (*axes, apart))
     scaled = Tensor.turned(u * first.width(first.angle), v * first.width(first.angle + AXES[1]), first.angle)
     return scaled.stretched(x, 1 / x)
 
@@ -352,7 +318,7 @@ def _of_event(g: float) -> float:
 
 def _cosine(cos_theta: Value, n: Value) -> Value:
     """Inside, by Snell's law."""
-    return ops.sqrt(1 - (1 - cos_theta * cos_theta) / (n * n), COS_MIN**2)
+    return ops.sqrt(1 - (1 - cos_theta * cos_theta) / (n * n), COS_OF_WIDTHS_MIN**2)
 
 
 def _steeper(cosine: Array, width: Array, steepness: Sequence[float]) -> list[Array]:

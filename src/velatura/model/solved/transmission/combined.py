@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.model.directions import select_direction
 from velatura.model.solved import sample_allocation
+from velatura.model.solved.guards import BELOW_ONE
 from velatura.model.solved.lobes import refracted_lobe
 from velatura.model.solved.lobes.remainder import EVEN
 from velatura.model.solved.sample_allocation import Demand
@@ -33,7 +34,6 @@ LEAST = 0.05  # share of samples of what passes that are scattered, for what all
 UNLIKE = 1.5  # weight over its mean, of samples that go straight through, for which more are drawn
 PASSES_MIN = 0.05  # share of facets that let light pass, where samples are shared
 LITTLE = 3e-3  # energy that passes straight through, which hardly says how much brighter it is than its integral
-BELOW_ONE = 1 - 2**-24
 
 Array = NDArray[np.floating]
 

@@ -39,8 +39,18 @@ from numpy.typing import NDArray
 from velatura import ops
 from velatura.films.of_material import films_of
 from velatura.films.reflectance import Films, dielectric_passing
+from velatura.model import fitted
+from velatura.model.guards import ALPHA_MIN
 from velatura.model.roughness_maps import RoughnessMap
-from velatura.model.variance import ALPHA_MIN, Covariance, Isotropic, Roughness, Variance
+from velatura.model.solved.guards import (
+    COS_IN_SLABS_MIN,
+    COS_OUTSIDE_MIN,
+    MOMENTUM_STEP_MIN,
+    MOMENTUM_WIDTH_ACROSS_MIN,
+    MOMENTUM_WIDTH_MIN,
+    WIDTH2_MIN,
+)
+from velatura.model.variance import Covariance, Isotropic, Roughness, Variance
 from velatura.ops import Value
 from velatura.optics import fresnel, ggx
 from velatura.optics.ggx import Direction
@@ -48,18 +58,11 @@ from velatura.renderer import compiled, low_discrepancy
 from velatura.stack import InterfaceValues, Material, SlabValues
 from velatura.stack.chain import chain
 
-EXPONENT = 1.3  # between Cauchy (1) and Gauss (2), as the tails of GGX ask for
-WIDTH_MIN = 1e-4  # of momentum, that an interface gives to light which it turns by itself
-NARROW_MIN = 2e-5  # of it, across the brushing
-FLAT = 1e-7  # step of momentum at steep facets, at least
-COS_MIN = 0.02  # in slabs that light crosses, and in those that it cannot enter
-GRAZING = 1e-4  # cosine outside
 NODES = (16, 24)  # of the quadrature
 EDGE = 0.98  # of the disc of momenta that can leave, where light from beyond it is looked for
-WEIGHT_MIN = 1e-12  # squared width that decides the shares where no interface has any
 
 #: Widths in the space where they add; they have no upper bound.
-WIDTHS = RoughnessMap(lambda a, _: ops.power(a, EXPONENT), lambda s, _: ops.power(s, 1 / EXPONENT))
+WIDTHS = RoughnessMap(lambda a, _: ops.power(a, fitted.EXPONENT), lambda s, _: ops.power(s, 1 / fitted.EXPONENT))
 
 Momentum = tuple[Value, Value]
 Passing = Callable[[Value, Value], Value]
@@ -175,12 +178,12 @@ def _crossing(
     u, v = ops.maximum(layer.alpha_u, ALPHA_MIN), ops.maximum(layer.alpha_v, ALPHA_MIN)
     # Across the brushing light has a width, too
     step = n_1 * ops.absolute(ratio - 1)
-    narrow = ops.divide(NARROW_MIN, step)
+    narrow = ops.divide(MOMENTUM_WIDTH_ACROSS_MIN, step)
     u, v = ops.maximum(u, ops.minimum(narrow, v)), ops.maximum(v, ops.minimum(narrow, u))
     roughness = Roughness(u, v, layer.rotation * (pi / 180) if kind is Covariance else 0.0)
-    least = n_1 * ops.sqrt(ratio) * WIDTH_MIN / ops.sqrt(u * v)
+    least = n_1 * ops.sqrt(ratio) * MOMENTUM_WIDTH_MIN / ops.sqrt(u * v)
     turns = step > least
-    sign, least = ops.select(turns, ops.select(ratio < 1, 1.0, -1.0), 0.0), ops.select(turns, FLAT, least)
+    sign, least = ops.select(turns, ops.select(ratio < 1, 1.0, -1.0), 0.0), ops.select(turns, MOMENTUM_STEP_MIN, least)
     return Refraction(n_1, n_1 * ratio, eta, roughness, kind.of(roughness, WIDTHS), u * v, sign, least, films)
 
 
@@ -209,10 +212,10 @@ def _crossed(transmission: Transmission, p: Momentum, above: Value, below: Value
     """The momentum p in all slabs, with the cosines above and below all interfaces where more exact ones are known."""
     p2 = p[0] * p[0] + p[1] * p[1]
     cosines = [ops.sqrt(1 - p2 / (n * n)) for n in transmission.indices]  # model.md, Eq. 1
-    bounded = [ops.maximum(c, COS_MIN) for c in cosines]
+    bounded = [ops.maximum(c, COS_IN_SLABS_MIN) for c in cosines]
     for l, known in ((0, above), (-1, below)):
         if known is not None:
-            cosines[l], bounded[l] = known, ops.maximum(known, GRAZING)
+            cosines[l], bounded[l] = known, ops.maximum(known, COS_OUTSIDE_MIN)
     refractions = transmission.refractions
     steps = [c.n_1 * bounded[l] - c.n_2 * bounded[l + 1] for l, c in enumerate(refractions)]
     passes = [c.passing(cosines[l], cosines[l + 1]) for l, c in enumerate(refractions)]
@@ -269,7 +272,7 @@ def _components(
     tails = [_tail(refraction, d) for refraction in refractions] if d is not None else []
     found = []
     for j, (refraction, size) in enumerate(zip(refractions, sizes)):
-        width, scale, weight, total = refraction.width, ops.power(size, -EXPONENT), at[j], at[j]
+        width, scale, weight, total = refraction.width, ops.power(size, -fitted.EXPONENT), at[j], at[j]
         if j:
             width, total = width + widths_above[j - 1] * scale, over_all[j - 1] + total
         if j < last:
@@ -283,13 +286,13 @@ def _components(
 
 def _width(refraction: Refraction, step: Value) -> Variance:
     """Width of a move of light that makes a step, in the space of `WIDTHS`."""
-    return refraction.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY), EXPONENT)
+    return refraction.width * ops.power(ops.maximum(ops.absolute(step), ops.TINY), fitted.EXPONENT)
 
 
 def _weight(refraction: Refraction, step: Value) -> Value:
     """Square of the width of a step."""
     width2 = ops.select(_turns(refraction.sign), step * step * refraction.area, 0.0)
-    return width2 + WEIGHT_MIN * refraction.n_1 * refraction.n_2
+    return width2 + WIDTH2_MIN * refraction.n_1 * refraction.n_2
 
 
 def _tail(refraction: Refraction, d: Momentum) -> Callable[[Value], Value]:
@@ -315,7 +318,7 @@ def _drawn(transmission: Transmission, i: MomentumInSlabs) -> tuple[list[_Compon
         return components, [1.0]
     # Leave out parts that light does not reach; it always reaches the first interface
     shares = [c.weight * ops.mean(share) for c, share in zip(components, _smooth_above(i))]
-    shares[0] = shares[0] + WEIGHT_MIN
+    shares[0] = shares[0] + WIDTH2_MIN
     total = sum(shares[1:], shares[0])
     return components, [share / total for share in shares]
 
@@ -524,7 +527,8 @@ def integrals(
     n = transmission.indices
     i = entered(transmission, wi)
     widths = [
-        c.width * ops.power(np.abs(step) + ops.TINY, EXPONENT) for c, step in zip(transmission.refractions, i.steps)
+        c.width * ops.power(np.abs(step) + ops.TINY, fitted.EXPONENT)
+        for c, step in zip(transmission.refractions, i.steps)
     ]
     u, v, rotation = (np.asarray(x)[..., None, None] for x in reduce(lambda a, b: a + b, widths).roughness(WIDTHS))
     # Cast rays from the middle
@@ -535,10 +539,10 @@ def integrals(
     rotation = np.arctan2(i.p[1], i.p[0])[:, None, None] if alike else rotation
     n_out = np.asarray(n[-1])
     length = np.sqrt(np.maximum(i.p2, ops.TINY))
-    bound = np.where(length < n_out, np.minimum(1, (1 - WIDTH_MIN) * n_out / length), EDGE * n_out / length)
+    bound = np.where(length < n_out, np.minimum(1, (1 - MOMENTUM_WIDTH_MIN) * n_out / length), EDGE * n_out / length)
     p = [(bound * x)[:, None, None] for x in i.p]
     gap = ((1 - bound) * length)[:, None, None]
-    u, v = (np.sqrt(width**2 + gap**2 + WIDTH_MIN**2) for width in (u, v))
+    u, v = (np.sqrt(width**2 + gap**2 + MOMENTUM_WIDTH_MIN**2) for width in (u, v))
     ray = u * np.cos(phi)[:, None], v * np.sin(phi)[:, None]
     cosine, sine = np.cos(rotation), np.sin(rotation)
     ray = cosine * ray[0] - sine * ray[1], sine * ray[0] + cosine * ray[1]

@@ -26,11 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from velatura import ops
+from velatura.model import fitted
+from velatura.model.solved.guards import COS_INSIDE_MIN, COS_OUTSIDE_MIN, G_MIN, INDEX_MAX, INTERNAL_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
 from velatura.model.solved.lobes.remainder import EVEN, Samples
 from velatura.model.solved.transmission.direct import (
-    EXPONENT,
     WIDTHS,
     MomentumInSlabs,
     Slab,
@@ -42,15 +43,7 @@ from velatura.model.variance import Roughness, Variance
 from velatura.ops import Value
 from velatura.optics.ggx import Direction
 
-BOUNCES = 0.3  # of the two faces of the slab that light bounces in
-COS_MIN = 0.22  # at which slabs are crossed, for widths
-ALPHA_MAX = 1.5
-DIFFUSE = 0.5, 0.9  # roughness from which scattering is diffuse in part, and as a whole
-FAR = 1e3  # index
 THIN = 1e-4  # optical depth of scattering that no light meets twice
-NO_LOBE = 1e-6  # asymmetry
-GRAZING = 1e-4  # cosine
-WIDE = 0.05  # roughness of bounced light of which a lobe holds half
 
 Array = NDArray[np.floating]
 
@@ -82,20 +75,21 @@ def bounced(transmission: Transmission, wi: Direction) -> RefractedLobe | None:
     if not transmission.bounces:
         return None
     faces = _sum(transmission.faces, [refraction.width for refraction in transmission.refractions])
-    return _lobe(transmission, entered(transmission, wi), transmission.under, faces * BOUNCES)
+    return _lobe(transmission, entered(transmission, wi), transmission.under, faces * fitted.BOUNCES)
 
 
 def share(lobe: RefractedLobe | None) -> Value:
     """Share of internal reflections that the lobe carries; falls with its width."""
     if lobe is None:
         return 0.0
-    return 1 / (1 + lobe.roughness.alpha_u * lobe.roughness.alpha_v / (WIDE * WIDE))
+    return 1 / (1 + lobe.roughness.alpha_u * lobe.roughness.alpha_v / (fitted.WIDE * fitted.WIDE))
 
 
 def bound(transmission: Transmission) -> Value:
     """Greatest momentum of scattered light that leaves."""
     return reduce(
-        ops.minimum, (x + FAR * (1 - flag) for x, flag in zip(transmission.indices, (*transmission.scattered, 1.0)))
+        ops.minimum,
+        (x + INDEX_MAX * (1 - flag) for x, flag in zip(transmission.indices, (*transmission.scattered, 1.0))),
     )
 
 
@@ -108,18 +102,20 @@ def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = E
     scattering = [(slab, cosine) for slab, cosine in zip(transmission.slabs, i.bounded) if not is_none(slab.scattering)]
     alpha = _turned(scattering)
     # Without a jump, which would be seen between directions, and in gradients
-    diffuse = ops.clip((alpha - DIFFUSE[0]) / (DIFFUSE[1] - DIFFUSE[0]), 0.0, 1.0)
+    diffuse = ops.clip(
+        (alpha - fitted.DIFFUSE_ALPHA[0]) / (fitted.DIFFUSE_ALPHA[1] - fitted.DIFFUSE_ALPHA[0]), 0.0, 1.0
+    )
     width = type(transmission.refractions[0].width).uniform(WIDTHS.variance(alpha))
     return Rest(_lobe(transmission, i, transmission.scattered, width), diffuse, reached, numbers)
 
 
 def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
     """Roughness of the mirror that deflects light as much as all scattering in slabs with their cosines."""
-    depths = [ops.mean(slab.scattering) / ops.maximum(cosine, COS_MIN) for slab, cosine in slabs]
+    depths = [ops.mean(slab.scattering) / ops.maximum(cosine, fitted.COS_OF_BOUNCES_MIN) for slab, cosine in slabs]
     total = reduce(operator.add, depths)
     g = ops.divide(reduce(operator.add, (depth * slab.g for depth, (slab, _) in zip(depths, slabs))), total)
     x = ops.maximum(total, THIN)
-    g = ops.exp(x / (1 - ops.exp(-x)) * ops.log(ops.clip(g, NO_LOBE, 1.0)))
+    g = ops.exp(x / (1 - ops.exp(-x)) * ops.log(ops.clip(g, G_MIN, 1.0)))
     cos_theta = ops.minimum(0.5 * g * (3 - g * g), 1.0)
     return ops.sqrt((1 - cos_theta) / (1 + cos_theta))
 
@@ -128,11 +124,13 @@ def _lobe(transmission: Transmission, i: MomentumInSlabs, under: Sequence[Value]
     """The lobe in the slab above the interfaces that are `under` it, of the widths of refractions and those that light
     takes on inside."""
     n = _above(under, transmission.indices)
-    scale = 1 / (2 * n * ops.maximum(_above(under, i.bounded), COS_MIN))
+    scale = 1 / (2 * n * ops.maximum(_above(under, i.bounded), fitted.COS_OF_BOUNCES_MIN))
     for refraction, step in zip(transmission.refractions, i.steps):
-        inside = inside + refraction.width * ops.power(ops.maximum(ops.absolute(step) * scale, ops.TINY), EXPONENT)
+        inside = inside + refraction.width * ops.power(
+            ops.maximum(ops.absolute(step) * scale, ops.TINY), fitted.EXPONENT
+        )
     u, v, rotation = inside.roughness(WIDTHS)
-    roughness = Roughness(ops.minimum(u, ALPHA_MAX), ops.minimum(v, ALPHA_MAX), rotation)
+    roughness = Roughness(ops.minimum(u, INTERNAL_ALPHA_MAX), ops.minimum(v, INTERNAL_ALPHA_MAX), rotation)
     return RefractedLobe(1.0, roughness, n / transmission.indices[-1], leaving=_leaving(transmission, under))
 
 
@@ -172,7 +170,7 @@ def seen_below(transmission: Transmission, wi: Direction) -> Direction:
     x, y = (wi[k] * (n[0] / n[-1]) for k in (0, 1))
     scale = 1 / ops.sqrt(ops.maximum(x * x + y * y, 1.0))
     x, y = scale * x, scale * y
-    return x, y, ops.maximum(ops.sqrt(1 - x * x - y * y), refracted_lobe.COS_MIN)
+    return x, y, ops.maximum(ops.sqrt(1 - x * x - y * y), COS_INSIDE_MIN)
 
 
 def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value]:
@@ -180,7 +178,7 @@ def eval_pdf_rest(found: Rest, i: Direction, o: Direction) -> tuple[Value, Value
     within = found.within(o)
     even = found.diffuse * ops.maximum(o[2], 0.0) / (found.bound * found.bound)
     value = ops.select(within[2] > 0, even * (1 / pi) * diffuse(found.numbers, i, within), 0.0)
-    density = even / ops.maximum(within[2], GRAZING) * found.samples.density(i, within)
+    density = even / ops.maximum(within[2], COS_OUTSIDE_MIN) * found.samples.density(i, within)
     if found.lobe:
         also, density_of_lobe = refracted_lobe.eval_pdf(found.lobe, i, o)
         value, density = (1 - found.diffuse) * also + value, (1 - found.diffuse) * density_of_lobe + density
