@@ -1,6 +1,6 @@
 """The papers' figures by name: modules and rows that compute the numbers, and draw them.
 
-    python -m velatura.figures.belcour2018_12
+    velatura figure belcour2018-12
 
 A figure is a module, or a row of `FIGURES` in the module of its paper. It has `compute`, which takes what makes it
 quick or exact (paths, picture sizes, a seed, `progress`) and returns plain numbers and lists, and `draw`, which makes a

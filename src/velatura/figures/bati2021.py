@@ -103,8 +103,3 @@ FIGURES = {
     # A pair of dielectrics on a diffuse base: black, grey, orange
     "bati2021-24": Looks(on_bases, [Panel(f"({part}) {name} base", (name,)) for part, name in zip("abc", ALBEDOS)]),
 }
-
-
-if __name__ == "__main__":
-    for name, figure in FIGURES.items():
-        figure.draw(figure.compute(), f"{name}.png")

@@ -93,7 +93,3 @@ def _whole(reflectance: float, eta_0: float) -> tuple[Any, Any]:
     ends = (1 - root) / (1 + root), (1 + root) / (1 - root)
     eta = sum(ends) / 2 - (ends[1] - ends[0]) / 2 * np.cos(np.linspace(0, np.pi, 200))
     return eta_0 * eta, eta_0 * np.sqrt(np.maximum((eta - ends[0]) * (ends[1] - eta), 0))
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-04.png")

@@ -48,7 +48,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     axes.plot(numbers["eta"], numbers["fresnel"], "k:", label="Fresnel")
     axes.set(xlabel="relative index", ylabel="directional albedo head-on", ylim=(0, None))
     axes.legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-06.png")

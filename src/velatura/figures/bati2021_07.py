@@ -72,7 +72,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
             figure.axes[0].annotate(letter, point, xytext=(6, -10), textcoords="offset points", fontweight="bold")
     key = "\n".join(f"{letters}: {kind}" for letters, kind in KINDS.items())
     figure.axes[0].text(0.03, 0.97, key, transform=figure.axes[0].transAxes, va="top", fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-07.png")

@@ -64,7 +64,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         (place,) = (point["indices"] for point in numbers["points"] if point["name"] == name)
         places.annotate(letter, place, xytext=(6, -10), textcoords="offset points", fontweight="bold")
     places.set(xlabel="eta 1", ylabel="eta 2", title="places, with letters as in figure 7")
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-08.png")

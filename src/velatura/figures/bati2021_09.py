@@ -129,7 +129,3 @@ def _crosses(eta: Sequence[float], depth: Sequence[float | None], lines: Any, sl
     for eta_2, tau in ((clear, 0.0), (ETA_MAX, depths[-1])):
         lines.plot(ETA_1, eta_2, "rX", markersize=8, markeredgecolor="white", clip_on=False, zorder=5)
         slices.plot(eta_2, tau, "rX", markersize=8, markeredgecolor="white", clip_on=False, zorder=5)
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-09.png")

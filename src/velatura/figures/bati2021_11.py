@@ -42,7 +42,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         axes.axvline(row["ends"][-1][1], color=f"C{n}", linestyle="--", linewidth=0.8, label=None if n else "ends")
     axes.set(xlabel="eta 1", ylabel="eta 2", xlim=(1, 3), ylim=(1, 4.2))
     axes.legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-11.png")

@@ -44,7 +44,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     energies = ", ".join(f"{case['energy']:g}" for case in numbers["channels"])
     axes.set_title(f"R {energies} below index {ETA_0:g}", fontsize="medium")
     axes.legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-12.png")

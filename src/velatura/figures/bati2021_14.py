@@ -60,7 +60,3 @@ PANELS = [
 ]
 FIGURE = Looks(stacks, PANELS, chart=chart, detail=True)
 compute, draw = FIGURE.compute, FIGURE.draw
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-14.png")

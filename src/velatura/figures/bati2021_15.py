@@ -42,7 +42,3 @@ LABELS = ("low absorption", "high absorption")
 PANELS = [Panel(title, (f"{name}, low", f"{name}, high"), LABELS) for name, title in TITLES.items()]
 FIGURE = Looks(stacks, PANELS, chart=chart)
 compute, draw = FIGURE.compute, FIGURE.draw
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-15.png")

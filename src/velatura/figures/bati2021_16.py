@@ -64,7 +64,3 @@ PANELS = [
 ]
 FIGURE = Looks(stacks, PANELS, chart=chart)
 compute, draw = FIGURE.compute, FIGURE.draw
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-16.png")

@@ -65,7 +65,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     angles = np.degrees(np.arccos(numbers["cosines"]))
     looks.curves(energy, angles, [np.array(numbers[order]["energy"]) for order in ORDERS], labels)
     energy.set(title="energy, both lobes", xlabel="angle of incidence (°)", ylim=(0, None))
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-17.png")

@@ -48,7 +48,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     for axes, key in ((reflected, "reflected"), (transmitted, "transmitted")):
         looks.curves(axes, angles, [np.array(numbers[name][key]) for name in names], names)
         axes.set(title=f"energy {key}", xlabel="angle of incidence (°)", ylim=(0, 1))
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-23.png")

@@ -91,7 +91,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         axes.set_xticks(at, labels, fontsize="small")
         axes.set_title(title)
     lower.legend()
-
-
-if __name__ == "__main__":
-    draw(compute(), "bati2021-25.png")

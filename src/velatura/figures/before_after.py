@@ -65,7 +65,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
             axis.imshow(difference, cmap="RdBu_r", vmin=-SCALE, vmax=SCALE)
             axis.set_title(f"{model} - reference\n{canvas.error_label(modelled, model)}", fontsize=8)
             axis.set_axis_off()
-
-
-if __name__ == "__main__":
-    draw(compute(), "before-after.png")

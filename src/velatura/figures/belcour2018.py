@@ -110,8 +110,3 @@ FIGURES = {
     # offline; `benchmarks/engines.py` counts what they cost in real time.
     "belcour2018-18": Cells(worn_paint, VARIANTS, "urn", quality=TEASER),
 }
-
-
-if __name__ == "__main__":
-    for name, figure in FIGURES.items():
-        figure.draw(figure.compute(), f"{name}.png")

@@ -48,7 +48,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         right.plot(numbers["alpha"], numbers[name], color=colour, marker=".", label=label)
     right.set(title="variance on the disc", xlabel="alpha", ylim=(0, None))
     right.legend()
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-03.png")

@@ -98,7 +98,3 @@ def draw_key(figure: Any, axes: Any) -> None:
 
     colours = ScalarMappable(cmap=LinearSegmentedColormap.from_list("first", ("red", "blue")))
     figure.colorbar(colours, ax=axes, label="alpha of the first surface")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-04.png")

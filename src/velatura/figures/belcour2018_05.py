@@ -63,7 +63,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
             axes.plot(numbers["sine"], np.array(curve["snell"], float), color=f"C{n}", linestyle="--")
         axes.set(title=f"alpha {alpha:g}", xlabel="sine of incidence", ylabel="mean of what is refracted", ylim=(0, 1))
         axes.legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-05.png")

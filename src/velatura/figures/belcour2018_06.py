@@ -55,7 +55,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     axes.set(xlabel="sine of the outgoing angle", ylabel="energy per area of the disc, over its highest")
     axes.set_title(f"index {ETA:g}, alpha {ALPHA:g}, incidence {ANGLE:g}°")
     axes.legend()
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-06.png")

@@ -72,7 +72,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     right.set(title="width over that of refraction", xlabel="angle of incidence (°)", ylim=(0, 2))
     left.legend(fontsize="small")
     right.legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-07.png")

@@ -67,7 +67,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     right.set(title="(b) scattering", xlabel="g")
     left.legend(fontsize="small")
     right.legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-08.png")

@@ -69,7 +69,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         plot.plot(angles, numbers["saturation"][column], marker=".", label=title, **styles[column])
     plot.set(title="saturation, 1 - blue / red", xlabel="angle of incidence (°)", ylim=(0, None))
     plot.legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-11.png")

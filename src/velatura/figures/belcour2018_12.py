@@ -52,7 +52,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         row[-1].axhline(1, color="0.7", linewidth=1)
         row[-1].set(title=f"energy kept, {name}", xlabel="angle of incidence (°)", ylim=(0, None))
         row[-1].legend(fontsize="small", loc="lower left")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-12.png")

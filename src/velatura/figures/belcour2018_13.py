@@ -70,7 +70,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
             drawn = canvas.show_difference(column[1], image, truth, 0.1, canvas.error_label(numbers, name))
     axes[1, -1].set_axis_off()
     figure.colorbar(drawn, ax=axes, shrink=0.5, label="minus the reference")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-13.png")

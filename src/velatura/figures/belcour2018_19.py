@@ -70,7 +70,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
             error = canvas.error_label(cell, form)
             drawn = canvas.show_difference(column[2 * n + 2], seen[form], seen["reference"], 0.2, error)
     figure.colorbar(drawn, ax=axes, shrink=0.3, label="minus the reference")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-19.png")

@@ -43,7 +43,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     right.set(title="equivalent roughness", xlabel="alpha of both surfaces", ylim=(0, 1))
     left.legend()
     right.legend()
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-20.png")

@@ -112,7 +112,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         if quantity == "variance":
             plot.set_ylim(0, None)
     axes[0, 0].legend()
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-21.png")

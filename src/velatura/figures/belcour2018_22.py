@@ -71,7 +71,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     for (left, right), cell, seen in zip(pairs, numbers["cells"], numbers["pictures"]):
         canvas.show(left, seen["model"], cell["name"].replace(", ", "\n"))
         canvas.show(right, seen["reference"], f"reference\n{canvas.error_label(cell, FORMS[0])}")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-22.png")

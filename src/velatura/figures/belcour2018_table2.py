@@ -123,7 +123,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         row[-1].set(title=f"{name}: cost over the baseline's", yscale="log", ylim=(0.5, 50))
         row[-1].axhline(1, color="black", linewidth=0.5)
     rows[0, -1].legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "belcour2018-table2.png")

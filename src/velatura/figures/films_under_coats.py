@@ -146,7 +146,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         row[-1].set(xticks=(), yticks=[BANDS * (k + 0.5) for k in range(len(COLUMNS))], yticklabels=COLUMNS)
         row[-1].tick_params(labelsize=6, length=0)
         row[-1].set_title("colour, normal to cos .1", fontsize=8)
-
-
-if __name__ == "__main__":
-    draw(compute(), "films-under-coats.png")

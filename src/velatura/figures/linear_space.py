@@ -149,7 +149,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
 
 def _published() -> Sequence[tuple[str, Any]]:
     return [(name, MAPS[name]) for name in ("belcour", "weier", "weier-2d")]
-
-
-if __name__ == "__main__":
-    draw(compute(), "linear-space.png")

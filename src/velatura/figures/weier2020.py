@@ -74,8 +74,3 @@ FIGURES = {
     # indices are those of figure 10, the sphere is chosen here
     "weier2020-13": Cells({"brushed": stack((0.05, 0.05), (0.1, 0.0))}, COLUMNS, exposure=0.4),
 }
-
-
-if __name__ == "__main__":
-    for name, figure in FIGURES.items():
-        figure.draw(figure.compute(), f"{name}.png")

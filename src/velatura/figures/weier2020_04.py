@@ -40,7 +40,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         disc.show(axes, lobe, f"alpha {u:g}, {v:g}: turned by {cell['turn']:.1f}°")
         at = disc.incidence(cell["theta"], cell["phi"])
         axes.plot([at[0]], [at[1]], "kx")
-
-
-if __name__ == "__main__":
-    draw(compute(), "weier2020-04.png")

@@ -81,7 +81,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         axes.set_title(f"{name}: error {error[0]:.3f}" if error else name, fontsize="medium")
         axes.set(xticks=(-1, 0, 1), yticks=(-1, 0, 1), xlabel="x of incidence", ylabel="y, along the rougher axis")
     figure.colorbar(drawn, ax=row, shrink=0.8, label="albedo")
-
-
-if __name__ == "__main__":
-    draw(compute(), "weier2020-05.png")

@@ -90,7 +90,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         rows[1, 2].plot(alphas, variance, label=f"alpha {alpha:g} along x")
     rows[1, 2].set(title="variance along x", xlabel="alpha along y", ylim=(0, None))
     rows[1, 2].legend(fontsize="small")
-
-
-if __name__ == "__main__":
-    draw(compute(), "weier2020-06.png")

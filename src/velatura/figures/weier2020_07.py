@@ -23,7 +23,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         for n, (top, name) in enumerate((top, name) for top in (1.0, LOW) for name in NAMES):
             draw_curves(row[n], numbers, width, name, top)
     draw_key(figure, rows)
-
-
-if __name__ == "__main__":
-    draw(compute(), "weier2020-07.png")

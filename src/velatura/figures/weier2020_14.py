@@ -63,7 +63,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         axes.imshow(image, origin="lower", extent=extent, cmap="magma", vmin=-5, vmax=-2)
         u, v = found["alpha"]
         axes.set(title=f"{side}: alpha {u:.3f}, {v:.3f}; diagonal {found['diagonal']:.2f}", xlabel="x", ylabel="y")
-
-
-if __name__ == "__main__":
-    draw(compute(), "weier2020-14.png")

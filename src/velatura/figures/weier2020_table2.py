@@ -79,7 +79,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         evaluation.bars(row[-1], {"": shown}, list(shown))
         row[-1].set(title="weier2020 over belcour2018", ylim=(0, None))
         row[-1].axhline(1, color="black", linewidth=0.5)
-
-
-if __name__ == "__main__":
-    draw(compute(), "weier2020-table2.png")

@@ -60,8 +60,3 @@ STACKS = {
 FIGURES = {
     name: Cells(stacks, COLUMNS, "lid" if name == "yamaguchi2019-04" else "sphere") for name, stacks in STACKS.items()
 }
-
-
-if __name__ == "__main__":
-    for name, figure in FIGURES.items():
-        figure.draw(figure.compute(), f"{name}.png")

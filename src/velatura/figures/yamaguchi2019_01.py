@@ -75,7 +75,3 @@ def draw(numbers: dict[str, Any], path: str | Path) -> None:
         InvalidInput: the file cannot be written.
     """
     cells.draw(numbers, path)
-
-
-if __name__ == "__main__":
-    draw(compute(), "yamaguchi2019-01.png")

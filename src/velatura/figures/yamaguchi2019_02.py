@@ -38,7 +38,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
     for axes, (name, lobe) in zip(figure.subplots(1, 2), numbers["pictures"].items()):
         spot = numbers[name]
         disc.show(axes, lobe, f"{name}: aspect {spot['aspect']:.2f}, turned by {spot['turn']:.1f}°")
-
-
-if __name__ == "__main__":
-    draw(compute(), "yamaguchi2019-02.png")

@@ -56,7 +56,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         found = numbers[name]
         for axes, angle, lobe, aspect in zip(row, numbers["angle"], numbers["pictures"][name], found["aspect"]):
             disc.show(axes, np.array(lobe), f"{name}, {angle:g}°: {aspect:.2f}")
-
-
-if __name__ == "__main__":
-    draw(compute(), "yamaguchi2019-03.png")

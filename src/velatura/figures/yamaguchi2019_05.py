@@ -122,7 +122,3 @@ def draw(figure: Any, numbers: dict[str, Any]) -> None:
         axes.legend()
     left.legend()
     middle.legend()
-
-
-if __name__ == "__main__":
-    draw(compute(), "yamaguchi2019-05.png")
