@@ -83,6 +83,15 @@ class Damaged(VelaturaWarning):
 
 
 @contextlib.contextmanager
+def within(place: str, refusal: type[ValueError] = InvalidInput) -> Iterator[None]:
+    """Raises InvalidInput for a refusal in the block, which names the place of what is read: `layer 1: depth: ...`."""
+    try:
+        yield
+    except refusal as error:
+        raise InvalidInput(f"{place}: {error}") from None
+
+
+@contextlib.contextmanager
 def needs(extra: str) -> Iterator[None]:
     """Raises MissingTool where an import in the block fails since this extra of the package is not installed."""
     try:

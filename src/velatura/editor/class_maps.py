@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from velatura.editor.appearance import answered, dragged, lobe_of
 from velatura.editor.messages import Answer, Body, Verb, array
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.inverse import EquivalenceClass, Target
 from velatura.inverse.lobes import interface, stacks
 from velatura.inverse.lobes.interface import conductor_extinction, conductor_index
@@ -142,10 +142,8 @@ def _wanted_depths(near: DraggedStack, lobe: int, body: Body) -> dict[int, Array
         if name not in free:
             allowed = f"one of {', '.join(free)}" if free else "none: they follow from the index"
             raise InvalidInput(f"depths: {name}: must be {allowed}")
-        try:
+        with within(f"depths: {name}", ValueError):
             found[int(name[-1])] = np.broadcast_to(np.array(DEPTH.check(value), float), 3)
-        except ValueError as error:
-            raise InvalidInput(f"depths: {name}: {error}") from None
     return found
 
 

@@ -22,7 +22,7 @@ from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, Model, named
 from velatura.stack import Stack, dumps
 from velatura.stack.schema import Parameter, show
-from velatura.stack.values import THICKEST_NM, Films, Flag, Scalar
+from velatura.stack.values import THICKEST_NM, Films, Flag, Scalar, Whole
 
 Body: TypeAlias = Mapping[str, Any]
 Answer: TypeAlias = dict[str, Any]
@@ -77,23 +77,6 @@ class Words(Parameter):
             raise self.refuse(value)
         if len(value) > self.most:
             raise ValueError(f"may have {self.most} characters at most, got {len(value)}")
-        return value
-
-
-@dataclass(frozen=True)
-class Whole(Parameter):
-    """A whole number in a range."""
-
-    low: int = 0
-    high: int = 1
-
-    @property
-    def values(self) -> str:
-        return f"a whole number from {self.low} to {self.high}"
-
-    def check(self, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not self.low <= value <= self.high:
-            raise self.refuse(value)
         return value
 
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.stack.layers import EXTERIOR, KINDS, LAYERS, PERFECT, film_key, has
 from velatura.stack.schema import parameters, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named
@@ -133,10 +133,8 @@ def changed(mapping: Mapping[str, Any], kinds: Sequence[str], values: Mapping[st
                 raise InvalidInput(f"{where} has no {key}, only {', '.join(keys)}")
         # Write it in
         ((entry, old),) = entries[index].items()
-        try:
+        with within(f"layer {index} ({entry})"):
             entries[index] = {entry: _merged(old, fields)}
-        except InvalidInput as error:
-            raise InvalidInput(f"layer {index} ({entry}): {error}") from None
     return {**mapping, **options, "layers": entries}
 
 

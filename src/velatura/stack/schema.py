@@ -89,9 +89,13 @@ class Parameter:
 
 
 class Record(BaseModel):
-    """A frozen model whose fields are declared parameters; its errors are InvalidInput, in one line."""
+    """A frozen model whose fields are declared parameters; its errors are InvalidInput, in one line.
+
+    `holds` is what a mapping of it holds, in words.
+    """
 
     model_config = ConfigDict(frozen=True)
+    holds: ClassVar[str] = "keys and values"
 
     def __init__(self, /, **fields: Any) -> None:
         for key in fields:
@@ -111,12 +115,14 @@ class Record(BaseModel):
         raise InvalidInput(f"{key}: a {type(self).__name__} is never changed; make another one without that value")
 
     @classmethod
-    def from_dict(cls: type[RecordType], fields: Mapping[Any, Any]) -> RecordType:
+    def from_dict(cls: type[RecordType], fields: Any) -> RecordType:
         """The model described by a mapping as it stands in a file.
 
         Raises:
-            InvalidInput: an unknown key, a key without a value, or a value outside its range.
+            InvalidInput: no mapping, an unknown key, a key without a value, or a value outside its range.
         """
+        if not isinstance(fields, Mapping):
+            raise InvalidInput(f"must hold {cls.holds}, got {show(fields)}")
         for key, value in fields.items():
             if value is None and key in cls.model_fields:
                 raise InvalidInput(f"{key}: has no value")

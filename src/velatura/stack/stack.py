@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import model_validator
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.stack import coatings, flat_names
 from velatura.stack.flat_names import Address
 from velatura.stack.layers import EXTERIOR, LAYERS, Diffuse, Interface, Kind, Layer, Value, entry_name, transmits
@@ -25,6 +25,8 @@ class Stack(Record):
     Raises:
         InvalidInput: in one line that names layer, key and allowed range.
     """
+
+    holds = "the keys of a material, layers above all"
 
     name: Annotated[str, Text("name of the material")] = ""
     source: Annotated[str, Text("where the numbers come from", lines=True)] = ""
@@ -103,17 +105,6 @@ class Stack(Record):
 
     # As a file holds it ----------------------------------------------------------------------------------------------
 
-    @classmethod
-    def from_dict(cls, fields: Any) -> Stack:
-        """The stack described by a mapping as it stands in a file.
-
-        Raises:
-            InvalidInput: in one line that names layer, key and allowed range.
-        """
-        if not isinstance(fields, Mapping):
-            raise InvalidInput(f"must hold the keys of a material, layers above all, got {show(fields)}")
-        return super().from_dict(fields)
-
     def to_dict(self) -> dict[str, Any]:
         """The mapping that `from_dict` reads back: plain values, defaults left out."""
         return {**super().to_dict(), "layers": [{entry_name(layer): layer.to_dict()} for layer in self.layers]}
@@ -180,11 +171,5 @@ def _layer(index: int, entry: Any) -> Layer:
     ((kind, fields),) = entry.items()
     if kind not in LAYERS:
         raise InvalidInput(f"layer {index}: {unknown('layer', kind, LAYERS)}")
-    fields = {} if fields is None else fields
-    where = f"layer {index} ({kind})"
-    if not isinstance(fields, Mapping):
-        raise InvalidInput(f"{where}: must hold keys and values, got {show(fields)}")
-    try:
-        return LAYERS[kind].from_dict(fields)
-    except InvalidInput as error:
-        raise InvalidInput(f"{where}: {error}") from None
+    with within(f"layer {index} ({kind})"):
+        return LAYERS[kind].from_dict({} if fields is None else fields)

@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import PrivateAttr, model_validator
 
+from velatura.errors import within
 from velatura.stack.schema import Parameter, Record, parameters, show, unknown
 from velatura.stack.spectra import MIRROR, Measured, Named, Table, names, read, rgb
 
@@ -66,6 +67,24 @@ class Flag(Parameter):
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "boolean"}
+
+
+@dataclass(frozen=True)
+class Whole(Parameter):
+    """A whole number in a range."""
+
+    low: int = 0
+    high: int = 1
+
+    @property
+    def values(self) -> str:
+        return f"a whole number from {self.low} to {self.high}"
+
+    def check(self, value: Any) -> int:
+        whole = isinstance(value, int) or hasattr(value, "__index__")  # NumPy's, which need not be loaded
+        if isinstance(value, bool) or not whole or not self.low <= value <= self.high:
+            raise self.refuse(value)
+        return int(value)
 
 
 @dataclass(frozen=True)
@@ -280,11 +299,9 @@ class Colour(Scalar):
         return self._table(value) if self.texturable and isinstance(value, Spectrum) else super().check(value)
 
     def _table(self, spectrum: Spectrum) -> Spectrum:
-        try:
+        with within(str(spectrum.spectrum), ValueError):
             for value in spectrum.table()[1]:
                 self._number(value, value)
-        except ValueError as error:
-            raise ValueError(f"{spectrum.spectrum}: {error}") from None
         return spectrum
 
     def _check_value(self, value: Any) -> Any:
@@ -448,6 +465,8 @@ class Brushing(Varying):
 class Film(Record):
     """A thin film: it changes what its interface reflects, by interference, and nothing else."""
 
+    holds = "eta and thickness_nm"
+
     eta: Annotated[
         float | RGB | str | Spectrum | Texture,
         Index(
@@ -496,12 +515,8 @@ class Films(Parameter):
     def _film(self, k: int, entry: Any) -> Film:
         if isinstance(entry, Film):
             return entry
-        if not isinstance(entry, Mapping):
-            raise ValueError(f"film {k}: must hold eta and thickness_nm, got {show(entry)}")
-        try:
+        with within(f"film {k}", ValueError):
             return Film.from_dict(entry)
-        except ValueError as error:
-            raise ValueError(f"film {k}: {error}") from None
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "array", "items": {"$ref": "#/$defs/film"}, "maxItems": self.most}

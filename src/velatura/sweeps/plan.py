@@ -13,11 +13,11 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, model_validator
 
-from velatura.errors import InvalidInput
+from velatura.errors import within
 from velatura.stack import io
 from velatura.stack.schema import Parameter, show, unknown
 from velatura.sweeps.questions import QUESTIONS, Question
-from velatura.sweeps.space import Space, Whole
+from velatura.sweeps.space import Number, Space
 from velatura.version import __version__
 
 #: Packages whose versions may change the numbers.
@@ -36,9 +36,6 @@ class QuestionName(Parameter):
             raise self.refuse(value)
         return value
 
-    def json_schema(self) -> dict[str, Any]:
-        return {"enum": list(QUESTIONS)}
-
 
 class Options(Parameter):
     """Keyword arguments of the question."""
@@ -49,9 +46,6 @@ class Options(Parameter):
         if not isinstance(value, Mapping):
             raise self.refuse(value)
         return {str(key): _plain(str(key), entry) for key, entry in value.items()}
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "object"}
 
 
 class Plan(Space):
@@ -65,9 +59,11 @@ class Plan(Space):
             root of the number of points.
     """
 
+    holds = "the keys of a plan, material above all"
+
     what: Annotated[str | Callable[..., Any], QuestionName("what is asked of each point")] = "lobes"
     options: Annotated[dict[str, Any], Options("keyword arguments of the question")] = Field(default_factory=dict)
-    chunk: Annotated[int | None, Whole("points that are computed and written at once", low=1)] = None
+    chunk: Annotated[int | None, Number("points that are computed and written at once", low=1)] = None
 
     @model_validator(mode="after")
     def _options_fit(self) -> Plan:
@@ -95,16 +91,14 @@ def load_plan(path: str | Path) -> Plan:
         InvalidInput: no such file, or its content is not a plan; one line that names the file.
     """
     fields = io.read(path, "a plan")
-    try:
-        if not isinstance(fields, Mapping):
-            raise InvalidInput(f"must hold the keys of a plan, material above all, got {show(fields)}")
+    with within(str(path)):
         return Plan.from_dict(_beside(Path(path).parent, fields))
-    except InvalidInput as error:
-        raise InvalidInput(f"{path}: {error}") from None
 
 
-def _beside(folder: Path, fields: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of a plan, with files of materials relative to its folder."""
+def _beside(folder: Path, fields: Any) -> Any:
+    """The keys of a plan, with files of materials relative to its folder; what holds no keys as it is."""
+    if not isinstance(fields, Mapping):
+        return fields
 
     def found(material: Any) -> Any:
         return str(folder / material) if isinstance(material, str) and Path(material).suffix else material

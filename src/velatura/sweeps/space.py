@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.stack import Stack, addressed, load
-from velatura.stack.schema import Parameter, Record, show
-from velatura.stack.values import LARGEST, Choice, Flag, Scalar
+from velatura.stack.schema import Parameter, Record
+from velatura.stack.values import LARGEST, Choice, Flag, Scalar, Whole
 
 Array = NDArray[Any]
 
@@ -29,23 +29,14 @@ MOST = 2**30  # points of a Sobol sequence
 
 
 @dataclass(frozen=True)
-class Whole(Parameter):
-    """A whole number in a range."""
+class Number(Whole):
+    """A whole number in a range, of points unless said otherwise."""
 
-    low: int = 0
     high: int = MOST
 
     @property
     def values(self) -> str:
         return f"a whole number in {self.low} to {self.high}"
-
-    def check(self, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or not self.low <= value <= self.high:
-            raise self.refuse(value)
-        return int(value)
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "integer", "minimum": self.low, "maximum": self.high}
 
 
 class Listed(Parameter):
@@ -58,9 +49,6 @@ class Listed(Parameter):
         if not isinstance(value, list | tuple) or not value:
             raise self.refuse(value)
         return tuple(tuple(entry) if isinstance(entry, list) else entry for entry in value)
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "array", "minItems": 1}
 
 
 class RangeEnds(Parameter):
@@ -75,9 +63,6 @@ class RangeEnds(Parameter):
             raise self.refuse(value)
         return float(value[0]), float(value[1])
 
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
-
 
 class MaterialSource(Parameter):
     """A material: a file, the name of a preset, or what a file would hold."""
@@ -89,9 +74,6 @@ class MaterialSource(Parameter):
             return Stack.from_dict(value) if isinstance(value, Mapping) else load(value)
         except InvalidInput as error:
             raise ValueError(str(error)) from None
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"anyOf": [{"type": "string"}, {"type": "object"}]}
 
 
 def _is_number(value: object) -> bool:
@@ -112,9 +94,11 @@ class Axis(Record):
         per_channel: a number of its own for red, green and blue, on no grid.
     """
 
+    holds = "values, range or distribution"
+
     values: Annotated[tuple[Any, ...] | None, Listed("the values")] = None
     range: Annotated[tuple[float, float] | None, RangeEnds("both ends")] = None
-    steps: Annotated[int | None, Whole("values in the range, on a grid", low=2, high=10**6)] = None
+    steps: Annotated[int | None, Number("values in the range, on a grid", low=2, high=10**6)] = None
     distribution: Annotated[str, Choice("how likely values are", options=("uniform", "log-uniform", "normal"))] = (
         "uniform"
     )
@@ -218,20 +202,13 @@ class Axes(Parameter):
         return {str(name): self._axis(str(name), entry) for name, entry in value.items()}
 
     def _axis(self, name: str, entry: Any) -> Axis:
-        if not isinstance(entry, Mapping | Axis):
-            raise ValueError(f"{name}: must hold values, range or distribution, got {show(entry)}")
-        try:
+        with within(name, ValueError):
             axis = entry if isinstance(entry, Axis) else Axis.from_dict(entry)
             if name != "material":
                 return axis
             if axis.values is None:
                 raise InvalidInput("needs values")
             return Axis(values=tuple(MaterialSource("a material").check(each) for each in axis.values))
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "object"}
 
 
 class Space(Record):
@@ -253,8 +230,8 @@ class Space(Record):
     material: Annotated[Stack, MaterialSource("a material: a file, a preset, or its layers")]
     vary: Annotated[dict[str, Axis], Axes("flat names, and how each varies")]
     sampling: Annotated[str, Choice("how points are chosen", options=("grid", "random", "sobol"))] = "grid"
-    count: Annotated[int | None, Whole("points, of random and sobol", low=1)] = None
-    seed: Annotated[int, Whole("of points, and of the random numbers at each", high=2**63 - 1)] = 0
+    count: Annotated[int | None, Number("points, of random and sobol", low=1)] = None
+    seed: Annotated[int, Number("of points, and of the random numbers at each", high=2**63 - 1)] = 0
 
     def __init__(self, /, **fields: Any) -> None:
         super().__init__(**fields)  # materials and axes in any form

@@ -10,12 +10,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import model_validator
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.model.roughness_maps import MAPS, RoughnessMap
 from velatura.model.variance import Covariance, Isotropic, PerAxis, Roughness, Variance
 from velatura.stack import RGB, Stack, io
 from velatura.stack.schema import Parameter, Record, show
-from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text
+from velatura.stack.values import INDEX_HIGH, INDEX_LOW, Choice, Colour, Film, Films, Pair, Scalar, Text, Whole
 
 BLUR = MAPS["belcour"]  # in whose space a target's variance is given
 KEPT = 1e-6  # by which what is fixed may be missed
@@ -24,23 +24,12 @@ LEAST = 1e-4  # energy or variance below which targets do not differ
 
 
 @dataclass(frozen=True)
-class Count(Parameter):
-    """A whole number in a range."""
-
-    low: int = 1
-    high: int = 1
+class Count(Whole):
+    """One of few whole numbers."""
 
     @property
     def values(self) -> str:
         return " or ".join(map(str, range(self.low, self.high + 1)))
-
-    def check(self, value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not self.low <= value <= self.high:
-            raise self.refuse(value)
-        return value
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "integer", "minimum": self.low, "maximum": self.high}
 
 
 @dataclass(frozen=True)
@@ -57,9 +46,6 @@ class Entries(Parameter):
         if not isinstance(value, list | tuple):
             raise self.refuse(value)
         return tuple(None if entry is None else self.entry.check(entry) for entry in value)
-
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "array", "items": {"anyOf": [self.entry.json_schema(), {"type": "null"}]}}
 
 
 @dataclass(frozen=True)
@@ -80,9 +66,6 @@ class Start(Parameter):
         except InvalidInput as error:
             raise ValueError(str(error)) from None
 
-    def json_schema(self) -> dict[str, Any]:
-        return {"type": "object"}
-
 
 def _number(doc: str, low: float = 0.0, **options: Any) -> Scalar:
     return Scalar(doc, low=low, texturable=False, differentiable=False, **options)
@@ -98,6 +81,8 @@ def _colour(doc: str, low: float = 0.0, **options: Any) -> Colour:
 
 class Fixed(Record):
     """Parameters that are held fixed: an entry for each interface of the lobe, from the top, null where free."""
+
+    holds = "keys and lists"
 
     eta: Annotated[tuple[Any, ...], Entries("absolute indices", entry=_colour("", INDEX_LOW, high=INDEX_HIGH))] = ()
     k: Annotated[tuple[Any, ...], Entries("absolute extinctions", entry=_colour("", high=INDEX_HIGH))] = ()
@@ -152,12 +137,8 @@ class TargetLobe(Record):
     def __init__(self, /, **fields: Any) -> None:
         kept = fields.get("fixed")
         if kept is not None and not isinstance(kept, Fixed):
-            if not isinstance(kept, Mapping):
-                raise InvalidInput(f"fixed: must hold keys and lists, got {show(kept)}")
-            try:
+            with within("fixed"):
                 fields["fixed"] = Fixed.from_dict(kept)
-            except InvalidInput as error:
-                raise InvalidInput(f"fixed: {error}") from None
         super().__init__(**fields)
 
     @model_validator(mode="after")
@@ -238,6 +219,8 @@ class Target(Record):
         InvalidInput: in one line that names lobe, key and allowed range.
     """
 
+    holds = "the keys of a target, lobes above all"
+
     name: Annotated[str, Text("name of the material")] = ""
     exterior: Annotated[float, _number("absolute index of refraction above", INDEX_LOW, high=INDEX_HIGH)] = 1.0
     eta_max: Annotated[float, _number("largest index of a dielectric", low=1.0, high=INDEX_HIGH, strict=True)] = 4.0
@@ -291,17 +274,6 @@ class Target(Record):
         """Whether an interface has thin films."""
         return any(lobe.fixed.films_of(n) for lobe in self.lobes for n in range(lobe.interfaces))
 
-    @classmethod
-    def from_dict(cls, fields: Any) -> Target:
-        """The target described by a mapping as it stands in a file.
-
-        Raises:
-            InvalidInput: in one line that names lobe, key and allowed range.
-        """
-        if not isinstance(fields, Mapping):
-            raise InvalidInput(f"must hold the keys of a target, lobes above all, got {show(fields)}")
-        return super().from_dict(fields)
-
     def with_lobe(self, index: int, **changes: Any) -> Target:
         """This target with some values of one lobe changed."""
         lobes = list(self.lobes)
@@ -354,10 +326,8 @@ def load_target(path: str | Path) -> Target:
         InvalidInput: no such file, or its content is not a target; one line that names the file.
     """
     fields = io.read(path, "a target file")
-    try:
+    with within(str(path)):
         return _asked(fields)
-    except InvalidInput as error:
-        raise InvalidInput(f"{path}: {error}") from None
 
 
 def read(target: Target | Mapping[str, Any] | Sequence[Mapping[str, Any]] | str | Path) -> Target:
@@ -383,12 +353,8 @@ def _asked(fields: Any) -> Target:
 def _lobe(number: int, entry: Any) -> TargetLobe:
     if isinstance(entry, TargetLobe):
         return entry
-    if not isinstance(entry, Mapping):
-        raise InvalidInput(f"lobe {number}: must hold keys and values, got {show(entry)}")
-    try:
+    with within(f"lobe {number}"):
         return TargetLobe.from_dict(entry)
-    except InvalidInput as error:
-        raise InvalidInput(f"lobe {number}: {error}") from None
 
 
 def distance(one: Target, other: Target) -> float:

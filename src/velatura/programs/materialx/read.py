@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from velatura import files
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.programs import xml
 from velatura.programs.gltf import read as gltf
 from velatura.programs.imported import Imported, Notes
@@ -161,10 +161,8 @@ def _material(element: Element, path: Path, notes: Notes) -> Imported:
         values.pop("specular" if values.get("spec_trans") else "eta")
     if surface.tag == "disney_principled":
         values["clearcoat_gloss"] = changed(values["clearcoat_gloss"], _gloss)
-    try:
+    with within(f"{path}: material {name}"):
         return source.read(values, name, notes)
-    except InvalidInput as error:
-        raise InvalidInput(f"{path}: material {name}: {error}") from None
 
 
 def _gloss(gloss: Any) -> Any:
@@ -348,14 +346,12 @@ def _image(node: Element, inputs: Mapping[str, Element], parameter: str, notes: 
         notes.add(f"{parameter}: colorspace", space, "the image is read as linear sRGB")
     for key, value in _placed(inputs):
         notes.add(f"{parameter}: {key}", value, "the image lies on the texture coordinates as they are")
-    try:
+    with within(f"{document}: node {node.name}"):
         texture = Texture(
             texture=Path(document or "").parent / name,
             channel="rgb" if is_colour else "r",
             encoding="srgb" if space == "srgb_texture" else "linear",
         )
-    except InvalidInput as error:
-        raise InvalidInput(f"{document}: node {node.name}: {error}") from None
     return _together(node, texture, _literal(inputs["factor"])) if "factor" in inputs else texture
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from velatura.errors import InvalidInput
+from velatura.errors import InvalidInput, within
 from velatura.programs import xml
 from velatura.programs.imported import Imported, Notes
 from velatura.programs.principled import read as principled
@@ -35,10 +35,8 @@ def materials(path: Path) -> tuple[dict[str, Callable[[Notes], Imported]], None]
 
     def reader(element: Element, name: str) -> Callable[[Notes], Imported]:
         def read(notes: Notes) -> Imported:
-            try:
+            with within(f"{path}: {name}"):
                 return principled.read(_values(element, path.parent, default, notes), name, notes)
-            except InvalidInput as error:
-                raise InvalidInput(f"{path}: {name}: {error}") from None
 
         return read
 
