@@ -22,7 +22,7 @@ from rows import parser
 import velatura as vt
 from velatura import imports, kernel
 from velatura.optics import ggx
-from velatura.programs.closures import Directions
+from velatura.programs.closures import ViewAndLight
 from velatura.programs.gltf import read as gltf
 from velatura.programs.openpbr import read as openpbr
 from velatura.programs.principled import read as principled
@@ -114,7 +114,7 @@ def rows(path: Path, counts: dict[str, int], checked: bool) -> list[tuple[str, s
 
 def by_formulas(module: str) -> Callable[[Sequence[Values], Any, Any], Sequence[Any]]:
     value = import_module(f"velatura.programs.{module}.formulas").value
-    return lambda materials, wi, wo: [value(each, Directions(wi, wo)) for each in materials]
+    return lambda materials, wi, wo: [value(each, ViewAndLight(wi, wo)) for each in materials]
 
 
 def by_generated_code(materials: Sequence[Values], wi: Any, wo: Any) -> Sequence[Any]:

@@ -21,7 +21,7 @@ import chromium
 from generated_surfaces import GLTF, OPENPBR, Surface, values
 
 from velatura.optics.directions import directions
-from velatura.programs.closures import Directions
+from velatura.programs.closures import ViewAndLight
 from velatura.renderer.low_discrepancy import square
 
 COSINES = (1.0, 0.7, 0.35)
@@ -38,7 +38,7 @@ def rays() -> tuple[np.ndarray, np.ndarray]:
 
 def differences(browser: chromium.Browser, surface: Surface) -> list[str]:
     wi, wo = rays()
-    ours = [surface.target.value(given, Directions(wi, wo)) for given in surface.materials.values()]
+    ours = [surface.target.value(given, ViewAndLight(wi, wo)) for given in surface.materials.values()]
     columns = []
     for undone in ((), surface.choices):
         cells = []

@@ -299,7 +299,7 @@ def names(**values: Value) -> None:
             dialect.name(value, name)
 
 
-class Named:
+class NamedFields:
     """A record whose values are printed under the names of its fields."""
 
     def __post_init__(self) -> None:

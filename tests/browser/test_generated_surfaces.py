@@ -8,7 +8,7 @@ import pytest
 from generated_surfaces import GLTF, OPENPBR, Surface, values
 
 from velatura.optics.directions import directions
-from velatura.programs.closures import Directions
+from velatura.programs.closures import ViewAndLight
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
 
@@ -24,7 +24,7 @@ def test_formulas_are_those_of_generated_code_without_its_departures(surface: Su
     with chromium.browser() as browser:
         found = values(browser, surface, wi, wo, surface.choices)
     for (name, given), generated in zip(surface.materials.items(), found):
-        expected = surface.target.value(given, Directions(wi, wo))
+        expected = surface.target.value(given, ViewAndLight(wi, wo))
         if surface is OPENPBR:
             np.testing.assert_allclose(
                 generated, expected, rtol=0.1 if name in FITTED else 0.02, atol=1e-4, err_msg=name

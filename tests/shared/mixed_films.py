@@ -14,7 +14,7 @@ import tmm
 from velatura import stack
 from velatura.films import of_material, polarised
 from velatura.optics import coatings, films
-from velatura.optics.films import Film, Response
+from velatura.optics.films import OpticalFilm, Response
 from velatura.stack import Interface, Layer, Medium, Stack
 
 THICK = 1e9  # nm, of a medium, whose extinction then changes no reflectance
@@ -48,7 +48,7 @@ class Mixed:
 
     indices: tuple[complex, ...]
     depths: tuple[float, ...]
-    films: tuple[tuple[Film, ...], ...]
+    films: tuple[tuple[OpticalFilm, ...], ...]
     wavelength_nm: float
 
     @property
@@ -106,7 +106,7 @@ class Mixed:
             r, t = down[0] + down[1] ** 2 * r / (1 - up * r), down[1] * t / (1 - up * r)
         return r, t
 
-    def _response(self, cosine: float, above: complex, on_it: tuple[Film, ...], below: complex) -> Response:
+    def _response(self, cosine: float, above: complex, on_it: tuple[OpticalFilm, ...], below: complex) -> Response:
         media = float(np.real(above)), on_it, float(np.real(below)), float(np.imag(below))
         return films.coherent(cosine, self.wavelength_nm, *media)
 
@@ -125,7 +125,7 @@ def random_mixed(rng: np.random.Generator, thickest_nm: float = 5000.0) -> tuple
     depths = [0.0, *(0.0 if clear or rng.random() < 0.4 else rng.uniform(0, 1) for _ in range(count - 1)), 0.0]
     on_it = tuple(
         tuple(
-            Film(
+            OpticalFilm(
                 float(rng.uniform(1.05, 3)),
                 float(rng.uniform(0, 1)) if not clear and rng.random() < 0.3 else 0.0,
                 float(rng.uniform(0, thickest_nm) * rng.random() ** 2),

@@ -12,7 +12,7 @@ import pytest
 import velatura as vt
 from velatura import kernel
 from velatura.model.solved import solve
-from velatura.optics.films import Film, coherent
+from velatura.optics.films import OpticalFilm, coherent
 from velatura.stack import luminance_sensitivity, srgb_weights
 
 COATED = vt.Stack(
@@ -258,7 +258,7 @@ def test_monochromatic_variants_have_the_luminance_of_films(model: str) -> None:
     stack = vt.Stack([vt.Interface(eta=2.0, k=1.0, alpha=0.02, films=[vt.Film(eta=1.5, thickness_nm=400)])])
     nm = np.arange(360.0, 831.0)
     weights = luminance_sensitivity(nm)[0]
-    exact = coherent(np.array(0.8), nm, 1.0, [Film(1.5, 0.0, 400.0)], 2.0, 1.0).reflected
+    exact = coherent(np.array(0.8), nm, 1.0, [OpticalFilm(1.5, 0.0, 400.0)], 2.0, 1.0).reflected
     rng = mono.PCG32(40_000)
     u = rng.next_float32(), mono.Point2f(rng.next_float32(), rng.next_float32())
     _, weight = vt.bsdf(stack, model=model).sample(mono.BSDFContext(), lit(mono, 0.8, np.full(40_000, 0.5)), *u)
@@ -301,7 +301,7 @@ def test_films_reflect_each_wavelength_by_itself(spectral: Any, thickness_nm: fl
     """Queried energies and weights of samples of a metal that is almost smooth, which moves waves by little."""
     film = vt.Film(eta=1.5, thickness_nm=thickness_nm)
     stack = vt.Stack([vt.Interface(eta=2.0, k=1.0, alpha=0.004, films=[film])])
-    exact = coherent(np.array(cosine), np.array(RAY), 1.0, [Film(1.5, 0.0, thickness_nm)], 2.0, 1.0).reflected
+    exact = coherent(np.array(cosine), np.array(RAY), 1.0, [OpticalFilm(1.5, 0.0, thickness_nm)], 2.0, 1.0).reflected
     bsdf = vt.bsdf(stack)
     energies = np.ravel(bsdf.eval_diffuse_reflectance(at_wavelengths(spectral, cosine)))
     assert energies == pytest.approx(exact, abs=5e-3)

@@ -13,7 +13,7 @@ from velatura import kernel
 from velatura.model.registry import MODELS
 from velatura.optics import fresnel
 from velatura.optics.coatings import Coating, ColouredFilm
-from velatura.optics.films import Film, coherent
+from velatura.optics.films import OpticalFilm, coherent
 from velatura.stack import dumps, loads, srgb_sensitivity
 
 COSINES = [1.0, 0.6, 0.3]
@@ -262,7 +262,7 @@ def test_a_mirror_reflects_all_but_what_its_films_absorb() -> None:
     assert vt.lobes(clear, COSINES).energy[0] == pytest.approx(np.ones((3, 3)), abs=2e-3)
     nm = np.arange(360.0, 831.0)
     weights = srgb_sensitivity(nm)
-    exact = coherent(np.array(1.0), nm, 1.0, [Film(1.5, 0.1, 300.0)], 1e-3, 1e6).reflected
+    exact = coherent(np.array(1.0), nm, 1.0, [OpticalFilm(1.5, 0.1, 300.0)], 1e-3, 1e6).reflected
     assert vt.lobes(tinted.replace(layer0_alpha=0.0), 1.0).energy[0][:, 0] == pytest.approx(
         weights @ exact / weights.sum(axis=1), abs=2e-3
     )

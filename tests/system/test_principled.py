@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from velatura import kernel
-from velatura.programs.closures import Directions
+from velatura.programs.closures import ViewAndLight
 from velatura.programs.principled import formulas as principled
 
 
@@ -34,4 +34,4 @@ def test_the_formulas_are_those_of_the_plugin(seed) -> None:
     bsdf, surface = kernel.load_dict({"type": "principled", **given}), dr.zeros(mi.SurfaceInteraction3f, count)
     surface.wi = mi.Vector3f(wi)
     plugin = np.array(bsdf.eval(mi.BSDFContext(mi.TransportMode.Importance), surface, mi.Vector3f(wo)))
-    assert principled.value(values, Directions(wi, wo)) == pytest.approx(plugin, rel=3e-4, abs=1e-4)
+    assert principled.value(values, ViewAndLight(wi, wo)) == pytest.approx(plugin, rel=3e-4, abs=1e-4)

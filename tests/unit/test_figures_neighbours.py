@@ -9,7 +9,7 @@ import velatura as vt
 from velatura.figures import films_under_coats, neighbours
 from velatura.figures.neighbours import FilmedMetal
 from velatura.optics import fresnel
-from velatura.optics.films import Film, coherent
+from velatura.optics.films import OpticalFilm, coherent
 from velatura.stack.spectra import srgb_weights
 
 COSINES = np.array([1.0, 0.8, 0.5, 0.2])
@@ -19,7 +19,7 @@ TITANIUM = films_under_coats.TITANIUM
 def summed(metal: FilmedMetal, n_1: float) -> np.ndarray:
     """The exact reflectance (N, 3), as colours in light of equal energy."""
     wavelengths_nm, weights = srgb_weights(d65=False)
-    film = [Film(metal.film_eta, 0.0, metal.thickness_nm)]
+    film = [OpticalFilm(metal.film_eta, 0.0, metal.thickness_nm)]
     each = [coherent(COSINES[:, None], wavelengths_nm, n_1, film, n, k).reflected for n, k in zip(metal.eta, metal.k)]
     return np.stack([found @ row for found, row in zip(each, weights)], axis=-1)
 

@@ -13,7 +13,7 @@ from velatura import kernel
 from velatura.films.of_material import films_of
 from velatura.optics import films, fresnel
 from velatura.optics.coatings import Coating, ColouredFilm, quadrature
-from velatura.optics.films import Film
+from velatura.optics.films import OpticalFilm
 from velatura.shader import shader
 from velatura.stack import Material
 from velatura.stack.spectra import srgb_sensitivity, srgb_weights
@@ -30,7 +30,7 @@ def random_stack(rng: np.random.Generator, clear: bool = False) -> dict[str, Any
         "wavelength_nm": float(rng.uniform(360, 830)),
         "eta_1": float(rng.uniform(1, 2.5)),
         "films": [
-            Film(
+            OpticalFilm(
                 float(rng.uniform(1, 3)),
                 0.0 if clear or rng.random() < 0.7 else float(rng.uniform(0, 3)),
                 0.0 if rng.random() < 0.1 else float(rng.uniform(0, 5000) * rng.random() ** 3),
@@ -84,15 +84,15 @@ def test_as_much_passes_from_either_side() -> None:
 
 @pytest.mark.parametrize("eta", [0.6, 1.5, 2.4])
 def test_a_thickness_of_0_is_no_film(eta: float) -> None:
-    none = films.coherent(COSINES, 550.0, 1.0, [Film(1.8, 0.3, 0.0)], eta)
+    none = films.coherent(COSINES, 550.0, 1.0, [OpticalFilm(1.8, 0.3, 0.0)], eta)
     assert none.reflected == pytest.approx(fresnel.dielectric(COSINES, eta), abs=1e-9)
-    metal = films.coherent(COSINES, 550.0, 1.0, [Film(1.8, 0.3, 0.0)], eta, 2.0)
+    metal = films.coherent(COSINES, 550.0, 1.0, [OpticalFilm(1.8, 0.3, 0.0)], eta, 2.0)
     assert metal.reflected == pytest.approx(fresnel.conductor(COSINES, eta, 2.0), abs=1e-9)
 
 
 def test_a_quarter_wave_takes_away_the_reflection() -> None:
     """Of an index that is the mean of its neighbours' (Born and Wolf 1999, section 1.6)."""
-    found = films.coherent(1.0, 550.0, 1.0, [Film(1.5, 0.0, 550 / 6)], 2.25)
+    found = films.coherent(1.0, 550.0, 1.0, [OpticalFilm(1.5, 0.0, 550 / 6)], 2.25)
     assert found.reflected == pytest.approx(0, abs=1e-15)
 
 
@@ -100,13 +100,15 @@ def test_a_quarter_wave_takes_away_the_reflection() -> None:
 def test_light_that_grazes_a_film_is_nothing_special(thickness_nm: float) -> None:
     """At the critical angle of a film, its field is linear over its depth."""
     critical = np.sqrt(1 - (1.3 / 1.6) ** 2)
-    around = [films.coherent(critical + d, 550.0, 1.6, [Film(1.3, 0.0, thickness_nm)], 1.6) for d in (-1e-7, 0, 1e-7)]
+    around = [
+        films.coherent(critical + d, 550.0, 1.6, [OpticalFilm(1.3, 0.0, thickness_nm)], 1.6) for d in (-1e-7, 0, 1e-7)
+    ]
     for below, at, above in zip(*([x.reflected_s, x.reflected_p] for x in around)):
         assert at == pytest.approx(0.5 * (below + above), abs=1e-6)
 
 
 def test_no_thickness_overflows() -> None:
-    found = films.coherent(COSINES, 400.0, 1.0, [Film(1.5, 3.0, 1e6)], 1.5)
+    found = films.coherent(COSINES, 400.0, 1.0, [OpticalFilm(1.5, 3.0, 1e6)], 1.5)
     assert found.reflected == pytest.approx(fresnel.conductor(COSINES, 1.5, 3.0), abs=1e-9)
     assert found.transmitted == pytest.approx(np.zeros_like(COSINES), abs=1e-30)
 
@@ -116,7 +118,7 @@ def test_a_renderer_has_the_same_values_and_gradients() -> None:
     import drjit as dr
 
     def reflected(thickness: Any, eta: Any, cosine: Any) -> Any:
-        stack = [Film(1.4, 0.0, 120.0), Film(eta, 0.05, thickness)]
+        stack = [OpticalFilm(1.4, 0.0, 120.0), OpticalFilm(eta, 0.05, thickness)]
         return films.coherent(cosine, 550.0, 1.0, stack, 0.9, 6.0).reflected
 
     cosine, thickness, eta = mi.Float(COSINES), mi.Float(480.0), mi.Float(2.3)
@@ -142,7 +144,7 @@ def finely(coating: Coating, cosines: np.ndarray) -> np.ndarray:
     wavelengths_nm = np.arange(360, 830.001, 0.02)
     found = []
     for c in range(3):
-        stack = [Film(film.eta[c], film.k[c], film.thickness_nm) for film in coating.films]
+        stack = [OpticalFilm(film.eta[c], film.k[c], film.thickness_nm) for film in coating.films]
         media = coating.eta_1[c], stack, coating.eta_2[c], coating.k_2[c]
         spectrum = films.coherent(cosines[:, None], wavelengths_nm, *media).reflected
         weight = np.interp(wavelengths_nm, at, weights[c])
@@ -271,7 +273,7 @@ def test_colours_of_thick_films_are_means_over_a_fine_spectrum() -> None:
     ):
         coating = Coating((ColouredFilm(white(index), white(k), thickness_nm), *others), white(1.0), white(1.5))
         (found,) = coating.shares(["reflected"], np.array([0.7]), srgb_sensitivity)
-        each = [Film(film.eta[0], film.k[0], film.thickness_nm) for film in coating.films]
+        each = [OpticalFilm(film.eta[0], film.k[0], film.thickness_nm) for film in coating.films]
         exact = weights @ films.coherent(0.7, 1 / wavenumber, 1.0, each, 1.5).reflected / weights.sum(axis=1)
         # Resonances between faces that reflect nearly all are sharper than the wavelengths that they are given
         assert np.abs(found[:, 0] - exact).max() < (4e-3 if index < 10 else 7e-3)
@@ -314,7 +316,7 @@ def test_a_fixed_quadrature_has_the_colours_of_a_fine_one(thickest_nm: float) ->
     rng, off = np.random.default_rng(3), list[float]()
     for _ in range(40):
         k = float(rng.uniform(0, 1)) if rng.random() < 0.4 else 0.0
-        film = Film(float(rng.uniform(1.05, 3)), k, float(rng.uniform(0, thickest_nm)))
+        film = OpticalFilm(float(rng.uniform(1.05, 3)), k, float(rng.uniform(0, thickest_nm)))
         below = float(rng.uniform(1.1, 3)), float(rng.uniform(0, 5) * (rng.random() < 0.5))
         cosine = np.array(rng.uniform(0.02, 1))
 

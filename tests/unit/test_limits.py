@@ -203,7 +203,7 @@ def test_a_base_below_a_medium_that_is_far_rarer_reflects_a_share_in_single_prec
     layers = [Interface(eta=1.0, alpha=1.0), Interface(eta=3000.0, alpha=0.2), Diffuse(albedo=0.5)]
     prepared = diffuse_base.with_means(prepare(Material.of(Stack(layers, exterior=1e4)), named(name)))
     assert prepared.base
-    worth = np.array([np.ravel(x)[0] for x in (*prepared.base.worth, prepared.base.mean_reflectance)])
+    worth = np.array([np.ravel(x)[0] for x in (*prepared.base.importance, prepared.base.mean_reflectance)])
     assert np.abs(worth).max() < 1e3  # products of some of them fit
     base = diffuse_base.under(prepared, (np.zeros(2), np.array([0.0, 0.6]), np.array([1.0, 0.8])))
     assert base and ((base.energy >= 0) & (base.energy <= 1)).all()

@@ -16,7 +16,7 @@ from velatura import kernel, ops
 from velatura.model.papers import mixture
 from velatura.model.papers.adding import Lobe
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
+from velatura.model.solved.lobes.refracted_lobe import MediumIndex, RefractedLobe
 from velatura.model.variance import Isotropic, Roughness
 from velatura.optics import fresnel
 from velatura.shader.recorder import symbol
@@ -185,7 +185,7 @@ def test_the_lobe_is_reciprocal_but_for_what_lets_it_out(name: str) -> None:
 @pytest.mark.parametrize("name", ["narrow", "brushed", "very rough", "dielectric"])
 def test_a_denser_medium_needs_no_bounds(name: str) -> None:
     """What is known to be denser than outside is as it is without that, grazing directions included."""
-    lobe, known = LOBES[name], replace(LOBES[name], n=Index.of(LOBES[name].n, denser=True))
+    lobe, known = LOBES[name], replace(LOBES[name], n=MediumIndex.of(LOBES[name].n, denser=True))
     wi, wo = random_directions(500, 20), random_directions(500, 21)
     wi[2][:5] = wo[2][5:10] = 1e-4
     u = np.random.default_rng(22).random((2, 500))

@@ -12,7 +12,7 @@ from velatura.optics.coatings import Coating, ColouredFilm
 from velatura.optics.fresnel import normal_incidence
 from velatura.programs import closures
 from velatura.programs.blender import formulas as blender
-from velatura.programs.closures import Directions
+from velatura.programs.closures import ViewAndLight
 from velatura.programs.gltf import formulas as gltf
 from velatura.programs.openpbr import formulas as openpbr
 from velatura.programs.principled import formulas as principled
@@ -36,7 +36,7 @@ def albedo(target, values, cosine, alpha=0.3, up=True, **options) -> np.ndarray:
     h = (wi + wo) / np.linalg.norm(wi + wo, axis=0)
     visible = ggx.ndf(tuple(h), alpha, alpha) * ggx.masking(tuple(wi), alpha, alpha) / (4 * cosine)
     weight = 1 / (len(U1) * (visible + wo[2] / pi))
-    value = target.value(values, Directions(wi, wo if up else wo * [[1], [1], [-1]]), **options)
+    value = target.value(values, ViewAndLight(wi, wo if up else wo * [[1], [1], [-1]]), **options)
     return np.sum(value * weight, axis=1)
 
 
@@ -199,7 +199,7 @@ def test_refraction_by_rough_facets_conserves_energy() -> None:
     cosine = 0.5 * (edges[1:] + edges[:-1])
     wo = np.stack([np.sqrt(1 - cosine**2), 0 * cosine, -cosine])
     wi = np.array([[0.0], [0.0], [1.0]]) * np.ones(len(cosine))
-    value = closures.refracted(Directions(wi, wo), eta, alpha, alpha)
+    value = closures.refracted(ViewAndLight(wi, wo), eta, alpha, alpha)
     assert 2 * pi * (value * np.diff(edges)).sum() == pytest.approx(1.0, abs=0.01)
 
 

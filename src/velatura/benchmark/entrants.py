@@ -15,7 +15,7 @@ from velatura.benchmark.stacks import Case
 from velatura.comparison.baked import bsdf as principled
 from velatura.errors import InvalidInput
 from velatura.model import DEFAULT, MODELS, Model, named
-from velatura.programs.closures import Directions
+from velatura.programs.closures import ViewAndLight
 from velatura.stack import DiffuseValues, InterfaceValues, Material, MediumValues
 from velatura.stack.schema import unknown
 
@@ -58,7 +58,7 @@ def _openpbr(case: Case) -> Candidate:
 
     def value(wi: Array, wo: Array) -> Array:
         """Its formulas are for light from above."""
-        light = TARGETS["openpbr"].value(found.values, Directions(wi.T, wo.T), found.thin)
+        light = TARGETS["openpbr"].value(found.values, ViewAndLight(wi.T, wo.T), found.thin)
         return np.where(wi[:, 2:] > 0, light.T, np.nan)
 
     return value

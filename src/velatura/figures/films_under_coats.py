@@ -97,7 +97,7 @@ def integration(cosines: Sequence[float] = (1.0, 0.5)) -> dict[str, Any]:
     errors: dict[str, list[Array]] = {"ours": [], "Gaussians": [], "three wavelengths": []}
     for thickness_nm in THICKNESSES_NM:
         metal = replace(TITANIUM, thickness_nm=float(thickness_nm))
-        film, media = [films.Film(metal.film_eta, 0.0, metal.thickness_nm)], list(zip(metal.eta, metal.k))
+        film, media = [films.OpticalFilm(metal.film_eta, 0.0, metal.thickness_nm)], list(zip(metal.eta, metal.k))
         spectra = [films.coherent(at[:, None], 1 / wavenumbers, 1.0, film, n, k).reflected for n, k in media]
         exact = np.clip(np.stack([found @ row for found, row in zip(spectra, weights)]), 0, 1)
         colours = ColouredFilm((metal.film_eta,) * 3, (0.0,) * 3, metal.thickness_nm)

@@ -16,7 +16,7 @@ from velatura.films.spectral import AtWavelengths
 from velatura.films.tables import NODES, Absorbing, Coated
 from velatura.ops import Value
 from velatura.optics.coatings import Coating, ColouredFilm
-from velatura.optics.films import Film
+from velatura.optics.films import OpticalFilm
 from velatura.stack import InterfaceValues, Material, luminance_sensitivity, srgb_sensitivity
 from velatura.stack.chain import Meeting, chain
 
@@ -62,7 +62,7 @@ def greatest_optical_thickness_nm(material: Material) -> float:
 
 def optical_thickness_nm(layer: InterfaceValues) -> float:
     """Optical thickness of all films on an interface."""
-    return sum(Film(float(np.max(x.eta)), 0.0, x.thickness_nm).in_colours().optical_nm for x in layer.films)
+    return sum(OpticalFilm(float(np.max(x.eta)), 0.0, x.thickness_nm).in_colours().optical_nm for x in layer.films)
 
 
 def _worked_out(meeting: Meeting, light: Any, may_absorb: bool) -> InterfaceFilms:

@@ -15,7 +15,7 @@ from velatura.films.reflectance import InterfaceFilms
 from velatura.films.tables import MATCHED
 from velatura.ops import Value
 from velatura.optics.coatings import Sensitivity, quadrature
-from velatura.optics.films import Film, Response, coherent
+from velatura.optics.films import OpticalFilm, Response, coherent
 from velatura.renderer.packets import aligned
 from velatura.stack import FilmValues, InterfaceValues
 
@@ -61,7 +61,7 @@ class AtWavelengths(InterfaceFilms):
         return self._colour(self._response(cosine).reflected)
 
     def _response(self, cosine: Value) -> Response:
-        films = [Film(x.eta, x.k, x.thickness_nm) for x in self.films]
+        films = [OpticalFilm(x.eta, x.k, x.thickness_nm) for x in self.films]
         films = [film.in_colours() for film in films] if self.in_colours else films
         k_2 = 0.0 if self.k_2 is None else self.k_2
         return coherent(cosine, self.wavelengths_nm, self.eta_1, films, self.eta_2, k_2)

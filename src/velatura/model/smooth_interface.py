@@ -14,7 +14,7 @@ from velatura.stack.chain import Meeting, chain
 
 
 @dataclass(frozen=True)
-class SmoothInterface(ops.Named):
+class SmoothInterface(ops.NamedFields):
     """An interface between media of indices eta_1 above and eta_2 below (colours; kappa None for a dielectric).
 
     `eta` = eta_2/eta_1 and `kappa` = k_2/eta_1 are None for a mirror, which reflects all light. `n12` is that of means

@@ -34,7 +34,7 @@ class Roughness(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Variance(ops.Named):
+class Variance(ops.NamedFields):
     """Components of a variance; sums and multiples are taken component by component."""
 
     def __add__(self: V, other: V) -> V:

@@ -19,7 +19,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura.optics.films import Film, coherent
+from velatura.optics.films import OpticalFilm, coherent
 
 Array: TypeAlias = NDArray[np.floating]
 Channels: TypeAlias = tuple[float, ...]
@@ -69,7 +69,7 @@ class Coating:
     def at(self, names: Sequence[str], cos_theta: Array, wavelengths_nm: Array) -> Array:
         """Properties like those of `shares`, of channels of one wavelength each (C,)."""
         eta_1, eta_2, k_2 = (np.reshape(x, (-1, 1)) for x in (self.eta_1, self.eta_2, self.k_2))
-        films = [Film(np.reshape(x.eta, (-1, 1)), np.reshape(x.k, (-1, 1)), x.thickness_nm) for x in self.films]
+        films = [OpticalFilm(np.reshape(x.eta, (-1, 1)), np.reshape(x.k, (-1, 1)), x.thickness_nm) for x in self.films]
         found = coherent(cos_theta, wavelengths_nm[:, None], eta_1, films, eta_2, k_2)
         return np.stack([getattr(found, name) for name in names])
 
@@ -101,7 +101,7 @@ class Coating:
         return np.asarray((np.array(self.eta_1) / np.array(self.eta_2))[:, None] ** 2)
 
     def _channel(self, c: int) -> _Channel:
-        stack = tuple(Film(film.eta[c], film.k[c], film.thickness_nm).in_colours() for film in self.films)
+        stack = tuple(OpticalFilm(film.eta[c], film.k[c], film.thickness_nm).in_colours() for film in self.films)
         return _Channel(self.eta_1[c], stack, self.eta_2[c], self.k_2[c])
 
 
@@ -110,7 +110,7 @@ class _Channel:
     """The films as one channel sees them."""
 
     eta_1: float
-    films: tuple[Film, ...]
+    films: tuple[OpticalFilm, ...]
     eta_2: float
     k_2: float
 

@@ -22,7 +22,7 @@ _SQUARE_MIN = 1e-12  # least square of q: what light grazes has a field that is 
 
 
 @dataclass(frozen=True)
-class Film:
+class OpticalFilm:
     """A film of index eta + i k and a thickness in nanometres; a thickness of 0 is no film.
 
     `phase_nm` is the thickness that the phase of light sees, that of the film unless it is given.
@@ -33,7 +33,7 @@ class Film:
     thickness_nm: Value
     phase_nm: Value | None = None
 
-    def in_colours(self) -> Film:
+    def in_colours(self) -> OpticalFilm:
         """The film as its colours see it: a thick one has the phase of a thinner one.
 
         Beyond `COHERENT_NM` the reflectance over the wavenumber has waves so close together that a colour is its mean
@@ -42,7 +42,7 @@ class Film:
         """
         waves = self.eta * self.thickness_nm / COHERENT_NM
         slower = (1 + ops.log(ops.maximum(waves, 1.0))) / ops.maximum(waves, 1.0)
-        return Film(self.eta, self.k, self.thickness_nm, self.thickness_nm * slower)
+        return OpticalFilm(self.eta, self.k, self.thickness_nm, self.thickness_nm * slower)
 
     @property
     def optical_nm(self) -> Value:
@@ -140,7 +140,7 @@ class Response:
 
 
 def coherent(
-    cos_theta: Value, wavelength_nm: Value, eta_1: Value, films: Sequence[Film], eta_2: Value, k_2: Value = 0.0
+    cos_theta: Value, wavelength_nm: Value, eta_1: Value, films: Sequence[OpticalFilm], eta_2: Value, k_2: Value = 0.0
 ) -> Response:
     """Reflectance, and transmittance into the medium below, of films between two media.
 

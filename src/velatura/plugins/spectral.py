@@ -60,8 +60,8 @@ class SampledSpectra:
         if base is None or prepared.base is None or self.means is None:
             return prepared
         fixed = (self.mi.UnpolarizedSpectrum(x) for x in base.means)
-        r, t, *worth = (self.mi.ArrayXf([*a, *b]) for a, b in zip(fixed, ops.interpolate(self.means, place)))
-        means = replace(prepared.base, mean_reflectance=r, mean_transmittance=t, worth=tuple(worth))
+        r, t, *importance = (self.mi.ArrayXf([*a, *b]) for a, b in zip(fixed, ops.interpolate(self.means, place)))
+        means = replace(prepared.base, mean_reflectance=r, mean_transmittance=t, importance=tuple(importance))
         return replace(prepared, base=means)
 
 

@@ -24,7 +24,7 @@ Number: TypeAlias = Any  # a float or an array
 
 
 @dataclass(frozen=True)
-class Directions:
+class ViewAndLight:
     """Directions wi above, and wo; `straight` is wo turned up where it lies below."""
 
     wi: Array
@@ -71,7 +71,7 @@ def anisotropic(alpha_u: Number, alpha_v: Number) -> tuple[Number, Number]:
 
 
 def microfacets(
-    pair: Directions, alpha_u: Number, alpha_v: Number, turn: float = 0.0, correlated: bool = True
+    pair: ViewAndLight, alpha_u: Number, alpha_v: Number, turn: float = 0.0, correlated: bool = True
 ) -> Array:
     """D G / (4 cos theta_i), on the side of wi and, as in a mirror, on the other (Walter 2007, Eq. 20).
 
@@ -81,7 +81,7 @@ def microfacets(
 
 
 def refracted(
-    pair: Directions,
+    pair: ViewAndLight,
     eta: float,
     alpha_u: Number,
     alpha_v: Number,
@@ -105,7 +105,7 @@ def refracted(
     return np.asarray(scale * _facets(pair, np.stack(h), alpha_u, alpha_v, turn, correlated))
 
 
-def _facets(pair: Directions, h: Array, alpha_u: Number, alpha_v: Number, turn: float, correlated: bool) -> Array:
+def _facets(pair: ViewAndLight, h: Array, alpha_u: Number, alpha_v: Number, turn: float, correlated: bool) -> Array:
     """D G / cos theta_i of the normals h, that are seen from wi and from `straight`."""
     wi, wo, normal = (ggx.rotate(tuple(w), turn) for w in (pair.wi, pair.straight, h))
     visible_i, visible_o = ggx.masking(wi, alpha_u, alpha_v), ggx.masking(wo, alpha_u, alpha_v)
@@ -115,11 +115,11 @@ def _facets(pair: Directions, h: Array, alpha_u: Number, alpha_v: Number, turn: 
     return np.asarray(ggx.ndf(normal, alpha_u, alpha_v) * both / pair.cos_i)
 
 
-def lambert(pair: Directions) -> Array:
+def lambert(pair: ViewAndLight) -> Array:
     return np.asarray(pair.reflected * pair.cos_o / pi)
 
 
-def oren_nayar(pair: Directions, colour: Array, roughness: float, again: Number = 1.0) -> Array:
+def oren_nayar(pair: ViewAndLight, colour: Array, roughness: float, again: Number = 1.0) -> Array:
     """Energy-preserving Oren-Nayar (Portsmouth et al. 2024, EON); `again` is a factor on light scattered many times."""
     if roughness < 1e-6:
         return np.asarray(colour * lambert(pair))
@@ -229,7 +229,7 @@ def compensation(cosine: Array, alpha: float, reflectance: Number) -> Array:
 
 
 def coat(
-    pair: Directions, weight: float, eta: float, alpha_u: float, alpha_v: float, turn: float = 0.0
+    pair: ViewAndLight, weight: float, eta: float, alpha_u: float, alpha_v: float, turn: float = 0.0
 ) -> tuple[Array, Array]:
     """Value of the facets of a dielectric coat of some weight, and the share of light that it does not reflect."""
     mean = float(np.sqrt(alpha_u * alpha_v))

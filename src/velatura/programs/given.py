@@ -11,7 +11,7 @@ import numpy as np
 
 from velatura.errors import InvalidInput
 from velatura.programs.imported import Notes, shown
-from velatura.programs.parameters import Parameter
+from velatura.programs.parameters import Input
 from velatura.programs.surface import INDICES
 from velatura.programs.values import Array, Value, changed, colour
 from velatura.stack import RGB, Texture
@@ -33,7 +33,7 @@ class Given:
     """
 
     def __init__(
-        self, values: Mapping[str, Any], declared: Sequence[Parameter], ignored: Mapping[str, str], notes: Notes
+        self, values: Mapping[str, Any], declared: Sequence[Input], ignored: Mapping[str, str], notes: Notes
     ) -> None:
         self.notes = notes
         self._declared = {each.name: each for each in declared}
@@ -119,7 +119,7 @@ class Given:
         self.notes.add(name, value, "the mean of the image stands for it")
         return mean
 
-    def _read(self, declared: Parameter, value: Any) -> Value:
+    def _read(self, declared: Input, value: Any) -> Value:
         if isinstance(value, Mapping):
             value = Texture.from_dict(value)
         if isinstance(value, Texture):

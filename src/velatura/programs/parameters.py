@@ -17,7 +17,7 @@ UNIT, ROUGH = (0.0, 1.0), (ALPHA_MIN**0.5, 1.0)
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Input:
     """A number or a colour (linear RGB) with its default and its range, each colour's components in the same.
 
     within: the part of the file that it stands in, where that has several: an extension's name.
@@ -43,6 +43,6 @@ class Parameter:
         return self.default is False
 
 
-def complete(parameters: tuple[Parameter, ...], given: Values) -> dict[str, Any]:
+def complete(parameters: tuple[Input, ...], given: Values) -> dict[str, Any]:
     """All values, the defaults where none is given."""
     return {each.name: given.get(each.name, each.default) for each in parameters}

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from velatura.programs.closures import Array, Directions
-from velatura.programs.parameters import RGB, Parameter, Values
+from velatura.programs.closures import Array, ViewAndLight
+from velatura.programs.parameters import RGB, Input, Values
 from velatura.programs.surface import Alpha, Surface
 from velatura.programs.values import Value
 from velatura.stack import Texture
@@ -34,8 +34,8 @@ class Program:
     """
 
     title: str
-    parameters: tuple[Parameter, ...]
-    value: Callable[[Values, Directions, bool], Array]
+    parameters: tuple[Input, ...]
+    value: Callable[[Values, ViewAndLight, bool], Array]
     start: Callable[[Surface], Fitted]
     text: Callable[[Bake, Any, dict[str, str]], str]
     coat_eta: bool = False
@@ -97,7 +97,7 @@ class Bake:
     images: dict[str, Carried]
     thin: bool
 
-    def differing(self, parameters: tuple[Parameter, ...]) -> list[tuple[Parameter, float | RGB]]:
+    def differing(self, parameters: tuple[Input, ...]) -> list[tuple[Input, float | RGB]]:
         """Parameters that differ from their defaults."""
         each = [(parameter, self.values[parameter.name]) for parameter in parameters]
         return [(parameter, value) for parameter, value in each if value != parameter.default]

@@ -16,7 +16,7 @@ from velatura.model import Model, variance_kind
 from velatura.model.base import Query
 from velatura.model.context import Context
 from velatura.optics import fresnel, ggx, refraction
-from velatura.programs.closures import ALPHA_MIN, Directions
+from velatura.programs.closures import ALPHA_MIN, ViewAndLight
 from velatura.programs.from_stack import Described, Facets
 from velatura.renderer.low_discrepancy import square
 
@@ -34,7 +34,7 @@ class Sampled:
     which add up to 1: the areas of a sphere that are seen so.
     """
 
-    pair: Directions
+    pair: ViewAndLight
     weight: Array
     which: NDArray[np.intp]
     count: int
@@ -49,7 +49,7 @@ class Sampled:
         drawn = (*WIDTHS, *((max(u, ALPHA_MIN), max(v, ALPHA_MIN), turn) for u, v, turn in stack.brushed))
         each = [_nodes(w, stack.below or 0.0, nodes, drawn) for w in wi]
         which = np.repeat(np.arange(len(wi)), [wo.shape[1] for wo, _ in each])
-        pair = Directions(wi[which].T, np.concatenate([wo for wo, _ in each], axis=1))
+        pair = ViewAndLight(wi[which].T, np.concatenate([wo for wo, _ in each], axis=1))
         value, _ = body.eval_pdf(tuple(pair.wi), tuple(pair.wo), Query(radiance=False))
         value = np.maximum(np.broadcast_to(value, pair.wi.shape), 0.0)
         weight = np.concatenate([weight for _, weight in each])

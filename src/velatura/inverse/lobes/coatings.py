@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from velatura.films.tables import Coated
 from velatura.ops import Value
 from velatura.optics.coatings import FINEST, PER_PERIOD, RANGE_NM
-from velatura.optics.films import Film as FilmOfChannel
-from velatura.optics.films import coherent
+from velatura.optics.films import OpticalFilm, coherent
 from velatura.stack import FilmValues, Interface, Material, Stack, srgb_sensitivity
 from velatura.stack.values import Film
 from velatura.tables import Average
@@ -100,14 +99,14 @@ class AtNormal(Coated):
         cosines = np.broadcast_to(cosines, (shape[1], cosines.shape[1]))
         eta_1, eta_2, k_2 = (np.broadcast_to(x, shape) for x in each)
         grey = shape[0] == 1 and all(np.ptp(x) == 0 for film in self.films for x in (film.eta, film.k))
-        slower = [FilmOfChannel(x.eta, x.k, x.thickness_nm).in_colours() for x in self.films]
+        slower = [OpticalFilm(x.eta, x.k, x.thickness_nm).in_colours() for x in self.films]
         thickness_nm = max(sum(float(np.max(film.optical_nm)) for film in slower), 1.0)
         wavelengths_nm, weights = _spectrum(thickness_nm)
         size = max(BLOCK // (cosines.shape[1] * len(wavelengths_nm)), 1)
         found = np.empty((3, *cosines.shape))
         for c in range(1 if grey else 3):
             own = slice(None) if grey else slice(c, c + 1)
-            films = [FilmOfChannel(x.eta[c, 0], x.k[c, 0], x.thickness_nm).in_colours() for x in self.films]
+            films = [OpticalFilm(x.eta[c, 0], x.k[c, 0], x.thickness_nm).in_colours() for x in self.films]
             for n in range(0, shape[1], size):
                 one, two, k = (x[c % shape[0], n : n + size, None, None] for x in (eta_1, eta_2, k_2))
                 r = coherent(cosines[n : n + size, :, None], wavelengths_nm, one, films, two, k)

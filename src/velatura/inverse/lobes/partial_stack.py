@@ -223,7 +223,7 @@ def named_as(roughness: Roughness, axis: float) -> Roughness:
 
 
 #: Records in which `take` and `join` look for arrays.
-RECORDS: tuple[Any, ...] = (Batch, Base, ops.Named)
+RECORDS: tuple[Any, ...] = (Batch, Base, ops.NamedFields)
 
 
 def whole(path: Sequence[Layers], exterior: Value, closely: bool = False) -> Material:

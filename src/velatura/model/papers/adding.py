@@ -18,7 +18,7 @@ from velatura.optics.ggx import Direction
 
 
 @dataclass(frozen=True)
-class Lobe(ops.Named):
+class Lobe(ops.NamedFields):
     """Energy (a colour), variance in the space of the roughness map, and the GGX lobe that has it."""
 
     energy: Value
@@ -27,7 +27,7 @@ class Lobe(ops.Named):
 
 
 @dataclass(frozen=True)
-class State(ops.Named):
+class State(ops.NamedFields):
     """The stack so far: energies (colours), variances, the cosine below it and the products of Snell's factors.
 
     Of the light that comes up to it, r_i0 returns, t_i0 leaves and a_i0 is absorbed. Each is kept apart, since 1 - r_i0

@@ -1,8 +1,8 @@
 """A diffuse base under a stack: light that enters, scatters there, and leaves, between bounces below the interfaces.
 
-Light in the stack is followed by its parts in a few directions (`tables.diffuse_nodes`). What a node is worth, that is
-the share of its light that reaches the base, follows from what the interfaces make of it, by sweeps up and down the
-stack. That is done once for a material; what a direction is worth is then the sum of its parts.
+Light in the stack is followed by its parts in a few directions (`tables.diffuse_nodes`). The importance of a node, that
+is the share of its light that reaches the base, follows from what the interfaces make of it, by sweeps up and down the
+stack. That is done once for a material; the importance of a direction is then the sum of its parts.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ Media = Sequence[tuple[PreparedMedium, Value]]  # with their optical depths alon
 
 SWEEPS = 6  # down the stack and up; what is missing then follows from how fast they converge
 SLOWEST = 0.95  # ratio of the last two sweeps
-# What a node may be worth, and the part of it that may leave: more, of cones that nodes do not resolve, grows in sweeps
-WORTH, LEAVING = 10.0, 3.0
+# Bounds of the importance of a node, and of what leaves of it: more, of cones that nodes do not resolve, grows
+MOST_IMPORTANT, LEAVING = 10.0, 3.0
 
 # Cosines and weights of the mean over directions above; what the stack does is smooth in the cosine
 _NODES = [(0.5 + 0.5 * float(x), 0.5 * float(w)) for x, w in zip(*np.polynomial.legendre.leggauss(6))]
@@ -70,7 +70,7 @@ def under(prepared: Prepared, wi: Direction) -> Base | None:
 
 
 def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
-    """`prepared` with what the stack does to diffuse light from the base, and what its nodes are worth.
+    """`prepared` with what the stack does to diffuse light from the base, and the importance of its nodes.
 
     `settle` is applied to every cosine, row and energy: a renderer evaluates them, so that one kernel serves all nodes.
     """
@@ -82,7 +82,7 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
     def lit(node: Value, n: Value) -> Direction:
         return _halfway(settle(node + 0 * n), inside.interfaces)
 
-    worth: Row = ()
+    importance: Row = ()
     reflected: Value = 0.0
     if inside.interfaces:
         with ops.block("By reciprocity, light leaves as it enters"):
@@ -92,8 +92,8 @@ def with_means(prepared: Prepared, settle: Settle = as_it_is) -> Prepared:
             even = diffuse_nodes.even(inside.indices[0])
             squared = inside.indices[0] * inside.indices[0]
             leaves = [ops.minimum(ops.divide(x, squared * w), LEAVING) for x, w in zip(leaves, even)]
-        worth, reflected = inside.solved(leaves, settle)
-    base = dataclasses.replace(prepared.base, worth=tuple(worth), mean_reflectance=reflected)
+        importance, reflected = inside.solved(leaves, settle)
+    base = dataclasses.replace(prepared.base, importance=tuple(importance), mean_reflectance=reflected)
     known = dataclasses.replace(prepared, base=base)
     through = ops.each(lambda node, n: settle(_through(known, lit(node, n))), nodes, base.n)
     transmitted = _sum(measure * t for measure, t in zip(measures, through)) / (base.n * base.n)
@@ -108,7 +108,7 @@ def _through(prepared: Prepared, wi: Direction) -> Value:
     if not inside.interfaces:
         return kept
     # Parts may be negative, and so may their sum be by a little where next to nothing enters
-    return kept * ops.clip(_sum(a * b for a, b in zip(_entered(prepared, wi), prepared.base.worth)), 0.0, 1.0)
+    return kept * ops.clip(_sum(a * b for a, b in zip(_entered(prepared, wi), prepared.base.importance)), 0.0, 1.0)
 
 
 def _entered(prepared: Prepared, wi: Direction) -> Row:
@@ -147,7 +147,7 @@ class _Inside:
         return cls(prepared.tables, media[0], interfaces, indices[1:], media[1:])
 
     def solved(self, leaves: Row, settle: Settle) -> tuple[Row, Value]:
-        """Worth of the nodes below the first interface, and the share of diffuse light that returns to the base.
+        """Importance of the nodes below the first interface, and the share of diffuse light that returns to the base.
 
         `leaves` is what leaves the stack of the light at each of these nodes.
         """
@@ -186,7 +186,7 @@ class _Inside:
                 """The gains of the last two sweeps, and the rows before the last one and after it."""
                 now = rows[len(begin) :]
                 *swept, _ = down(up([*_split(now), last]))
-                after = [ops.clip(x, -WORTH, WORTH) for row in swept for x in row]
+                after = [ops.clip(x, -MOST_IMPORTANT, MOST_IMPORTANT) for row in swept for x in row]
                 return [gain, _sum(b - a for a, b in zip(now, after)), *now, *after]
 
             gain_before, gain, *rows = ops.repeat(sweep, SWEEPS, 0.0, 0.0, *begin, *begin)
@@ -194,9 +194,9 @@ class _Inside:
             rest = ratio / (1 - ratio)
             before, after = rows[: len(begin)], rows[len(begin) :]
             going_down = [*_split([b + (b - a) * rest for a, b in zip(before, after)]), last]
-        worth = [a * b for a, b in zip(kept[0], going_down[0])]
+        importance = [a * b for a, b in zip(kept[0], going_down[0])]
         even = diffuse_nodes.even(self.indices[-1])
-        return settle(worth), settle(_sum(w * a * b for w, a, b in zip(even, kept[-1], up(going_down)[-1])))
+        return settle(importance), settle(_sum(w * a * b for w, a, b in zip(even, kept[-1], up(going_down)[-1])))
 
     def _exchange(self, k: int, settle: Settle) -> _Exchange:
         """Scattering matrices of the interface between two media."""
@@ -285,9 +285,9 @@ def _balanced(staying: Sequence[Row], leaving: Row) -> Sequence[Row]:
     return [[x + missing[k] if k == i else x for i, x in enumerate(row)] for k, row in enumerate(staying)]
 
 
-def _seen(rows: Sequence[Row], kept: Row, worth: Row) -> Row:
-    """Worth of the nodes above an interface and a medium that transmits `kept`, from their worth below."""
-    after = [a * b for a, b in zip(kept, worth)]
+def _seen(rows: Sequence[Row], kept: Row, importance: Row) -> Row:
+    """Importance of the nodes above an interface and a medium that transmits `kept`, from that below."""
+    after = [a * b for a, b in zip(kept, importance)]
     return [_sum(part * x for part, x in zip(row, after)) for row in rows]
 
 

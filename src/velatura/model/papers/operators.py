@@ -16,7 +16,7 @@ PreparedLayer: TypeAlias = PreparedInterface | PreparedMedium
 
 
 @dataclass(frozen=True)
-class Operator(ops.Named):
+class LayerStatistics(ops.NamedFields):
     """One layer: energies reflected, transmitted and absorbed of light that goes down (12) and up (21), variances,
     Snell's factors.
 
@@ -41,7 +41,7 @@ class Operator(ops.Named):
 
 def interface(
     prepared: Prepared, layer: PreparedInterface, cos_theta: Value, s_t0i: Variance, wi: Direction
-) -> Operator:
+) -> LayerStatistics:
     """Reflection and refraction by a rough interface lit with variance s_t0i at cos_theta (Belcour 2018, Eqs. 7-13)."""
     model, none = prepared.model, prepared.variance.uniform(0.0)
     lit = (s_t0i + layer.s_r).roughness(prepared.f)  # as rough as interface and light together
@@ -52,7 +52,7 @@ def interface(
         if layer.leaving is not None:
             leaving = ops.clip(layer.leaving(*fetched(prepared, lit, cos_theta, wi)), 0.0, 1.0)
     if layer.opaque:
-        return Operator(r, 0.0, 0.0, 0.0, 1 - r, 1.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
+        return LayerStatistics(r, 0.0, 0.0, 0.0, 1 - r, 1.0, layer.s_r, none, none, 1.0, 1.0, 1.0, leaving)
 
     with ops.block("Refract, unless Snell's law has no solution"):
         sin2_t = (1 - cos_theta * cos_theta) / (layer.n12 * layer.n12)
@@ -73,7 +73,7 @@ def interface(
         back = ops.clip(r + layer.reflect_back(cos_theta, cos_t) - layer.reflect(cos_theta), 0.0, 1 - t)
     r_21, a_12 = ops.select(passes, back, 0.0), ops.select(passes, lost, 1 - r)
     a_21 = ops.select(passes, 1 - t - back, 1.0) if layer.absorbed is not None else ops.select(passes, 0.0, 1.0)
-    return Operator(r, t, r_21, t, a_12, a_21, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
+    return LayerStatistics(r, t, r_21, t, a_12, a_21, layer.s_r, s_t12, s_t21, ratio, 1 / ratio, cos_t, leaving)
 
 
 def reflectance(prepared: Prepared, layer: PreparedInterface, cos_theta: Value, lit: Roughness, wi: Direction) -> Value:
@@ -99,7 +99,7 @@ def _transmitted(prepared: Prepared, roughness: Roughness, ratio: Value, passes:
     return prepared.variance.of(roughness.scaled(scale), prepared.f)
 
 
-def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) -> Operator:
+def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) -> LayerStatistics:
     """Absorption and forward scattering by a medium (Belcour 2018, Eqs. 15-17, 21-24)."""
     path = layer.along(1, cos_theta)
     g = ops.clip(layer.g, G_MIN, 1.0)
@@ -117,7 +117,7 @@ def transmission(prepared: Prepared, layer: PreparedMedium, cos_theta: Value) ->
     s_t = prepared.variance.uniform(ops.select(layer.g > 0, s_g, 0.0))
     none = prepared.variance.uniform(0.0)
     a = ops.maximum(1 - t, 0.0)
-    return Operator(0.0, t, 0.0, t, a, a, none, s_t, s_t, 1.0, 1.0, cos_theta, None)
+    return LayerStatistics(0.0, t, 0.0, t, a, a, none, s_t, s_t, 1.0, 1.0, cos_theta, None)
 
 
 def fetched(

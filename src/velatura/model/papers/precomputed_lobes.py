@@ -22,7 +22,7 @@ from velatura.renderer import directional_grid
 Lobes = Callable[[Direction], tuple[list[Lobe], Lobe | None]]
 
 
-class Sampled(Protocol):
+class SampledLobes(Protocol):
     """Columns of numbers that were sampled over direction."""
 
     @property
@@ -36,7 +36,7 @@ class PrecomputedLobes:
     """Energies and roughnesses of all lobes, the transmitted one last if there is one; `colour` makes an energy of
     `width` channels. There are `count` lobes."""
 
-    curves: Sampled
+    curves: SampledLobes
     colour: Callable[..., Value]
     width: int
     prepared: Prepared

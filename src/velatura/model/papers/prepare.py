@@ -44,7 +44,7 @@ class PreparedInterface(SmoothInterface):
 
 
 @dataclass(frozen=True)
-class PreparedMedium(ops.Named):
+class PreparedMedium(ops.NamedFields):
     """A medium by its optical depths along the normal (colours) and its asymmetry g."""
 
     tau: Value
@@ -60,20 +60,20 @@ class PreparedMedium(ops.Named):
 class PreparedBase:
     """A diffuse base: albedo (a colour), relative index n of the medium above it, and means of the stack for its light.
 
-    The means (colours) are those for diffuse light from below. `worth` is the share of light below the first interface
-    that reaches the base, at each node of `tables.diffuse_nodes`. All are known once the layers are.
+    The means (colours) are those for diffuse light from below. `importance` is the share of light below the first
+    interface that reaches the base, at each node of `tables.diffuse_nodes`. All are known once the layers are.
     """
 
     albedo: Value
     n: Value
     mean_reflectance: Value = 0.0
     mean_transmittance: Value = 1.0
-    worth: tuple[Value, ...] = ()
+    importance: tuple[Value, ...] = ()
 
     @property
     def means(self) -> tuple[Value, ...]:
         """All means of the stack for the light of the base."""
-        return self.mean_reflectance, self.mean_transmittance, *self.worth
+        return self.mean_reflectance, self.mean_transmittance, *self.importance
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,8 @@ from velatura.model.smooth_interface import SmoothInterface
 from velatura.model.solved.columns import Column, Columns, Declaration
 from velatura.model.solved.guards import BELOW_ONE, COS_OF_DIRECTIONS_MIN, ENERGY_EPS
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
-from velatura.model.solved.lobes.remainder import Remainder, Samples
+from velatura.model.solved.lobes.refracted_lobe import MediumIndex, RefractedLobe
+from velatura.model.solved.lobes.remainder import Remainder, RemainderSamples
 from velatura.model.solved.transmission import combined
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
@@ -53,9 +53,9 @@ class Shape:
     lets it out, with the index above that."""
 
     interface: int
-    n: Index
+    n: MediumIndex
     facets: SmoothInterface | None
-    n_first: Index
+    n_first: MediumIndex
     first: SmoothInterface | None
 
     def lobe(self, weight: Value, roughness: Roughness) -> RefractedLobe:
@@ -80,7 +80,7 @@ class Side:
     curves: Any
     shapes: tuple[Shape, ...]
     polynomial: Remainder
-    samples: Samples
+    samples: RemainderSamples
     transmission: Transmission | None
     colour: Callable[..., Value]
     colours: int
@@ -147,7 +147,7 @@ class SideView:
     lobes: list[RefractedLobe]
     plane: tuple[Value, Value] | None
     polynomial: Remainder
-    samples: Samples
+    samples: RemainderSamples
     transmission: Transmission | None
     columns: Columns
 

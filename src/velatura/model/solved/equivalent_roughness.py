@@ -17,7 +17,7 @@ from velatura import ops
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.solved.guards import COS_OF_DIRECTIONS_MIN, SAMPLED_ENERGY_MIN, SEARCHED_ALPHA
 from velatura.model.solved.lobes import refracted_lobe
-from velatura.model.solved.lobes.refracted_lobe import Index, RefractedLobe
+from velatura.model.solved.lobes.refracted_lobe import MediumIndex, RefractedLobe
 from velatura.model.solved.transmission import combined, internal_reflections
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.solved.transmission.direct import Transmission
@@ -36,7 +36,7 @@ ROUND = 1e-4  # difference of variances, of their sum, below which a lobe hardly
 
 
 @dataclass(frozen=True)
-class Samples:
+class LobeSamples:
     """Directions wo above, (N, M) each, of light from wi, (N,) each, with the energy of each, (N, M)."""
 
     wi: Direction
@@ -44,15 +44,17 @@ class Samples:
     energy: Array
 
 
-def of_lobe(lobe: RefractedLobe, wi: Direction) -> Samples:
+def of_lobe(lobe: RefractedLobe, wi: Direction) -> LobeSamples:
     """Samples of a lobe with numbers (N,), and a weight (C, N), for directions wi.
 
-    Samples are those of a GGX reflection outside that is as wide to first order: there the value of a lobe falls off
+    They are those of a GGX reflection outside that is as wide to first order: there the value of a lobe falls off
     steadily towards the horizon, so that the roughness has no steps, as samples inside that are totally reflected have.
     """
     u1, u2 = _lattice(_azimuth(wi) - lobe.roughness.rotation)
     i = ggx.rotate(_columns(wi), lobe.roughness.rotation[:, None])
-    wider = np.sqrt(np.maximum(Index.of(lobe.n).ring2 + i[2] * i[2], 0.0)) / np.maximum(i[2], COS_OF_DIRECTIONS_MIN)
+    wider = np.sqrt(np.maximum(MediumIndex.of(lobe.n).ring2 + i[2] * i[2], 0.0)) / np.maximum(
+        i[2], COS_OF_DIRECTIONS_MIN
+    )
     u, v = (np.clip(alpha[:, None] * wider, ALPHA_MIN, 1.0) for alpha in lobe.roughness[:2])
     h = ggx.sample_visible(i, u, v, u1, u2)
     density = ggx.masking(i, u, v) * ggx.ndf(h, u, v) / (4 * np.maximum(i[2], COS_OF_DIRECTIONS_MIN))
@@ -61,7 +63,7 @@ def of_lobe(lobe: RefractedLobe, wi: Direction) -> Samples:
     return _weighted(wi, (x, y, z), refracted_lobe.eval_pdf(each, _direction(wi), (x, y, z))[0], density.ravel())
 
 
-def of_passed(transmission: Transmission, parts: Parts, wi: Direction) -> Samples:
+def of_passed(transmission: Transmission, parts: Parts, wi: Direction) -> LobeSamples:
     """Samples of light that passes, in the medium beyond, turned up; that of wi is refracted by all interfaces."""
     u, u1, u2 = low_discrepancy.at_nodes(len(wi[2]), SAMPLES, None)
     i, each = _direction(wi), Parts(*map(_each, vars(parts).values()))
@@ -70,13 +72,13 @@ def of_passed(transmission: Transmission, parts: Parts, wi: Direction) -> Sample
     return _weighted(internal_reflections.seen_below(transmission, wi), (x, y, -z), value, density)
 
 
-def together(samples: Sequence[Samples]) -> Samples:
+def together(samples: Sequence[LobeSamples]) -> LobeSamples:
     """Light of several lobes."""
     wo = [np.concatenate(each, axis=-1) for each in zip(*(part.wo for part in samples))]
-    return Samples(samples[0].wi, (wo[0], wo[1], wo[2]), np.concatenate([part.energy for part in samples], axis=-1))
+    return LobeSamples(samples[0].wi, (wo[0], wo[1], wo[2]), np.concatenate([part.energy for part in samples], axis=-1))
 
 
-def roughness(samples: Samples, axis: Array | None = None) -> Roughness:
+def roughness(samples: LobeSamples, axis: Array | None = None) -> Roughness:
     """The equivalent roughness, (N,) each; `axis` is the rotation where symmetry gives it."""
     i, o = _columns(samples.wi), samples.wo
     x, y, z = ggx.normalize((i[0] + o[0], i[1] + o[1], np.maximum(i[2] + o[2], COS_OF_DIRECTIONS_MIN)))
@@ -161,11 +163,11 @@ def _axis(h: Direction, weight: Array, azimuth: Array) -> Array:
     return np.asarray(0.5 * np.arctan2(2 * xy + little * np.sin(2 * azimuth), xx - yy + little * np.cos(2 * azimuth)))
 
 
-def _weighted(wi: Direction, wo: Direction, value: Array, density: Array) -> Samples:
+def _weighted(wi: Direction, wo: Direction, value: Array, density: Array) -> LobeSamples:
     shape = len(wi[2]), SAMPLES
     energy = ops.divide(np.mean(np.atleast_2d(value), axis=0), density)
     x, y, z = (np.broadcast_to(w, energy.shape).reshape(shape) for w in wo)
-    return Samples(wi, (x, y, z), energy.reshape(shape))
+    return LobeSamples(wi, (x, y, z), energy.reshape(shape))
 
 
 def _columns(w: Direction) -> Direction:

@@ -23,7 +23,7 @@ from velatura.model.solved.energies.energies import INCIDENCES, SAMPLES, Energie
 from velatura.model.solved.grid import Folded, Grid, Listed
 from velatura.model.solved.guards import ALBEDO_MIN, COS_ON_GRID_MIN, ENERGY_EPS, WIDTH_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder, widths
-from velatura.model.solved.lobes.refracted_lobe import Index
+from velatura.model.solved.lobes.refracted_lobe import MediumIndex
 from velatura.model.solved.lobes.remainder import Remainder
 from velatura.model.solved.lobes.widths import Tensor
 from velatura.model.solved.sample_allocation import Demand
@@ -635,9 +635,9 @@ def _evenly(of: Parts, least: float) -> Parts:
 
 def shapes_of(found: Sequence[SmoothInterface], drawn: Sequence[LobeSpec]) -> list[Shape]:
     """One for each lobe."""
-    indices = [Index.of(1.0)]
+    indices = [MediumIndex.of(1.0)]
     for layer in found:
-        indices.append(Index.of(indices[-1].n * layer.n12))
+        indices.append(MediumIndex.of(indices[-1].n * layer.n12))
     shapes = []
     for lobe in drawn:
         own, k = found[lobe.interface], lobe.first

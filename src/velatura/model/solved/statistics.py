@@ -139,7 +139,7 @@ def _seen(
     if veil is None and (shape.first is None or not np.any(own[:2])):
         return own
 
-    def samples(roughness: Roughness, energy: Array) -> equivalent_roughness.Samples:
+    def samples(roughness: Roughness, energy: Array) -> equivalent_roughness.LobeSamples:
         lobe = shape.lobe(1.0, roughness)
         weight = np.maximum(energy, ENERGY_EPS) / np.maximum(refracted_lobe.integral(lobe, wi), ENERGY_EPS)
         return equivalent_roughness.of_lobe(replace(lobe, weight=weight), wi)

@@ -40,7 +40,7 @@ UNKNOWN = {**dict.fromkeys(("depth", "sigma_a", "sigma_s"), (0.0, 6.25)), **text
 
 
 @dataclass(frozen=True)
-class Axis:
+class TextureAxis:
     """The values that one texture gives, and the least and the greatest of its coordinates.
 
     A coordinate is a value, or the root of one, in which energies and widths vary smoothly. Nodes lie on a fixed
@@ -54,7 +54,7 @@ class Axis:
     fine: int = FINE[2]
 
     @classmethod
-    def of(cls, given: Range, together: int, step: float | None = None, waves_max: int = 0) -> Axis:
+    def of(cls, given: Range, together: int, step: float | None = None, waves_max: int = 0) -> TextureAxis:
         """The axis of a texture, in a table of so many axes; of waves, with a `step` between nodes, and so many of
         them at most."""
         addresses, *ends = given
@@ -84,7 +84,7 @@ class Axis:
         """Number of the node in the middle, of an odd number of nodes."""
         return self.count // 2
 
-    def with_middle(self, most: int) -> Axis:
+    def with_middle(self, most: int) -> TextureAxis:
         """The axis with as many nodes at most, an odd number of them."""
         if self.waves:
             return replace(self, count=self.count | 1)
@@ -95,9 +95,9 @@ class Axis:
         """Whether it is a thickness of films, or their index."""
         return self.addresses[0].role in WAVING
 
-    def covers(self, other: Axis | Wavelengths) -> bool:
+    def covers(self, other: TextureAxis | Wavelengths) -> bool:
         return (
-            isinstance(other, Axis)
+            isinstance(other, TextureAxis)
             and self.addresses == other.addresses
             and self.low <= other.low
             and other.high <= self.high
@@ -160,7 +160,7 @@ class Wavelengths:
     def with_middle(self, most: int) -> Wavelengths:
         return self
 
-    def covers(self, other: Axis | Wavelengths) -> bool:
+    def covers(self, other: TextureAxis | Wavelengths) -> bool:
         return self == other
 
     def refined(self, values: Array, axis: int) -> Array:
@@ -183,7 +183,7 @@ def _coordinate(address: Address, value: Value) -> Value:
     return ops.sqrt(value) if address.role in ROOTS else value
 
 
-def refined(values: Array, axes: Sequence[Axis | Wavelengths]) -> Array:
+def refined(values: Array, axes: Sequence[TextureAxis | Wavelengths]) -> Array:
     """Values at the nodes of all axes, (nodes, ...), at all places: the axes are the leading ones."""
     found = values.reshape(*(axis.count for axis in axes), *values.shape[1:])
     for k, axis in enumerate(axes):
@@ -191,7 +191,7 @@ def refined(values: Array, axes: Sequence[Axis | Wavelengths]) -> Array:
     return found
 
 
-def placed(material: Material, axes: Sequence[Axis | Wavelengths], values: Iterable[Any]) -> Material:
+def placed(material: Material, axes: Sequence[TextureAxis | Wavelengths], values: Iterable[Any]) -> Material:
     """A material of NumPy's values with others on some axes."""
     changed: dict[str, Any] = {}
     for axis, x in zip(axes, values):

@@ -31,7 +31,7 @@ from velatura.model.solved.guards import ENERGY_EPS
 from velatura.model.solved.lobes import remainder
 from velatura.model.solved.rotation_frame import Frame
 from velatura.model.solved.solve import Layout, SolvedSide, Solver
-from velatura.model.solved.texture_axes import BESIDE, COARSE, WAVES_MAX, WAVES_OF_TWO, Axis, Range, Wavelengths
+from velatura.model.solved.texture_axes import BESIDE, COARSE, WAVES_MAX, WAVES_OF_TWO, Range, TextureAxis, Wavelengths
 from velatura.model.solved.transmission.combined import Parts
 from velatura.model.variance import Isotropic, Variance
 from velatura.ops import Value
@@ -98,20 +98,20 @@ class Term:
     """What some axes change: tables over direction and them, for either side, and of the remainder over them. The first
     term has the columns themselves, a further one by what it scales those of the first, or `adds` to them."""
 
-    axes: tuple[Axis | Wavelengths, ...]
+    axes: tuple[TextureAxis | Wavelengths, ...]
     columns: tuple[Packed, ...]
     polynomials: tuple[Packed | Summed, ...]
 
     def places(self, material: Material, place: Value) -> list[Value]:
-        return [axis.at(material) if isinstance(axis, Axis) else place for axis in self.axes]
+        return [axis.at(material) if isinstance(axis, TextureAxis) else place for axis in self.axes]
 
 
 @dataclass(frozen=True)
-class Tables:
+class TextureTables:
     """A material by some terms, of which further ones scale or add; `fixed` are the values that it was solved for,
     beside those of textures."""
 
-    axes: tuple[Axis | Wavelengths, ...]
+    axes: tuple[TextureAxis | Wavelengths, ...]
     terms: tuple[Term, ...]
     adds: tuple[Array, ...]
     layouts: list[Layout]
@@ -135,7 +135,7 @@ class Tables:
             made.append(_Interpolated(**vars(side), summed=len(self.terms) > 1))
         return self.solver.bsdf(material, made)
 
-    def holds(self, solver: Solver, wanted: Sequence[Axis | Wavelengths], fixed: bytes) -> bool:
+    def holds(self, solver: Solver, wanted: Sequence[TextureAxis | Wavelengths], fixed: bytes) -> bool:
         """Whether it is what would be solved, for values of textures in these ranges."""
         covered = len(self.axes) == len(wanted) and all(a.covers(b) for a, b in zip(self.axes, wanted))
         return covered and fixed == self.fixed and solver.variance is self.solver.variance
@@ -232,7 +232,9 @@ def _tabulated(
     spans = [textured_films.Span(at, *ends) for of, *ends in _textures(ranges) for at in of]
     step = partial(_step, textured_films.highest(numbers, spans))
     waves_max = WAVES_MAX[together] if films == 1 else WAVES_OF_TWO
-    spanned = [x if isinstance(x, Wavelengths) else Axis.of(x, together, step(x[0][0]), waves_max) for x in ranges]
+    spanned = [
+        x if isinstance(x, Wavelengths) else TextureAxis.of(x, together, step(x[0][0]), waves_max) for x in ranges
+    ]
     start = texture_axes.placed(numbers, spanned, [axis.middle for axis in spanned])
     solver = Solver.of(model, variance, context)
     grid = replace(solver.grid, cosines=COSINES[isotropic])
@@ -240,7 +242,7 @@ def _tabulated(
     textures = {name for axis in spanned for name in axis.changed(axis.middle)}
     fixed = b"".join(np.asarray(x).tobytes() for address, x in start.values() if address.name not in textures)
     given = Variables.of(material)
-    if isinstance(before, Tables) and not given.given and before.holds(solver, spanned, fixed):
+    if isinstance(before, TextureTables) and not given.given and before.holds(solver, spanned, fixed):
         return before
     groups = _groups(spanned, together if isotropic else 1)
     ends = product(*((axis.values[0], axis.values[-1]) for axis in spanned))
@@ -248,7 +250,7 @@ def _tabulated(
 
     reads: list[list[int]] = []
 
-    def solved(made: Material, group: Sequence[Axis | Wavelengths]) -> list[tuple[Array, Array]]:
+    def solved(made: Material, group: Sequence[TextureAxis | Wavelengths]) -> list[tuple[Array, Array]]:
         """Columns and numbers of each side, (nodes, ...)."""
         nodes = [texture_axes.placed(made, group, values) for values in product(*(axis.values for axis in group))]
         wavelengths = next((axis.count for axis in group if isinstance(axis, Wavelengths)), 0)
@@ -317,7 +319,7 @@ def _tabulated(
         ]
         terms.append(Term(group, tuple(made[::2]), tuple(polynomials)))
     point = replace(at_a_point(), colour=context.colour, tables=context.tables)
-    return Tables(tuple(spanned), tuple(terms), tuple(adds), layouts, solver, point, fixed)
+    return TextureTables(tuple(spanned), tuple(terms), tuple(adds), layouts, solver, point, fixed)
 
 
 def _textures(ranges: Sequence[Range | Wavelengths]) -> list[Range]:
@@ -333,7 +335,7 @@ def _step(highest: Material, address: Address) -> float | None:
     return textured_films.step(address, layer)
 
 
-Group = tuple[Axis | Wavelengths, ...]
+Group = tuple[TextureAxis | Wavelengths, ...]
 
 
 def _of_few(polynomials: Array) -> tuple[Array, Array] | None:
@@ -342,7 +344,7 @@ def _of_few(polynomials: Array) -> tuple[Array, Array] | None:
     return None if alike else remainder.of_few(polynomials, WIDTH)
 
 
-def _groups(spanned: Sequence[Axis | Wavelengths], together: int) -> list[tuple[Group, Sequence[int]]]:
+def _groups(spanned: Sequence[TextureAxis | Wavelengths], together: int) -> list[tuple[Group, Sequence[int]]]:
     """The axes of all tables, some together in the first one, and those at whose middle others have the columns."""
     groups: list[tuple[Group, Sequence[int]]] = [(tuple(spanned[:together]), ())]
     others = [axis.with_middle(BESIDE) for axis in spanned[together:]]
@@ -390,7 +392,7 @@ def _leading(values: Array) -> Array:
     return values.swapaxes(0, 1).reshape(-1, *values.shape[2:])
 
 
-def _flat(values: Array, group: Sequence[Axis | Wavelengths]) -> Array:
+def _flat(values: Array, group: Sequence[TextureAxis | Wavelengths]) -> Array:
     """Values (nodes, channels, directions) or (nodes, channels), at all places, and interleaved: flat, with the nodes
     of directions first and channels last."""
     fine = texture_axes.refined(values, group)

@@ -10,14 +10,14 @@ import numpy as np
 from velatura.optics import fresnel
 from velatura.programs import closures
 from velatura.programs.blender.parameters import PARAMETERS
-from velatura.programs.closures import Array, Directions
+from velatura.programs.closures import Array, ViewAndLight
 from velatura.programs.parameters import Values, complete
 
 ORDERS = 3  # of interference
 THINNEST_NM = 0.1  # a thinner film is none
 
 
-def value(given: Values, pair: Directions, thin: bool = False) -> Array:
+def value(given: Values, pair: ViewAndLight, thin: bool = False) -> Array:
     """f |cos theta_o| (3, N) of the node with multiple scattering: no subsurface, sheen or emission.
 
     `thin` changes nothing, since the node always refracts.
@@ -102,7 +102,7 @@ def _often(f_0: Array, f_82: Array, alpha: float) -> Array:
     return closures.often(f_0 + (1 - f_0) / 21 - lowered / 126, lambda cosine: closures.albedo(cosine, alpha, 1.0))
 
 
-def _glass(pair: Directions, v: Mapping[str, Any], f: Array) -> Array:
+def _glass(pair: ViewAndLight, v: Mapping[str, Any], f: Array) -> Array:
     """Facets that reflect and refract, which are never brushed."""
     eta, colour = v["IOR"], np.sqrt(np.reshape(v["Base Color"], (3, 1)))
     # An index of 1 is no surface, regardless of its roughness

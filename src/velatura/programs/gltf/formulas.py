@@ -6,7 +6,7 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.programs import closures
-from velatura.programs.closures import Array, Directions, Number
+from velatura.programs.closures import Array, Number, ViewAndLight
 from velatura.programs.gltf.parameters import PARAMETERS
 from velatura.programs.parameters import Values, complete
 
@@ -18,7 +18,7 @@ def alphas(roughness: Number, strength: float) -> tuple[Number, Number]:
     return roughness**2 * (1 - strength**2) + strength**2, roughness**2
 
 
-def value(given: Values, pair: Directions, thin: bool = True) -> Array:
+def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
     """f |cos theta_o| (3, N) of appendix B and the extensions; `thin`: no refraction, as without a volume."""
     v = complete(PARAMETERS, given)
     base, tint = (np.reshape(v[name], (3, 1)) for name in ("baseColorFactor", "specularColorFactor"))

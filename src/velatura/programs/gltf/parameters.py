@@ -2,7 +2,7 @@
 
 from math import pi
 
-from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Parameter
+from velatura.programs.parameters import GREATEST, ROUGH, UNIT, Input
 
 CORE = "pbrMetallicRoughness"
 CLEARCOAT = "KHR_materials_clearcoat"
@@ -15,24 +15,24 @@ IRIDESCENCE = "KHR_materials_iridescence"
 
 #: Angles are in radians, thicknesses in nanometres; `baseColorFactor` is without its fourth component, the coverage.
 PARAMETERS = (
-    Parameter("baseColorFactor", (1.0, 1.0, 1.0), within=CORE, fit=("colour", *UNIT)),
-    Parameter("metallicFactor", 1.0, within=CORE, fit=("metal", *UNIT)),
-    Parameter("roughnessFactor", 1.0, within=CORE, fit=("rough", *ROUGH)),
-    Parameter("clearcoatFactor", 0.0, within=CLEARCOAT),
-    Parameter("clearcoatRoughnessFactor", 0.0, within=CLEARCOAT),
-    Parameter("anisotropyStrength", 0.0, within=ANISOTROPY, fit=("brushed", *UNIT)),
-    Parameter("anisotropyRotation", 0.0, -GREATEST, GREATEST, ANISOTROPY, ("brushed", -pi, pi)),  # anticlockwise
-    Parameter("ior", 1.5, low=1.0, high=GREATEST, within=IOR, fit=("index", 1.001, 4.0)),  # 0 for an infinite one
-    Parameter("specularFactor", 1.0, within=SPECULAR),
-    Parameter("specularColorFactor", (1.0, 1.0, 1.0), high=GREATEST, within=SPECULAR, fit=("tint", *UNIT)),
-    Parameter("transmissionFactor", 0.0, within=TRANSMISSION, fit=("clear", *UNIT)),
-    Parameter("thicknessFactor", 0.0, high=GREATEST, within=VOLUME),
-    Parameter("attenuationDistance", GREATEST, high=GREATEST, within=VOLUME),
-    Parameter("attenuationColor", (1.0, 1.0, 1.0), within=VOLUME),
-    Parameter("iridescenceFactor", 0.0, within=IRIDESCENCE),
-    Parameter("iridescenceIor", 1.3, low=1.0, high=GREATEST, within=IRIDESCENCE, fit=("film", 1.001, 3.0)),
-    Parameter("iridescenceThicknessMinimum", 100.0, high=GREATEST, within=IRIDESCENCE),
-    Parameter("iridescenceThicknessMaximum", 400.0, high=GREATEST, within=IRIDESCENCE, fit=("thickness", 10.0, 2000.0)),
+    Input("baseColorFactor", (1.0, 1.0, 1.0), within=CORE, fit=("colour", *UNIT)),
+    Input("metallicFactor", 1.0, within=CORE, fit=("metal", *UNIT)),
+    Input("roughnessFactor", 1.0, within=CORE, fit=("rough", *ROUGH)),
+    Input("clearcoatFactor", 0.0, within=CLEARCOAT),
+    Input("clearcoatRoughnessFactor", 0.0, within=CLEARCOAT),
+    Input("anisotropyStrength", 0.0, within=ANISOTROPY, fit=("brushed", *UNIT)),
+    Input("anisotropyRotation", 0.0, -GREATEST, GREATEST, ANISOTROPY, ("brushed", -pi, pi)),  # anticlockwise
+    Input("ior", 1.5, low=1.0, high=GREATEST, within=IOR, fit=("index", 1.001, 4.0)),  # 0 for an infinite one
+    Input("specularFactor", 1.0, within=SPECULAR),
+    Input("specularColorFactor", (1.0, 1.0, 1.0), high=GREATEST, within=SPECULAR, fit=("tint", *UNIT)),
+    Input("transmissionFactor", 0.0, within=TRANSMISSION, fit=("clear", *UNIT)),
+    Input("thicknessFactor", 0.0, high=GREATEST, within=VOLUME),
+    Input("attenuationDistance", GREATEST, high=GREATEST, within=VOLUME),
+    Input("attenuationColor", (1.0, 1.0, 1.0), within=VOLUME),
+    Input("iridescenceFactor", 0.0, within=IRIDESCENCE),
+    Input("iridescenceIor", 1.3, low=1.0, high=GREATEST, within=IRIDESCENCE, fit=("film", 1.001, 3.0)),
+    Input("iridescenceThicknessMinimum", 100.0, high=GREATEST, within=IRIDESCENCE),
+    Input("iridescenceThicknessMaximum", 400.0, high=GREATEST, within=IRIDESCENCE, fit=("thickness", 10.0, 2000.0)),
 )
 
 #: Channels of images that stand in place of factors.

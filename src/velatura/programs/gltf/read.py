@@ -11,17 +11,17 @@ from velatura.programs import parts
 from velatura.programs.given import Given
 from velatura.programs.gltf import formulas, parameters
 from velatura.programs.imported import Imported, Notes
-from velatura.programs.parameters import GREATEST, Parameter
+from velatura.programs.parameters import GREATEST, Input
 from velatura.programs.surface import Coat, Surface
 from velatura.programs.to_stack import imported
 
 PARAMETERS = (
     *parameters.PARAMETERS,
-    Parameter("emissiveFactor", (0.0, 0.0, 0.0), high=GREATEST),
-    Parameter("sheenColorFactor", (0.0, 0.0, 0.0), within="KHR_materials_sheen"),
-    Parameter("alpha", 1.0),
-    Parameter("dispersion", 0.0, high=GREATEST, within="KHR_materials_dispersion"),
-    Parameter("diffuseTransmissionFactor", 0.0, within="KHR_materials_diffuse_transmission"),
+    Input("emissiveFactor", (0.0, 0.0, 0.0), high=GREATEST),
+    Input("sheenColorFactor", (0.0, 0.0, 0.0), within="KHR_materials_sheen"),
+    Input("alpha", 1.0),
+    Input("dispersion", 0.0, high=GREATEST, within="KHR_materials_dispersion"),
+    Input("diffuseTransmissionFactor", 0.0, within="KHR_materials_diffuse_transmission"),
 )
 IGNORED = {
     "normalTexture": parts.FLAT,

@@ -6,7 +6,7 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.programs import closures
-from velatura.programs.closures import Array, Directions, Number
+from velatura.programs.closures import Array, Number, ViewAndLight
 from velatura.programs.openpbr.parameters import PARAMETERS, TURNS
 from velatura.programs.parameters import Values, complete
 
@@ -17,7 +17,7 @@ def alphas(roughness: Number, anisotropy: float) -> tuple[Number, Number]:
     return along, along * (1 - anisotropy)
 
 
-def value(given: Values, pair: Directions, thin: bool = True) -> Array:
+def value(given: Values, pair: ViewAndLight, thin: bool = True) -> Array:
     """f |cos theta_o| (3, N) of the reference graph: no fuzz, subsurface, dispersion or emission.
 
     `thin`: transmission passes a thin wall, without refraction.

@@ -13,7 +13,7 @@ from velatura.programs.given import Given
 from velatura.programs.imported import Imported, Notes
 from velatura.programs.metals import of_f82_tint
 from velatura.programs.openpbr import formulas, parameters
-from velatura.programs.parameters import GREATEST, Parameter
+from velatura.programs.parameters import GREATEST, Input
 from velatura.programs.surface import WHITE, Alpha, Coat, Surface
 from velatura.programs.to_stack import imported
 from velatura.programs.values import Value, changed, colour
@@ -21,14 +21,14 @@ from velatura.programs.values import Value, changed, colour
 PARAMETERS = (
     *parameters.PARAMETERS,
     *parameters.TURNS,
-    Parameter("emission_luminance", 0.0, high=GREATEST),
-    Parameter("emission_color", WHITE),
-    Parameter("geometry_opacity", 1.0),
-    Parameter("geometry_thin_walled", False),
+    Input("emission_luminance", 0.0, high=GREATEST),
+    Input("emission_color", WHITE),
+    Input("geometry_opacity", 1.0),
+    Input("geometry_thin_walled", False),
     # Of version 1.2
-    Parameter("specular_haze", 0.0),
-    Parameter("specular_haze_spread", 0.3),
-    Parameter("specular_retroreflectivity", 0.0),
+    Input("specular_haze", 0.0),
+    Input("specular_haze_spread", 0.3),
+    Input("specular_retroreflectivity", 0.0),
 )
 IGNORED = {"geometry_normal": parts.FLAT, "geometry_coat_normal": parts.FLAT}
 MISSED = 0.02  # of the reflectance towards the edge, that is listed

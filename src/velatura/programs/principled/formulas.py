@@ -6,7 +6,7 @@ import numpy as np
 
 from velatura.optics import fresnel
 from velatura.programs import closures
-from velatura.programs.closures import Array, Directions
+from velatura.programs.closures import Array, ViewAndLight
 from velatura.programs.parameters import Values, complete
 from velatura.programs.principled.parameters import PARAMETERS
 from velatura.stack.spectra import LUMINANCE
@@ -16,7 +16,7 @@ COAT_F_0, COAT_MASKING = 0.04, 0.25
 UNRESOLVED = 0.01  # excess of an index over 1
 
 
-def value(given: Values, pair: Directions, thin: bool = False) -> Array:
+def value(given: Values, pair: ViewAndLight, thin: bool = False) -> Array:
     """f |cos theta_o| (3, N) for wi above; `thin` changes nothing, since the plugin always refracts."""
     v = complete(PARAMETERS, given)
     base = np.reshape(v["base_color"], (3, 1))
@@ -65,7 +65,7 @@ def value(given: Values, pair: Directions, thin: bool = False) -> Array:
     return np.asarray(found)
 
 
-def _refracted(pair: Directions, eta: float, alpha_u: float, alpha_v: float) -> Array:
+def _refracted(pair: ViewAndLight, eta: float, alpha_u: float, alpha_v: float) -> Array:
     """Facets that hardly deflect light leave a lobe too narrow to be resolved; it then has that of the least
     roughness."""
     if eta - 1 < UNRESOLVED:

@@ -12,7 +12,7 @@ from velatura.programs import parts
 from velatura.programs.closures import burley
 from velatura.programs.given import Given
 from velatura.programs.imported import Imported, Notes
-from velatura.programs.parameters import Parameter
+from velatura.programs.parameters import Input
 from velatura.programs.principled import formulas, parameters
 from velatura.programs.surface import Coat, Surface
 from velatura.programs.to_stack import imported
@@ -20,7 +20,7 @@ from velatura.programs.values import changed
 from velatura.stack import RGB
 from velatura.stack.spectra import LUMINANCE
 
-PARAMETERS = (*parameters.PARAMETERS, Parameter("specular", 0.5))
+PARAMETERS = (*parameters.PARAMETERS, Input("specular", 0.5))
 RATES = ("diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate")
 COAT = 1.5  # index of a clearcoat, whose reflectance at the normal the plugin has
 

@@ -41,7 +41,7 @@ def of_lobes(body: bsdf.Lobed, wi: Direction, weighed: bool, added: bool) -> See
     """The lobes of a body in closed form, with weights where they are `weighed`; `added` where lobes are added up."""
     base = body.above.base if added else None  # the values read of a base hold all of it
     body, shown = _weighed(body) if weighed else (body, [])
-    fields = _fields(bsdf.scattered(body, wi), base.worth if base else ())
+    fields = _fields(bsdf.scattered(body, wi), base.importance if base else ())
     energies = [name for name in fields if part(name) in ("energy", "base_energy")]
     return Seen(body, fields, shown, sorted(energies, key=lambda name: name[0] != "t"))
 
@@ -83,8 +83,8 @@ def _weighed(body: bsdf.Lobed) -> tuple[bsdf.Lobed, list[str]]:
     return (replace(shown, base_above=base), [*names, "base"]) if body.above.base else (shown, names)
 
 
-def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> dict[str, Value]:
-    """All that is known once wi is, by its place in the struct; `worth` is that of the light over a diffuse base."""
+def _fields(seen: bsdf.Scattered, importance: Sequence[Value]) -> dict[str, Value]:
+    """All that is known once wi is, by its place in the struct; `importance` is that of nodes over a diffuse base."""
     lobes = {f"reflected[{k}]": lobe for k, lobe in enumerate(seen.reflected)}
     if seen.transmitted is not None:
         lobes["transmitted"] = seen.transmitted
@@ -92,4 +92,4 @@ def _fields(seen: bsdf.Scattered, worth: Sequence[Value]) -> dict[str, Value]:
     fields = {f"{place}.{part}": value for place, all_parts in parts.items() for part, value in all_parts.items()}
     if seen.base:
         fields |= {"base_scale": seen.base.scale, "base_energy": seen.base.energy}
-    return fields | {f"base_worth{k}": value for k, value in enumerate(worth)}
+    return fields | {f"base_importance{k}": value for k, value in enumerate(importance)}

@@ -38,7 +38,7 @@ Reflectance = Callable[[Value], Value]
 
 
 @dataclass(frozen=True)
-class Index:
+class MediumIndex:
     """An index n relative to the medium outside, and what lobes take of it: its inverse, and the radius of the ring of
     momenta beyond those that can leave, from 1 to n, in squares and as it is. `denser`: whether n is known to be 1 at
     least, so that light from any direction gets in."""
@@ -50,19 +50,19 @@ class Index:
     denser: bool = False
 
     @classmethod
-    def of(cls, n: Value, denser: bool = False) -> Index:
-        if isinstance(n, Index):
+    def of(cls, n: Value, denser: bool = False) -> MediumIndex:
+        if isinstance(n, MediumIndex):
             return n
         ring2 = n * n - 1
         return cls(n, 1 / n, ring2, ops.sqrt(ops.maximum(ring2, 0.0)), denser)
 
     @staticmethod
-    def selected(where: Value, a: Index, b: Index) -> Index:
+    def selected(where: Value, a: MediumIndex, b: MediumIndex) -> MediumIndex:
         """The index a where a condition holds, else b; denser if both are."""
         n, inverse, ring2, ring = (
             ops.select(where, getattr(a, x), getattr(b, x)) for x in ("n", "inverse", "ring2", "ring")
         )
-        return Index(n, inverse, ring2, ring, a.denser and b.denser)
+        return MediumIndex(n, inverse, ring2, ring, a.denser and b.denser)
 
     @property
     def is_outside(self) -> bool:
@@ -71,9 +71,9 @@ class Index:
 
 
 @dataclass(frozen=True)
-class RefractedLobe(ops.Named):
+class RefractedLobe(ops.NamedFields):
     """A lobe of `weight` (a colour) times a GGX reflection of `roughness` in a medium of index `n`, a number or an
-    `Index`, refracted out.
+    `MediumIndex`, refracted out.
 
     `facets` is the Fresnel reflectance of the facets by the square of a cosine, and `leaving` the share of light at a
     cosine outside that the first interface lets out; None where the weight has all of it, or nothing lies above. With
@@ -120,7 +120,7 @@ def eval_pdf(lobe: RefractedLobe, wi: Direction, wo: Direction) -> tuple[Value, 
 
 def eval_plain(lobe: RefractedLobe, wi: Direction, wo: Direction) -> Value:
     """The value of `eval_pdf` as it is printed, for directions above whose light is inside; the reference of a test."""
-    n, alpha = Index.of(lobe.n).n, (lobe.roughness.alpha_u, lobe.roughness.alpha_v)
+    n, alpha = MediumIndex.of(lobe.n).n, (lobe.roughness.alpha_u, lobe.roughness.alpha_v)
     i, o = (
         (x / n, y / n, ops.sqrt(1 - (x * x + y * y) / (n * n))) for x, y, _ in (_in_frame(lobe, w) for w in (wi, wo))
     )
@@ -154,7 +154,7 @@ def sample(lobe: RefractedLobe, wi: Direction, u1: Value, u2: Value) -> Directio
 def either(where: Value, a: RefractedLobe, b: RefractedLobe) -> RefractedLobe:
     """A lobe to `sample`: that of a where a condition holds, else of b."""
     roughness = Roughness(*(ops.select(where, x, y) for x, y in zip(a.roughness, b.roughness)))
-    return RefractedLobe(1.0, roughness, ops.select_record(where, Index.of(a.n), Index.of(b.n)))
+    return RefractedLobe(1.0, roughness, ops.select_record(where, MediumIndex.of(a.n), MediumIndex.of(b.n)))
 
 
 def integral(lobe: RefractedLobe, wi: Direction, normals: int = NORMALS) -> Value:
@@ -187,7 +187,7 @@ def _split(lobe: RefractedLobe, wi: Direction) -> tuple[list[Array], list[Any]]:
     """Numbers of each direction, and those of a lobe for all."""
     numbers = [*wi, *lobe.roughness]
     varying = [x for x in numbers if np.ndim(x)]
-    return varying, [[None if np.ndim(x) else x for x in numbers], Index.of(lobe.n), lobe.facets, lobe.leaving]
+    return varying, [[None if np.ndim(x) else x for x in numbers], MediumIndex.of(lobe.n), lobe.facets, lobe.leaving]
 
 
 def _joined(directions: Sequence[Value], numbers: Any) -> tuple[RefractedLobe, Direction]:
@@ -240,11 +240,11 @@ def _flat(reflectance: Reflectance, cosine: Value) -> Value:
     return found.reshape(*found.shape[:-1], *cosine.shape) if np.ndim(found) else found
 
 
-def _inside(lobe: RefractedLobe, wi: Direction) -> tuple[Value, Value, Index, Direction]:
+def _inside(lobe: RefractedLobe, wi: Direction) -> tuple[Value, Value, MediumIndex, Direction]:
     """Roughnesses, the index, and the momentum of light from wi in the medium, in the frame of the lobe."""
     alpha_u, alpha_v = ops.maximum(lobe.roughness.alpha_u, ALPHA_MIN), ops.maximum(lobe.roughness.alpha_v, ALPHA_MIN)
     x, y, z = _in_frame(lobe, wi)
-    n = Index.of(lobe.n)
+    n = MediumIndex.of(lobe.n)
     if n.is_outside or n.denser:
         return alpha_u, alpha_v, n, (x, y, _height(n, z))
     inverse = 1 / ops.sqrt(wi[0] * wi[0] + wi[1] * wi[1], ops.TINY)
@@ -254,12 +254,12 @@ def _inside(lobe: RefractedLobe, wi: Direction) -> tuple[Value, Value, Index, Di
     return alpha_u, alpha_v, n, (scale * x, scale * y, height)
 
 
-def _height(n: Index, z: Value) -> Value:
+def _height(n: MediumIndex, z: Value) -> Value:
     """Height, along the normal, of the momentum inside, of light with a cosine outside."""
     return ops.maximum(z, COS_INSIDE_MIN) if n.is_outside else ops.sqrt(_height2(n, z), None)
 
 
-def _height2(n: Index, z: Value) -> Value:
+def _height2(n: MediumIndex, z: Value) -> Value:
     """Its square."""
     if n.is_outside:
         return _height(n, z) * _height(n, z)
@@ -270,7 +270,7 @@ def _squares(w: Direction) -> Direction:
     return w[0] * w[0], w[1] * w[1], w[2] * w[2]
 
 
-def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: Index) -> tuple[Direction, Value]:
+def _far(i: Direction, p: tuple[Value, Value], p2: Value, n: MediumIndex) -> tuple[Direction, Value]:
     """Vector along the normal of light from outside the cone that is spread to a momentum p inside, and its scale."""
     stretch = ops.sqrt((n.ring2 + 1) * (1 / p2) - n.ring2 * p2)
     return (i[0] + stretch * p[0], i[1] + stretch * p[1], i[2] + n.ring * p2), stretch

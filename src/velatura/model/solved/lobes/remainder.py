@@ -39,7 +39,7 @@ TILT = 0.3  # by how much more light is sampled on one side than on the opposite
 
 
 @dataclass(frozen=True)
-class Remainder(ops.Named):
+class Remainder(ops.NamedFields):
     """The polynomial by its numbers, colours: C_ab, then B and A."""
 
     c_00: Value
@@ -75,12 +75,12 @@ class Remainder(ops.Named):
         return sum(k * moment for k, moment in zip(self._at(cos_theta), MOMENTS))
 
     @property
-    def samples(self) -> Samples:
+    def samples(self) -> RemainderSamples:
         """How it is sampled, which all colours share."""
         c_00, c_01, c_02, c_11, c_12, c_22, b, a = map(ops.mean, vars(self).values())
         rows = (c_00, c_01, c_02), (c_01, c_11, c_12), (c_02, c_12, c_22)
         even = [sum(c * moment for c, moment in zip(row, MOMENTS)) for row in rows]
-        return Samples((c_00 + c_02, c_01 + c_12, c_02 + c_22), (even[0], even[1], even[2]), b, a)
+        return RemainderSamples((c_00 + c_02, c_01 + c_12, c_02 + c_22), (even[0], even[1], even[2]), b, a)
 
     def density(self, wi: Direction, wo: Direction) -> Value:
         """Density of `sample`, of directions above."""
@@ -101,7 +101,7 @@ class Remainder(ops.Named):
 
 
 @dataclass(frozen=True)
-class Samples:
+class RemainderSamples:
     """Samples of a remainder, by means over its colours: coefficients of u at the cosine of the light, of what leaves
     along the horizon in the mean over azimuths, and of all that leaves; B and A."""
 

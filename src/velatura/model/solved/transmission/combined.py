@@ -39,7 +39,7 @@ Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
-class Parts(ops.Named):
+class Parts(ops.NamedFields):
     """Light from one direction that passes: weights (colours) of what goes straight through, of what bounces, and of
     what is scattered, and the probabilities of sampling them; reflected lobes are sampled else."""
 

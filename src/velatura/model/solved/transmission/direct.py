@@ -71,7 +71,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Refraction(ops.Named):
+class Refraction(ops.NamedFields):
     """An interface between media of mean indices n_1 and n_2; `eta` is the lower over the upper one, by colour.
 
     `width` is the roughness in the space of `WIDTHS`, `area` its product over the axes, `sign` that of n_1 - n_2: 0
@@ -95,7 +95,7 @@ class Refraction(ops.Named):
 
 
 @dataclass(frozen=True)
-class Slab(ops.Named):
+class CrossedSlab(ops.NamedFields):
     """What lies between two interfaces: optical depths along the normal (colours), in all and for scattering, and the
     asymmetry g."""
 
@@ -117,7 +117,7 @@ class Transmission:
     """
 
     refractions: tuple[Refraction, ...]
-    slabs: tuple[Slab, ...]
+    slabs: tuple[CrossedSlab, ...]
     faces: tuple[Value, ...]
     under: tuple[Value, ...]
     scattered: tuple[Value, ...]
@@ -143,17 +143,17 @@ def transmission(
     """
     n = 1.0
     refractions: list[Refraction] = []
-    slabs = [Slab()]
+    slabs = [CrossedSlab()]
     for meeting in chain(material.solid(), films_of(material)):
         layer = meeting.layer
         if isinstance(layer, SlabValues):
             tau_s = layer.tau_s
             clear = is_none(tau_s) if cloudy is None else len(refractions) not in cloudy
-            slabs[-1] = Slab(layer.tau_a + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
+            slabs[-1] = CrossedSlab(layer.tau_a + tau_s, 0.0 if clear else tau_s, ops.mean(layer.g))
             continue
         assert isinstance(layer, InterfaceValues) and layer.kind == "dielectric"
         refractions.append(_crossing(layer, meeting.above, n, kind, meeting.films))
-        slabs.append(Slab())
+        slabs.append(CrossedSlab())
         n = refractions[-1].n_2
     count = len(refractions)
     lower, *others = reversed(range(count) if stepped is None else stepped or [count - 1])
@@ -188,7 +188,7 @@ def _crossing(
 
 
 @dataclass(frozen=True)
-class MomentumInSlabs(ops.Named):
+class MomentumInSlabs(ops.NamedFields):
     """A momentum p in all slabs: its cosines there, 0 where it cannot be, and the same bounded; for interfaces, the
     steps w_l, and the shares (colours) of light that they let pass; the latter for slabs, too."""
 
@@ -243,7 +243,7 @@ def _smooth_below(crossed: MomentumInSlabs) -> list[Value]:
 
 
 @dataclass(frozen=True)
-class _Component(ops.Named):
+class _Component(ops.NamedFields):
     """Interface j as the one that takes the step: that step, bounded, the roughness seen there, and its weight."""
 
     step: Value
@@ -418,7 +418,7 @@ def sample(transmission: Transmission, wi: Direction, u: Value, u1: Value, u2: V
 
 
 @dataclass(frozen=True)
-class _Facet(ops.Named):
+class _Facet(ops.NamedFields):
     """The facet that refracts light: its slope, up to a sign, and (1 - F) v_i v_o / w^2 (a colour; 0 without one)."""
 
     slope: Momentum

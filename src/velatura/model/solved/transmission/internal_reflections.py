@@ -30,11 +30,11 @@ from velatura.model import fitted
 from velatura.model.solved.guards import COS_INSIDE_MIN, COS_OUTSIDE_MIN, G_MIN, INDEX_MAX, INTERNAL_ALPHA_MAX
 from velatura.model.solved.lobes import refracted_lobe, remainder
 from velatura.model.solved.lobes.refracted_lobe import RefractedLobe
-from velatura.model.solved.lobes.remainder import EVEN, Samples
+from velatura.model.solved.lobes.remainder import EVEN, RemainderSamples
 from velatura.model.solved.transmission.direct import (
     WIDTHS,
+    CrossedSlab,
     MomentumInSlabs,
-    Slab,
     Transmission,
     entered,
     is_none,
@@ -59,10 +59,10 @@ class Rest:
     numbers: Sequence[Value]
 
     @property
-    def samples(self) -> Samples:
+    def samples(self) -> RemainderSamples:
         """How diffuse light is sampled."""
         even, _, grazing, once, twice = self.numbers
-        return Samples((even + grazing, 0.0, 0.0), (1.0, 0.0, 0.0), once, twice)
+        return RemainderSamples((even + grazing, 0.0, 0.0), (1.0, 0.0, 0.0), once, twice)
 
     def within(self, o: Direction) -> Direction:
         """A direction below as one of all that diffuse light has."""
@@ -109,7 +109,7 @@ def rest(transmission: Transmission, wi: Direction, numbers: Sequence[Value] = E
     return Rest(_lobe(transmission, i, transmission.scattered, width), diffuse, reached, numbers)
 
 
-def _turned(slabs: Sequence[tuple[Slab, Value]]) -> Value:
+def _turned(slabs: Sequence[tuple[CrossedSlab, Value]]) -> Value:
     """Roughness of the mirror that deflects light as much as all scattering in slabs with their cosines."""
     depths = [ops.mean(slab.scattering) / ops.maximum(cosine, fitted.COS_OF_BOUNCES_MIN) for slab, cosine in slabs]
     total = reduce(operator.add, depths)
