@@ -111,15 +111,7 @@ def test_an_alias_is_the_same_material() -> None:
     assert rgb(Named("glass", "eta")) == rgb(Named("bk7", "eta"))
 
 
-@pytest.mark.parametrize(
-    "named",
-    [
-        Named("xyzzy", "eta"),
-        Named("bk7", "k"),
-        Named("mirror", "k"),
-        Named("AlAs", "k"),
-    ],
-)
+@pytest.mark.parametrize("named", [Named("xyzzy", "eta"), Named("bk7", "k"), Named("mirror", "k"), Named("AlAs", "k")])
 def test_what_has_no_spectrum_is_refused(named: Named) -> None:
     with pytest.raises(InvalidInput) as caught:
         spectrum(named)
