@@ -9,17 +9,20 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from typing import Any
 
 import chromium
 import pytest
 from editor import browser, require_fresh_page
+from lab import PATIENCE, Kernel, lab
 
-pytest.importorskip("jupyterlab")
-pytest.importorskip("anywidget")
-pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing())
-
-from lab import PATIENCE, Kernel, lab  # noqa: E402  (which needs Jupyter)
+# Not imported here, since all workers read all files of tests, and jupyterlab and nbformat take seconds
+LACKS = [name for name in ("jupyterlab", "anywidget") if not find_spec(name)]
+pytestmark = [
+    pytest.mark.skipif(bool(LACKS), reason=f"missing: {LACKS}"),
+    pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing()),
+]
 
 ONE = "import velatura as vt\none = vt.Editor('coated-gold', height=600)\none"
 TWO = "two = vt.Editor(vt.preset('coated-gold'), model='belcour2018', height=600)\ntwo"

@@ -13,8 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import nbformat
-
 import velatura
 
 NOTEBOOK = "notebook.ipynb"
@@ -31,6 +29,8 @@ class Lab:
     """JupyterLab with one notebook; nothing of the user's own Jupyter is read or written."""
 
     def __init__(self, folder: Path, cells: Sequence[str]) -> None:
+        import nbformat
+
         self.runtime = folder / "runtime"
         root = folder / "root"
         root.mkdir()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +11,17 @@ import pytest
 
 import velatura
 
-nbformat = pytest.importorskip("nbformat")
-nbclient = pytest.importorskip("nbclient")
-pytest.importorskip("anywidget")
+# Not imported here, since all workers read all files of tests, and these take seconds
+LACKS = [name for name in ("nbformat", "nbclient", "anywidget") if not find_spec(name)]
+pytestmark = pytest.mark.skipif(bool(LACKS), reason=f"missing: {LACKS}")
 
 NOTEBOOK = Path(__file__).parents[2] / "docs" / "tutorials" / "inverse-design.ipynb"
 LARGEST = 600_000  # bytes
 
 
 def stored() -> Any:
+    import nbformat
+
     return nbformat.read(NOTEBOOK, as_version=4)
 
 
@@ -28,6 +31,8 @@ def printed(cell: Any) -> str:
 
 def test_the_notebook_runs_and_prints_what_it_has_stored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is printed is rounded so that it is the same everywhere; of pictures it counts that there are any."""
+    import nbclient
+
     monkeypatch.setenv("PYTHONPATH", str(Path(velatura.__file__).parents[1]))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
     expected, run = stored(), stored()
