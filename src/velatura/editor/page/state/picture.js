@@ -3,6 +3,7 @@
 import { Offline } from '../connection.js';
 import { isPaired } from './compared.js';
 import { documentOf, flat, layersOf, pattern } from './material.js';
+import { Solutions } from './solutions.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
 
@@ -25,6 +26,7 @@ class Slot {
   #moved = null; // the state whose values Python is to work out next, with the question
   #moving = false; // whether it is at work on some
   #settled = false; // whether the state is drawn, and not a coarse answer
+  #solutions = new Solutions(); // of values that move
 
   constructor(name, services) {
     this.#name = name;
@@ -63,14 +65,23 @@ class Slot {
     clearTimeout(this.#timer);
     this.#timer = null;
     const { viewport, session, lacks } = this.#services, asks = isWorkedOut(this.shader);
+    if (!known || !viewport.held) this.#solutions.clear();
     if (!known || (asks && (!viewport.held || lacks('values')))) return this.#ask();
     this.#timer = setTimeout(() => {
       this.#timer = null;
       this.#ask();
     }, PAUSE);
     if (!asks) return this.#setContents(contentsOf(this.shader, state, session), state);
+    if (this.#foresee(state)?.close) return;
     this.#moved = { state, shape, question: { material, model, switches, coarse: true } };
     return this.#move();
+  }
+
+  /** Draws values that Python has not worked out, where there are solutions beside them; what was drawn, or null. */
+  #foresee(state) {
+    const found = this.#solutions.foresee(contentsOf(this.shader, state, this.#services.session).values);
+    if (found) this.#setContents({ ...found.contents, coarse: true }, state);
+    return found;
   }
 
   /** Takes a state of the same material, opened anew maybe, for the one that was asked for. */
@@ -95,8 +106,10 @@ class Slot {
       const { state, shape, question } = this.#moved;
       this.#moved = null;
       try {
-        const contents = await this.#services.call('values', question);
-        if (shape === this.drawn && !this.#settled) this.#setContents({ ...contents, coarse: true }, state);
+        const contents = this.#solutions.add(await this.#services.call('values', question));
+        if (shape !== this.drawn || this.#settled) continue;
+        const later = state === this.#state ? null : this.#foresee(this.#state);
+        if (!later) this.#setContents({ ...contents, coarse: true }, state);
       } catch {
         // The reason is shown when the shader is asked for, after a pause
       }

@@ -1,0 +1,93 @@
+// The picture follows values that move, drawn between answers of Python.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { follow } from '../../src/velatura/editor/page/state/picture.js';
+
+const SESSION = {
+  default_model: 'velatura',
+  names: { dielectrics: {}, conductors: {} },
+  schema: { interface: { eta: { kind: 'index', default: 1.5 }, alpha: { kind: 'pair', default: 0.1 } } },
+};
+
+const stateOf = (alpha) => ({
+  ...{ name: '', source: '', exterior: 1, thin: false, model: 'velatura', switches: {}, document: null, camera: null },
+  layers: [{ id: 1, kind: 'interface', enabled: true, keys: { eta: 1.5, alpha } }],
+  view: { object: 'ball', environment: 'studio', mode: 'one' },
+});
+
+/** An answer whose texel is the roughness. */
+function answer({ material }) {
+  const { eta, alpha } = material.layers[0].interface;
+  const encoded = (...numbers) => ({ array: new Float32Array(numbers), shape: [numbers.length] });
+  return {
+    ...{ key: 'k', shown: [], films: null },
+    values: { exterior: 1, layer0_eta: eta, layer0_alpha_u: alpha, layer0_alpha_v: alpha },
+    solution: { texels: encoded(alpha), remainder: encoded(alpha), layout: encoded(0) },
+  };
+}
+
+const pause = () => new Promise((resolve) => setImmediate(resolve));
+
+/** A picture of a roughness in a held viewport, with the texels that are drawn and the requests that wait. */
+async function held(alpha) {
+  const drawn = [], waiting = [];
+  let changed = null;
+  let state = stateOf(alpha);
+  const viewport = {
+    ...{ held: true, slots: { a: null }, camera: null },
+    ...{ setView: () => {}, setCamera: () => {}, setObject: () => {}, setEnvironment: () => {}, forget: () => {} },
+    setMaterial: () => {},
+    setContents: (_, { solution }) => drawn.push(solution.texels.array[0]),
+  };
+  const picture = follow({
+    ...{ viewport, session: SESSION, lacks: () => '', onProblem: () => {}, onBaked: () => {}, onShader: () => {} },
+    store: { get: () => state, subscribe: (listener) => ((changed = listener), () => {}) },
+    files: { object: () => null, environment: () => null },
+    call: (verb, question) =>
+      verb === 'shader' ? answer(question) : new Promise((resolve) => waiting.push(() => resolve(answer(question)))),
+  });
+  await pause();
+  const move = (to) => changed((state = stateOf(to)));
+  const reply = async () => {
+    waiting.shift()();
+    await pause();
+  };
+  return { picture, drawn, waiting, move, reply };
+}
+
+test('values that move are drawn at once where solutions lie beside them, and asked for one at a time', async () => {
+  const { picture, drawn, waiting, move, reply } = await held(0.1);
+  const last = () => drawn.at(-1);
+  move(0.2);
+  move(0.22);
+  assert.equal(waiting.length, 1);
+  await reply(); // the second one follows
+  await reply();
+  assert.equal(last(), Math.fround(0.22));
+  const before = drawn.length;
+  move(0.24);
+  assert.equal(drawn.length, before + 1);
+  assert.ok(Math.abs(last() - 0.24) < 1e-6);
+  assert.equal(waiting.length, 1);
+  // What was foreseen was close: the next values need no answer
+  await reply();
+  move(0.26);
+  assert.ok(Math.abs(last() - 0.26) < 1e-6);
+  assert.equal(waiting.length, 0);
+  picture.stop();
+});
+
+test('an answer that comes late does not take the picture back', async () => {
+  const { picture, drawn, move, reply } = await held(0.1);
+  move(0.2);
+  await reply();
+  move(0.22);
+  await reply();
+  move(0.24); // foreseen, and asked for
+  move(0.25);
+  await reply();
+  assert.ok(Math.abs(drawn.at(-1) - 0.25) < 1e-6);
+  picture.stop();
+});
