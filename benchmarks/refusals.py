@@ -76,6 +76,8 @@ def lifted(target: Target, n: int, reason: str) -> Iterator[Target]:
     ends = {DIMMER: 1e-3, BRIGHTER: 1 / max(colour.max(), 1e-3)}
     for scale in (x for reasons, end in ends.items() if reason in reasons for x in np.geomspace(1, end, STEPS)):
         yield whole.with_lobe(n, energy=tuple((scale * colour).tolist()))
+    for bound in np.geomspace(colour.max(), colour.min() + 1e-6, STEPS) if reason in DIMMER else ():
+        yield whole.with_lobe(n, energy=tuple(np.minimum(colour, bound).tolist()))
     if reason == "colour":
         for energy in np.geomspace(colour.min() + 1e-6, colour.max(), STEPS):
             yield whole.with_lobe(n, energy=float(energy))

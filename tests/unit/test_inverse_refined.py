@@ -16,11 +16,11 @@ from velatura.figures.bati2021_targets import FIGURES
 from velatura.inverse import Infeasible, Target, alternatives, invert, invert_stack
 from velatura.inverse.lobes.partial_stack import read_whole
 from velatura.inverse.local import coordinates, surrogate
-from velatura.inverse.local.dragged import DraggedStack
+from velatura.inverse.local.dragged import DraggedStack, seen
 from velatura.inverse.local.newton import Nearest, Problem
 from velatura.inverse.reasons import REASONS
 from velatura.model import named
-from velatura.stack import Medium, Stack
+from velatura.stack import Interface, Medium, Stack
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -339,6 +339,14 @@ def test_lobes_of_rough_stacks_are_not_refused() -> None:
     """A slice of the benchmark, where models differ by factors; each stack itself is an answer."""
     for target in [METAL_BELOW_A_ROUGH_COAT, *benchmark("inverse").physical_targets(2, MODEL, seed=0, rough=True)]:
         assert missed(target, invert_stack(target, MODEL).stack) < 1e-6
+
+
+def test_lobes_of_a_brushed_metal_below_a_rough_coat_are_not_refused() -> None:
+    """The lobes hardly have axes, the metal does: its reflectance lies on its bound long before the axes are found."""
+    coat, metal = Interface(eta=2.3, alpha=(0.562, 0.413)), Interface(eta=1.1, k=3.3, alpha=(0.203, 0.697))
+    form = [{"energy": 0.1}, {"energy": 0.1, "base": "conductor"}]
+    target = seen(Stack([coat, Medium(sigma_a=0.34), metal]), Target(form), MODEL)
+    assert missed(target, invert_stack(target, MODEL).stack) < 1e-4
 
 
 def test_lobes_below_crossed_brushings_are_not_refused() -> None:

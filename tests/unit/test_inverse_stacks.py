@@ -175,6 +175,10 @@ def test_the_index_follows_from_a_fixed_lower_roughness(model: Model) -> None:
     assert variance < (1e-4 if model.closed_form else 1e-3)
 
 
+ROUGH_PAIR = {"energy": 0.0035, "alpha": 0.17, "interfaces": 2}
+SMOOTH_PAIR = {"energy": [0.057, 0.056, 0.036], "alpha": 0.0, "interfaces": 2, "base": "conductor"}
+
+
 @pytest.mark.parametrize(
     ("lobes", "constraint", "why"),
     [
@@ -189,7 +193,13 @@ def test_the_index_follows_from_a_fixed_lower_roughness(model: Model) -> None:
         ([{"energy": 0.1, "fixed": {"eta": [1.5]}}], "absorption", "lobe 1: the fixed index reflects too little"),
         ([{"energy": 0.03, "fixed": {"eta": [1.5]}}], "excess", "lobe 1: the fixed index reflects more"),
         ([{"energy": [0.03, 0.1, 0.1], "fixed": {"eta": [1.5]}}], "colour", "lobe 1: what lies above it absorbs"),
-        ([{"energy": 0.04}, {"energy": 0.2, "fixed": {"eta": [2.0]}}], "absorption", "lobe 2: the fixed index"),
+        ([{"energy": 0.04}, {"energy": 0.15, "fixed": {"eta": [2.0]}}], "absorption", "lobe 2: the fixed index"),
+        # What is fixed is no reason where nothing is gained without it
+        ([{"energy": 0.04}, {"energy": 0.2, "fixed": {"eta": [2.0]}}], "energy", "lobe 2: no index up to 4 reflects"),
+        ([ROUGH_PAIR, {**SMOOTH_PAIR, "fixed": {"alpha": [None, 0.23]}}], "blur", "lobe 2: what lies above it blurs"),
+        ([ROUGH_PAIR, {**SMOOTH_PAIR, "fixed": {"eta": [2.5, None]}}], "blur", "lobe 2: what lies above it blurs"),
+        # Lower indices leave room for the blur, but none for the energy
+        ([{"energy": 0.6528, "alpha": 0.5533, "interfaces": 2}], "energy", "lobe 1: no index up to 4 reflects"),
     ],
 )
 def test_why_there_is_no_stack(lobes, constraint: str, why: str) -> None:

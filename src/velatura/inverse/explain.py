@@ -93,19 +93,41 @@ def why_not(target: Target, model: Model) -> tuple[int, str]:
     spread, keep = EFFORT[-1]
     paths = stacks.beginning(target, model)
     for n, lobe in enumerate(target.lobes):
-        tried = stacks.extended(paths, lobe, target, spread, first=n == 0)
+        above, tried = paths, stacks.extended(paths, lobe, target, spread, first=n == 0)
         paths = stacks.pruned(tried, lobe.interfaces, keep)
-        if not len(tried.cost):
-            return n, "fixed"  # between no two interfaces is there an index that gives it
-        if not len(paths.cost):
-            layers = tried.layers[-lobe.interfaces :]
-            if not np.any(layers[0].feasible):  # what it leaves for the one below has no meaning
-                layers = layers[:1]
-            names = [key for part in layers for key in part.margins]
-            margins = np.array(np.broadcast_arrays(*(m for part in layers for m in part.margins.values())))
-            best = margins[:, np.argmax(np.maximum(np.minimum(margins, 0), -1e9).sum(axis=0))]
-            return n, _named(names[int(np.argmin(best))], lobe)
+        if len(paths.cost):
+            continue
+        free = lobe.model_copy(update={"fixed": lobe.fixed.films_alone})
+        if free != lobe:
+            # What is fixed is the reason only if there is a stack without it
+            without = stacks.extended(above, free, target, spread, first=n == 0)
+            if not len(stacks.pruned(without, free.interfaces, keep).cost):
+                tried, lobe = without, free
+        return n, _violated(tried, lobe)
     return len(target.lobes) - 1, UNMET[0]
+
+
+def _violated(tried: stacks.Partial, lobe: TargetLobe) -> str:
+    """The constraint that the best of the stacks that were tried violates most; if some violate one alone, of these.
+
+    A colour that one index does not give is in the way at any brightness.
+    """
+    if not len(tried.cost):
+        return "fixed"  # between no two interfaces is there an index that gives it
+    layers = tried.layers[-lobe.interfaces :]
+    if not np.any(layers[0].feasible):  # what it leaves for the one below has no meaning
+        layers = layers[:1]
+    names = [key for part in layers for key in part.margins]
+    margins = np.array(np.broadcast_arrays(*(m for part in layers for m in part.margins.values())))
+    broken = np.maximum(np.minimum(margins, 0), -1e9)
+    alike = np.array(["energy" if name in TOO_LITTLE else name for name in names])
+    each = [np.any(broken[alike == name] < 0, axis=0) for name in dict.fromkeys(alike.tolist())]
+    alone = np.sum(each, axis=0) == 1
+    best = margins[:, np.argmax(np.where(alone | ~alone.any(), broken.sum(axis=0), -np.inf))]
+    violated = names[int(np.argmin(best))]
+    if violated == "energy" and np.ptp(lobe.colour) > 0 and dict(zip(names, best)).get("colour", 0) < 0:
+        return "colour"
+    return _named(violated, lobe)
 
 
 def _named(constraint: str, lobe: TargetLobe) -> str:

@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from velatura import ops
 from velatura.errors import InvalidInput
 from velatura.inverse.fitting import angles
 from velatura.inverse.fitting.angles import ReflectanceTable, radiance
 from velatura.inverse.lobes.interface import conductor_extinction
 from velatura.inverse.lobes.partial_stack import CLEAR, Array, written
-from velatura.inverse.local.approach import bounded_step
+from velatura.inverse.local.approach import Secants
 from velatura.model import Model, named, variance_kind
 from velatura.model.guards import ALPHA_MIN
 from velatura.model.papers import bsdf
@@ -50,8 +49,6 @@ MOST = 70  # of these readings
 # Rounds of a descent in closed form, of one that stands in for another model, and for how many values these are
 ROUNDS, STANDING, FEW_VALUES = 100, 25, 16
 TOLERANCE = 1e-9  # relative change in a round where it ends
-DAMPED, DAMPINGS = 1e-3, 3  # share of the slopes that damps steps at first, and tenfold ones that are tried
-SLOW, COARSE = 0.02, 1e-4  # shares of the cost that a step gains, below which slopes are differences again, or it ends
 CONDUCTOR, BRIGHTEST = (0.02, 30.0), 0.999  # bounds of a metal's eta, and of its reflectance in air
 DEPTH_MAX = 10.0  # of a medium
 THINNEST_NM, OUTSIDE = 1.0, 1e3  # of a film, and errors where there is no material
@@ -411,34 +408,15 @@ class Descent:
         return first if first.cost <= found.cost else End(self, found.x, found.fun)
 
     def _by_secants(self, readings: int) -> End:
-        """The nearest point that is read, by damped steps (Levenberg, Marquardt).
-
-        Their slopes are differences of the model, and then follow from each reading (Broyden's method), until steps
-        gain little.
-        """
-        best, size = self.start_end, self._scale
-        low, high = np.transpose([free.bounds for free in self.free])
-        slopes, fresh, damping, tried = np.empty(0), False, DAMPED, 0
-        while readings > (0 if len(slopes) else len(size)):
-            if not len(slopes):
-                slopes, fresh, readings = self._differences(best) * size, True, readings - len(size)
-            x, largest = best.x, np.linalg.norm(slopes, axis=0).max()
-            # Steps see no more of the residuals than the slopes span
-            span, own = np.linalg.qr(slopes)
-            ahead = -span.T @ best.residuals, damping * largest, (low - x) / size, (high - x) / size
-            step = bounded_step(own, *ahead)
-            end = End(self, np.clip(x + step * size, low, high), np.empty(0))
-            end, readings = replace(end, residuals=self.residuals(end.x[None])[0]), readings - 1
-            missed = end.residuals - best.residuals - slopes @ step
-            slopes = slopes + np.outer(missed, ops.divide(step, step @ step))
-            gained = 1 - end.cost / max(best.cost, ops.TINY)
-            best, damping, tried = (end, damping / 10, 0) if gained > 0 else (best, 10 * damping, tried + 1)
-            if gained < (COARSE if fresh else SLOW) and tried in (0, DAMPINGS):
-                if fresh:
-                    break
-                slopes, tried = np.empty(0), 0
-            fresh = fresh and gained <= 0
-        return best
+        first, (low, high) = self.start_end, np.transpose([free.bounds for free in self.free])
+        secants = Secants(
+            lambda x: self.residuals(x[None])[0],
+            lambda x, residuals: self._differences(End(self, x, residuals)),
+            self._scale,
+            low,
+            high,
+        )
+        return End(self, *secants.nearest(first.x, first.residuals, readings))
 
     def residuals(self, x: Array) -> Array:
         """Residuals at P points x (P, free), (P, 3 N): `missed`, and the gap."""

@@ -6,11 +6,12 @@ Every stack that is read lies within the bounds of its coordinates, so that ther
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from velatura import ops
 from velatura.inverse.lobes.partial_stack import Array, Mask
 from velatura.inverse.local.coordinates import Bound, Point, Reading, Space, units
 from velatura.optics import fresnel
@@ -24,6 +25,8 @@ ROUNDS, ENOUGH, CLOSE = 10, 1e-3, 1e-2  # of steps, the share by which the last 
 FURTHER, LITTLE = 0.7, 0.01  # share of a reflectance by which it changes in a step, and least change
 MET = 1e-8  # what is missing where all is met
 SETTLED = 0.9  # share of what was missing, above which corrections end
+DAMPED, DAMPINGS = 1e-3, 3  # share of slopes that damps steps at first, and tenfold ones that are tried
+SLOW, COARSE = 0.02, 1e-4  # shares of squares that a step gains, below which slopes are differences again, or it ends
 FAINT, BLURRED = 1e-4, 0.01  # energy and variance that is added before logarithms are compared
 
 
@@ -178,6 +181,49 @@ class Approach:
                 x[own.reflectances] = np.minimum(x[own.reflectances], fresnel.normal_incidence(end / above))
                 above = float(np.mean(space.layers(x[:, None])[n].eta))
         return x
+
+
+@dataclass
+class Secants:
+    """Damped steps within bounds (Levenberg, Marquardt) to where least is missing, of what takes long to read.
+
+    Slopes are differences, and then follow from each reading (Broyden's method), until steps gain little.
+
+    read: what is missing at a point (D,). differences: the slopes at a point, given what is missing there; they take D
+    readings. size: units of coordinates.
+    """
+
+    read: Callable[[Array], Array]
+    differences: Callable[[Array, Array], Array]
+    size: Array
+    low: Array
+    high: Array
+
+    def nearest(self, x: Array, missing: Array, readings: int, enough: float = 0.0) -> tuple[Array, Array]:
+        """The nearest point of those read, and what is missing there, from one that is read; not more readings than are
+        given, and none once nothing misses more than is enough."""
+        slopes, fresh, damping, tried = np.empty(0), False, DAMPED, 0
+        while readings > (0 if len(slopes) else len(x)) and np.abs(missing).max() > enough:
+            if not len(slopes):
+                slopes, fresh, readings = self.differences(x, missing) * self.size, True, readings - len(x)
+            # Steps see no more of what is missing than the slopes span
+            span, own = np.linalg.qr(slopes)
+            reach = (self.low - x) / self.size, (self.high - x) / self.size
+            step = bounded_step(own, -span.T @ missing, damping * np.linalg.norm(own, axis=0).max(), *reach)
+            there = np.clip(x + step * self.size, self.low, self.high)
+            found, readings = self.read(there), readings - 1
+            slopes = slopes + np.outer(found - missing - slopes @ step, ops.divide(step, step @ step))
+            gained = 1 - float(found @ found) / max(float(missing @ missing), ops.TINY)
+            if gained > 0:
+                x, missing, damping, tried = there, found, damping / 10, 0
+            else:
+                damping, tried = 10 * damping, tried + 1
+            if gained < (COARSE if fresh else SLOW) and tried in (0, DAMPINGS):
+                if fresh:
+                    break
+                slopes, tried = np.empty(0), 0
+            fresh = fresh and gained <= 0
+        return x, missing
 
 
 def bounded_step(slopes: Array, missing: Array, damping: float, low: Array, high: Array) -> Array:

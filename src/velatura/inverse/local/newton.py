@@ -9,7 +9,7 @@ import numpy as np
 
 from velatura import ops
 from velatura.inverse.lobes.partial_stack import Array
-from velatura.inverse.local.approach import bounded_step
+from velatura.inverse.local.approach import Secants
 from velatura.inverse.local.coordinates import SLACK, Bound, Point, Reading, units
 from velatura.inverse.reasons import UNMET
 
@@ -17,11 +17,10 @@ ROUNDS = 8
 ALMOST, ENOUGH = 1e-5, 1e-8  # missing share that one more round makes good; also where Newton's method is slow
 SLOW_ALMOST = 1e-6  # the same by Broyden's method, whose rounds gain less
 SLOW_ROUNDS, PATIENCE = 16, 3  # for models that are slow: of Broyden's method, and of these at a bound
-# Of lobes with axes, whose readings wind: what those rounds may miss where differences of the model itself follow,
-# rounds with these, and what may be missing in the end
-NEAR, MEASURED, WINDING = 0.05, 4, 1e-3
-FAR, MEASURED_FAR = 0.2, 8  # the same where a search does not give up
-DAMPED, DAMPINGS, GAINED = 1e-3, 3, 0.9  # damping of these rounds at first, tenfold ones that are tried, and least gain
+# Of lobes with axes, whose readings wind: what those rounds may miss where secants of the model itself follow, how many
+# readings these take for each coordinate, also at a bound, and what may be missing in the end
+NEAR, MEASURED, MEASURED_THERE, WINDING = 0.05, 4, 2, 1e-3
+FAR, MEASURED_FAR = 1.0, 8  # the same where a search does not give up
 JUMP = 3e-4  # what may be missing of other lobes in the end, since readings jump where nodes are shared out anew
 BLURRED = 0.2  # most that a folded variance changes by in a round
 HALF, FURTHER, LITTLE = 0.5, 0.7, 0.05  # shares of a reflectance by which it changes in a round, and least change
@@ -91,9 +90,10 @@ class Problem:
             # and not where what misses most is at its own
             stopped = space.winds and found.coordinate is not None
             apart = nearest.missing > ALMOST
-            if (apart == space.winds or space.coated) and not (stopped and self._ends(nearest)):
-                near, rounds = (NEAR, 1 if stopped else MEASURED) if effort == 1 else (FAR, MEASURED_FAR)
-                self._approach(nearest, rounds if nearest.missing < near else 0, giving=effort > 1)
+            if (apart == space.winds or space.coated) and not (stopped and effort == 1 and self._ends(nearest)):
+                near, readings = (NEAR, MEASURED_THERE if stopped else MEASURED) if effort == 1 else (FAR, MEASURED_FAR)
+                if nearest.missing < near:
+                    self._approach(nearest, readings * len(space.free), giving=effort > 1)
             enough = WINDING if space.winds else JUMP if found.reason in UNMET else ALMOST
             if nearest.missing < enough and not space.broken(nearest.x, None):
                 return Solution(Point(space, nearest.x), 1.0)
@@ -140,30 +140,33 @@ class Problem:
                 return space.bound_at(min(held), full)
         return space.broken(x, bound) or bound or self._in_the_way(nearest)
 
-    def _approach(self, nearest: Nearest, rounds: int, giving: bool) -> None:
-        """Newton's method from the nearest point, with differences of the model itself, damped (Levenberg, Marquardt).
+    def _approach(self, nearest: Nearest, readings: int, giving: bool) -> None:
+        """Keep the nearest point that secants read, from the nearest one so far.
 
         giving: whether what absorbs between lobes moves, too, which may be needed for roughnesses below 1.
         """
-        space, damping = self.start.space, DAMPED
+        space, start = self.start.space, nearest.x.copy()
         depths = [own.depth for own in space.interfaces if giving and own.depth is not None]
         free = np.r_[space.free, depths].astype(int)
-        for _ in range(rounds):
-            x, before = nearest.x, nearest.missing
-            here, size = space.differences(x, free), units(x[free])
-            low, high = ((end[free] - x[free]) / size for end in space.box)
-            for _ in range(DAMPINGS):
-                ahead = self._scaled(here.slopes * size), self._scaled(self.goal - here.value)
-                tried = x.copy()
-                tried[free] += size * bounded_step(*ahead, damping, low, np.maximum(high, low + SLACK))
-                tried = space.clipped(tried)
-                nearest.keep(tried, self._scaled(space.read(tried[:, None])[:, 0] - self.goal))
-                if nearest.missing < before / 2:
-                    damping = damping / 10
-                    break
-                damping = damping * 10
-            if nearest.missing < ALMOST or nearest.missing > GAINED * before:
-                break
+
+        def placed(values: Array) -> Array:
+            x = start.copy()
+            x[free] = values
+            return space.clipped(x)
+
+        def read(values: Array) -> Array:
+            x = placed(values)
+            missing = self._scaled(space.read(x[:, None])[:, 0] - self.goal)
+            nearest.keep(x, missing)
+            return missing
+
+        def differences(values: Array, missing: Array) -> Array:
+            return self._scaled(space.differences(placed(values), free).slopes)
+
+        low, high = (end[free] for end in space.box)
+        Secants(read, differences, units(start[free]), low, np.maximum(high, low + SLACK)).nearest(
+            start[free], read(start[free]), readings, ALMOST
+        )
 
     def _in_the_way(self, nearest: Nearest) -> Bound:
         """The bound that stops a search that does not end: that of the coordinate whose reading misses most."""
