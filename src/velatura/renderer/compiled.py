@@ -33,6 +33,7 @@ MANY = 500_000  # values of a kind, about as long as a kernel of it takes to com
 LEAST = 15_000  # values at a time: for fewer, a kernel takes longer to describe than NumPy to run
 BLOCK = 1 << 15  # values at a time, which a processor's cache holds
 COMPILED_BLOCK = 1 << 18
+REDUCED_BLOCK = 1 << 16  # of values that are reduced at once: larger arrays are new pages each time
 COLOURS = 3
 
 _asked: Counter[Hashable] = Counter()  # values so far, by kind
@@ -43,12 +44,14 @@ def over(
     sources: Sequence[Array],
     samples: Sequence[Array],
     numbers: Any,
+    reduced: Callable[[list[Array]], list[Array]] | None = None,
 ) -> tuple[list[Array], Array]:
     """Values of a function of each source (S,) and each sample (N,), or its own (S, N): of each group of K values
     (S, N, K), and sums over the samples (L, S).
 
     `numbers` are a list, a tuple or a record: of others, of numbers, and of colours (3, 1, ...). What is no number, and
-    0.0 and 1.0, belong to the kind of function. It runs by NumPy alone if other objects are among them.
+    0.0 and 1.0, belong to the kind of function. It runs by NumPy alone if other objects are among them. `reduced` makes
+    arrays (..., S) of the groups of some sources at a time, which are what is returned.
     """
     count = samples[0].shape[-1]
     module = None
@@ -56,18 +59,21 @@ def over(
         kind = function.__module__, function.__qualname__, *(x.ndim for x in samples), _kind(numbers)
         module = kernel.llvm() if _asked[kind] > MANY else None
         _asked[kind] += 0 if module else len(sources[0]) * count
-    size = max((COMPILED_BLOCK if module else BLOCK) // count, 1)
+    compiled_block = REDUCED_BLOCK if reduced else COMPILED_BLOCK
+    size = max((compiled_block if module else BLOCK) // count, 1)
     found = []
     for first in range(0, max(len(sources[0]), 1), size):
         some, own = [x[first : first + size] for x in sources], [_part(x, first, size) for x in samples]
         if module is None:
-            found.append(_plain(function, some, own, numbers))
+            values, sums = _plain(function, some, own, numbers)
         else:
-            found.append(_compiled(module, function, some, own, numbers))
-    groups, sums = zip(*found)
+            values, sums = _compiled(module, function, some, own, numbers)
+        found.append((reduced(values) if reduced else values, sums))
+    groups, totals = zip(*found)
     if len(found) == 1:
-        return groups[0], sums[0]
-    return [np.concatenate(each) for each in zip(*groups)], np.concatenate(sums, axis=-1)
+        return groups[0], totals[0]
+    axis = -1 if reduced else 0
+    return [np.concatenate(each, axis=axis) for each in zip(*groups)], np.concatenate(totals, axis=-1)
 
 
 def _part(samples: Array, first: int, size: int) -> Array:

@@ -85,8 +85,10 @@ class Basis(ABC):
                 groups += [[first], shares, [weight * mode for weight in light.weights for mode in modes]]
             return groups, others
 
-        found, others = compiled.over(function, (p, psi), fibonacci(samples), [*parts, *numbers])
-        return [self._sums(*found[k : k + 3]) for k in range(0, len(found), 3)], others
+        def sums(groups: list[Array]) -> list[Array]:
+            return [self._sums(*groups[k : k + 3]) for k in range(0, len(groups), 3)]
+
+        return compiled.over(function, (p, psi), fibonacci(samples), [*parts, *numbers], sums)
 
     def _sums(self, first: Array, shares: Array, weights: Array) -> Array:
         """Sums of weights (S, samples, K) by node, for stencils that begin at nodes `first`."""
