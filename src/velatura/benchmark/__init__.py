@@ -7,10 +7,10 @@ random stacks.
 from velatura.benchmark.candidates import Candidate, Factory, Walk, from_values, values_of
 from velatura.benchmark.entrants import ENTRANTS, entrant
 from velatura.benchmark.figure import save_figure
-from velatura.benchmark.scores import ScoredPair, Scores, kept_score, score
+from velatura.benchmark.scores import Record, Scores, kept_score, score
 from velatura.benchmark.stacks import FORMAT, KINDS, Case, edition
 from velatura.benchmark.task import write_task
-from velatura.benchmark.walks import WalkedLight, truth, walk_all
+from velatura.benchmark.walks import Light, truth, walk_all
 
 __all__ = [
     "ENTRANTS",
@@ -19,10 +19,10 @@ __all__ = [
     "Candidate",
     "Case",
     "Factory",
-    "ScoredPair",
+    "Light",
+    "Record",
     "Scores",
     "Walk",
-    "WalkedLight",
     "edition",
     "entrant",
     "from_values",

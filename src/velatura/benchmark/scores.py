@@ -30,7 +30,7 @@ NUMBERS = ConfigDict(allow_inf_nan=False)  # of scores that are read
 
 
 @dataclass(frozen=True)
-class ScoredPair:
+class Record:
     """Light from one direction on one side of a stack.
 
     variation, floor: total variation, and what an exact candidate would have in the mean, by the noise of both; albedo,
@@ -63,7 +63,7 @@ class Scores:
     """
 
     name: str
-    records: tuple[ScoredPair, ...]
+    records: tuple[Record, ...]
     asked: Mapping[str, int]
     refused: Mapping[str, int]
     cost: float | None = None
@@ -123,7 +123,7 @@ def score(
         MissingTool: LLVM is missing or too old.
     """
     cases, true = chosen(kinds), truth()
-    records: list[ScoredPair] = []
+    records: list[Record] = []
     asked: dict[str, int] = {kind.name: 0 for kind in KINDS if kind.name in {case.kind for case in cases}}
     refused: Counter[str] = Counter()
     for n, case in enumerate(cases):
@@ -187,7 +187,7 @@ def kept_score(
     return found
 
 
-def _record(case: Case, key: tuple[int, str], found: Binned, true: Binned, spread: float | None) -> ScoredPair:
+def _record(case: Case, key: tuple[int, str], found: Binned, true: Binned, spread: float | None) -> Record:
     total = true.total.sum()
     noise = np.hypot(found.energy_error, true.energy_error)
     lit = true.total > FAINT
@@ -196,7 +196,7 @@ def _record(case: Case, key: tuple[int, str], found: Binned, true: Binned, sprea
     def relative(values: Array) -> tuple[float | None, ...]:
         return tuple(float(x / e) if bright else None for x, e, bright in zip(values, true.total, lit))
 
-    return ScoredPair(
+    return Record(
         stack=case.id,
         kind=case.kind,
         bounces="any" if case.often else "one",

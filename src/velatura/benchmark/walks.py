@@ -43,7 +43,7 @@ class Binned:
 
 
 @dataclass(frozen=True)
-class WalkedLight(Binned):
+class Light(Binned):
     """The same with the mean (2,) and the covariance (3,: xx, xy, yy) of the outgoing x and y, over the mean of the
     colours, and their standard errors.
     """
@@ -57,7 +57,7 @@ class WalkedLight(Binned):
 # Walk ----------------------------------------------------------------------------------------------------------------
 
 
-def walked(case: Case, direction: int, paths: int = PATHS, seed: int = SEED) -> dict[str, WalkedLight]:
+def walked(case: Case, direction: int, paths: int = PATHS, seed: int = SEED) -> dict[str, Light]:
     """The light of a case from one of its directions, by side.
 
     Raises:
@@ -76,7 +76,7 @@ def walked(case: Case, direction: int, paths: int = PATHS, seed: int = SEED) -> 
     }
 
 
-def _light(bins: Bins, wo: Array, weight: Array, paths: int, symmetric: bool) -> WalkedLight:
+def _light(bins: Bins, wo: Array, weight: Array, paths: int, symmetric: bool) -> Light:
     number = bins.number(wo)
 
     def summed(values: Array) -> Array:
@@ -90,7 +90,7 @@ def _light(bins: Bins, wo: Array, weight: Array, paths: int, symmetric: bool) ->
         energy = 0.5 * (energy + mirrored(energy))
         error = 0.5 * np.hypot(error, mirrored(error))
     spread = moments(wo[:2], weight.mean(axis=0))
-    return WalkedLight(energy, error, total, np.sqrt(np.maximum(squares - total**2, 0) / paths), *spread)
+    return Light(energy, error, total, np.sqrt(np.maximum(squares - total**2, 0) / paths), *spread)
 
 
 def walk_all(
@@ -111,7 +111,7 @@ def walk_all(
     cases = list(all_drawn(of_each, seed))
     kept = folder / f"walks-seed-{seed}-paths-{paths}"
     files.make_folder(kept)
-    lights: dict[Key, WalkedLight] = {}
+    lights: dict[Key, Light] = {}
     for n, case in enumerate(cases):
         for (direction, side), light in _kept(case, paths, seed, kept / f"{case.id}.npz").items():
             lights[n, direction, side] = light
@@ -120,15 +120,15 @@ def walk_all(
     write(folder, cases, lights, paths, seed)
 
 
-def _kept(case: Case, paths: int, seed: int, path: Path) -> dict[tuple[int, int], WalkedLight]:
+def _kept(case: Case, paths: int, seed: int, path: Path) -> dict[tuple[int, int], Light]:
     """The light of a case, from a file if it is there, else walked and kept there."""
     text = json.dumps(case.to_dict())
-    names = [field.name for field in fields(WalkedLight)]
+    names = [field.name for field in fields(Light)]
     if path.exists():
         with np.load(path) as found:
             if str(found["case"]) == text:
                 return {
-                    (direction, side): WalkedLight(*(found[f"{direction}-{side}-{name}"] for name in names))
+                    (direction, side): Light(*(found[f"{direction}-{side}-{name}"] for name in names))
                     for direction in range(len(case.incident))
                     for side in range(1 + case.stack.transmits)
                 }
@@ -146,7 +146,7 @@ def _kept(case: Case, paths: int, seed: int, path: Path) -> dict[tuple[int, int]
 # Files ---------------------------------------------------------------------------------------------------------------
 
 
-def write(folder: Path, cases: Iterable[Case], lights: Mapping[Key, WalkedLight], paths: int, seed: int) -> None:
+def write(folder: Path, cases: Iterable[Case], lights: Mapping[Key, Light], paths: int, seed: int) -> None:
     """Write an edition.
 
     Raises:
@@ -180,7 +180,7 @@ def _rounded(values: Array, bits: int) -> Array:
 
 
 def _names() -> list[str]:
-    return [field.name for field in fields(WalkedLight)]
+    return [field.name for field in fields(Light)]
 
 
 def _columns() -> list[str]:
@@ -190,7 +190,7 @@ def _columns() -> list[str]:
     return ["stack", "kind", "bounces", "wi_x", "wi_y", "wi_z", "side", *measured]
 
 
-def _row(case: Case, key: Key, light: WalkedLight) -> list[str]:
+def _row(case: Case, key: Key, light: Light) -> list[str]:
     measured = np.concatenate([getattr(light, name) for name in _names()[2:]])
     _, direction, side = key
     wi = [f"{x:.6f}" for x in case.incident[direction]]
@@ -198,7 +198,7 @@ def _row(case: Case, key: Key, light: WalkedLight) -> list[str]:
 
 
 @cache
-def truth() -> Mapping[tuple[str, int, str], WalkedLight]:
+def truth() -> Mapping[tuple[str, int, str], Light]:
     """The truth that comes with the package, by stack, direction, and side; not to be written to."""
     ids = [fields["id"] for fields in json.loads((DATA / "stacks.json").read_text(encoding="utf-8"))["stacks"]]
     with (DATA / "truth.npz").open("rb") as stream, np.load(stream) as found:
@@ -207,6 +207,6 @@ def truth() -> Mapping[tuple[str, int, str], WalkedLight]:
             array.flags.writeable = False
         keys = zip(found["case"], found["direction"], found["side"])
         return {
-            (ids[case], int(direction), SIDES[side]): WalkedLight(**{name: array[n] for name, array in arrays.items()})
+            (ids[case], int(direction), SIDES[side]): Light(**{name: array[n] for name, array in arrays.items()})
             for n, (case, direction, side) in enumerate(keys)
         }
