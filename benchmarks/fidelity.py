@@ -66,6 +66,10 @@ GOALS: dict[str, tuple[float, float, float | None]] = {
     "passing, once: from inside": (0.055, 0.010, None),
     "passing, often: from inside": (0.055, 0.010, None),
     "passing scattering, often: from inside": (0.075, 0.010, None),
+    "brushed under lacquer": (0.035, 0.004, 0.015),
+    "crossed brushing": (0.035, 0.004, 0.015),
+    "frosted pane": (0.045, 0.004, 0.015),
+    "very rough": (0.035, 0.004, 0.015),
     "passing, once: beyond the critical angle": (0.10, 0.05, None),
     "passing, often: beyond the critical angle": (0.10, 0.05, None),
 }
