@@ -1,7 +1,7 @@
 // The picture follows values that move, drawn between answers of Python.
 
 import assert from 'node:assert/strict';
-import { test } from 'node:test';
+import { mock, test } from 'node:test';
 
 import { follow } from '../../src/velatura/editor/page/state/picture.js';
 
@@ -27,6 +27,9 @@ function answer({ material }) {
     solution: { texels: encoded(alpha), remainder: encoded(alpha), layout: encoded(0) },
   };
 }
+
+let clock = 0; // milliseconds
+mock.method(performance, 'now', () => clock);
 
 const pause = () => new Promise((resolve) => setImmediate(resolve));
 
@@ -89,5 +92,21 @@ test('an answer that comes late does not take the picture back', async () => {
   move(0.25);
   await reply();
   assert.ok(Math.abs(drawn.at(-1) - 0.25) < 1e-6);
+  picture.stop();
+});
+
+test('Python rests after an answer, while values are foreseen', async () => {
+  const { picture, drawn, waiting, move, reply } = await held(0.1);
+  for (const alpha of [0.2, 0.21]) {
+    move(alpha);
+    clock += 50;
+    await reply();
+  }
+  move(0.225); // foreseen, but farther than any that was close
+  assert.equal(waiting.length, 0);
+  assert.ok(Math.abs(drawn.at(-1) - 0.225) < 1e-6);
+  clock += 101;
+  move(0.226);
+  assert.equal(waiting.length, 1);
   picture.stop();
 });

@@ -6,6 +6,7 @@ import { documentOf, flat, layersOf, pattern } from './material.js';
 import { Solutions } from './solutions.js';
 
 const PAUSE = 250; // milliseconds without a change, after which Python is asked whether values are allowed
+const REST = 2; // times as long as an answer took, Python is not asked for values that are foreseen
 
 /** One material in the viewport: the state's own (`a`), that of the other model (`b`), or one beside it (`b` to `d`). */
 class Slot {
@@ -27,6 +28,7 @@ class Slot {
   #moving = false; // whether it is at work on some
   #settled = false; // whether the state is drawn, and not a coarse answer
   #solutions = new Solutions(); // of values that move
+  #rest = 0; // time until which Python is not asked for what is foreseen
 
   constructor(name, services) {
     this.#name = name;
@@ -72,7 +74,8 @@ class Slot {
       this.#ask();
     }, PAUSE);
     if (!asks) return this.#setContents(contentsOf(this.shader, state, session), state);
-    if (this.#foresee(state)?.close) return;
+    const found = this.#foresee(state);
+    if (found && (found.close || performance.now() < this.#rest)) return;
     this.#moved = { state, shape, question: { material, model, switches, coarse: true } };
     return this.#move();
   }
@@ -106,10 +109,14 @@ class Slot {
       const { state, shape, question } = this.#moved;
       this.#moved = null;
       try {
+        const begin = performance.now();
         const contents = this.#solutions.add(await this.#services.call('values', question));
+        const end = performance.now();
+        this.#rest = end + REST * (end - begin);
         if (shape !== this.drawn || this.#settled) continue;
         const later = state === this.#state ? null : this.#foresee(this.#state);
-        if (!later) this.#setContents({ ...contents, coarse: true }, state);
+        if (later) this.#moved = null;
+        else this.#setContents({ ...contents, coarse: true }, state);
       } catch {
         // The reason is shown when the shader is asked for, after a pause
       }
