@@ -121,7 +121,7 @@ def textured(stack: Stack, model: Model) -> Any:
     return kernel.load_dict({"type": "layered", "material": dumps(stack, "json"), **switches, **maps})
 
 
-def seen(probe: Probe, incidence: Incidence, azimuth: float) -> tuple[Array, Array]:
+def seen(probe: Probe, incidence: Incidence, azimuth: float = 0.0) -> tuple[Array, Array]:
     """Energies (2, 2, 3, bins, bins) as `Walks.grids` has them, and the weights (n,) of all samples."""
     z = -incidence.cosine if incidence.inside else incidence.cosine
     sine = np.sqrt(1 - z * z)

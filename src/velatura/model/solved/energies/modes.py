@@ -26,7 +26,7 @@ from velatura.renderer.low_discrepancy import fibonacci
 
 Array = NDArray[np.floating]
 
-RATIOS = (2.0, 5.0, 10.0)  # of two roughnesses, from which one more order of the azimuth is needed
+RATIOS = (1.8, 5.0, 10.0)  # of two roughnesses, from which one more order of the azimuth is needed
 SQUARE = 1e-6  # of a right angle, within which two axes are at one
 ROOT = float(np.sqrt(2))
 
