@@ -211,6 +211,7 @@ def test_hostile_names_run_nothing_under_a_strict_policy(stranger: Visit) -> Non
     button(name="Pin as B").click()
     button(name="Put beside").click()
     button(name="Export").click()
+    page.get_by_label("What is written").wait_for()  # which moves the button
     button(name="Close").click()
     button(name="Open").click()
     for name in hostile.NAMES[:3]:

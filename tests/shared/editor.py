@@ -85,26 +85,15 @@ def _environment() -> dict[str, str]:
 EVERYTHING_OPEN = """localStorage['velatura.layout'] ??=
   JSON.stringify({ form: 1, value: { look: true, view: true, model: true } })"""
 
-# No paths are traced, however late a busy machine gets to the page: previews are the same every time
-PREVIEWS_ALONE = """{
-  let editor;
-  Object.defineProperty(window, 'velatura', {
-    get: () => editor,
-    set(mounted) {
-      editor = mounted;
-      editor.viewport?.setBudget({ samples: 0 });
-    },
-  });
-}"""
-
 
 class Visit:
     """A page of the editor, with what its console has complained about; a slow machine has its time."""
 
     open: ClassVar[list[Visit]] = []  # all that were begun
 
-    def __init__(self, page: Any, address: str, script: str = "") -> None:
-        """`script` runs in each document of the visit before its own code does."""
+    def __init__(self, page: Any, address: str, script: str = "", fresh: bool = False) -> None:
+        """`script` runs in each document of the visit before its own code does. What a `fresh` one finds in storage is
+        forgotten by the page itself: its process keeps what was cleared from outside."""
         self.open.append(self)
         self.page = page
         page.set_default_timeout(90_000)  # clicks, too, wait for shaders that the processor compiles
@@ -114,8 +103,8 @@ class Visit:
             page.on(event, listener)
         self._devtools = page.context.new_cdp_session(page)
         self._devtools.send("Page.enable")
-        first = self._before("sessionStorage.clear()")
-        self._before(f"{script};{EVERYTHING_OPEN};{PREVIEWS_ALONE}")
+        first = self._before(f"sessionStorage.clear();{'localStorage.clear()' if fresh else ''}")
+        self._before(f"{script};{EVERYTHING_OPEN}")
         page.goto(address)
         self._devtools.send("Page.removeScriptToEvaluateOnNewDocument", first)
         self.ready()
@@ -136,8 +125,9 @@ class Visit:
             self.complaints.append(message.text)
 
     def ready(self) -> None:
-        """Wait until there is a picture."""
+        """Wait until there is a picture; from then on the preview alone is drawn, which is the same every time."""
         self.page.wait_for_function("() => window.velatura?.viewport.slots.a.shader && velatura.viewport.previewed")
+        self.page.evaluate("window.velatura.viewport.setBudget({ samples: 0 })")
 
     def told(self) -> str:
         """The state of the page, for the report of a failed test."""
@@ -196,7 +186,7 @@ class Tabs:
         width, height = size or self.size
         page.set_viewport_size({"width": width, "height": height})
         page.emulate_media(color_scheme=scheme)
-        self.visits.append(Visit(page, address, script))
+        self.visits.append(Visit(page, address, script, fresh=not self.visits))
         return self.visits[-1]
 
     def forget(self) -> list[Visit]:
