@@ -156,9 +156,9 @@ def compared(kind: Kind, walks: Walks, bsdf: Any) -> list[Record]:
     """Every direction of incidence, and the sides that are looked at."""
     probe, found = probe_of(bsdf), []
     for n, incidence in enumerate(walks.incidences):
-        grids, weights = seen(probe, incidence, kind.azimuth)
+        grids, weights = seen(probe, incidence, kind.light.azimuth)
         modelled, true = grids, walks.grids[:, :, :, n]
-        if not kind.azimuth:
+        if not kind.light.azimuth:
             modelled, true = (symmetric(walks.stack, incidence.cosine, g) for g in (modelled, true))
         spread = float(weights.var() / max(weights.mean(), 1e-9) ** 2)
         for side, name in enumerate(FAINT):

@@ -45,14 +45,24 @@ from velatura.stack import Material, Stack, as_described, dumps
 Array = NDArray[np.floating]
 
 COSINES = (1.0, 0.7, 0.35)
-SLANTED = (0.9, 0.5, 0.2, 0.08)
-ASIDE = 0.2  # radians: mirrored light is on no border of bins
 MOMENTA = (0.0, 0.6, 0.93, 1.04)  # from inside
 DEEP = 0.6  # of the way from the critical angle to grazing
 HALVES = ("fit", "test")
 STACKS, PATHS, FOLDER = 12, 1_000_000, Path("walks")
 
 # Stacks of every kind ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """Light from above at some cosines and an azimuth from the tangent; and into solids also from inside, or not."""
+
+    cosines: tuple[float, ...] = COSINES
+    azimuth: float = 0.0
+    inside: bool = True
+
+
+SLANTED = Lighting((0.9, 0.5, 0.2, 0.08), 0.2, False)  # mirrored light is on no border of bins
 
 
 @dataclass(frozen=True)
@@ -66,8 +76,7 @@ class Kind:
     draw: Callable[[np.random.Generator, int], Stack]
     often: bool
     passes: bool = False
-    cosines: tuple[float, ...] = COSINES
-    azimuth: float = 0.0  # of the light, from the tangent
+    light: Lighting = Lighting()
 
     def stack(self, seed: int, half: str, number: int) -> Stack:
         """One of its stacks, independent of the others that are drawn."""
@@ -86,10 +95,10 @@ KINDS = (
     Kind("passing, once", clear, False, True),
     Kind("passing, often", clear, True, True),
     Kind("passing scattering, often", milky, True, True),
-    Kind("brushed under lacquer", lacquered, True, False, SLANTED, ASIDE),
-    Kind("crossed brushing", crossed, True, False, SLANTED, ASIDE),
-    Kind("frosted pane", frosted, True, True, SLANTED, ASIDE),
-    Kind("very rough", very_rough, True, True, SLANTED, ASIDE),
+    Kind("brushed under lacquer", lacquered, True, light=SLANTED),
+    Kind("crossed brushing", crossed, True, light=SLANTED),
+    Kind("frosted pane", frosted, True, True, SLANTED),
+    Kind("very rough", very_rough, True, True, SLANTED),
 )
 
 # Their walks ---------------------------------------------------------------------------------------------------------
@@ -121,8 +130,8 @@ class Walks:
 
 def incidences(kind: Kind, stack: Stack) -> tuple[Incidence, ...]:
     """Every direction that a stack of that kind is lit from."""
-    found = [Incidence(c, False, float(np.sqrt(1 - c * c))) for c in kind.cosines]
-    if kind.passes and not stack.thin and kind.cosines is COSINES:
+    found = [Incidence(c, False, float(np.sqrt(1 - c * c))) for c in kind.light.cosines]
+    if kind.passes and not stack.thin and kind.light.inside:
         index = Material.of(stack, as_described).below
         momenta = sorted({*MOMENTA, 1 + DEEP * (index - 1)})
         found += [Incidence(float(np.sqrt(1 - (p / index) ** 2)), True, p) for p in momenta]
@@ -137,14 +146,17 @@ def walked(kind: Kind, stack: Stack, paths: int) -> Walks:
         seen = _reversed(stack) if inside else stack
         cosines = [i.cosine for i in lit if i.inside == inside]
         halves = [
-            vt.reference.distribution(seen, cosines, kind.azimuth, paths // 2, seed, kind.often) for seed in (1, 2)
+            vt.reference.distribution(seen, cosines, kind.light.azimuth, paths // 2, seed, kind.often)
+            for seed in (1, 2)
         ]
         nothing = np.zeros_like(halves[0].reflected)
         sides.append([[h.reflected, nothing if h.transmitted is None else h.transmitted] for h in halves])
     grids = np.concatenate([np.array(side, np.float32) for side in sides], axis=3)
     if kind.passes:
         return Walks(stack, lit, grids, None)
-    energy = np.array(vt.reference.statistics(stack, kind.cosines, kind.azimuth, paths, 3, kind.often).energy)
+    energy = np.array(
+        vt.reference.statistics(stack, kind.light.cosines, kind.light.azimuth, paths, 3, kind.often).energy
+    )
     return Walks(stack, lit, grids, energy)
 
 

@@ -39,9 +39,14 @@ def base(rng: np.random.Generator, turned: str | None = None) -> Interface:
     """A metal of any colour, more rarely a mirror or glass."""
     u = rng.uniform()
     if u < 0.7:
-        eta, k = (tuple(map(float, rng.uniform(*span, 3))) for span in ((0.2, 2.0), (1.5, 5.0)))
+        eta, k = _metal(rng, 1.5, 5.0)
         return surface(rng, turned, eta=eta, k=k)
     return surface(rng, turned, conductor="mirror") if u < 0.85 else coat(rng, turned)
+
+
+def _metal(rng: np.random.Generator, low: float, high: float) -> tuple[RGB, RGB]:
+    """Index and extinction of any colour, the latter between two bounds."""
+    return _colour(rng.uniform(0.2, 2.0, 3)), _colour(rng.uniform(low, high, 3))
 
 
 def absorbing(rng: np.random.Generator) -> Medium:
@@ -131,7 +136,7 @@ def lacquered(rng: np.random.Generator, number: int) -> Stack:
     """Brushed metal, three to twelve times as rough across the brushing, under one lacquer, smooth in every second."""
     long, ratio = float(rng.uniform(0.15, 0.4)), float(rng.uniform(3, 12))
     lacquer = Interface(eta=float(rng.uniform(1.4, 1.6)), alpha=float(rng.uniform(0.02, 0.2)) if number % 2 else 0.0)
-    return Stack([lacquer, _metal(rng, (long, long / ratio), float(rng.uniform(0, 180)))])
+    return Stack([lacquer, _brushed(rng, (long, long / ratio), float(rng.uniform(0, 180)))])
 
 
 def crossed(rng: np.random.Generator, number: int) -> Stack:
@@ -143,7 +148,7 @@ def crossed(rng: np.random.Generator, number: int) -> Stack:
         last = k == 1 + number % 2
         alpha, angle = (long, long / ratio), (angle + float(rng.uniform(45, 135))) % 180
         eta = float(rng.uniform(1.3, 1.7))
-        layers.append(_metal(rng, alpha, angle) if last else Interface(eta=eta, alpha=alpha, rotation=angle))
+        layers.append(_brushed(rng, alpha, angle) if last else Interface(eta=eta, alpha=alpha, rotation=angle))
     return Stack(layers)
 
 
@@ -161,6 +166,6 @@ def very_rough(rng: np.random.Generator, number: int) -> Stack:
     return Stack([Interface(eta=float(n), alpha=float(a)) for n, a in zip(indices, alphas)], thin=bool(number % 2))
 
 
-def _metal(rng: np.random.Generator, alpha: tuple[float, float], rotation: float) -> Interface:
-    eta, k = (_colour(rng.uniform(*span, 3)) for span in ((0.2, 2.0), (3.0, 7.0)))
+def _brushed(rng: np.random.Generator, alpha: tuple[float, float], rotation: float) -> Interface:
+    eta, k = _metal(rng, 3.0, 7.0)
     return Interface(eta=eta, k=k, alpha=alpha, rotation=rotation)

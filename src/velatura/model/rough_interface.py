@@ -20,7 +20,7 @@ from velatura.films.tables import Coated
 from velatura.model import fitted
 from velatura.model.guards import ALPHA_MIN, COS_AT_FACETS_MIN, SIN_AT_FACETS_MAX
 from velatura.ops import Value
-from velatura.optics import fresnel, ggx
+from velatura.optics import fresnel, ggx, refraction
 from velatura.optics.ggx import Direction
 from velatura.renderer import compiled
 from velatura.renderer.kept import Kept
@@ -81,6 +81,11 @@ class Facets:
     @property
     def opaque(self) -> bool:
         return self.below is None or self.k is not None
+
+    @property
+    def outcomes(self) -> int:
+        """How many things facets do to light: they reflect it, and unless they are opaque refract it."""
+        return 1 if self.opaque else 2
 
     @property
     def is_exit(self) -> bool:
@@ -208,7 +213,7 @@ class FirstShares:
     @classmethod
     def beside(cls, facets: Facets, lights: Sequence[Array], others: Array) -> FirstShares:
         """Shares of the lights of `FirstEvents`, (C, sources) each, and those that it has besides: (L, sources)."""
-        first, colours, nothing = 1 if facets.opaque else 2, len(lights[0]), 0 * lights[0]
+        first, colours, nothing = facets.outcomes, len(lights[0]), 0 * lights[0]
         kept, passed = (*lights[:first], nothing)[:2]
         *blocked, rest = np.split(others, [colours * (k + 1) for k in range(first)])
         second, twice = (lights[first], rest[1:]) if len(lights) > first else (nothing, nothing)
@@ -222,8 +227,8 @@ class FirstEvents:
     the shares of `FirstShares` that the last way blocks.
 
     `ways` says whether masking is correlated with the height of facets, as what follows needs (Heitz et al. 2016);
-    otherwise it is separable. With `again`, there is also the light of second events, of what the last
-    way blocks: what is reflected twice, and unless facets are opaque what then passes, and what was refracted at first.
+    otherwise it is separable. With `again`, there is also the light of second events, of what the last way blocks: what
+    is reflected twice, and unless facets are opaque what then passes, and what was refracted at first.
     """
 
     facets: Facets
@@ -237,8 +242,9 @@ class FirstEvents:
 
     @property
     def lights(self) -> int:
-        """How many lights there are."""
-        return (1 if self.facets.opaque else 2) + (0 if not self.again else 1 if self.facets.opaque else 3)
+        """How many lights there are: of second events also what was refracted at first."""
+        first = self.facets.outcomes
+        return first + (2 * first - 1 if self.again else 0)
 
     def numbers(self, samples: int) -> list[Any]:
         """All numbers, and films, as `__call__` reads them."""
@@ -284,7 +290,7 @@ class FirstEvents:
         others = [r * share * blocked for r in reflectance]
         again, twice = self._second(o, others, u_2 / share, numbers) if self.again else ([], [])
         if not self.facets.opaque:
-            x, y, z = self._refracted(wi, h, cosine, eta)
+            x, y, z = refraction.refract_at(wi, h, cosine, eta)
             through = []
             for often in self.ways:
                 both = self._escape((x, y, z), here, alpha, often, through=True)
@@ -315,15 +321,9 @@ class FirstEvents:
         found = [Light(n * x, n * y, [seen * each for each in twice])]
         if self.facets.opaque:
             return found, twice
-        x, y, z = self._refracted(wi, h, cosine, eta)
+        x, y, z = refraction.refract_at(wi, h, cosine, eta)
         through = [ops.select(z < 0, t * weight, 0.0) for t, weight in zip(passing, weights)]
         return [*found, Light(n * eta * x, n * eta * y, through)], twice
-
-    @staticmethod
-    def _refracted(wi: Direction, h: Direction, cosine: Value, eta: Value) -> Direction:
-        along = cosine / eta - fresnel.cos_transmitted(cosine, eta)
-        x, y, z = (along * facing - towards / eta for facing, towards in zip(h, wi))
-        return x, y, z
 
     def _divided(self, cosine: Value, eta: Value, colours: Sequence[Value]) -> tuple[list[Value], list[Value]]:
         """Shares that facets reflect, and let pass, by colour."""

@@ -16,9 +16,13 @@ _FLAT = 1e-9  # where the two directions cancel out there is no normal, and none
 
 def refract(w: Direction, h: Direction, eta: Value) -> Direction:
     """The refracted direction, by Snell's law; it grazes the facet where light is totally reflected."""
-    c = ggx.dot(w, h)
-    t = c / eta - fresnel.cos_transmitted(c, eta)
-    return ggx.normalize((t * h[0] - w[0] / eta, t * h[1] - w[1] / eta, t * h[2] - w[2] / eta))
+    return ggx.normalize(refract_at(w, h, ggx.dot(w, h), eta))
+
+
+def refract_at(w: Direction, h: Direction, cosine: Value, eta: Value) -> Direction:
+    """The same by the cosine w·h that is known, of length 1 only where light passes."""
+    t = cosine / eta - fresnel.cos_transmitted(cosine, eta)
+    return t * h[0] - w[0] / eta, t * h[1] - w[1] / eta, t * h[2] - w[2] / eta
 
 
 def half_vector(w: Direction, o: Direction, eta: Value) -> Direction:

@@ -181,7 +181,7 @@ def _mapped(value: Any, number: Callable[[float], Any], colour: Callable[[list[A
 
 
 def _kind(value: Any) -> Hashable:
-    """What of a value belongs to the kind of function: all but its numbers."""
+    """A value without its numbers: equal for values that one kernel serves."""
     if isinstance(value, list | tuple):
         return type(value), *map(_kind, value)
     if is_dataclass(value) and not isinstance(value, type):

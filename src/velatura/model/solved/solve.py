@@ -238,12 +238,15 @@ class Solver:
 
     def body(self, material: Material, found: Sequence[SolvedSide], layouts: Sequence[Layout]) -> Solved:
         """The BSDF in NumPy."""
-        context, made = Context(colour=_stacked, tables=self.tables), []
+        made = []
         for seen, side, layout in zip(sides(material), found, layouts):
             curves = directional_grid.curves(list(self.spread(side)), self.shape, None)
-            polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(side.polynomial).values()))
-            made.append(self.side(seen, layout, curves, polynomial, context))
+            made.append(self._in_numpy(seen, side, layout, curves))
         return self.bsdf(material, made)
+
+    def _in_numpy(self, material: Material, found: SolvedSide, layout: Layout, curves: Any) -> Side:
+        polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(found.polynomial).values()))
+        return self.side(material, layout, curves, polynomial, Context(colour=_stacked, tables=self.tables))
 
     def side(self, material: Material, layout: Layout, curves: Any, polynomial: Remainder, context: Context) -> Side:
         """A side of a material of a renderer's values, those of one point or of all."""
@@ -271,9 +274,7 @@ class Solver:
         """The upper side of a material of NumPy's values, solved for light from directions wi, (M,) each, alone."""
         (layout, *_), upper = self.layouts([material]), sides(material)[0]
         found = self._side(upper, layout, Listed(self.isotropic, wi))
-        polynomial = Remainder(*(np.reshape(x, (-1, 1)) for x in vars(found.polynomial).values()))
-        context = Context(colour=_stacked, tables=self.tables)
-        return Lit(self.side(upper, layout, None, polynomial, context), found.columns, wi)
+        return Lit(self._in_numpy(upper, found, layout, None), found.columns, wi)
 
     def _side(self, material: Material, layout: Layout, folded: Folded | Listed) -> SolvedSide:
         """A side of a material at some directions, in the order of the physics."""

@@ -142,7 +142,7 @@ class _Met:
             return [cls.of(facets, *each, setting) for each in sources]
         p, psi = map(np.concatenate, zip(*sources))
         met, ends = cls.of(facets, p, psi, setting), np.cumsum([len(each) for each, _ in sources])
-        return [met._part(slice(end - len(each), end)) for end, (each, _) in zip(ends, sources)]
+        return [met._of_some(slice(end - len(each), end)) for end, (each, _) in zip(ends, sources)]
 
     @classmethod
     def _of(cls, facets: Facets, p: Array, psi: Array, setting: Setting) -> _Met:
@@ -152,25 +152,24 @@ class _Met:
         # Stencils keep the energy
         totals = [light[-events.colours :, 0].sum(axis=1) for light in lights]
         shares = FirstShares.beside(facets, totals, others)
-        first = 1 if facets.opaque else 2
-        lights, second = lights[:first], lights[first:]
+        lights, second = lights[: facets.outcomes], lights[facets.outcomes :]
         if len(second) > 1:
             second = [second[0], second[1] + second[2]]
         return cls(lights[0], None if facets.opaque or facets.final else lights[1], shares, tuple(second))
 
-    def _part(self, sources: slice) -> _Met:
-        """Some of the sources."""
-        reflected, refracted = (None if x is None else x[..., sources] for x in (self.reflected, self.refracted))
-        assert reflected is not None
-        return _Met(reflected, refracted, FirstShares(*(x[:, sources] for x in vars(self.shares).values())))
-
     def _around(self, places: NDArray[np.integer], psi: Array, basis: Basis) -> _Met:
         """The sources of numbers `places`, which isotropic facets met at the azimuth 0, at others."""
+        return self._of_some(places, lambda light: basis.around(light, psi))
+
+    def _of_some(
+        self, sources: slice | NDArray[np.integer], turned: Callable[[Array], Array] = lambda light: light
+    ) -> _Met:
+        """Some of the sources of isotropic facets, whose second events are not looked at."""
         reflected, refracted = (
-            None if x is None else basis.around(x[..., places], psi) for x in (self.reflected, self.refracted)
+            None if x is None else turned(x[..., sources]) for x in (self.reflected, self.refracted)
         )
         assert reflected is not None
-        return _Met(reflected, refracted, FirstShares(*(x[:, places] for x in vars(self.shares).values())))
+        return _Met(reflected, refracted, FirstShares(*(x[:, sources] for x in vars(self.shares).values())))
 
 
 @dataclass(frozen=True)
