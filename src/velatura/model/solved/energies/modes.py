@@ -75,32 +75,35 @@ class Basis(ABC):
 
         def function(
             sources: Sequence[Value], lattice: Sequence[Value], values: Sequence[Value]
-        ) -> tuple[list[list[Value]], Sequence[Value]]:
+        ) -> tuple[list[Sequence[Value]], Sequence[Value]]:
             lights, others = scatter(sources, lattice, values[count:])
-            groups = []
+            groups: list[Sequence[Value]] = []
             for light in lights:
                 length, cosine, sine = _polar(light)
                 first, shares = self.nodes.stencil(length, values[:count])
-                modes = self.angular(cosine, sine)
-                groups += [[first], shares, [weight * mode for weight in light.weights for mode in modes]]
+                groups += [[first], shares, [cosine, sine], light.weights]
             return groups, others
 
         def sums(groups: list[Array]) -> list[Array]:
-            return [self._sums(*groups[k : k + 3]) for k in range(0, len(groups), 3)]
+            return [self._sums(*groups[k : k + 4]) for k in range(0, len(groups), 4)]
 
         return compiled.over(function, (p, psi), fibonacci(samples), [*parts, *numbers], sums)
 
-    def _sums(self, first: Array, shares: Array, weights: Array) -> Array:
-        """Sums of weights (S, samples, K) by node, for stencils that begin at nodes `first`."""
+    def _sums(self, first: Array, shares: Array, azimuth: Array, weights: Array) -> Array:
+        """Sums of weights (S, samples, K) by mode and node, for stencils that begin at nodes `first`, at azimuths by
+        their cosine and sine."""
         sources, samples, count = weights.shape
+        # Not in the function, whose kernels any number of modes shares
+        modes = np.stack(np.broadcast_arrays(*self.angular(azimuth[..., 0], azimuth[..., 1])), axis=-1)
+        weights = weights[..., :, None] * modes[..., None, :]
         node, source = first[..., 0].astype(np.int32), np.arange(sources, dtype=np.int32)[:, None]
         # Samples are columns of a sparse matrix; what lies on the far side of 0 has a row of its own
         rows = (node * np.int32(sources) + source)[..., None] + np.int32(sources) * np.arange(STENCIL, dtype=np.int32)
         rows[..., 0] += np.where(node < 0, np.int32((self.nodes.count + 1) * sources), 0)
         shape = (self.nodes.count + 1) * sources, sources * samples
         entries = shares.ravel(), rows.ravel(), np.arange(0, shares.size + 1, STENCIL, dtype=np.int32)
-        found = (csc_array(entries, shape) @ weights.reshape(-1, count)).T
-        found = found.reshape(count // len(self.odd), len(self.odd), self.nodes.count + 1, sources)
+        found = (csc_array(entries, shape) @ weights.reshape(sources * samples, count * len(self.odd))).T
+        found = found.reshape(count, len(self.odd), self.nodes.count + 1, sources)
         sign = np.where(self.odd, -1, 1)[:, None]
         found[:, :, 1] += sign * found[:, :, -1]
         return np.asarray(found[:, :, :-1])
