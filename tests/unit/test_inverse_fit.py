@@ -392,6 +392,17 @@ def test_an_rgl_file(tmp_path: Path) -> None:
     broken(ndf=np.full((4, 1), 0.5, single))
     broken(vndf=np.full((1, 3, 4, 4), np.nan, single))
     broken(theta_i=np.array([0, 1.5, 0.8], single))
+    # Up to two azimuths are an isotropic sample's, which Mitsuba mirrors or not by a number that it does not set
+    halves = ("phi_i", "vndf", "luminance", "rgb")
+    pair = {**fields, **{name: np.concatenate([fields[name], fields[name]]) for name in halves}}
+    pair["phi_i"] = np.array([0, 6], single)
+    path.write_bytes(tensors(pair))
+    assert np.array_equal(load_table(path).value, table.value)
+    pair["rgb"] = pair["rgb"] * np.array([1, 0.5], single)[:, None, None, None, None]
+    path.write_bytes(tensors(pair))
+    with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: rgb: must be equal at two azimuths"):
+        load_table(path)
+
     path.write_bytes(tensors(fields)[:-8])
     with pytest.raises(InvalidInput, match=r"paint_rgb\.bsdf: is no RGB file of the RGL database: its head is broken"):
         load_table(path)

@@ -148,10 +148,11 @@ def _rgl(path: Path) -> ReflectanceTable:
 
 
 def _check_tensors(path: Path, content: bytes) -> None:
-    """Refuse a file of tensors that Mitsuba would read beyond its end, or whose nodes are none.
+    """Refuse a file of tensors that Mitsuba would read beyond its end or with memory unset, or whose nodes are none.
 
     Raises:
-        InvalidInput: a head that ends early, numbers outside the file or not finite, grids without an inside.
+        InvalidInput: a head that ends early, numbers outside the file or not finite, grids without an inside, an
+            isotropic sample that depends on its azimuth.
     """
     arrays: dict[bytes, Array] = {}
     try:
@@ -171,6 +172,12 @@ def _check_tensors(path: Path, content: bytes) -> None:
         raise InvalidInput(f"{path}: is no RGB file of the RGL database: its head is broken ({error})") from None
     if not usable:
         raise InvalidInput(f"{path}: holds values that are no finite numbers, or no grids of them")
+    # Mitsuba takes up to two azimuths for an isotropic sample, and then mirrors directions or not by a number not set
+    if len(arrays[b"phi_i"]) == 2:
+        for name in (b"vndf", b"luminance", b"rgb"):
+            if name in arrays and np.ptp(arrays[name], axis=0).any():
+                rule = "must be equal at two azimuths, which are an isotropic sample's"
+                raise InvalidInput(f"{path}: {name.decode()}: {rule}, or hold more")
 
 
 def _inside(grid: Array) -> bool:
